@@ -1,0 +1,136 @@
+"""The person's bones: 27 joints, 66 angles.
+
+A pose is (66,): root yaw, pitch, roll, then rx, ry, rz of the 21 inner joints in the order of `JOINTS`.
+Following Acclaim, a joint is named after the bone that ends in it, and the angles of that name turn that
+bone about the joint it starts from. The five end bones have no freedom. SAPSO section 2.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.geometry import kinematics
+from posefit.geometry.rotation import Array
+
+_TREE = """
+root        lhipjoint rhipjoint lowerback
+lhipjoint   lfemur
+lfemur      ltibia
+ltibia      lfoot
+lfoot       ltoes
+rhipjoint   rfemur
+rfemur      rtibia
+rtibia      rfoot
+rfoot       rtoes
+lowerback   upperback
+upperback   thorax
+thorax      lowerneck lclavicle rclavicle
+lowerneck   upperneck
+upperneck   head
+lclavicle   lhumerus
+lhumerus    lradius
+lradius     lwrist
+lwrist      lhand
+rclavicle   rhumerus
+rhumerus    rradius
+rradius     rwrist
+rwrist      rhand
+"""
+
+
+def _walk_tree() -> tuple[tuple[str, ...], tuple[int, ...]]:
+    children = {line.split()[0]: line.split()[1:] for line in _TREE.split("\n") if line}
+    names: list[str] = []
+    parents: list[int] = []
+
+    def visit(name: str, parent: int) -> None:
+        names.append(name)
+        parents.append(parent)
+        here = len(names) - 1
+        for child in children.get(name, []):
+            visit(child, here)
+
+    visit("root", -1)
+    return tuple(names), tuple(parents)
+
+
+JOINTS, PARENTS = _walk_tree()  # 27 names, parents before children; PARENTS[0] is -1
+BONES = JOINTS[1:]  # bone b runs from joint PARENTS[b + 1] to joint b + 1
+ENDS = tuple(j for j in range(len(JOINTS)) if j not in PARENTS)
+INNER = tuple(j for j in range(1, len(JOINTS)) if j in PARENTS)
+ANGLES = 3 + 3 * len(INNER)  # M = 66
+MIRROR = tuple(
+    JOINTS.index({"l": "r", "r": "l"}[name[0]] + name[1:])
+    if name[0] in "lr" and name not in ("root", "lowerback", "lowerneck")
+    else j
+    for j, name in enumerate(JOINTS)
+)  # the joint on the other side of the body
+
+Channels = tuple[tuple[str, tuple[str, ...]], ...]
+
+
+def angle_index(joint: int) -> int:
+    """Return where in a pose the three angles of an inner joint start, or -1 for an end joint."""
+    return 3 + 3 * INNER.index(joint) if joint in INNER else -1
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Bone vectors at rest and the frames their angles are counted in. Lengths are metres."""
+
+    name: str
+    offsets: Array = field(repr=False)  # (26, 3) from a bone's start to its end, at rest, in the world frame
+    axes: Array = field(repr=False)  # (26, 3, 3) world_from_bone at rest: the frame of the bone's angles
+    channels: Channels = field(repr=False)  # the .amc layout after the root: (bone, its free angles) in file order
+
+    def __post_init__(self) -> None:
+        for name, shape in (("offsets", (26, 3)), ("axes", (26, 3, 3))):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            if value.shape != shape:
+                raise ValueError(f"{name} must have shape {shape}, got {value.shape}")
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Bone lengths (26,) in metres."""
+        return np.asarray(np.linalg.norm(self.offsets, axis=1))
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Which of the 66 angles the subject really has (66,); the others are padding and stay zero."""
+        free = np.zeros(ANGLES, dtype=bool)
+        free[:3] = True
+        for bone, angles in self.channels:
+            start = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
+            if start > 0:
+                free[[start + "xyz".index(angle[1]) for angle in angles]] = True
+        return free
+
+    @cached_property
+    def chain(self) -> kinematics.Chain:
+        """The constant arrays that the kinematics kernel wants."""
+        return kinematics.chain(
+            np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))]), self.axes, self.offsets
+        )
+
+    def joints(self, poses: Array, translations: Array | None = None) -> Array:
+        """Return joint positions (..., 27, 3) in metres, world frame, of poses (..., 66).
+
+        `translations` (..., 3) places the root joint; without it the root is at the origin.
+        Raises ValueError where a shape does not fit.
+        """
+        poses = np.asarray(poses, dtype=np.float64)
+        if poses.ndim < 1 or poses.shape[-1] != ANGLES:
+            raise ValueError(f"poses must have shape (..., {ANGLES}), got {poses.shape}")
+        lead = poses.shape[:-1]
+        where = np.zeros((*lead, 3)) if translations is None else np.asarray(translations, dtype=np.float64)
+        if where.shape != (*lead, 3):
+            raise ValueError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
+        flat = np.ascontiguousarray(poses.reshape(-1, ANGLES))
+        positions = kinematics.joint_positions(self.chain, flat, np.ascontiguousarray(where.reshape(-1, 3)))
+        return np.asarray(positions).reshape(*lead, len(JOINTS), 3)

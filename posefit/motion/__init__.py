@@ -1,0 +1,12 @@
+"""Motion capture: clips of poses, and the files they come from.
+
+| looking for | file |
+|---|---|
+| a clip: poses, translations, frames a second; cutting and resampling it | motion.py |
+| Acclaim skeletons, such as CMU's `02.asf` | asf.py |
+| Acclaim motions, such as CMU's `02_01.amc`; `read_clip` reads both files at once | amc.py |
+| BVH, through the optional library pybvh | bvh.py |
+
+A file is hostile until parsed: what is wrong with it raises ValueError with the file, the line, what was expected
+and what came. Degrees and file units stay in the files; in memory there are radians and metres.
+"""

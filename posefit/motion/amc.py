@@ -1,0 +1,165 @@
+"""Acclaim motions (.amc): read into a `Motion`, and written from one."""
+
+from array import array
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.geometry.rotation import (
+    Array,
+    joint_angles_from_rotation,
+    root_angles_from_rotation,
+    rotation_from_joint_angles,
+    rotation_from_root_angles,
+)
+from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton, angle_index
+from posefit.motion.asf import LARGEST, METRES_PER_UNIT, check_size, mistake, parse_asf, positive
+from posefit.motion.motion import Motion, gimbal_lock_allowed
+
+FPS = 120.0  # CMU's rate; the files do not state it
+SIZE_LIMIT = 500_000_000  # bytes
+LONGEST_LINE = 10_000  # bytes; a root line has about 60
+
+Spans = dict[bytes, tuple[int, int]]  # bone: where its values start and stop in a frame
+
+
+def read_clip(asf: str | Path, amc: str | Path, *, fps: float = FPS) -> Motion:
+    """Return the motion of an .amc file over the skeleton of its .asf file, in that file's length unit.
+
+    Raises ValueError with file and line where one of them is not what it should be.
+    """
+    skeleton, metres = parse_asf(asf)
+    return read_amc(amc, skeleton, fps=fps, metres_per_unit=metres)
+
+
+def read_amc(
+    path: str | Path, skeleton: Skeleton, *, fps: float = FPS, metres_per_unit: float = METRES_PER_UNIT
+) -> Motion:
+    """Return the motion of an .amc file, named after it: every frame, in radians and metres.
+
+    `metres_per_unit` scales the root's translation; `read_clip` takes it from the .asf file. Angles of end bones and
+    of bones outside the 27 joints are read and left out. All angles are unwrapped along time. Every frame must give
+    all channels of `skeleton`, in any order. Raises ValueError with file and line.
+    """
+    path, unit = Path(path), positive("metres_per_unit", metres_per_unit)
+    check_size(path, SIZE_LIMIT)
+    spans, columns, targets = _layout(skeleton)
+    values, radians = _frames(path, spans, skeleton.name)
+    angles = values if radians else np.deg2rad(values)
+    poses = np.zeros((len(values), ANGLES))
+    with gimbal_lock_allowed():
+        poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))
+    poses[:, targets] = angles[:, columns]
+    return Motion(path.stem, skeleton, np.unwrap(poses, axis=0), values[:, :3] * unit, fps)
+
+
+def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.int64]]:
+    """Return the spans of a frame's values, and which of its columns go to which of the 66 angles."""
+    spans: Spans = {b"root": (0, 6)}
+    columns: list[int] = []
+    targets: list[int] = []
+    start = 6
+    for bone, angles in skeleton.channels:
+        spans[bone.encode()] = start, start + len(angles)
+        first = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
+        if first > 0:
+            columns += range(start, start + len(angles))
+            targets += [first + "xyz".index(angle[1]) for angle in angles]
+        start += len(angles)
+    return spans, np.array(columns, dtype=np.int64), np.array(targets, dtype=np.int64)
+
+
+def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
+    """Return all frames (T, values of a frame) in file units, and whether their angles are radians."""
+    width = max(stop for _, stop in spans.values())
+    data, row = array("d"), [0.0] * width
+    seen: set[bytes] = set()
+    frame, radians, number = -1, None, 0
+    with path.open("rb") as file:
+        for number, raw in enumerate(file, 1):
+            if len(raw) > LONGEST_LINE:
+                raise mistake(path, number, f"a line of at most {LONGEST_LINE} bytes", f"{len(raw)}")
+            words = raw.split()
+            if not words or words[0].startswith(b"#"):
+                continue
+            word = words[0]
+            span = spans.get(word)
+            if span is not None and frame >= 0:
+                if word in seen:
+                    raise mistake(path, number, f"each bone once in frame {frame}", f"{_quoted(word)} again")
+                seen.add(word)
+                row[span[0] : span[1]] = _numbers(path, number, words, span[1] - span[0])
+            elif len(words) == 1 and word.isdigit() and len(word) < 10:
+                if radians is None:
+                    raise mistake(path, number, ":DEGREES or :RADIANS before the first frame", f"frame {int(word)}")
+                if frame >= 0:
+                    _check_whole(path, number, spans, seen, frame, f"frame {int(word)}")
+                    data.extend(row)
+                    if int(word) != frame + 1:
+                        raise mistake(path, number, f"frame {frame + 1}", f"frame {int(word)}")
+                frame = int(word)
+                seen.clear()
+            elif frame < 0 and word.startswith(b":"):
+                keyword = word.upper()
+                if keyword not in (b":FULLY-SPECIFIED", b":DEGREES", b":RADIANS"):
+                    raise mistake(path, number, ":FULLY-SPECIFIED, :DEGREES or :RADIANS", _quoted(raw))
+                if keyword != b":FULLY-SPECIFIED":
+                    radians = keyword == b":RADIANS"
+            elif frame < 0:
+                raise mistake(path, number, "a header such as :DEGREES or the number of a frame", _quoted(raw))
+            else:
+                raise mistake(path, number, f"a bone of skeleton {name!r} or a frame's number", _quoted(raw))
+    if frame < 0:
+        raise mistake(path, max(number, 1), "at least one frame", "the end of the file")
+    _check_whole(path, number, spans, seen, frame, "the end of the file")
+    data.extend(row)
+    return np.array(data).reshape(-1, width), bool(radians)
+
+
+def _numbers(path: Path, number: int, words: list[bytes], count: int) -> list[float]:
+    if len(words) != count + 1:
+        raise mistake(path, number, f"{count} values for {_quoted(words[0])}", f"{len(words) - 1}")
+    try:
+        values = [float(word) for word in words[1:]]
+    except ValueError:
+        raise mistake(path, number, f"numbers for {_quoted(words[0])}", _quoted(b" ".join(words[1:]))) from None
+    if not sum(map(abs, values)) < LARGEST:  # this way round it is true of NaN, too
+        expected = f"finite numbers below {LARGEST:g} for {_quoted(words[0])}"
+        raise mistake(path, number, expected, _quoted(b" ".join(words[1:])))
+    return values
+
+
+def _check_whole(path: Path, number: int, spans: Spans, seen: set[bytes], frame: int, came: str) -> None:
+    if len(seen) < len(spans):
+        missing = next(bone for bone in spans if bone not in seen)
+        raise mistake(path, number, f"bone {_quoted(missing)} in frame {frame}", came)
+
+
+def _quoted(raw: bytes) -> str:
+    return repr(raw.strip().decode("utf-8", errors="replace"))
+
+
+def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METRES_PER_UNIT) -> None:
+    """Write an .amc file that reads back as the same motion, up to whole turns of the root.
+
+    Channels that a pose does not hold, such as fingers, are written as 0. Raises ValueError where the motion turns a
+    joint about an axis that its skeleton has no channel for, as the file could not hold that.
+    """
+    unit = positive("metres_per_unit", metres_per_unit)
+    lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)
+    if lost > 1e-9:
+        raise ValueError(f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one")
+    spans, columns, targets = _layout(motion.skeleton)
+    values = np.zeros((len(motion), max(stop for _, stop in spans.values())))
+    values[:, :3] = motion.translations / unit
+    with gimbal_lock_allowed():
+        root = joint_angles_from_rotation(rotation_from_root_angles(motion.poses[:, :3]))
+    values[:, 3:6] = np.rad2deg(root)
+    values[:, columns] = np.rad2deg(motion.poses[:, targets])
+    bones = [(bone.decode(), start, stop) for bone, (start, stop) in spans.items()]
+    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
+        file.write(":FULLY-SPECIFIED\n:DEGREES\n")
+        for frame, row in enumerate(values.tolist(), 1):
+            file.write(f"{frame}\n")
+            file.writelines(f"{bone} {' '.join(map(repr, row[start:stop]))}\n" for bone, start, stop in bones)

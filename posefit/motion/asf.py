@@ -1,0 +1,265 @@
+"""Acclaim skeletons (.asf): read into a `Skeleton`, and written from one."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
+from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, Channels, Skeleton
+from posefit.motion.motion import gimbal_lock_allowed
+
+INCH = 0.0254  # metres
+METRES_PER_UNIT = INCH / 0.45  # CMU's files say `length 0.45`: a unit is 1 / 0.45 inch
+LARGEST = 1e6  # no angle or length of a person comes near; beyond it arithmetic would overflow
+SIZE_LIMIT = 10_000_000  # bytes; CMU's files have 7,000
+ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
+# Where to hang the bones that a Skeleton knows by their channels alone.
+_FINGERS = {"lfingers": "lhand", "lthumb": "lwrist", "rfingers": "rhand", "rthumb": "rwrist"}
+
+
+def mistake(path: Path, line: int, expected: str, got: str) -> ValueError:
+    """Return the error of a file's line; what came is quoted, and cut where it is long."""
+    return ValueError(f"{path}:{line}: expected {expected}, got {got if len(got) <= 60 else got[:57] + '...'}")
+
+
+def check_size(path: Path, limit: int) -> None:
+    """Return nothing. Raises ValueError where a file is too large to be read."""
+    size = path.stat().st_size
+    if size > limit:
+        raise ValueError(f"{path}: expected at most {limit // 1_000_000} MB, got {size / 1e6:.1f} MB")
+
+
+def positive(name: str, value: float) -> float:
+    """Return a value that must be positive and finite. Raises ValueError with its name otherwise."""
+    if not (np.isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} must be a positive number, got {value}")
+    return float(value)
+
+
+@dataclass(frozen=True)
+class _Line:
+    path: Path
+    number: int
+    words: list[str]
+
+    @property
+    def key(self) -> str:
+        return self.words[0].lower()
+
+    def mistake(self, expected: str, got: str | None = None) -> ValueError:
+        return mistake(self.path, self.number, expected, repr(" ".join(self.words)) if got is None else got)
+
+    def numbers(self, count: int, more: int = 0) -> list[float]:
+        """Return the numbers after the keyword, which `more` other words follow."""
+        if len(self.words) != 1 + count + more:
+            raise self.mistake(f"'{self.key}' and {count + more} values")
+        try:
+            values = [float(word) for word in self.words[1 : 1 + count]]
+        except ValueError:
+            raise self.mistake(f"'{self.key}' and {count} numbers") from None
+        if not sum(map(abs, values)) < LARGEST:
+            raise self.mistake(f"'{self.key}' and finite numbers below {LARGEST:g}")
+        return values
+
+
+@dataclass(frozen=True)
+class _Bone:
+    vector: Array  # (3,) file units
+    axis: Array  # (3,) radians
+    free: tuple[str, ...]
+
+
+def read_asf(path: str | Path) -> Skeleton:
+    """Return the skeleton of an .asf file, named after it, in metres.
+
+    Only the 26 bones of `posefit.geometry.skeleton.BONES` are kept; other bones may be there and keep their place
+    in `channels`. Raises ValueError with file and line where the file is not an Acclaim skeleton of this tree.
+    """
+    return parse_asf(path)[0]
+
+
+def parse_asf(path: str | Path) -> tuple[Skeleton, float]:
+    """Return the skeleton of an .asf file and how many metres its length unit has."""
+    path = Path(path)
+    check_size(path, SIZE_LIMIT)
+    sections = _sections(path)
+    metres, degrees = _units(sections.get("units", []))
+    _check_root(sections["root"])
+    bones = _bones(sections["bonedata"], np.pi / 180.0 if degrees else 1.0)
+    _check_tree(path, sections["hierarchy"], bones)
+    kept = [bones[name] for name in BONES]
+    skeleton = Skeleton(
+        name=path.stem,
+        offsets=np.array([bone.vector for bone in kept]) * metres,
+        axes=rotation_from_joint_angles(np.array([bone.axis for bone in kept])),
+        channels=tuple((name, bone.free) for name, bone in bones.items() if bone.free),
+    )
+    return skeleton, metres
+
+
+def _sections(path: Path) -> dict[str, list[_Line]]:
+    sections: dict[str, list[_Line]] = {}
+    current: list[_Line] | None = None
+    text = path.read_bytes().decode("utf-8", errors="replace").split("\n")
+    for number, words in enumerate(map(str.split, text), 1):
+        if not words or words[0].startswith("#"):
+            continue
+        line = _Line(path, number, words)
+        if words[0].startswith(":"):
+            name = line.key[1:]
+            if name in sections:
+                raise line.mistake(f"one section :{name}", "a second one")
+            current = sections[name] = []
+        if current is None:
+            raise line.mistake("a section such as :units")
+        current.append(line)
+    for name in ("root", "bonedata", "hierarchy"):
+        if name not in sections:
+            raise mistake(path, len(text), f"a section :{name}", "the end of the file")
+    return sections
+
+
+def _units(lines: list[_Line]) -> tuple[float, bool]:
+    """Return metres per file unit and whether angles are degrees; Acclaim's own defaults are inches and degrees."""
+    metres, degrees = INCH, True
+    for line in lines[1:]:
+        if line.key == "length":
+            (unit,) = line.numbers(1)
+            if unit < 1.0 / LARGEST:
+                raise line.mistake("a positive length unit")
+            metres = INCH / unit
+        elif line.key == "angle":
+            if len(line.words) != 2 or line.words[1].lower() not in ("deg", "rad"):
+                raise line.mistake("'angle deg' or 'angle rad'")
+            degrees = line.words[1].lower() == "deg"
+    return metres, degrees
+
+
+def _check_root(lines: list[_Line]) -> None:
+    seen = False
+    for line in lines[1:]:
+        values = tuple(word.upper() for word in line.words[1:])
+        if line.key == "order":
+            seen = True
+            if values != ROOT_CHANNELS:
+                raise line.mistake(f"root order {' '.join(ROOT_CHANNELS)}")
+        elif line.key == "axis" and values != ("XYZ",):
+            raise line.mistake("root axis XYZ")
+        elif line.key in ("position", "orientation") and any(line.numbers(3)):
+            raise line.mistake(f"root {line.key} 0 0 0")
+    if not seen:
+        raise lines[-1].mistake(f"root order {' '.join(ROOT_CHANNELS)}", "none")
+
+
+def _bones(lines: list[_Line], radians: float) -> dict[str, _Bone]:
+    bones: dict[str, _Bone] = {}
+    block: dict[str, _Line] | None = None
+    for line in lines[1:]:
+        if line.key == "begin" and block is None:
+            block = {}
+        elif block is None or line.key == "begin":
+            raise line.mistake("'begin'" if block is None else "'end' before the next bone")
+        elif line.key == "end":
+            for key in ("name", "direction", "length", "axis"):
+                if key not in block:
+                    raise line.mistake(f"a bone with a {key}", "none")
+            name = " ".join(block["name"].words[1:])
+            if len(block["name"].words) != 2 or name == "root" or name in bones:
+                raise block["name"].mistake("one new name")
+            bones[name] = _bone(block, radians)
+            block = None
+        else:
+            block[line.key] = line
+    if block is not None:
+        raise lines[-1].mistake("'end' of the bone", "the end of the section")
+    return bones
+
+
+def _bone(block: dict[str, _Line], radians: float) -> _Bone:
+    direction = np.array(block["direction"].numbers(3))
+    (length,) = block["length"].numbers(1)
+    axis = np.array(block["axis"].numbers(3, more=1))
+    norm = float(np.linalg.norm(direction))
+    if length < 0.0:
+        raise block["length"].mistake("a length of 0 or more")
+    if length > 0.0 and norm < 1.0 / LARGEST:
+        raise block["direction"].mistake("a direction that is not zero")
+    if block["axis"].words[4].upper() != "XYZ":
+        raise block["axis"].mistake("axis order XYZ")
+    free = tuple(word.lower() for word in block["dof"].words[1:]) if "dof" in block else ()
+    if not set(free) <= {"rx", "ry", "rz"} or sorted(set(free)) != list(free):
+        raise block["dof"].mistake("dof out of rx ry rz, in this order")
+    return _Bone(direction / norm * length if length > 0.0 else np.zeros(3), axis * radians, free)
+
+
+def _check_tree(path: Path, lines: list[_Line], bones: Iterable[str]) -> None:
+    known = {"root", *bones}
+    for name in BONES:
+        if name not in known:
+            raise ValueError(f"{path}: the skeleton needs bone {name!r}, which this file does not define")
+    parents: dict[str, tuple[str, _Line]] = {}
+    for line in lines[1:]:
+        if line.key in ("begin", "end") and len(line.words) == 1:
+            continue
+        for name in line.words:
+            if name not in known:
+                raise line.mistake("bones that :bonedata defines", repr(name))
+        for name in line.words[1:]:
+            if name in parents or name == "root":
+                raise line.mistake("one parent a bone", f"another one for {name!r}")
+            parents[name] = line.words[0], line
+    for name, above in zip(BONES, PARENTS[1:], strict=True):
+        if name not in parents:
+            raise lines[-1].mistake(f"bone {name!r} in the hierarchy", "none")
+        parent, line = parents[name]
+        if parent != JOINTS[above]:
+            raise line.mistake(f"bone {name!r} under {JOINTS[above]!r}", f"it under {parent!r}")
+
+
+def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = METRES_PER_UNIT) -> None:
+    """Write an .asf file that reads back as the same skeleton. Lengths are divided by `metres_per_unit`.
+
+    Bones of which only the channels are known, such as fingers, get the length 0.
+    """
+    unit = positive("metres_per_unit", metres_per_unit)
+    with gimbal_lock_allowed():
+        axes = np.rad2deg(joint_angles_from_rotation(skeleton.axes))
+    header = (
+        f":version 1.10\n:name {'_'.join(skeleton.name.split()) or 'skeleton'}\n:units\n  mass 1.0\n"
+        f"  length {INCH / unit!r}\n  angle deg\n:root\n  order {' '.join(ROOT_CHANNELS)}\n  axis XYZ\n"
+        "  position 0 0 0\n  orientation 0 0 0\n:bonedata\n"
+    )
+    text = [header]
+    for number, (name, free) in enumerate(_in_file_order(skeleton.channels), 1):
+        direction, length, axis = [1.0, 0.0, 0.0], 0.0, [0.0, 0.0, 0.0]
+        if name in BONES:
+            bone = BONES.index(name)
+            length = float(skeleton.lengths[bone])
+            axis = axes[bone].tolist()
+            if length > 0.0:
+                direction = (skeleton.offsets[bone] / length).tolist()
+        dof = f"    dof {' '.join(free)}\n" if free else ""
+        text.append(
+            f"  begin\n    id {number}\n    name {name}\n    direction {_spaced(direction)}\n"
+            f"    length {length / unit!r}\n    axis {_spaced(axis)} XYZ\n{dof}  end\n"
+        )
+    text.append(":hierarchy\n  begin\n")
+    parents = {name: JOINTS[above] for name, above in zip(BONES, PARENTS[1:], strict=True)}
+    parents |= {name: _FINGERS.get(name, "root") for name, _ in skeleton.channels if name not in JOINTS}
+    for parent in JOINTS:
+        children = [name for name, above in parents.items() if above == parent]
+        if children:
+            text.append(f"    {parent} {' '.join(children)}\n")
+    text.append("  end\n")
+    Path(path).write_text("".join(text), encoding="utf-8", newline="\n")
+
+
+def _in_file_order(channels: Channels) -> Channels:
+    turning = {name for name, _ in channels}
+    return (*((name, ()) for name in BONES if name not in turning), *channels)
+
+
+def _spaced(values: list[float]) -> str:
+    return " ".join(map(repr, values))

@@ -1,0 +1,96 @@
+"""A clip of motion capture: one pose and one translation a frame."""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from posefit.geometry.rotation import Array, root_angles_from_rotation, rotation_from_root_angles
+from posefit.geometry.skeleton import ANGLES, Skeleton
+
+# Share of a frame within which two times count as the same one.
+SAME_TIME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Poses of one skeleton at a constant rate. Arrays are copied and cannot be written to."""
+
+    name: str
+    skeleton: Skeleton
+    poses: Array = field(repr=False)  # (T, 66) radians, unwrapped along time by the readers
+    translations: Array = field(repr=False)  # (T, 3) metres, the root joint in the world
+    fps: float
+
+    def __post_init__(self) -> None:
+        for name, columns in (("poses", ANGLES), ("translations", 3)):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            if value.ndim != 2 or value.shape[1] != columns:
+                raise ValueError(f"{name} must have shape (frames, {columns}), got {value.shape}")
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        if len(self.poses) < 1:
+            raise ValueError("poses must hold at least 1 frame, got 0")
+        if len(self.translations) != len(self.poses):
+            raise ValueError(f"translations must have shape {(len(self.poses), 3)}, got {self.translations.shape}")
+        object.__setattr__(self, "fps", _rate(self.fps))
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def frames(self, start: int, stop: int) -> "Motion":
+        """Return frames start to stop - 1 as a motion. Raises ValueError where that leaves the clip or is empty."""
+        if not 0 <= start < stop <= len(self):
+            raise ValueError(f"frames must be 0 <= start < stop <= {len(self)}, got start {start} and stop {stop}")
+        return Motion(self.name, self.skeleton, self.poses[start:stop], self.translations[start:stop], self.fps)
+
+    def resampled(self, fps: float) -> "Motion":
+        """Return the motion at another rate, over the times k / fps that lie within it.
+
+        Where the old rate is a whole multiple k of the new one, every k-th frame is taken as it is. Elsewhere joint
+        angles and translations are interpolated linearly, and the root's rotation along the shortest arc.
+        """
+        fps = _rate(fps)
+        ratio = self.fps / fps
+        step = round(ratio)
+        if step >= 1 and abs(ratio - step) < 1e-9 * step:
+            return Motion(self.name, self.skeleton, self.poses[::step], self.translations[::step], fps)
+        last = len(self) - 1
+        # in frames of this motion; the last time may be off by rounding
+        times = np.minimum(np.arange(int(last / ratio + SAME_TIME) + 1) * ratio, last)
+        if last == 0:
+            return Motion(self.name, self.skeleton, self.poses, self.translations, fps)
+        before = np.minimum(times.astype(np.int64), last - 1)
+        share = (times - before)[:, None]
+        poses, translations = (
+            (1.0 - share) * series[before] + share * series[before + 1] for series in (self.poses, self.translations)
+        )
+        poses[:, :3] = self._root_angles(times)
+        return Motion(self.name, self.skeleton, poses, translations, fps)
+
+    def _root_angles(self, times: Array) -> Array:
+        rotations = Rotation.from_matrix(rotation_from_root_angles(self.poses[:, :3]))
+        between = Slerp(np.arange(len(self)), rotations)(times).as_matrix()
+        with gimbal_lock_allowed():
+            angles = np.unwrap(root_angles_from_rotation(between), axis=0)
+        turns = np.round((self.poses[0, :3] - angles[0]) / (2.0 * np.pi))
+        return np.asarray(angles + 2.0 * np.pi * turns)
+
+
+@contextmanager
+def gimbal_lock_allowed() -> Iterator[None]:
+    """Return a context in which scipy keeps quiet when it picks one of many equal triples of angles."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Gimbal lock")
+        yield
+
+
+def _rate(fps: float) -> float:
+    if not (np.isfinite(fps) and fps > 0.0):
+        raise ValueError(f"fps must be a positive number, got {fps}")
+    return float(fps)

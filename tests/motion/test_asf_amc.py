@@ -1,0 +1,460 @@
+"""Acclaim files: real ones against a slow reader of the same text, small ones against numbers worked by hand."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from posefit.geometry.rotation import Array, geodesic, rotation_from_root_angles
+from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, Skeleton, angle_index
+from posefit.motion import amc, asf
+from posefit.motion.amc import read_amc, read_clip, write_amc
+from posefit.motion.asf import METRES_PER_UNIT, read_asf, write_asf
+from posefit.motion.motion import Motion
+
+CHILDREN = """\
+root lhipjoint rhipjoint lowerback
+lhipjoint lfemur
+lfemur ltibia
+ltibia lfoot
+lfoot ltoes
+rhipjoint rfemur
+rfemur rtibia
+rtibia rfoot
+rfoot rtoes
+lowerback upperback
+upperback thorax
+thorax lowerneck lclavicle rclavicle
+lowerneck upperneck
+upperneck head
+lclavicle lhumerus
+lhumerus lradius
+lradius lwrist
+lwrist lhand lthumb
+rclavicle rhumerus
+rhumerus rradius
+rradius rwrist
+rwrist rhand
+"""
+DOF = {"lfemur": "rx ry rz", "ltibia": "rx", "ltoes": "rx", "lthumb": "rx rz", "rwrist": "ry", "rfoot": "rx rz"}
+HEADER = "#!OML:ASF C:\\somebody.ASF\n:FULLY-SPECIFIED\n:DEGREES\n"
+FRAME = """\
+root 1 2 3 0 90 0
+lfemur 10 20 30
+ltibia 40
+ltoes 5
+lthumb 6 7
+rwrist 50
+rfoot -10 -20
+"""
+
+
+def asf_text(length: str = "0.45", angle: str = "deg", turn: str = "20") -> str:
+    text = f"# made by a test\n:version 1.10\n:name VICON\n:units\n  mass 1.0\n  length {length}\n  angle {angle}\n"
+    text += ":documentation\n  any words\n:root\n  order TX TY TZ RX RY RZ\n  axis XYZ\n"
+    text += "  position 0 0 0\n  orientation 0 0 0\n:bonedata\n"
+    for number, bone in enumerate(dict.fromkeys(CHILDREN.replace("root ", "", 1).split()), 1):
+        text += f"  begin\n     id {number}\n     name {bone}\n     direction 0 -2 0\n     length {number}\n"
+        text += f"     axis 0 0 {turn}  XYZ\n"
+        if bone in DOF:
+            text += f"    dof {DOF[bone]}\n    limits (-160.0 20.0)\n" + "           (-70 70)\n" * DOF[bone].count(" ")
+        text += "  end\n"
+    return text + ":hierarchy\n  begin\n" + CHILDREN + "  end\n"
+
+
+def amc_text(*frames: str) -> str:
+    return HEADER + "".join(f"{number}\n{frame}" for number, frame in enumerate(frames or (FRAME, FRAME), 1))
+
+
+@pytest.fixture
+def skeleton(tmp_path: Path) -> Skeleton:
+    path = tmp_path / "small.asf"
+    path.write_text(asf_text())
+    return read_asf(path)
+
+
+def amc_file(folder: Path, text: str) -> Path:
+    path = folder / "clip.amc"
+    path.write_text(text, newline="")
+    return path
+
+
+def angles_of(motion: Motion, bone: str) -> Array:
+    start = angle_index(JOINTS.index(bone))
+    return np.degrees(motion.poses[:, start : start + 3])
+
+
+# Real clips.
+
+
+def clips(cmu: Path) -> list[tuple[Path, Path, int]]:
+    with (cmu / "manifest.tsv").open() as file:
+        rows = [row for row in csv.DictReader(file, delimiter="\t") if row["frames"]]
+    return [(next((cmu / row["file"]).parent.glob("*.asf")), cmu / row["file"], int(row["frames"])) for row in rows]
+
+
+def test_every_frame_is_kept(cmu: Path) -> None:
+    found = {clip.name: len(read_clip(skeleton, clip)) for skeleton, clip, _ in clips(cmu)}
+    assert found == {clip.name: frames for _, clip, frames in clips(cmu)}
+
+
+def turn(x: float, y: float, z: float) -> Array:
+    """Return Rz @ Ry @ Rx of angles in degrees."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians([x, y, z])), np.sin(np.radians([x, y, z]))
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return np.asarray(about_z @ about_y @ about_x)
+
+
+def slow_joints(skeleton: Path, clip: Path, frame: int) -> Array:
+    """Return the joints (27, 3) of a frame, straight from the words of both files and the definition by Acclaim.
+
+    A bone's local rotation is C M C^-1, where C is its axis and M its motion; its end is its start plus direction
+    times length. A unit is 1 / 0.45 inch. End bones do not turn.
+    """
+    definition: dict[str, dict[str, list[str]]] = {}
+    parents: dict[str, str] = {}
+    bones, tree = skeleton.read_text().split(":bonedata")[1].split(":hierarchy")
+    for block in bones.split("begin")[1:]:
+        words = {line.split()[0]: line.split()[1:] for line in block.splitlines() if line.split()}
+        definition[words["name"][0]] = words
+    for line in tree.splitlines():
+        for child in line.split()[1:]:
+            parents[child] = line.split()[0]
+    lines = clip.read_text().splitlines()
+    start = lines.index(str(frame))
+    stop = lines.index(str(frame + 1)) if str(frame + 1) in lines else len(lines)
+    values = {line.split()[0]: [float(word) for word in line.split()[1:]] for line in lines[start + 1 : stop]}
+    ends = {"root": np.array(values["root"][:3])}
+    frames = {"root": turn(*values["root"][3:])}
+    for bone in BONES:
+        words = definition[bone]
+        motion = {"rx": 0.0, "ry": 0.0, "rz": 0.0}
+        if JOINTS.index(bone) not in ENDS:
+            motion |= dict(zip(words.get("dof", []), values.get(bone, []), strict=True))
+        axis = turn(*(float(word) for word in words["axis"][:3]))
+        frames[bone] = frames[parents[bone]] @ axis @ turn(*motion.values()) @ np.linalg.inv(axis)
+        direction = np.array([float(word) for word in words["direction"]])
+        vector = direction / np.linalg.norm(direction) * float(words["length"][0])
+        ends[bone] = ends[parents[bone]] + frames[bone] @ vector
+    return np.array([ends[joint] for joint in JOINTS]) / 0.45 * 0.0254
+
+
+@pytest.mark.parametrize("clip", ["02/02_01", "127/127_03", "49/49_02", "16/16_15"])
+def test_joints_are_where_acclaim_puts_them(cmu: Path, clip: str) -> None:
+    moving = cmu / f"{clip}.amc"
+    skeleton = next(moving.parent.glob("*.asf"))
+    motion = read_clip(skeleton, moving)
+    for frame in (1, 40, 163, len(motion)):
+        joints = motion.skeleton.joints(motion.poses[frame - 1], motion.translations[frame - 1])
+        np.testing.assert_allclose(joints, slow_joints(skeleton, moving, frame), atol=1e-9)
+
+
+def test_a_real_skeleton_and_clip_survive_writing(cmu: Path, tmp_path: Path) -> None:
+    motion = read_clip(cmu / "49/49.asf", cmu / "49/49_18.amc")
+    write_asf(tmp_path / "49.asf", motion.skeleton)
+    write_amc(tmp_path / "49_18.amc", motion)
+    again = read_clip(tmp_path / "49.asf", tmp_path / "49_18.amc")
+    np.testing.assert_allclose(again.skeleton.offsets, motion.skeleton.offsets, atol=1e-9)
+    np.testing.assert_allclose(again.skeleton.axes, motion.skeleton.axes, atol=1e-9)
+    assert again.skeleton.channels == motion.skeleton.channels
+    np.testing.assert_allclose(again.poses, motion.poses, atol=1e-9)
+    np.testing.assert_allclose(again.translations, motion.translations, atol=1e-9)
+    assert (again.name, again.skeleton.name) == ("49_18", "49")
+
+
+# Skeletons.
+
+
+def test_cmu_units_are_5_64_centimetres(skeleton: Skeleton) -> None:
+    # bone 2, lfemur's place in the text below root's three children, has length 4 in the direction -y
+    assert pytest.approx(0.056444, abs=1e-6) == METRES_PER_UNIT
+    np.testing.assert_allclose(skeleton.offsets[BONES.index("lfemur")], [0.0, -4 * 0.0254 / 0.45, 0.0], atol=1e-12)
+
+
+def test_axes_are_turned_about_z_by_20_degrees(skeleton: Skeleton) -> None:
+    c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    np.testing.assert_allclose(skeleton.axes[7], [[c, -s, 0], [s, c, 0], [0, 0, 1]], atol=1e-12)
+
+
+def test_channels_follow_the_file_and_keep_bones_outside_the_tree(skeleton: Skeleton) -> None:
+    names = [bone for bone, _ in skeleton.channels]
+    assert set(names) == set(DOF)
+    assert names.index("lfemur") < names.index("ltibia") < names.index("ltoes")
+    assert dict(skeleton.channels)["lthumb"] == ("rx", "rz")
+
+
+def test_angles_may_be_radians(skeleton: Skeleton, tmp_path: Path) -> None:
+    (tmp_path / "rad.asf").write_text(asf_text(angle="rad", turn=repr(np.pi / 9)))
+    np.testing.assert_allclose(read_asf(tmp_path / "rad.asf").axes, skeleton.axes, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("name lfemur", "name femur", "small.asf: the skeleton needs bone 'lfemur', which this file does not define"),
+        ("order TX TY TZ RX RY RZ", "order TX TY TZ RZ RY RX", "11: expected root order TX TY TZ RX RY RZ, got 'order"),
+        ("order TX TY TZ RX RY RZ", "", "expected root order TX TY TZ RX RY RZ, got none"),
+        ("axis XYZ", "axis ZYX", "12: expected root axis XYZ, got 'axis ZYX'"),
+        ("position 0 0 0", "position 0 1 0", "13: expected root position 0 0 0, got 'position 0 1 0'"),
+        ("orientation 0 0 0", "orientation 0 0 9", "14: expected root orientation 0 0 0"),
+        ("length 0.45", "length 0", "6: expected a positive length unit"),
+        ("length 0.45", "length x", "6: expected 'length' and 1 numbers, got 'length x'"),
+        ("length 0.45", "length nan", "6: expected 'length' and finite numbers"),
+        ("angle deg", "angle grad", "7: expected 'angle deg' or 'angle rad'"),
+        ("axis 0 0 20  XYZ", "axis 0 0 20  ZYX", "21: expected axis order XYZ"),
+        ("axis 0 0 20  XYZ", "axis 0 0 20", "21: expected 'axis' and 4 values"),
+        ("direction 0 -2 0", "direction 0 0 0", "19: expected a direction that is not zero"),
+        ("length 1\n", "length -1\n", "20: expected a length of 0 or more"),
+        ("     length 1\n", "", "expected a bone with a length"),
+        ("dof rx ry rz", "dof rz ry rx", "expected dof out of rx ry rz, in this order, got 'dof rz ry rx'"),
+        ("dof rx ry rz", "dof rx rx", "expected dof out of rx ry rz"),
+        ("dof rx ry rz", "dof tx ty", "expected dof out of rx ry rz"),
+        ("name lfemur", "name ltibia", "expected one new name"),
+        ("lhipjoint lfemur\n", "", "expected bone 'lfemur' in the hierarchy"),
+        ("lhipjoint lfemur\n", "rhipjoint lfemur\n", "expected bone 'lfemur' under 'lhipjoint', got it under 'rhip"),
+        ("lhipjoint lfemur\n", "lhipjoint lfemur wing\n", "expected bones that :bonedata defines, got 'wing'"),
+        ("lhipjoint lfemur\n", "lhipjoint lfemur head\n", "expected one parent a bone"),
+        (":hierarchy", ":hierarch", "expected a section :hierarchy, got the end of the file"),
+        (":hierarchy", ":units", "expected one section :units"),
+        ("  end\n:hierarchy", ":hierarchy", "expected 'end' of the bone"),
+        (":version", "version", "2: expected a section such as :units"),
+    ],
+)
+def test_mistakes_in_a_skeleton_are_named(tmp_path: Path, before: str, after: str, message: str) -> None:
+    assert before in asf_text()
+    path = tmp_path / "small.asf"
+    path.write_text(asf_text().replace(before, after, 1))
+    with pytest.raises(ValueError, match="expected|needs") as caught:
+        read_asf(path)
+    assert str(tmp_path / "small.asf") in str(caught.value)
+    assert message in str(caught.value)
+
+
+def test_a_synthetic_skeleton_survives_writing(skeleton: Skeleton, tmp_path: Path) -> None:
+    write_asf(tmp_path / "again.asf", skeleton, metres_per_unit=0.01)
+    again = read_asf(tmp_path / "again.asf")
+    np.testing.assert_allclose(again.offsets, skeleton.offsets, atol=1e-12)
+    np.testing.assert_allclose(again.axes, skeleton.axes, atol=1e-12)
+    assert again.channels == skeleton.channels
+
+
+# Motions.
+
+
+def test_a_frame_is_read_into_radians_and_metres(skeleton: Skeleton, tmp_path: Path) -> None:
+    motion = read_amc(amc_file(tmp_path, amc_text()), skeleton)
+    assert (motion.name, len(motion), motion.fps) == ("clip", 2, 120.0)
+    np.testing.assert_allclose(motion.translations[1], np.array([1, 2, 3]) * 0.0254 / 0.45)
+    np.testing.assert_allclose(np.degrees(motion.poses[1, :3]), [90, 0, 0], atol=1e-9)  # RY alone is yaw
+    np.testing.assert_allclose(angles_of(motion, "lfemur")[1], [10, 20, 30])
+    np.testing.assert_allclose(angles_of(motion, "rwrist")[1], [0, 50, 0])
+    np.testing.assert_allclose(angles_of(motion, "rfoot")[1], [-10, 0, -20])
+    assert np.count_nonzero(np.abs(motion.poses[1]) > 1e-12) == 1 + 3 + 1 + 1 + 2  # no toes, no thumb
+
+
+def test_the_root_turns_as_acclaim_says(skeleton: Skeleton, tmp_path: Path) -> None:
+    text = amc_text(FRAME.replace("0 90 0", "16.712 37.9505 8.93735"))
+    motion = read_amc(amc_file(tmp_path, text), skeleton)
+    expected = turn(16.712, 37.9505, 8.93735)
+    np.testing.assert_allclose(rotation_from_root_angles(motion.poses[0, :3]), expected, atol=1e-12)
+
+
+def test_line_ends_blank_lines_and_comments_make_no_difference(skeleton: Skeleton, tmp_path: Path) -> None:
+    plain = read_amc(amc_file(tmp_path, amc_text()), skeleton)
+    for text in (amc_text().replace("\n", "\r\n"), amc_text().replace("\n", " \n\n# caf\u00e9\n"), amc_text().rstrip()):
+        np.testing.assert_array_equal(read_amc(amc_file(tmp_path, text), skeleton).poses, plain.poses)
+    (tmp_path / "crlf.asf").write_bytes(asf_text().replace("\n", "\r\n").encode())
+    np.testing.assert_array_equal(read_asf(tmp_path / "crlf.asf").offsets, skeleton.offsets)
+
+
+def test_bones_may_come_in_any_order(skeleton: Skeleton, tmp_path: Path) -> None:
+    turned = "".join(reversed(FRAME.splitlines(keepends=True)))
+    motion = read_amc(amc_file(tmp_path, amc_text(FRAME, turned)), skeleton)
+    np.testing.assert_array_equal(motion.poses[0], motion.poses[1])
+
+
+def test_radians_are_understood(skeleton: Skeleton, tmp_path: Path) -> None:
+    text = amc_text().replace(":DEGREES", ":radians").replace("0 90 0", "0 1 0").replace("ltibia 40", "ltibia 0.5")
+    motion = read_amc(amc_file(tmp_path, text.replace("10 20 30", "0 0 0")), skeleton)
+    np.testing.assert_allclose(motion.poses[:, 0], 1.0)
+    np.testing.assert_allclose(angles_of(motion, "ltibia")[:, 0], np.degrees(0.5))
+
+
+def test_angles_are_unwrapped_along_time(skeleton: Skeleton, tmp_path: Path) -> None:
+    frames = [
+        FRAME.replace("ltibia 40", f"ltibia {(50 * k + 180) % 360 - 180}").replace("0 90 0", f"0 {-60 * k} 0")
+        for k in range(20)
+    ]
+    motion = read_amc(amc_file(tmp_path, amc_text(*frames)), skeleton)
+    np.testing.assert_allclose(angles_of(motion, "ltibia")[:, 0], 50 * np.arange(20), atol=1e-9)
+    np.testing.assert_allclose(np.degrees(motion.poses[:, 0]), -60 * np.arange(20), atol=1e-9)
+
+
+def test_a_clip_is_scaled_by_its_own_skeleton(tmp_path: Path) -> None:
+    (tmp_path / "inch.asf").write_text(asf_text(length="1.0"))
+    motion = read_clip(tmp_path / "inch.asf", amc_file(tmp_path, amc_text()), fps=60.0)
+    np.testing.assert_allclose(motion.translations[0], [0.0254, 2 * 0.0254, 3 * 0.0254])
+    np.testing.assert_allclose(motion.skeleton.offsets[BONES.index("lfemur")], [0, -4 * 0.0254, 0], atol=1e-12)
+    assert motion.fps == 60.0
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("ltibia 40\n", "", ":11: expected bone 'ltibia' in frame 1, got frame 2"),
+        ("ltibia 40\n", "ltibia 40\nltibia 40\n", ":8: expected each bone once in frame 1, got 'ltibia' again"),
+        ("ltibia 40", "ltibia 40 41", ":7: expected 1 values for 'ltibia', got 2"),
+        ("ltibia 40", "ltibia", ":7: expected 1 values for 'ltibia', got 0"),
+        ("ltibia 40", "ltibia 4o", ":7: expected numbers for 'ltibia', got '4o'"),
+        ("ltibia 40", "ltibia nan", ":7: expected finite numbers below 1e+06 for 'ltibia', got 'nan'"),
+        ("10 20 30", "10 nan 30", ":6: expected finite numbers below 1e+06 for 'lfemur', got '10 nan 30'"),
+        ("10 20 30", "10 -inf 30", ":6: expected finite numbers"),
+        ("10 20 30", "10 1e400 30", ":6: expected finite numbers"),
+        ("10 20 30", "10 1e300 30", ":6: expected finite numbers"),
+        ("ltibia 40", "lfin 40", ":7: expected a bone of skeleton 'small' or a frame's number, got 'lfin 40'"),
+        ("\n2\n", "\n3\n", ":12: expected frame 2, got frame 3"),
+        ("\n2\n", "\n1\n", ":12: expected frame 2, got frame 1"),
+        ("\n2\n", "\n2.0\n", ":12: expected a bone of skeleton 'small' or a frame's number, got '2.0'"),
+        (":DEGREES\n", "", ":3: expected :DEGREES or :RADIANS before the first frame, got frame 1"),
+        (":DEGREES", ":GRADS", ":3: expected :FULLY-SPECIFIED, :DEGREES or :RADIANS, got ':GRADS'"),
+        ("\n1\n", "\n", ":4: expected a header such as :DEGREES or the number of a frame, got 'root 1 2 3"),
+        ("\n1\n", "\n" + "1" * 10_001 + "\n", ":4: expected a line of at most 10000 bytes, got 10002"),
+    ],
+)
+def test_mistakes_in_a_motion_are_named(
+    skeleton: Skeleton, tmp_path: Path, before: str, after: str, message: str
+) -> None:
+    assert before in amc_text()
+    path = amc_file(tmp_path, amc_text().replace(before, after, 1))
+    with pytest.raises(ValueError, match="expected") as caught:
+        read_amc(path, skeleton)
+    assert f"{path}{message}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", ":1: expected at least one frame, got the end of the file"),
+        (HEADER.encode(), ":3: expected at least one frame, got the end of the file"),
+        ((HEADER + "1\n").encode(), ":4: expected bone 'root' in frame 1, got the end of the file"),
+        ((HEADER + "1\n" + FRAME[:-9]).encode(), ":11: expected 2 values for 'rfoot', got 0"),
+        (b"\xff\xd8\xff\xe0\x00\x10JFIF", ":1: expected a header such as :DEGREES or the number of a frame, got"),
+        (HEADER.encode() + b"1\n\x80\x81 1 2\n", ":5: expected a bone of skeleton 'small'"),
+    ],
+)
+def test_cut_off_and_alien_files_are_named(skeleton: Skeleton, tmp_path: Path, content: bytes, message: str) -> None:
+    path = tmp_path / "clip.amc"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match="expected") as caught:
+        read_amc(path, skeleton)
+    assert f"{path}{message}" in str(caught.value)
+
+
+def test_huge_files_are_refused_unread(skeleton: Skeleton, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with (tmp_path / "huge.amc").open("wb") as file:
+        file.truncate(500_000_001)
+    with pytest.raises(ValueError, match=r"huge\.amc: expected at most 500 MB, got 500\.0 MB"):
+        read_amc(tmp_path / "huge.amc", skeleton)
+    with (tmp_path / "huge.asf").open("wb") as file:
+        file.truncate(20_000_000)
+    with pytest.raises(ValueError, match=r"huge\.asf: expected at most 10 MB, got 20\.0 MB"):
+        read_asf(tmp_path / "huge.asf")
+
+
+def test_units_must_be_positive(skeleton: Skeleton, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"metres_per_unit must be a positive number, got 0\.0"):
+        read_amc(amc_file(tmp_path, amc_text()), skeleton, metres_per_unit=0.0)
+
+
+def test_what_a_file_cannot_hold_is_not_written(skeleton: Skeleton, tmp_path: Path) -> None:
+    poses = np.zeros((1, ANGLES))
+    poses[0, angle_index(JOINTS.index("ltibia")) + 1] = 0.25  # the knee bends about x only
+    motion = Motion("m", skeleton, poses, np.zeros((1, 3)), 120.0)
+    with pytest.raises(ValueError, match=r"turn joints about their free axes only, got 0\.25 rad"):
+        write_amc(tmp_path / "m.amc", motion)
+
+
+def test_a_sideways_root_is_written_without_a_warning(skeleton: Skeleton, tmp_path: Path) -> None:
+    poses = np.zeros((1, ANGLES))
+    poses[0, :3] = np.pi / 2, 0.2, 0.1
+    write_amc(tmp_path / "m.amc", Motion("m", skeleton, poses, np.zeros((1, 3)), 120.0))
+    again = read_amc(tmp_path / "m.amc", skeleton)
+    np.testing.assert_allclose(again.poses[0, :3], poses[0, :3], atol=1e-9)
+
+
+# Any motion, any damage.
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("acclaim")
+    (folder / "small.asf").write_text(asf_text())
+    (folder / "clip.amc").write_text(amc_text())
+    return folder
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 5))
+def test_any_motion_survives_writing(workshop: Path, seed: int, frames: int) -> None:
+    rng, skeleton = np.random.default_rng(seed), read_asf(workshop / "small.asf")
+    poses = rng.uniform(-1.5, 1.5, (frames, ANGLES)) * skeleton.free
+    motion = Motion("any", skeleton, poses, rng.normal(size=(frames, 3)), 120.0)
+    write_amc(workshop / "any.amc", motion)
+    again = read_amc(workshop / "any.amc", skeleton)
+    assert geodesic(
+        rotation_from_root_angles(again.poses[:, :3]), rotation_from_root_angles(motion.poses[:, :3])
+    ).max() < 1e-7  # fmt: skip
+    np.testing.assert_allclose(again.poses, motion.poses, atol=1e-9)
+    np.testing.assert_allclose(again.translations, motion.translations, atol=1e-9)
+
+
+damage = st.lists(
+    st.tuples(
+        st.floats(0.0, 1.0), st.integers(0, 6), st.binary(max_size=4) | st.sampled_from([b"\n", b" ", b"9", b"-"])
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+def damaged(content: bytes, cuts: list[tuple[float, int, bytes]]) -> bytes:
+    for where, length, instead in cuts:
+        start = int(where * len(content))
+        content = content[:start] + instead + content[start + length :]
+    return content
+
+
+@given(damage)
+def test_a_damaged_motion_is_read_or_refused_with_its_line(
+    workshop: Path, cuts: list[tuple[float, int, bytes]]
+) -> None:
+    path = workshop / "damaged.amc"
+    path.write_bytes(damaged(amc_text().encode(), cuts))
+    try:
+        motion = read_amc(path, read_asf(workshop / "small.asf"))
+    except ValueError as error:
+        rest = str(error).removeprefix(f"{path}:")
+        assert rest != str(error)
+        assert rest.split(":")[0].isdigit()
+    else:
+        assert len(motion) >= 1
+
+
+@given(damage)
+def test_a_damaged_skeleton_is_read_or_refused(workshop: Path, cuts: list[tuple[float, int, bytes]]) -> None:
+    path = workshop / "damaged.asf"
+    path.write_bytes(damaged(asf_text().encode(), cuts))
+    try:
+        skeleton = read_asf(path)
+    except ValueError as error:
+        assert str(error).startswith(f"{path}:")
+    else:
+        assert np.isfinite(skeleton.offsets).all()
+
+
+def test_limits_are_those_that_the_manual_names() -> None:
+    assert (amc.SIZE_LIMIT, asf.SIZE_LIMIT, amc.FPS) == (500_000_000, 10_000_000, 120.0)

@@ -1,0 +1,244 @@
+"""BVH files against forward kinematics done slowly from the file's own definition."""
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from posefit.geometry.rotation import Array
+from posefit.motion.bvh import read_bvh
+
+pytest.importorskip("pybvh")
+
+# (Acclaim's name, cgspeed's name, parent); written out, so that a slip in the reader's table shows
+TREE = [
+    line.split()
+    for line in """
+root Hips -
+lhipjoint LHipJoint root
+lfemur LeftUpLeg lhipjoint
+ltibia LeftLeg lfemur
+lfoot LeftFoot ltibia
+ltoes LeftToeBase lfoot
+rhipjoint RHipJoint root
+rfemur RightUpLeg rhipjoint
+rtibia RightLeg rfemur
+rfoot RightFoot rtibia
+rtoes RightToeBase rfoot
+lowerback LowerBack root
+upperback Spine lowerback
+thorax Spine1 upperback
+lowerneck Neck thorax
+upperneck Neck1 lowerneck
+head Head upperneck
+lclavicle LeftShoulder thorax
+lhumerus LeftArm lclavicle
+lradius LeftForeArm lhumerus
+lwrist LeftHand lradius
+lhand LeftFingerBase lwrist
+rclavicle RightShoulder thorax
+rhumerus RightArm rclavicle
+rradius RightForeArm rhumerus
+rwrist RightHand rradius
+rhand RightFingerBase rwrist
+""".strip().splitlines()
+]
+ORDERS = ("ZYX", "ZXY", "XYZ", "YZX")
+
+
+@dataclass
+class Node:
+    name: str
+    offset: Array
+    order: str
+    children: list["Node"] = field(default_factory=list)
+    tip: Array | None = None  # End Site
+
+
+def build(names: str) -> tuple[Node, dict[str, Node]]:
+    """Return a BVH tree with random bones, where the BVH joint of a bone sits at the bone's start."""
+    rng = np.random.default_rng(5)
+    vectors = {bone: np.round(rng.normal(size=3), 5) for bone, _, _ in TREE}
+    vectors["root"] = np.zeros(3)
+    nodes: dict[str, Node] = {}
+    for k, (bone, cgspeed, parent) in enumerate(TREE):
+        name = cgspeed if names == "cgspeed" else bone
+        nodes[bone] = Node(name, vectors.get(parent, np.zeros(3)), ORDERS[k % len(ORDERS)])
+        if parent != "-":
+            nodes[parent].children.append(nodes[bone])
+    for bone, node in nodes.items():
+        if not node.children:
+            node.tip = vectors[bone]
+    # as in the real files: fingers go on from the hand, a thumb hangs beside it
+    fingers = Node("LeftHandIndex1", vectors["lhand"], "ZYX", tip=np.ones(3))
+    nodes["lhand"].children, nodes["lhand"].tip = [fingers], None
+    nodes["lwrist"].children.append(Node("LThumb", np.zeros(3), "ZYX", tip=np.ones(3)))
+    return nodes["root"], nodes
+
+
+def in_order(node: Node) -> list[Node]:
+    return [node, *(below for child in node.children for below in in_order(child))]
+
+
+def spaced(values: Array) -> str:
+    return " ".join(f"{value:.5f}" for value in values)
+
+
+def hierarchy(node: Node, word: str = "ROOT") -> str:
+    channels = " ".join(f"{axis}rotation" for axis in node.order)
+    channels = f"6 Xposition Yposition Zposition {channels}" if word == "ROOT" else f"3 {channels}"
+    inside = "".join(hierarchy(child, "JOINT") for child in node.children)
+    if node.tip is not None:
+        inside += f"End Site\n{{\nOFFSET {spaced(node.tip)}\n}}\n"
+    return f"{word} {node.name}\n{{\nOFFSET {spaced(node.offset)}\nCHANNELS {channels}\n{inside}}}\n"
+
+
+def text(root: Node, values: Array) -> str:
+    motion = "\n".join(spaced(row) for row in values)
+    return f"HIERARCHY\n{hierarchy(root)}MOTION\nFrames: {len(values)}\nFrame Time: 0.0083333\n{motion}\n"
+
+
+def about(axis: str, degrees: float) -> Array:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array(
+        {"X": [[1, 0, 0], [0, c, -s], [0, s, c]], "Y": [[c, 0, s], [0, 1, 0], [-s, 0, c]], "Z": [[c, -s, 0], [s, c, 0], [0, 0, 1]]}[axis]
+    )  # fmt: skip
+
+
+def tips(root: Node, nodes: dict[str, Node], row: Array) -> Array:
+    """Return where each of the 27 bones ends, from the definition of BVH. End bones do not turn by themselves."""
+    values = {id(node): row[3 + 3 * k : 6 + 3 * k] for k, node in enumerate(in_order(root))}
+    starts: dict[int, Array] = {}
+    frames: dict[int, Array] = {}
+
+    def visit(node: Node, start: Array, frame: Array) -> None:
+        starts[id(node)] = start
+        turning = frame
+        for axis, degrees in zip(node.order, values[id(node)], strict=True):
+            turning = turning @ about(axis, degrees)
+        ends = ("ltoes", "rtoes", "head", "lhand", "rhand")
+        frames[id(node)] = frame if any(node is nodes[bone] for bone in ends) else turning
+        for child in node.children:
+            visit(child, start + turning @ child.offset, turning)
+
+    visit(root, row[:3], np.eye(3))
+    found = [row[:3]]
+    for bone, _, _ in TREE[1:]:
+        node = nodes[bone]
+        vector = node.tip if node.tip is not None else node.children[0].offset
+        found.append(starts[id(node)] + frames[id(node)] @ vector)
+    return np.array(found)
+
+
+def random_values(root: Node, frames: int = 6) -> Array:
+    rng = np.random.default_rng(8)
+    return np.round(rng.uniform(-80.0, 80.0, (frames, 3 + 3 * len(in_order(root)))), 5)
+
+
+@pytest.mark.parametrize("names", ["cgspeed", "acclaim"])
+def test_joints_are_where_the_file_puts_them(tmp_path: Path, names: str) -> None:
+    root, nodes = build(names)
+    values = random_values(root)
+    path = tmp_path / "clip.bvh"
+    path.write_text(text(root, values))
+    motion = read_bvh(path, metres_per_unit=0.01)
+    expected = 0.01 * np.array([tips(root, nodes, row) for row in values])
+    np.testing.assert_allclose(motion.skeleton.joints(motion.poses, motion.translations), expected, atol=1e-9)
+    assert (motion.name, len(motion)) == ("clip", 6)
+    assert motion.fps == pytest.approx(120.0, rel=1e-5)
+
+
+def test_angles_that_pass_half_a_turn_go_on(tmp_path: Path) -> None:
+    root, _ = build("cgspeed")
+    values = np.zeros((9, 3 + 3 * len(in_order(root))))
+    knee = next(k for k, node in enumerate(in_order(root)) if node.name == "LeftLeg")
+    assert in_order(root)[knee].order == "YZX"
+    values[:, 3 + 3 * knee : 6 + 3 * knee] = np.outer(np.arange(9), [0.0, 0.0, 50.0])
+    path = tmp_path / "clip.bvh"
+    path.write_text(text(root, values))
+    motion = read_bvh(path)
+    turned = motion.poses[:, np.abs(motion.poses).max(axis=0) > 1e-9]
+    np.testing.assert_allclose(turned[:, 0], np.radians(50.0 * np.arange(9)), atol=1e-9)
+
+
+def edited(before: str, after: str) -> str:
+    root, _ = build("cgspeed")
+    whole = text(root, random_values(root))
+    assert before in whole
+    return whole.replace(before, after, 1)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("JOINT LeftLeg", "JOINT Knee", r"with all 27 joints, got one without ltibia \(LeftLeg\)"),
+        ("ROOT Hips", "ROOT Hip", r"without root \(Hips\)"),
+        ("Frames: 6", "Frames: 7", "cannot read: BVH declares 7 frames"),
+        ("Frame Time: 0.0083333", "Frame Time: -1", "cannot read: frame_time must be >= 0"),
+        ("Frame Time: 0.0083333", "Frame Time: nan", "x.bvh: expected"),
+        ("OFFSET", "OFFSET nan", "x.bvh: expected"),
+        ("HIERARCHY", "JOINT", "cannot read"),
+    ],
+)
+def test_mistakes_name_the_file(tmp_path: Path, before: str, after: str, message: str) -> None:
+    path = tmp_path / "x.bvh"
+    path.write_text(edited(before, after))
+    with pytest.raises(ValueError, match=message) as caught:
+        read_bvh(path)
+    assert str(path) in str(caught.value)
+
+
+def test_numbers_that_are_not_finite_are_refused(tmp_path: Path) -> None:
+    root, _ = build("cgspeed")
+    values = random_values(root)
+    values[2, 7] = np.nan
+    path = tmp_path / "x.bvh"
+    path.write_text(text(root, values))
+    with pytest.raises(ValueError, match=r"x\.bvh: expected finite numbers"):
+        read_bvh(path)
+
+
+def test_shoulders_must_start_where_the_neck_starts(tmp_path: Path) -> None:
+    root, nodes = build("cgspeed")
+    nodes["rclavicle"].offset = nodes["rclavicle"].offset + [0.0, 0.1, 0.0]
+    path = tmp_path / "x.bvh"
+    path.write_text(text(root, random_values(root)))
+    with pytest.raises(ValueError, match=r"x\.bvh: expected joint 'RightShoulder' at OFFSET"):
+        read_bvh(path)
+
+
+def test_a_joint_between_two_bones_is_refused(tmp_path: Path) -> None:
+    root, nodes = build("cgspeed")
+    hip = nodes["lhipjoint"]
+    hip.children = [Node("Twist", np.ones(3), "ZYX", hip.children)]
+    path = tmp_path / "x.bvh"
+    path.write_text(text(root, random_values(root)))
+    with pytest.raises(ValueError, match="expected joint 'LeftUpLeg' right under 'LHipJoint', got it under 'Twist'"):
+        read_bvh(path)
+
+
+def test_the_hips_must_be_the_root(tmp_path: Path) -> None:
+    root, _ = build("cgspeed")
+    scene = Node("Scene", np.zeros(3), "ZYX", [root])
+    path = tmp_path / "x.bvh"
+    path.write_text(text(scene, random_values(scene)))
+    with pytest.raises(ValueError, match="expected joint 'Hips' as the ROOT, got it under 'Scene'"):
+        read_bvh(path)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\xff\xfe\x00\x80" * 50, b"HIERARCHY\nROOT", b"MOTION\n", b"ROOT Hips\n{\n}"]
+)
+def test_junk_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "x.bvh"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"x\.bvh: expected a BVH file"):
+        read_bvh(path)
+
+
+def test_without_the_library_the_way_out_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "pybvh", None)
+    with pytest.raises(ImportError, match=r"pip install posefit\[bvh\]"):
+        read_bvh(tmp_path / "x.bvh")

@@ -1,0 +1,115 @@
+"""A clip is cut and resampled without blur."""
+
+import numpy as np
+import pytest
+
+from posefit.geometry.rotation import geodesic, rotation_from_root_angles
+from posefit.geometry.skeleton import BONES, Skeleton
+from posefit.motion.motion import Motion
+
+SKELETON = Skeleton("stick", np.ones((26, 3)), np.tile(np.eye(3), (26, 1, 1)), tuple((bone, ()) for bone in BONES))
+
+
+def clip(frames: int, fps: float = 120.0) -> Motion:
+    rng = np.random.default_rng(3)
+    steps = rng.uniform(-0.3, 0.3, (frames, 66))
+    return Motion("clip", SKELETON, np.cumsum(steps, axis=0), rng.normal(size=(frames, 3)), fps)
+
+
+def test_a_motion_is_as_long_as_its_poses() -> None:
+    assert len(clip(7)) == 7
+
+
+def test_arrays_are_copies_that_cannot_be_written_to() -> None:
+    poses, translations = np.zeros((2, 66)), np.zeros((2, 3))
+    motion = Motion("m", SKELETON, poses, translations, 30.0)
+    poses[0, 0] = 1.0
+    assert motion.poses[0, 0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        motion.translations[0, 0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("poses", "translations", "fps", "message"),
+    [
+        (np.zeros((2, 62)), np.zeros((2, 3)), 30.0, r"poses must have shape \(frames, 66\), got \(2, 62\)"),
+        (np.zeros(66), np.zeros((1, 3)), 30.0, r"poses must have shape \(frames, 66\), got \(66,\)"),
+        (np.zeros((0, 66)), np.zeros((0, 3)), 30.0, "poses must hold at least 1 frame, got 0"),
+        (np.full((1, 66), np.nan), np.zeros((1, 3)), 30.0, "poses must be finite, got 66 that are not"),
+        (np.zeros((2, 66)), np.zeros((3, 3)), 30.0, r"translations must have shape \(2, 3\), got \(3, 3\)"),
+        (np.zeros((2, 66)), np.zeros((2, 3)), 0.0, "fps must be a positive number, got 0.0"),
+        (np.zeros((2, 66)), np.zeros((2, 3)), np.nan, "fps must be a positive number, got nan"),
+    ],
+)
+def test_mistakes_are_named(poses: np.ndarray, translations: np.ndarray, fps: float, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Motion("m", SKELETON, poses, translations, fps)
+
+
+def test_frames_cuts_a_clip() -> None:
+    motion = clip(10)
+    part = motion.frames(2, 5)
+    np.testing.assert_array_equal(part.poses, motion.poses[2:5])
+    np.testing.assert_array_equal(part.translations, motion.translations[2:5])
+    assert (part.name, part.fps) == ("clip", 120.0)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(3, 3), (-1, 4), (0, 11), (5, 2)])
+def test_frames_outside_the_clip_are_refused(start: int, stop: int) -> None:
+    with pytest.raises(ValueError, match=rf"start < stop <= 10, got start {start} and stop {stop}"):
+        clip(10).frames(start, stop)
+
+
+@pytest.mark.parametrize(("frames", "kept"), [(1, 1), (4, 1), (5, 2), (9, 3), (343, 86)])
+def test_a_whole_ratio_takes_every_kth_frame_as_it_is(frames: int, kept: int) -> None:
+    motion = clip(frames)
+    slow = motion.resampled(30.0)
+    assert len(slow) == kept
+    assert slow.fps == 30.0
+    np.testing.assert_array_equal(slow.poses, motion.poses[::4])
+    np.testing.assert_array_equal(slow.translations, motion.translations[::4])
+
+
+def test_the_same_rate_changes_nothing() -> None:
+    motion = clip(6)
+    np.testing.assert_array_equal(motion.resampled(120.0).poses, motion.poses)
+
+
+@pytest.mark.parametrize(
+    ("frames", "fps", "new", "kept"),
+    # times k / new up to (frames - 1) / fps: 0.05 s at 50 Hz is k = 0, 1, 2; 0.1 s at 30 Hz is k = 0 ... 3
+    [(7, 120.0, 50.0, 3), (11, 100.0, 30.0, 4), (2, 30.0, 120.0, 5), (1, 30.0, 120.0, 1), (2, 30.0, 29.0, 1)],
+)
+def test_times_stay_within_the_clip(frames: int, fps: float, new: float, kept: int) -> None:
+    assert len(clip(frames, fps).resampled(new)) == kept
+
+
+def test_between_frames_joints_are_linear() -> None:
+    motion = clip(5, 20.0)
+    fast = motion.resampled(40.0)
+    assert len(fast) == 9
+    np.testing.assert_allclose(fast.poses[::2], motion.poses, atol=1e-12)
+    np.testing.assert_allclose(fast.poses[1::2, 3:], (motion.poses[1:, 3:] + motion.poses[:-1, 3:]) / 2, atol=1e-12)
+    middle = (motion.translations[1:] + motion.translations[:-1]) / 2
+    np.testing.assert_allclose(fast.translations[1::2], middle, atol=1e-12)
+
+
+def test_between_frames_the_root_lies_half_way_on_the_shortest_arc() -> None:
+    motion = clip(5, 20.0)
+    roots = rotation_from_root_angles(motion.poses[:, :3])
+    between = rotation_from_root_angles(motion.resampled(40.0).poses[1::2, :3])
+    whole = geodesic(roots[:-1], roots[1:])
+    np.testing.assert_allclose(geodesic(roots[:-1], between), whole / 2, atol=1e-9)
+    np.testing.assert_allclose(geodesic(between, roots[1:]), whole / 2, atol=1e-9)
+
+
+def test_a_root_that_turns_on_and_on_keeps_its_turns() -> None:
+    poses = np.zeros((40, 66))
+    poses[:, 0] = 7.0 + 0.5 * np.arange(40)
+    fast = Motion("spin", SKELETON, poses, np.zeros((40, 3)), 30.0).resampled(45.0)
+    np.testing.assert_allclose(fast.poses[:, 0], 7.0 + np.arange(len(fast)) / 3.0, atol=1e-9)
+
+
+def test_a_new_rate_must_be_positive() -> None:
+    with pytest.raises(ValueError, match=r"fps must be a positive number, got -30"):
+        clip(3).resampled(-30.0)
