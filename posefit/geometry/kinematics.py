@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from posefit.geometry.rotation import Array
 
-jit = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+jit = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 
 # pi in two parts, so that angles of many turns keep their digits; then Taylor's coefficients on [-pi/2, pi/2],
 # where the first term left out is below 1e-10.

@@ -57,4 +57,5 @@ def _matrices(order: str, angles: Array) -> Array:
 
 
 def _angles(order: str, rotations: Array) -> Array:
-    return _as_batch(rotations).as_euler(order).reshape(*np.shape(rotations)[:-1])
+    # At the singularity one of the angles is free; scipy then takes zero for it.
+    return _as_batch(rotations).as_euler(order, suppress_warnings=True).reshape(*np.shape(rotations)[:-1])

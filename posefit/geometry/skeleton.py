@@ -131,6 +131,6 @@ class Skeleton:
         where = np.zeros((*lead, 3)) if translations is None else np.asarray(translations, dtype=np.float64)
         if where.shape != (*lead, 3):
             raise ValueError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
-        flat = np.ascontiguousarray(poses.reshape(-1, ANGLES))
-        positions = kinematics.joint_positions(self.chain, flat, np.ascontiguousarray(where.reshape(-1, 3)))
+        flat = np.require(poses.reshape(-1, ANGLES), np.float64, "CW")
+        positions = kinematics.joint_positions(self.chain, flat, np.require(where.reshape(-1, 3), np.float64, "CW"))
         return np.asarray(positions).reshape(*lead, len(JOINTS), 3)

@@ -15,7 +15,7 @@ from posefit.geometry.rotation import (
 )
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton, angle_index
 from posefit.motion.asf import LARGEST, METRES_PER_UNIT, check_size, mistake, parse_asf, positive
-from posefit.motion.motion import Motion, gimbal_lock_allowed
+from posefit.motion.motion import Motion
 
 FPS = 120.0  # CMU's rate; the files do not state it
 SIZE_LIMIT = 500_000_000  # bytes
@@ -48,8 +48,7 @@ def read_amc(
     values, radians = _frames(path, spans, skeleton.name)
     angles = values if radians else np.deg2rad(values)
     poses = np.zeros((len(values), ANGLES))
-    with gimbal_lock_allowed():
-        poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))
+    poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))
     poses[:, targets] = angles[:, columns]
     return Motion(path.stem, skeleton, np.unwrap(poses, axis=0), values[:, :3] * unit, fps)
 
@@ -153,8 +152,7 @@ def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METR
     spans, columns, targets = _layout(motion.skeleton)
     values = np.zeros((len(motion), max(stop for _, stop in spans.values())))
     values[:, :3] = motion.translations / unit
-    with gimbal_lock_allowed():
-        root = joint_angles_from_rotation(rotation_from_root_angles(motion.poses[:, :3]))
+    root = joint_angles_from_rotation(rotation_from_root_angles(motion.poses[:, :3]))
     values[:, 3:6] = np.rad2deg(root)
     values[:, columns] = np.rad2deg(motion.poses[:, targets])
     bones = [(bone.decode(), start, stop) for bone, (start, stop) in spans.items()]

@@ -8,7 +8,6 @@ import numpy as np
 
 from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, Channels, Skeleton
-from posefit.motion.motion import gimbal_lock_allowed
 
 INCH = 0.0254  # metres
 METRES_PER_UNIT = INCH / 0.45  # CMU's files say `length 0.45`: a unit is 1 / 0.45 inch
@@ -224,8 +223,7 @@ def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = 
     Bones of which only the channels are known, such as fingers, get the length 0.
     """
     unit = positive("metres_per_unit", metres_per_unit)
-    with gimbal_lock_allowed():
-        axes = np.rad2deg(joint_angles_from_rotation(skeleton.axes))
+    axes = np.rad2deg(joint_angles_from_rotation(skeleton.axes))
     header = (
         f":version 1.10\n:name {'_'.join(skeleton.name.split()) or 'skeleton'}\n:units\n  mass 1.0\n"
         f"  length {INCH / unit!r}\n  angle deg\n:root\n  order {' '.join(ROOT_CHANNELS)}\n  axis XYZ\n"

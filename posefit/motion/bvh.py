@@ -18,7 +18,7 @@ from posefit.geometry.rotation import Array, joint_angles_from_rotation, root_an
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Channels, Skeleton, angle_index
 from posefit.motion.amc import SIZE_LIMIT
 from posefit.motion.asf import LARGEST, check_size, positive
-from posefit.motion.motion import Motion, gimbal_lock_allowed
+from posefit.motion.motion import Motion
 
 _LIMBS = {  # names in the CMU conversions by cgspeed, without their side
     "hipjoint": "HipJoint",
@@ -69,16 +69,15 @@ def read_bvh(path: str | Path, *, metres_per_unit: float = 1.0) -> Motion:
     skeleton = Skeleton(path.stem, offsets, np.tile(np.eye(3), (len(BONES), 1, 1)), CHANNELS)
     columns = [bvh.joint_index[node.name] for node in chosen]
     poses = np.zeros((len(bvh.root_pos), ANGLES))
-    with gimbal_lock_allowed():
-        for joint, (node, column) in enumerate(zip(chosen, columns, strict=True)):
-            # capital letters: each channel turns about the axes that the channels before it have turned
-            order = "".join(node.rot_channels).upper()
-            rotations = Rotation.from_euler(order, bvh.joint_angles[:, column]).as_matrix()
-            if joint == 0:
-                poses[:, :3] = root_angles_from_rotation(rotations)
-            elif joint not in ENDS:
-                start = angle_index(joint)
-                poses[:, start : start + 3] = joint_angles_from_rotation(rotations)
+    for joint, (node, column) in enumerate(zip(chosen, columns, strict=True)):
+        # capital letters: each channel turns about the axes that the channels before it have turned
+        order = "".join(node.rot_channels).upper()
+        rotations = Rotation.from_euler(order, bvh.joint_angles[:, column]).as_matrix()
+        if joint == 0:
+            poses[:, :3] = root_angles_from_rotation(rotations)
+        elif joint not in ENDS:
+            start = angle_index(joint)
+            poses[:, start : start + 3] = joint_angles_from_rotation(rotations)
     return Motion(path.stem, skeleton, np.unwrap(poses, axis=0), bvh.root_pos * unit, bvh.fps)
 
 

@@ -1,8 +1,5 @@
 """A clip of motion capture: one pose and one translation a frame."""
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -76,18 +73,9 @@ class Motion:
     def _root_angles(self, times: Array) -> Array:
         rotations = Rotation.from_matrix(rotation_from_root_angles(self.poses[:, :3]))
         between = Slerp(np.arange(len(self)), rotations)(times).as_matrix()
-        with gimbal_lock_allowed():
-            angles = np.unwrap(root_angles_from_rotation(between), axis=0)
+        angles = np.unwrap(root_angles_from_rotation(between), axis=0)
         turns = np.round((self.poses[0, :3] - angles[0]) / (2.0 * np.pi))
         return np.asarray(angles + 2.0 * np.pi * turns)
-
-
-@contextmanager
-def gimbal_lock_allowed() -> Iterator[None]:
-    """Return a context in which scipy keeps quiet when it picks one of many equal triples of angles."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Gimbal lock")
-        yield
 
 
 def _rate(fps: float) -> float:

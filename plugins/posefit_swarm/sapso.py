@@ -1,0 +1,160 @@
+"""Simulated-annealed particle swarm optimisation: the paper's Algorithm 1."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit import SearchSpace
+from posefit.geometry.rotation import Array
+from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, inertia, position, velocity
+
+PARTICLES = 40  # N, section 5.2
+ITERATIONS = 60  # C, section 5.2
+TEMPERATURE = 1.0  # T, section 5.2
+COOLING = 0.95  # gamma, section 5.2
+STOP_TEMPERATURE = 0.0  # T0; Reading S5
+REDRAWS = 100  # Reading S7
+FIRST_REDRAWS = 4  # ours: how many of them are drawn at once; then eight times as many, and so on
+CHOICES = (
+    ("iteration", "acceptance"),
+    ("dimension", "scalar"),
+    ("symmetric", "literal"),
+    ("kept", "zeroed"),
+)
+
+
+class SAPSO:
+    """Algorithm 1 as an ask/tell optimiser. Velocities and positions are those of the unit box.
+
+    Settings beyond the paper's constants choose between readings of it:
+    `cool` once an "iteration" or once an "acceptance", with one shared temperature (Reading S6);
+    `redraws` of rand() before a particle that breaks a constraint is stopped (Reading S7);
+    `rand` fresh for every "dimension" or one "scalar" a particle (Reading S8);
+    `velocity_limits` "symmetric" about 0 or "literal", alpha times the range's own ends (Reading S9);
+    `rejected_velocity` "kept" or "zeroed" (Reading S11).
+    """
+
+    def __init__(
+        self,
+        space: SearchSpace,
+        rng: np.random.Generator,
+        *,
+        particles: int = PARTICLES,
+        iterations: int = ITERATIONS,
+        temperature: float = TEMPERATURE,
+        cooling: float = COOLING,
+        stop_temperature: float = STOP_TEMPERATURE,
+        inertia: float = INERTIA,
+        acceleration: float = ACCELERATION,
+        alpha: float = ALPHA,
+        redraws: int = REDRAWS,
+        cool: Literal["iteration", "acceptance"] = "iteration",
+        rand: Literal["dimension", "scalar"] = "dimension",
+        velocity_limits: Literal["symmetric", "literal"] = "symmetric",
+        rejected_velocity: Literal["kept", "zeroed"] = "kept",
+    ) -> None:
+        _check(particles, iterations, inertia, cool, rand, velocity_limits, rejected_velocity)
+        self._space, self._rng = space, rng
+        self._iterations, self._inertia, self._acceleration = iterations, inertia, acceleration
+        self._temperature, self._cooling, self._stop = temperature, cooling, stop_temperature
+        self._redraws, self._cool_each, self._scalar = redraws, cool == "acceptance", rand == "scalar"
+        self._zero_rejected = rejected_velocity == "zeroed"
+        self._low, self._high = _velocity_limits(space, alpha, velocity_limits)
+        self._iteration = 0
+        # Algorithm 1, step 1: particles that meet both constraints
+        self._moved = space.draw(rng, particles)
+        self._velocity = self._first_velocities()
+        self._position, self._cost = self._moved, np.full(particles, np.inf)
+        self._best, self._best_cost = self._moved.copy(), np.full(particles, np.inf)
+
+    def ask(self) -> Array:
+        """Return the particles (n, d) after their move; none once the iterations or the temperature are used up."""
+        # Algorithm 1, step 2: the loop's condition. Reading S10: the last generation is evaluated too.
+        if self._iteration > self._iterations or self._temperature <= self._stop:
+            return np.empty((0, self._space.dimensions))
+        return self._moved.copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Accept or refuse the move, remember the best, and fly on."""
+        costs = np.where(np.isnan(costs), np.inf, costs)
+        accepted = self._accept(costs)  # Algorithm 1, step 2d
+        self._position = np.where(accepted[:, None], proposals, self._position)
+        self._cost = np.where(accepted, costs, self._cost)
+        if self._zero_rejected:
+            self._velocity[~accepted] = 0.0
+        if self._iteration > 0:
+            # Algorithm 1, step 2e; Reading S6
+            self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
+        better = self._cost < self._best_cost  # Algorithm 1, step 2b
+        self._best[better], self._best_cost[better] = self._position[better], self._cost[better]
+        if self._iteration < self._iterations:
+            self._fly()
+        self._iteration += 1
+
+    def _accept(self, costs: Array) -> NDArray[np.bool_]:
+        with np.errstate(invalid="ignore"):
+            rise = np.where(np.isinf(self._cost), 0.0, costs - self._cost)
+        chance = np.exp(-np.maximum(rise, 0.0) / self._temperature)
+        return np.asarray((rise <= 0.0) | (chance > self._rng.random(len(costs))))
+
+    def _first_velocities(self) -> Array:
+        shape = self._moved.shape
+        start = self._space.start
+        if start is None:
+            return self._rng.uniform(self._low, self._high, shape)
+        # SAPSO (7); Reading S12: the bounds may be reversed
+        drawn = self._rng.uniform(np.minimum(0.0, start.velocity), np.maximum(0.0, start.velocity), shape)
+        return np.clip(drawn, self._low, self._high)
+
+    def _fly(self) -> None:
+        """Move every particle by (1) and (2), so that it meets the constraints: Algorithm 1, step 2c."""
+        space, here = self._space, self._position
+        best = self._best[np.argmin(self._best_cost)]
+        to_best, to_swarm = space.towards(here, self._best), space.towards(here, best)
+        omega = inertia(self._iteration, self._iterations, self._inertia)
+        before = self._velocity
+
+        def attempt(rows: NDArray[np.int64]) -> tuple[Array, Array]:
+            shape = (2, len(rows), 1 if self._scalar else here.shape[1])  # Reading S8
+            phi = self._acceleration * self._rng.random(shape)
+            flown = velocity(omega, before[rows], phi[0] * to_best[rows], phi[1] * to_swarm[rows])
+            flown = np.minimum(np.maximum(flown, self._low), self._high)
+            return flown, space.wrap(position(here[rows], flown))
+
+        self._velocity, self._moved = attempt(np.arange(len(here)))
+        broken = np.flatnonzero(~space.feasible(self._moved))
+        left, many = self._redraws, FIRST_REDRAWS
+        while left > 0 and len(broken):
+            many = min(left, many)
+            flown, moved = attempt(np.repeat(broken, many))
+            works = space.feasible(moved).reshape(-1, many)
+            mended = works.any(axis=1)
+            chosen = (np.arange(len(broken)) * many + works.argmax(axis=1))[mended]
+            self._velocity[broken[mended]], self._moved[broken[mended]] = flown[chosen], moved[chosen]
+            broken, left, many = broken[~mended], left - many, many * 8
+        # Reading S7: clip and stop; where even that breaks constraint 2, the particle stays where it was
+        clipped = np.clip(self._moved[broken], -1.0, 1.0)
+        self._moved[broken] = np.where(space.feasible(clipped)[:, None], clipped, here[broken])
+        self._velocity[broken] = 0.0
+
+
+def _velocity_limits(space: SearchSpace, alpha: float, kind: str) -> tuple[Array, Array]:
+    """Return the lowest and highest velocity (d,) of the unit box. SAPSO 2.2 constraint 1, Reading S9."""
+    if kind == "symmetric":
+        return np.full(space.dimensions, -alpha), np.full(space.dimensions, alpha)
+    half = np.where(space.half > 0.0, space.half, 1.0)
+    ends = alpha * (space.centre - space.half) / half, alpha * (space.centre + space.half) / half
+    return ends
+
+
+def _check(particles: int, iterations: int, first_inertia: float, *choices: str) -> None:
+    for name, value in (("particles", particles), ("iterations", iterations)):
+        if value < 1:
+            raise ValueError(f"{name} must be at least 1, got {value}")
+    if first_inertia <= 0.1:
+        raise ValueError(f"inertia must be above 0.1, got {first_inertia}")
+    names = ("cool", "rand", "velocity_limits", "rejected_velocity")
+    for name, choice, known in zip(names, choices, CHOICES, strict=True):
+        if choice not in known:
+            raise ValueError(f"{name} must be one of {', '.join(known)}, got {choice!r}")

@@ -1,0 +1,67 @@
+"""What an optimiser is, and the loop that drives one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from posefit.fitting.space import SearchSpace
+from posefit.geometry.rotation import Array
+
+
+class Optimiser(Protocol):
+    """Proposes populations and learns their costs; nothing to inherit."""
+
+    def ask(self) -> Array:
+        """Return the next population (n, d) in [-1, 1]^d; an empty one, (0, d), ends the search."""
+        ...
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Take the costs (n,) of exactly what `ask` returned; lower is better."""
+        ...
+
+
+class OptimiserFactory(Protocol):
+    """Builds an optimiser for one search: `factory(space, rng, **settings)`, settings keyword-only.
+
+    Randomness comes from `rng` alone.
+    """
+
+    def __call__(self, space: SearchSpace, rng: np.random.Generator, **settings: Any) -> Optimiser: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """What a search found."""
+
+    proposal: Array  # (d,) the best one seen
+    cost: float
+    evaluations: int
+    history: Array = field(repr=False)  # (populations,) best cost so far after each population
+
+
+def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluations: int) -> Minimum:
+    """Return the best proposal an optimiser finds within a budget of whole populations.
+
+    `evaluate` gives the costs (n,) of proposals (n, d). A population that would go over `evaluations` is not
+    evaluated. A cost that is nan never counts as best. Raises ValueError where the budget does not hold one
+    population, or where every cost is nan.
+    """
+    best, cost, used, history = None, np.inf, 0, []
+    while True:
+        proposals = optimiser.ask()
+        if not len(proposals) or used + len(proposals) > evaluations:
+            break
+        costs = evaluate(proposals)
+        used += len(proposals)
+        lowest = int(np.argmin(costs)) if not np.isnan(costs).any() else int(np.argmin(np.nan_to_num(costs, nan=np.inf)))
+        if best is None or costs[lowest] < cost:
+            best, cost = proposals[lowest].copy(), float(costs[lowest])
+        history.append(cost)
+        optimiser.tell(proposals, costs)
+    if best is None:
+        raise ValueError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
+    if np.isnan(cost):
+        raise ValueError(f"costs must be numbers, got nan for all {used} proposals")
+    return Minimum(best, cost, used, np.array(history))

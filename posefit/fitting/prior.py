@@ -1,0 +1,48 @@
+"""What a prior is: a space of joint angles with few coordinates, in the manner of scikit-learn."""
+
+from pathlib import Path
+from typing import Any, Protocol, Self
+
+from numpy.typing import NDArray
+
+import numpy as np
+
+from posefit.geometry.rotation import Array
+
+
+class Prior(Protocol):
+    """Maps joint angles (n, 63) to latents (n, m) and back. The root is no part of it: SAPSO section 2.
+
+    It is built as `factory(**settings)`, settings keyword-only. `low`, `high` and the methods below `fit` may be used
+    only after `fit`. `inverse_transform` and `feasible` must give the same bits for a row whatever rows stand
+    beside it.
+    """
+
+    low: Array  # (m,) the range of the latents, constraint 1
+    high: Array  # (m,)
+
+    def fit(self, angles: Array) -> Self:
+        """Learn from joint angles (T, 63) in radians and return itself."""
+        ...
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63)."""
+        ...
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        ...
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return which latents (n, m) are poses at all (n,), constraint 2; constraint 1 is checked by the box."""
+        ...
+
+    def save(self, path: str | Path) -> None:
+        """Write everything `fit` learned to an .npz file."""
+        ...
+
+
+class PriorFactory(Protocol):
+    """Builds an unfitted prior from its settings."""
+
+    def __call__(self, **settings: Any) -> Prior: ...

@@ -1,0 +1,67 @@
+"""The problem an optimiser solves: which proposal's body has the observed silhouettes?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from posefit.fitting.alignment import align
+from posefit.fitting.space import SearchSpace
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array
+from posefit.silhouette.cost import BETA, Areas, areas, mismatch
+from posefit.silhouette.mask import Silhouette
+
+
+@dataclass(frozen=True, eq=False)
+class PoseProblem:
+    """One observation, from one camera or several, and the space in which its pose is sought. SAPSO (5).
+
+    `evaluate` is pure: a proposal's cost has the same bits whatever stands beside it and however many threads work.
+    """
+
+    body: Body = field(repr=False)
+    cameras: Sequence[Camera]
+    silhouettes: Sequence[Silhouette] = field(repr=False)
+    space: SearchSpace
+    beta: float = BETA
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        if len(self.cameras) != len(self.silhouettes) or not self.cameras:
+            raise ValueError(f"silhouettes must be one a camera ({len(self.cameras)}), got {len(self.silhouettes)}")
+        for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
+            if silhouette.size != (camera.width, camera.height):
+                size = (camera.height, camera.width)
+                raise ValueError(f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}")
+        if not 0.0 <= self.beta <= 1.0:
+            raise ValueError(f"beta must lie in 0 to 1, got {self.beta}")
+        if self.threads < 1:
+            raise ValueError(f"threads must be at least 1, got {self.threads}")
+
+    def evaluate(self, proposals: Array) -> Array:
+        """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4)."""
+        return self.cost(*self.decode(proposals))
+
+    def decode(self, proposals: Array) -> tuple[Array, Array]:
+        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space asks it."""
+        poses, translations = self.space.decode(proposals)
+        if self.space.translation == "aligned":
+            translations = align(self.body, self.cameras, self.silhouettes, poses, translations)
+        return poses, translations
+
+    def cost(self, poses: Array, translations: Array) -> Array:
+        """Return the cost (n,) of poses (n, 66) with their root at translations (n, 3)."""
+        counts = self.areas(poses, translations)
+        costs = mismatch(counts[0], self.beta)
+        for more in counts[1:]:
+            costs += mismatch(more, self.beta)
+        return costs / len(counts)
+
+    def areas(self, poses: Array, translations: Array) -> list[Areas]:
+        """Return R, B, Y (n, 3) of each view."""
+        return [
+            areas(self.body, camera, silhouette, poses, translations, self.threads)
+            for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
+        ]

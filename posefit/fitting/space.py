@@ -1,0 +1,152 @@
+"""The box that optimisers search: proposals in [-1, 1]^d, and the poses they stand for."""
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.fitting.prior import Prior
+from posefit.geometry.rotation import Array, wrapped
+from posefit.geometry.skeleton import ANGLES
+
+Translation = Literal["known", "searched", "aligned"]  # Reading S4
+TRANSLATIONS: tuple[Translation, ...] = ("known", "searched", "aligned")
+
+REDRAWS = 100  # Reading S7
+ROOT_RANGE_DEGREES = (45.0, 15.0, 15.0)  # ours: how far yaw, pitch and roll are searched to either side
+TRANSLATION_RANGE = (0.5, 0.5, 0.5)  # ours: metres to either side
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """The distribution of a first population around a prediction, in the unit box. SAPSO (6), (7)."""
+
+    mean: Array  # (d,)
+    spread: Array  # (d,) standard deviations
+    velocity: Array  # (d,) v_pred
+
+
+@dataclass(frozen=True, eq=False)
+class SearchSpace:
+    """Maps proposals (n, d) in [-1, 1]^d to poses (n, 66) and translations (n, 3).
+
+    A proposal's coordinates, in this order: root yaw, pitch, roll in radians; the translation in metres, where it is
+    searched; the latents of the prior.
+    """
+
+    prior: Prior = field(repr=False)
+    root_centre: Array  # (3,) radians: the middle of the root's range
+    root_range: Array  # (3,) radians to either side; a yaw range of pi wraps around
+    anchor: Array  # (3,) metres: the known translation, the middle of the searched range, or where aligning starts
+    translation: Translation = "known"
+    translation_range: Array = field(default_factory=lambda: np.array(TRANSLATION_RANGE))  # (3,) metres
+    start: Start | None = None  # None: the first population is drawn uniformly from the box
+    centre: Array = field(init=False, repr=False)  # (d,) coordinates of the box's middle
+    half: Array = field(init=False, repr=False)  # (d,) half its sides
+    periodic: NDArray[np.bool_] = field(init=False, repr=False)  # (d,) coordinates that wrap around
+
+    def __post_init__(self) -> None:
+        if self.translation not in TRANSLATIONS:
+            raise ValueError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {self.translation!r}")
+        low, high = np.asarray(self.prior.low), np.asarray(self.prior.high)
+        middle, half = [self.root_centre, 0.5 * (low + high)], [self.root_range, 0.5 * (high - low)]
+        if self.translation == "searched":
+            middle.insert(1, self.anchor)
+            half.insert(1, self.translation_range)
+        object.__setattr__(self, "centre", np.concatenate(middle))
+        object.__setattr__(self, "half", np.concatenate(half))
+        periodic = np.zeros(len(self.centre), dtype=bool)
+        periodic[0] = self.root_range[0] >= np.pi - 1e-12
+        object.__setattr__(self, "periodic", periodic)
+
+    @property
+    def dimensions(self) -> int:
+        """How many coordinates a proposal has."""
+        return len(self.centre)
+
+    @property
+    def latents(self) -> slice:
+        """Where the prior's latents stand in a proposal."""
+        return slice(6 if self.translation == "searched" else 3, None)
+
+    def around(self, coordinates: Array, start: Start | None = None, anchor: Array | None = None) -> "SearchSpace":
+        """Return the space whose yaw range, and searched translation, are centred on coordinates (d,)."""
+        root = np.array([coordinates[0], *self.root_centre[1:]])
+        if self.translation == "searched":
+            anchor = coordinates[3:6]
+        return replace(self, root_centre=root, anchor=self.anchor if anchor is None else anchor, start=start)
+
+    def coordinates(self, proposals: Array) -> Array:
+        """Return the coordinates (..., d), in radians, metres and latents, of proposals (..., d)."""
+        return self.centre + self.half * proposals
+
+    def proposals(self, coordinates: Array) -> Array:
+        """Return the proposals (..., d) of coordinates (..., d), the nearest ones in the box."""
+        away = coordinates - self.centre
+        away[..., 0] = wrapped(away[..., 0])
+        return np.clip(away / np.where(self.half > 0.0, self.half, 1.0), -1.0, 1.0)
+
+    def decode(self, proposals: Array) -> tuple[Array, Array]:
+        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d).
+
+        An aligned translation is only its anchor here; the problem, which knows the silhouette, aligns it.
+        Raises ValueError where the shape does not fit or a proposal is not finite.
+        """
+        proposals = np.asarray(proposals, dtype=np.float64)
+        if proposals.ndim != 2 or proposals.shape[1] != self.dimensions:
+            raise ValueError(f"proposals must have shape (n, {self.dimensions}), got {proposals.shape}")
+        if not np.isfinite(proposals).all():
+            raise ValueError("proposals must be finite, got nan or infinity")
+        coordinates = self.coordinates(proposals)
+        poses = np.empty((len(proposals), ANGLES))
+        poses[:, :3] = coordinates[:, :3]
+        poses[:, 3:] = self.prior.inverse_transform(coordinates[:, self.latents])
+        if self.translation == "searched":
+            return poses, coordinates[:, 3:6].copy()
+        translations = np.empty((len(proposals), 3))
+        translations[:] = self.anchor
+        return poses, translations
+
+    def feasible(self, proposals: Array) -> NDArray[np.bool_]:
+        """Return which proposals (n, d) lie in the box and mean a pose to the prior (n,). SAPSO 2.2."""
+        inside = (np.abs(proposals) <= 1.0).all(axis=1)
+        latents = self.coordinates(proposals)[:, self.latents]
+        return np.asarray(inside & self.prior.feasible(latents))
+
+    def wrap(self, proposals: Array) -> Array:
+        """Return proposals with their periodic coordinates brought into [-1, 1)."""
+        if not self.periodic.any():
+            return proposals
+        return np.where(self.periodic, (proposals + 1.0) % 2.0 - 1.0, proposals)
+
+    def towards(self, origin: Array, target: Array) -> Array:
+        """Return target - origin, the short way round where a coordinate is periodic."""
+        return self.wrap(target - origin)
+
+    def draw(self, rng: np.random.Generator, count: int) -> Array:
+        """Return a first population (count, d) of feasible proposals, from `start` or uniform. SAPSO (6).
+
+        Each is redrawn at most 100 times (Reading S7); what is then still infeasible becomes the start's mean, or
+        the copy of one that is feasible. Raises ValueError where none is.
+        """
+        drawn = np.empty((count, self.dimensions))
+        wanted = np.arange(count)
+        for _ in range(REDRAWS):
+            drawn[wanted] = self._sample(rng, len(wanted))
+            wanted = wanted[~self.feasible(drawn[wanted])]
+            if not len(wanted):
+                return drawn
+        if self.start is not None and self.feasible(self.start.mean[None])[0]:
+            drawn[wanted] = self.start.mean
+            return drawn
+        found = np.setdiff1d(np.arange(count), wanted)
+        if not len(found):
+            raise ValueError(f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws")
+        drawn[wanted] = drawn[rng.choice(found, len(wanted))]
+        return drawn
+
+    def _sample(self, rng: np.random.Generator, count: int) -> Array:
+        if self.start is None:
+            return rng.uniform(-1.0, 1.0, (count, self.dimensions))
+        return self.wrap(rng.normal(self.start.mean, self.start.spread, (count, self.dimensions)))  # SAPSO (6)

@@ -1,0 +1,58 @@
+"""The person's flesh: a tapered cone on every bone."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, Skeleton
+
+# Radii as shares of the bone's length: (where the bone starts, where it ends). Ours: read off an adult's build.
+PROPORTIONS = {
+    "hipjoint": (0.80, 0.72),
+    "femur": (0.205, 0.130),
+    "tibia": (0.125, 0.085),
+    "foot": (0.34, 0.27),
+    "toes": (0.50, 0.34),
+    "lowerback": (1.00, 1.00),
+    "upperback": (1.00, 1.05),
+    "thorax": (1.05, 0.80),
+    "lowerneck": (0.66, 0.58),
+    "upperneck": (0.60, 0.85),
+    "head": (0.88, 0.86),
+    "clavicle": (0.40, 0.31),
+    "humerus": (0.185, 0.140),
+    "radius": (0.185, 0.130),
+    "wrist": (0.27, 0.33),
+    "hand": (0.90, 0.80),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A skeleton with the two radii of every bone's truncated cone, in metres. SAPSO section 2."""
+
+    skeleton: Skeleton
+    radii: Array = field(repr=False)  # (26, 2) where the bone starts, where it ends
+
+    def __post_init__(self) -> None:
+        radii = np.array(self.radii, dtype=np.float64)
+        if radii.shape != (len(BONES), 2):
+            raise ValueError(f"radii must have shape {(len(BONES), 2)}, got {radii.shape}")
+        if not (np.isfinite(radii).all() and (radii >= 0.0).all()):
+            raise ValueError(f"radii must be finite and not negative, got {radii.min()} to {radii.max()}")
+        radii.setflags(write=False)
+        object.__setattr__(self, "radii", radii)
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, girth: float = 1.0) -> "Body":
+        """Return the body whose radii are `PROPORTIONS` of the bone lengths, times `girth`."""
+        shares = np.array([PROPORTIONS[bone if bone in PROPORTIONS else bone[1:]] for bone in BONES])
+        return cls(skeleton, girth * shares * skeleton.lengths[:, None])
+
+    def joint_radii(self) -> Array:
+        """Return the largest radius (27,) that a bone has at each joint."""
+        radii = np.zeros(len(JOINTS))
+        np.maximum.at(radii, np.array(PARENTS[1:]), self.radii[:, 0])
+        np.maximum.at(radii, np.arange(1, len(JOINTS)), self.radii[:, 1])
+        return radii

@@ -1,0 +1,122 @@
+"""Pinhole cameras: x right, y down, z forward; pixel centres at +0.5."""
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from posefit.geometry.rotation import Array
+
+LARGEST_SIDE = 16_384  # pixels
+FIELD_OF_VIEW = math.radians(40.0)  # across the larger side; our guess for a camera nobody described
+MARGIN = 0.06  # share of the image left free around what `framing` shows
+_KEYS = ("width", "height", "focal", "centre", "camera_from_world")
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A calibrated view: `points_camera = rotation @ points_world + translation`, in metres."""
+
+    width: int
+    height: int
+    focal: Array  # (2,) pixels
+    centre: Array  # (2,) pixels
+    rotation: Array = field(repr=False)  # (3, 3) camera_from_world
+    translation: Array = field(repr=False)  # (3,) metres
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height"):
+            side = getattr(self, name)
+            if isinstance(side, bool) or not isinstance(side, int | np.integer) or not 1 <= side <= LARGEST_SIDE:
+                raise ValueError(f"{name} must be a whole number from 1 to {LARGEST_SIDE}, got {side!r}")
+            object.__setattr__(self, name, int(side))
+        for name, shape in (("focal", (2,)), ("centre", (2,)), ("rotation", (3, 3)), ("translation", (3,))):
+            try:
+                value = np.array(getattr(self, name), dtype=np.float64)
+            except (TypeError, ValueError):
+                raise ValueError(f"{name} must be numbers of shape {shape}, got {getattr(self, name)!r}") from None
+            if value.shape != shape or not np.isfinite(value).all():
+                raise ValueError(f"{name} must be finite numbers of shape {shape}, got {value.tolist()}")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        if (self.focal <= 0.0).any():
+            raise ValueError(f"focal must be positive, got {self.focal.tolist()}")
+        if not np.allclose(self.rotation @ self.rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(self.rotation) < 0:
+            raise ValueError(f"rotation must be orthonormal and right-handed, got {self.rotation.tolist()}")
+
+    @property
+    def position(self) -> Array:
+        """The optical centre (3,) in the world."""
+        return np.asarray(-self.rotation.T @ self.translation)
+
+    @classmethod
+    def around(
+        cls,
+        target: Array,
+        azimuth: float,
+        distance: float,
+        size: tuple[int, int],
+        field_of_view: float = FIELD_OF_VIEW,
+    ) -> "Camera":
+        """Return an upright camera of `size` (width, height) that looks level at `target` (3,).
+
+        It stands `distance` metres away in the direction `azimuth` radians about the vertical: 0 is world +z, and
+        pi/2 is world +x. `field_of_view` is the angle across the image's larger side.
+        """
+        sine, cosine = math.sin(azimuth), math.cos(azimuth)
+        rotation = np.array([[cosine, 0.0, -sine], [0.0, -1.0, 0.0], [-sine, 0.0, -cosine]])
+        focal = 0.5 * max(size) / math.tan(0.5 * field_of_view)
+        back = np.array([0.0, 0.0, distance])
+        return cls(*size, np.full(2, focal), np.array(size) / 2.0, rotation, back - rotation @ np.asarray(target))
+
+    @classmethod
+    def framing(cls, points: Array, radii: Array, azimuth: float, size: tuple[int, int]) -> "Camera":
+        """Return the nearest camera at `azimuth` that sees all balls, points (n, 3) with radii (n,), with a margin.
+
+        It aims at the middle of the points' bounding box. `azimuth` and `size` as in `around`.
+        """
+        points, radii = np.asarray(points, dtype=np.float64), np.asarray(radii, dtype=np.float64)
+        target = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        near = cls.around(target, azimuth, 0.0, size)
+        x, y, z = (points @ near.rotation.T + near.translation).T
+        free = (1.0 - MARGIN) * 0.5 * np.array(size) / near.focal
+        needed = np.maximum((np.abs(x) + radii) / free[0], (np.abs(y) + radii) / free[1]) - z
+        return cls.around(target, azimuth, float(max(needed.max(), (radii - z).max() + 0.5)), size)
+
+    def project(self, points: Array) -> tuple[Array, Array]:
+        """Return pixels (..., 2) and depths (...) in metres of world points (..., 3)."""
+        seen = np.asarray(points) @ self.rotation.T + self.translation
+        depths = seen[..., 2]
+        return seen[..., :2] / depths[..., None] * self.focal + self.centre, depths
+
+    def to_json(self) -> str:
+        """Return the text that `from_json` reads: sizes and pixels, and the 4 x 4 matrix camera_from_world."""
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.rotation, self.translation
+        values = (self.width, self.height, self.focal.tolist(), self.centre.tolist(), matrix.tolist())
+        return json.dumps(dict(zip(_KEYS, values, strict=True)), indent=1)
+
+    @classmethod
+    def from_json(cls, path: str | Path) -> "Camera":
+        """Return the camera of a file written by `to_json`. Raises ValueError naming the file and the key."""
+        path = Path(path)
+        if path.stat().st_size > 1_000_000:
+            raise ValueError(f"{path}: expected a camera file of at most 1 MB, got {path.stat().st_size} bytes")
+        try:
+            values = json.loads(path.read_text(encoding="utf-8"))
+        except (UnicodeDecodeError, json.JSONDecodeError) as error:
+            raise ValueError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {error}") from None
+        if not isinstance(values, dict) or set(values) != set(_KEYS):
+            keys = sorted(values) if isinstance(values, dict) else type(values).__name__
+            raise ValueError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {keys}")
+        try:
+            matrix = np.array(values["camera_from_world"], dtype=np.float64)
+            if matrix.shape != (4, 4):
+                raise ValueError(f"camera_from_world must have shape (4, 4), got {matrix.shape}")
+            return cls(
+                values["width"], values["height"], values["focal"], values["centre"], matrix[:3, :3], matrix[:3, 3]
+            )
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{path}: {error}") from None

@@ -1,0 +1,102 @@
+"""The two-way silhouette cost of many poses, over one view or several."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.kinematics import jit
+from posefit.geometry.rotation import Array
+from posefit.silhouette import kernels
+from posefit.silhouette.mask import Mask, Silhouette, unpack
+
+SCALE = 100.0  # S
+BETA = 0.5  # beta
+LEAST_SHARE = 16  # poses; a smaller share of work is not worth handing to another thread
+
+Areas = NDArray[np.int64]  # (n, 3): R, B, Y
+
+
+def view_of(camera: Camera) -> kernels.View:
+    """Return a camera as the kernel wants it."""
+    return kernels.View(
+        camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height
+    )
+
+
+def areas(
+    body: Body, camera: Camera, silhouette: Silhouette, poses: Array, translations: Array, threads: int = 1
+) -> Areas:
+    """Return R, B, Y (n, 3) in pixels of poses (n, 66) with their root at translations (n, 3). SAPSO (3).
+
+    R is silhouette without body, B body without silhouette, Y both; unknown pixels are in none. A bone with an end
+    nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`.
+    """
+    # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
+    poses, translations = np.require(poses, np.float64, "CW"), np.require(translations, np.float64, "CW")
+    n = len(poses)
+    out = np.empty((n, 3), dtype=np.int64)
+    chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
+    observed, valid = silhouette.bits
+
+    def work(part: slice) -> None:
+        kernels.count_areas(  # SAPSO (3)
+            chain, radii, view, observed, valid, poses[part], translations[part], out[part]
+        )
+
+    shares = max(1, min(threads, n // LEAST_SHARE))
+    cuts = [n * share // shares for share in range(shares + 1)]
+    others = [_submit(threads, work, slice(a, b)) for a, b in zip(cuts[1:-1], cuts[2:], strict=True)]
+    work(slice(0, cuts[1]))
+    for other in others:
+        other.result()
+    return out
+
+
+@jit
+def add_mismatch(areas, scale, beta, costs):
+    """Add the mismatch of areas (n, 3) to costs (n,). SAPSO (4)."""
+    for i in range(areas.shape[0]):
+        r, b, y = float(areas[i, 0]), float(areas[i, 1]), float(areas[i, 2])
+        # Reading S2: an empty denominator makes its term 1.
+        spilled = b / (b + y) if b + y > 0.0 else 1.0
+        missed = r / (r + y) if r + y > 0.0 else 1.0
+        costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)
+
+
+def mismatch(areas: Areas, beta: float = BETA) -> Array:
+    """Return the cost (n,) of areas R, B, Y (n, 3), 0 to 100. SAPSO (4), Reading S2."""
+    costs = np.zeros(len(areas))
+    add_mismatch(areas, SCALE, beta, costs)
+    return costs
+
+
+def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask:
+    """Return the mask (height, width) of one body, pose (66,), root at translation (3,)."""
+    bits = kernels.draw_bits(
+        body.skeleton.chain,
+        body.radii,
+        view_of(camera),
+        np.require(pose, np.float64, "CW"),
+        np.require(translation, np.float64, "CW"),
+    )
+    return unpack(bits, camera.width)
+
+
+@lru_cache(maxsize=1)
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads - 1, thread_name_prefix="posefit")
+
+
+if hasattr(os, "register_at_fork"):
+    # The threads of a pool do not live on in a forked child; without this its first call would wait for ever.
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+def _submit(threads: int, work: Callable[[slice], None], part: slice) -> "Future[None]":
+    return _pool(threads).submit(work, part)

@@ -1,0 +1,74 @@
+"""Masks, and the silhouette of one view as the kernel wants it: bits."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.silhouette.kernels import PAD, Bits
+
+Mask = NDArray[np.bool_]  # (height, width)
+
+
+def pack(mask: Mask) -> Bits:
+    """Return the bit image (words, height + PAD) of a mask (height, width)."""
+    height, width = mask.shape
+    words = (width + 63) // 64
+    octets = np.zeros((height + PAD, 8 * words), dtype=np.uint8)
+    packed = np.packbits(mask, axis=1, bitorder="little")
+    octets[:height, : packed.shape[1]] = packed
+    return np.ascontiguousarray(octets.view("<u8").T.astype(np.uint64))
+
+
+def unpack(bits: Bits, width: int) -> Mask:
+    """Return the mask (height, width) of a bit image."""
+    octets = np.ascontiguousarray(bits.T.astype("<u8")).view(np.uint8)
+    return np.unpackbits(octets, axis=1, count=width, bitorder="little")[:-PAD].astype(bool)
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouette:
+    """What one camera saw: the person's pixels, and which pixels are known at all."""
+
+    mask: Mask = field(repr=False)  # (height, width); unknown pixels are False
+    valid: Mask = field(repr=False)  # (height, width)
+
+    @classmethod
+    def of(cls, mask: NDArray[np.generic], valid: NDArray[np.generic] | None = None) -> "Silhouette":
+        """Return the silhouette of a mask (height, width), any value but 0 being the person.
+
+        Pixels where `valid` is 0 are unknown and count for nothing. Raises ValueError where shapes differ.
+        """
+        seen = np.asarray(mask)
+        if seen.ndim != 2 or 0 in seen.shape:
+            raise ValueError(f"mask must have shape (height, width), got {seen.shape}")
+        known = np.ones(seen.shape, dtype=bool) if valid is None else np.asarray(valid) != 0
+        if known.shape != seen.shape:
+            raise ValueError(f"valid must have the mask's shape {seen.shape}, got {known.shape}")
+        return cls((seen != 0) & known, known)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.mask.shape[1], self.mask.shape[0]
+
+    @cached_property
+    def bits(self) -> tuple[Bits, Bits]:
+        """The bit images of `mask` and `valid`."""
+        return pack(self.mask), pack(self.valid)
+
+    @cached_property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom border of the person in pixels; nan where nothing or the image's edge is seen."""
+        rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))
+        if not len(rows):
+            return (np.nan,) * 4
+        width, height = self.size
+        left, right, top, bottom = columns[0], columns[-1] + 1, rows[0], rows[-1] + 1
+        return (
+            float(left) if left > 0 else np.nan,
+            float(top) if top > 0 else np.nan,
+            float(right) if right < width else np.nan,
+            float(bottom) if bottom < height else np.nan,
+        )
