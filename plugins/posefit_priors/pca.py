@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.geometry.arrays import writeable
 from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
 
@@ -77,12 +78,12 @@ class PCA:
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m): Recovery. SAPSO 2.1."""
         angles = np.empty((len(latents), len(self.mean)))
-        _recover(np.require(latents, np.float64, "CW"), self.components, self.mean, angles)
+        _recover(writeable(latents), self.components, self.mean, angles)
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
-        distances = _nearest(self.centres, np.require(latents, np.float64, "CW"))
+        distances = _nearest(self.centres, writeable(latents))
         return np.asarray(distances < self.reach)  # SAPSO 2.2 constraint 2
 
     def save(self, path: str | Path) -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from posefit import SearchSpace
 from posefit.geometry.rotation import Array
-from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, inertia, position, velocity
+from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, fly, inertia, mend, settle
 
 PARTICLES = 40  # N, section 5.2
 ITERATIONS = 60  # C, section 5.2
@@ -15,7 +15,7 @@ TEMPERATURE = 1.0  # T, section 5.2
 COOLING = 0.95  # gamma, section 5.2
 STOP_TEMPERATURE = 0.0  # T0; Reading S5
 REDRAWS = 100  # Reading S7
-FIRST_REDRAWS = 4  # ours: how many of them are drawn at once; then eight times as many, and so on
+FIRST_REDRAWS = 8  # ours: how many of them are drawn at once; then all that are left
 CHOICES = (
     ("iteration", "acceptance"),
     ("dimension", "scalar"),
@@ -61,11 +61,11 @@ class SAPSO:
         self._redraws, self._cool_each, self._scalar = redraws, cool == "acceptance", rand == "scalar"
         self._zero_rejected = rejected_velocity == "zeroed"
         self._low, self._high = _velocity_limits(space, alpha, velocity_limits)
-        self._iteration = 0
+        self._iteration, self._everyone = 0, np.arange(particles)
         # Algorithm 1, step 1: particles that meet both constraints
         self._moved = space.draw(rng, particles)
         self._velocity = self._first_velocities()
-        self._position, self._cost = self._moved, np.full(particles, np.inf)
+        self._position, self._cost = self._moved.copy(), np.full(particles, np.inf)
         self._best, self._best_cost = self._moved.copy(), np.full(particles, np.inf)
 
     def ask(self) -> Array:
@@ -77,26 +77,19 @@ class SAPSO:
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Accept or refuse the move, remember the best, and fly on."""
-        costs = np.where(np.isnan(costs), np.inf, costs)
-        accepted = self._accept(costs)  # Algorithm 1, step 2d
-        self._position = np.where(accepted[:, None], proposals, self._position)
-        self._cost = np.where(accepted, costs, self._cost)
+        accepted = np.empty(len(costs), dtype=bool)
+        leader = settle(  # Algorithm 1, steps 2d and 2b
+            proposals, np.asarray(costs, dtype=np.float64), self._rng.random(len(costs)), self._temperature,
+            self._position, self._cost, self._best, self._best_cost, accepted,
+        )
         if self._zero_rejected:
             self._velocity[~accepted] = 0.0
         if self._iteration > 0:
             # Algorithm 1, step 2e; Reading S6
             self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
-        better = self._cost < self._best_cost  # Algorithm 1, step 2b
-        self._best[better], self._best_cost[better] = self._position[better], self._cost[better]
         if self._iteration < self._iterations:
-            self._fly()
+            self._fly(self._best[leader].copy())
         self._iteration += 1
-
-    def _accept(self, costs: Array) -> NDArray[np.bool_]:
-        with np.errstate(invalid="ignore"):
-            rise = np.where(np.isinf(self._cost), 0.0, costs - self._cost)
-        chance = np.exp(-np.maximum(rise, 0.0) / self._temperature)
-        return np.asarray((rise <= 0.0) | (chance > self._rng.random(len(costs))))
 
     def _first_velocities(self) -> Array:
         shape = self._moved.shape
@@ -107,36 +100,36 @@ class SAPSO:
         drawn = self._rng.uniform(np.minimum(0.0, start.velocity), np.maximum(0.0, start.velocity), shape)
         return np.clip(drawn, self._low, self._high)
 
-    def _fly(self) -> None:
+    def _fly(self, swarm_best: Array) -> None:
         """Move every particle by (1) and (2), so that it meets the constraints: Algorithm 1, step 2c."""
-        space, here = self._space, self._position
-        best = self._best[np.argmin(self._best_cost)]
-        to_best, to_swarm = space.towards(here, self._best), space.towards(here, best)
-        omega = inertia(self._iteration, self._iterations, self._inertia)
-        before = self._velocity
-
-        def attempt(rows: NDArray[np.int64]) -> tuple[Array, Array]:
-            shape = (2, len(rows), 1 if self._scalar else here.shape[1])  # Reading S8
-            phi = self._acceleration * self._rng.random(shape)
-            flown = velocity(omega, before[rows], phi[0] * to_best[rows], phi[1] * to_swarm[rows])
-            flown = np.minimum(np.maximum(flown, self._low), self._high)
-            return flown, space.wrap(position(here[rows], flown))
-
-        self._velocity, self._moved = attempt(np.arange(len(here)))
-        broken = np.flatnonzero(~space.feasible(self._moved))
+        before, feasible = self._velocity, self._space.feasible
+        self._velocity, self._moved = self._attempt(self._everyone, before, swarm_best)
+        broken = np.flatnonzero(~feasible(self._moved))
         left, many = self._redraws, FIRST_REDRAWS
         while left > 0 and len(broken):
             many = min(left, many)
-            flown, moved = attempt(np.repeat(broken, many))
-            works = space.feasible(moved).reshape(-1, many)
-            mended = works.any(axis=1)
-            chosen = (np.arange(len(broken)) * many + works.argmax(axis=1))[mended]
-            self._velocity[broken[mended]], self._moved[broken[mended]] = flown[chosen], moved[chosen]
-            broken, left, many = broken[~mended], left - many, many * 8
-        # Reading S7: clip and stop; where even that breaks constraint 2, the particle stays where it was
-        clipped = np.clip(self._moved[broken], -1.0, 1.0)
-        self._moved[broken] = np.where(space.feasible(clipped)[:, None], clipped, here[broken])
-        self._velocity[broken] = 0.0
+            flown, moved = self._attempt(np.repeat(broken, many), before, swarm_best)
+            broken = mend(broken, feasible(moved), flown, moved, self._velocity, self._moved)
+            left, many = left - many, self._redraws
+        if len(broken):
+            # Reading S7: clip and stop; where even that breaks constraint 2, the particle stays where it was
+            clipped = np.clip(self._moved[broken], -1.0, 1.0)
+            self._moved[broken] = np.where(feasible(clipped)[:, None], clipped, self._position[broken])
+            self._velocity[broken] = 0.0
+
+    def _attempt(self, rows: NDArray[np.int64], velocity: Array, swarm_best: Array) -> tuple[Array, Array]:
+        """Return new velocities and positions (k, d) of some particles, with fresh draws of rand()."""
+        shape = (len(rows), self._space.dimensions)
+        if self._scalar:  # Reading S8
+            rand = np.repeat(self._rng.random((2, len(rows), 1)), shape[1], axis=2)
+        else:
+            rand = self._rng.random((2, *shape))
+        flown, moved = np.empty(shape), np.empty(shape)
+        fly(
+            rows, inertia(self._iteration, self._iterations, self._inertia), self._acceleration, rand,
+            self._position, velocity, self._best, swarm_best, self._low, self._high, self._space.periodic, flown, moved,
+        )
+        return flown, moved
 
 
 def _velocity_limits(space: SearchSpace, alpha: float, kind: str) -> tuple[Array, Array]:
@@ -144,8 +137,7 @@ def _velocity_limits(space: SearchSpace, alpha: float, kind: str) -> tuple[Array
     if kind == "symmetric":
         return np.full(space.dimensions, -alpha), np.full(space.dimensions, alpha)
     half = np.where(space.half > 0.0, space.half, 1.0)
-    ends = alpha * (space.centre - space.half) / half, alpha * (space.centre + space.half) / half
-    return ends
+    return alpha * (space.centre - space.half) / half, alpha * (space.centre + space.half) / half
 
 
 def _check(particles: int, iterations: int, first_inertia: float, *choices: str) -> None:

@@ -1,5 +1,6 @@
 """What an optimiser is, and the loop that drives one."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -55,7 +56,9 @@ def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluatio
             break
         costs = evaluate(proposals)
         used += len(proposals)
-        lowest = int(np.argmin(costs)) if not np.isnan(costs).any() else int(np.argmin(np.nan_to_num(costs, nan=np.inf)))
+        lowest = int(costs.argmin())
+        if math.isnan(costs[lowest]):  # argmin prefers nan to any number
+            lowest = int(np.where(np.isnan(costs), np.inf, costs).argmin())
         if best is None or costs[lowest] < cost:
             best, cost = proposals[lowest].copy(), float(costs[lowest])
         history.append(cost)

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.fitting.prior import Prior
+from posefit.geometry.arrays import writeable
+from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array, wrapped
 from posefit.geometry.skeleton import ANGLES
 
@@ -54,8 +56,9 @@ class SearchSpace:
         if self.translation == "searched":
             middle.insert(1, self.anchor)
             half.insert(1, self.translation_range)
-        object.__setattr__(self, "centre", np.concatenate(middle))
-        object.__setattr__(self, "half", np.concatenate(half))
+        object.__setattr__(self, "centre", np.concatenate(middle).astype(np.float64))
+        object.__setattr__(self, "half", np.concatenate(half).astype(np.float64))
+        object.__setattr__(self, "anchor", np.array(self.anchor, dtype=np.float64))
         periodic = np.zeros(len(self.centre), dtype=bool)
         periodic[0] = self.root_range[0] >= np.pi - 1e-12
         object.__setattr__(self, "periodic", periodic)
@@ -64,11 +67,6 @@ class SearchSpace:
     def dimensions(self) -> int:
         """How many coordinates a proposal has."""
         return len(self.centre)
-
-    @property
-    def latents(self) -> slice:
-        """Where the prior's latents stand in a proposal."""
-        return slice(6 if self.translation == "searched" else 3, None)
 
     def around(self, coordinates: Array, start: Start | None = None, anchor: Array | None = None) -> "SearchSpace":
         """Return the space whose yaw range, and searched translation, are centred on coordinates (d,)."""
@@ -93,25 +91,21 @@ class SearchSpace:
         An aligned translation is only its anchor here; the problem, which knows the silhouette, aligns it.
         Raises ValueError where the shape does not fit or a proposal is not finite.
         """
-        proposals = np.asarray(proposals, dtype=np.float64)
+        proposals = writeable(proposals)
         if proposals.ndim != 2 or proposals.shape[1] != self.dimensions:
             raise ValueError(f"proposals must have shape (n, {self.dimensions}), got {proposals.shape}")
-        if not np.isfinite(proposals).all():
+        n, first = len(proposals), self.dimensions - len(self.prior.low)
+        poses, translations = np.empty((n, ANGLES)), np.empty((n, 3))
+        latents = np.empty((n, self.dimensions - first))
+        if not _decode(proposals, self.centre, self.half, self.anchor, first, poses, translations, latents):
             raise ValueError("proposals must be finite, got nan or infinity")
-        coordinates = self.coordinates(proposals)
-        poses = np.empty((len(proposals), ANGLES))
-        poses[:, :3] = coordinates[:, :3]
-        poses[:, 3:] = self.prior.inverse_transform(coordinates[:, self.latents])
-        if self.translation == "searched":
-            return poses, coordinates[:, 3:6].copy()
-        translations = np.empty((len(proposals), 3))
-        translations[:] = self.anchor
+        poses[:, 3:] = self.prior.inverse_transform(latents)
         return poses, translations
 
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, d) lie in the box and mean a pose to the prior (n,). SAPSO 2.2."""
-        inside = (np.abs(proposals) <= 1.0).all(axis=1)
-        latents = self.coordinates(proposals)[:, self.latents]
+        proposals = writeable(proposals)
+        inside, latents = _inside(proposals, self.centre, self.half, self.dimensions - len(self.prior.low))
         return np.asarray(inside & self.prior.feasible(latents))
 
     def wrap(self, proposals: Array) -> Array:
@@ -150,3 +144,31 @@ class SearchSpace:
         if self.start is None:
             return rng.uniform(-1.0, 1.0, (count, self.dimensions))
         return self.wrap(rng.normal(self.start.mean, self.start.spread, (count, self.dimensions)))  # SAPSO (6)
+
+
+@jit
+def _decode(proposals, centre, half, anchor, first, poses, translations, latents):
+    """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite."""
+    total = 0.0
+    for i in range(proposals.shape[0]):
+        for j in range(3):
+            poses[i, j] = centre[j] + half[j] * proposals[i, j]
+            translations[i, j] = centre[3 + j] + half[3 + j] * proposals[i, 3 + j] if first > 3 else anchor[j]
+            total += poses[i, j] + translations[i, j]
+        for j in range(latents.shape[1]):
+            latents[i, j] = centre[first + j] + half[first + j] * proposals[i, first + j]
+            total += latents[i, j]
+    return np.isfinite(total)
+
+
+@jit
+def _inside(proposals, centre, half, first):
+    """Return which proposals (n, d) lie in the box, and the latents of all."""
+    n, d = proposals.shape
+    inside, latents = np.ones(n, np.bool_), np.empty((n, d - first))
+    for i in range(n):
+        for j in range(d):
+            inside[i] &= abs(proposals[i, j]) <= 1.0
+        for j in range(first, d):
+            latents[i, j - first] = centre[j] + half[j] * proposals[i, j]
+    return inside, latents

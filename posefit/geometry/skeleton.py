@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.geometry import kinematics
+from posefit.geometry.arrays import writeable
 from posefit.geometry.rotation import Array
 
 _TREE = """
@@ -131,6 +132,6 @@ class Skeleton:
         where = np.zeros((*lead, 3)) if translations is None else np.asarray(translations, dtype=np.float64)
         if where.shape != (*lead, 3):
             raise ValueError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
-        flat = np.require(poses.reshape(-1, ANGLES), np.float64, "CW")
-        positions = kinematics.joint_positions(self.chain, flat, np.require(where.reshape(-1, 3), np.float64, "CW"))
+        flat = writeable(poses.reshape(-1, ANGLES))
+        positions = kinematics.joint_positions(self.chain, flat, writeable(where.reshape(-1, 3)))
         return np.asarray(positions).reshape(*lead, len(JOINTS), 3)

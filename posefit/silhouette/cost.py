@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.geometry.arrays import writeable
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.kinematics import jit
@@ -38,7 +39,7 @@ def areas(
     nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`.
     """
     # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
-    poses, translations = np.require(poses, np.float64, "CW"), np.require(translations, np.float64, "CW")
+    poses, translations = writeable(poses), writeable(translations)
     n = len(poses)
     out = np.empty((n, 3), dtype=np.int64)
     chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
@@ -82,8 +83,8 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         body.skeleton.chain,
         body.radii,
         view_of(camera),
-        np.require(pose, np.float64, "CW"),
-        np.require(translation, np.float64, "CW"),
+        writeable(pose),
+        writeable(translation),
     )
     return unpack(bits, camera.width)
 

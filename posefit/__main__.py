@@ -1,0 +1,3 @@
+from posefit.cli import main
+
+main()

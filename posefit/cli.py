@@ -1,0 +1,158 @@
+"""The command line. Messages and progress go to stderr, results to stdout; a mistake is one line and exit status 2."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import click
+
+from posefit import __version__
+
+
+class _Mistakes(click.Group):
+    """Turns the errors that users can make into one line on stderr."""
+
+    def invoke(self, context: click.Context) -> Any:
+        try:
+            return super().invoke(context)
+        except (ValueError, FileNotFoundError, PermissionError, ImportError) as error:
+            click.echo(f"posefit: {' '.join(str(error).split())}", err=True)
+            context.exit(2)
+
+
+def _size(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
+    width, _sign, height = value.lower().partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise click.BadParameter(f"expected WIDTHxHEIGHT such as 320x240, got {value!r}")
+    return int(width), int(height)
+
+
+def _range(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int | None, int | None]:
+    if value is None:
+        return None, None
+    start, colon, stop = value.partition(":")
+    try:
+        if colon:
+            return int(start) if start else None, int(stop) if stop else None
+    except ValueError:
+        pass
+    raise click.BadParameter(f"expected A:B such as 0:50, :50 or 10:, got {value!r}")
+
+
+_OPTIONS = (
+    click.argument("source", default="walk"),
+    click.option("--asf", metavar="FILE", help="Skeleton of SOURCE; by default the only .asf beside an .amc."),
+    click.option("--camera", metavar="FILE", help="Camera as JSON; guessed where absent."),
+    click.option("--optimiser", default="sapso", show_default=True, help="See `posefit plugins`."),
+    click.option("--prior", default="pca", show_default=True, help="See `posefit plugins`."),
+    click.option("--train", multiple=True, metavar="SOURCE", help="Motion the prior learns from; may be repeated."),
+    click.option("--view-degrees", type=float, help="Where the camera stands: 0 in front, 90 to the side."),
+    click.option("--size", default="320x240", show_default=True, callback=_size, help="Image of a rendered motion."),
+    click.option("--fps", type=float, default=30.0, show_default=True, help="Rate to resample a motion to."),
+    click.option("--particles", type=int, default=40, show_default=True, help="N"),
+    click.option("--iterations", type=int, default=60, show_default=True, help="C"),
+    click.option("--translation", help="Root translation: known, searched or aligned."),
+    click.option("--seed", type=int, default=0, show_default=True),
+    click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),
+    click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),
+    click.option("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
+    click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout."),
+)
+
+
+def _common(command: Callable[..., None]) -> Callable[..., None]:
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+@click.group(cls=_Mistakes, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="posefit")
+def main() -> None:
+    """Recover a person's 3D pose from silhouettes, by searching."""
+
+
+@main.command()
+@_common
+@click.option("--frames", callback=_range, metavar="A:B", help="Only these frames, counted after resampling.")
+def track(as_json: bool, **options: Any) -> None:
+    """Follow a person through SOURCE: a built-in motion, an .amc or .bvh file, a folder or .npz of masks."""
+    from posefit.study.run import track as run
+
+    result = run(options.pop("source"), progress=_progress, say=_say, **options)
+    if as_json:
+        click.echo(json.dumps(result.summary))
+        return
+    from posefit.study.table import table
+
+    click.echo(table(result.summary))
+    if options["out"]:
+        click.echo(f"written to {options['out']}: watch overlay.mp4, look at summary.png")
+
+
+@main.command()
+@_common
+@click.option("--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling.")
+def fit(as_json: bool, **options: Any) -> None:
+    """Find the pose in one frame of SOURCE."""
+    from posefit.study.run import fit as run
+
+    result = run(options.pop("source"), say=_say, **options)
+    if as_json:
+        click.echo(json.dumps({**result.summary, "pose_degrees": _degrees(result.pose)}))
+        return
+    from posefit.study.table import table
+
+    click.echo(table(result.summary))
+    if options["out"]:
+        click.echo(f"written to {options['out']}: look at summary.png")
+
+
+@main.command()
+@click.option("--threads", type=int, help="How many `all threads` are; by default every core.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def bench(threads: int | None, as_json: bool) -> None:
+    """Time the kernel, the OpenCV way and a SAPSO frame, all in one run."""
+    from posefit.study.bench import bench as run
+
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be at least 1, got {threads}")
+    _say("timing; this takes about half a minute ...")
+    figures = run(threads)
+    if as_json:
+        click.echo(json.dumps(figures))
+        return
+    for name, value in figures.items():
+        click.echo(f"{name:34} {value:.4g}" if isinstance(value, float) else f"{name:34} {value}")
+
+
+@main.command()
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def plugins(as_json: bool) -> None:
+    """List the optimisers and priors that are installed."""
+    from posefit.registry import registry
+
+    offers = [offer for kind in registry().offers.values() for offer in kind.values()]
+    rows = [(offer.kind, offer.name, f"{offer.distribution} {offer.version}", offer.summary) for offer in offers]
+    if as_json:
+        click.echo(json.dumps([dict(zip(("kind", "name", "distribution", "summary"), row, strict=True)) for row in rows]))
+        return
+    for kind, name, distribution, summary in rows:
+        click.echo(f"{kind:10} {name:10} {distribution:16} {summary}")
+
+
+def _say(message: str) -> None:
+    click.echo(message, err=True)
+
+
+def _progress(frames: Iterator[Any], count: int) -> Iterator[Any]:
+    from tqdm import tqdm
+
+    return iter(tqdm(frames, total=count, unit="frame", file=sys.stderr, dynamic_ncols=True))
+
+
+def _degrees(pose: Any) -> list[float]:
+    import numpy as np
+
+    return [round(float(angle), 6) for angle in np.degrees(pose)]

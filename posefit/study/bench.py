@@ -1,0 +1,129 @@
+"""How fast is the loop? All figures from one run, so that their ratios hold on any machine."""
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numpy as np
+
+from posefit.fitting.optimiser import minimise
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import PARENTS
+from posefit.motion import library
+from posefit.registry import registry
+from posefit.silhouette.cost import mismatch, project
+from posefit.silhouette.mask import Silhouette
+
+SIZE = (320, 240)
+POSES = 1000
+PARTICLES, ITERATIONS = 40, 60
+ROUNDS = 15  # the fastest of so many counts
+
+
+def problem(threads: int = 1) -> PoseProblem:
+    """Return the benchmark's problem: one frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
+    motion = library.built_in("walk", frames=1, fps=30.0)
+    body = Body.of(motion.skeleton)
+    styles = [library.built_in(name, frames=60, fps=30.0) for name in library.other_styles("walk")]
+    prior = registry().prior("pca")().fit(np.concatenate([style.poses[:, 3:] for style in styles]))
+    joints = motion.skeleton.joints(motion.poses, motion.translations)[0]
+    camera = Camera.framing(joints, body.joint_radii(), motion.poses[0, 0] + np.radians(45.0), SIZE)
+    space = SearchSpace(
+        prior, np.array([motion.poses[0, 0], 0.0, 0.0]), np.radians([45.0, 15.0, 15.0]), motion.translations[0]
+    )
+    silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
+    return PoseProblem(body, [camera], [silhouette], space, threads=threads)
+
+
+def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:
+    """Return the costs (n,) of proposals the usual way: OpenCV draws every cone into a byte image and counts it.
+
+    Kinematics, prior and outlines are computed for all poses at once; drawing is two circles and a quadrilateral a
+    bone, at 1/16 pixel, as everybody would write it.
+    """
+    body, camera, silhouette = problem.body, problem.cameras[0], problem.silhouettes[0]
+    poses, translations = problem.decode(proposals)
+    pixels, depths = camera.project(body.skeleton.joints(poses, translations))
+    scale = np.sqrt(camera.focal.prod()) / depths
+    parents = np.array(PARENTS[1:])
+    first, second = pixels[:, parents], pixels[:, 1:]
+    radius0, radius1 = scale[:, parents] * body.radii[:, 0], scale[:, 1:] * body.radii[:, 1]
+    axis = second - first
+    square = (axis**2).sum(axis=-1)
+    along = ((radius0 - radius1) / square)[..., None]
+    across = (np.sqrt(np.maximum(square - (radius0 - radius1) ** 2, 0.0)) / square)[..., None]
+    normal = np.stack([-axis[..., 1], axis[..., 0]], axis=-1)
+    up, down = along * axis + across * normal, along * axis - across * normal
+    r0, r1 = radius0[..., None], radius1[..., None]
+    corners = np.stack([first + r0 * up, second + r1 * up, second + r1 * down, first + r0 * down], axis=2)
+    corners = np.rint((corners - 0.5) * 16).astype(np.int32)
+    a, b = (np.rint((points - 0.5) * 16).astype(int).tolist() for points in (first, second))
+    r, s = (np.rint(radii * 16).astype(int).tolist() for radii in (radius0, radius1))
+    observed = silhouette.mask.astype(np.uint8)
+    total = cv2.countNonZero(observed)
+    image = np.zeros_like(observed)
+    areas = np.empty((len(proposals), 3), dtype=np.int64)
+    for i in range(len(proposals)):
+        image[:] = 0
+        for j in range(len(parents)):
+            cv2.fillConvexPoly(image, corners[i, j], 1, cv2.LINE_8, 4)
+            cv2.circle(image, a[i][j], r[i][j], 1, -1, cv2.LINE_8, 4)
+            cv2.circle(image, b[i][j], s[i][j], 1, -1, cv2.LINE_8, 4)
+        overlap = cv2.countNonZero(cv2.bitwise_and(image, observed))
+        areas[i] = total - overlap, cv2.countNonZero(image) - overlap, overlap
+    return mismatch(areas)
+
+
+def bench(threads: int | None = None) -> dict[str, Any]:
+    """Return the timings; `threads` is how many "all" are, by default every core this process may use."""
+    many = threads or (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+    alone, together = problem(), problem(many)
+    rng = np.random.default_rng(0)
+    proposals = alone.space.draw(rng, POSES)
+    factory = registry().optimiser("sapso")
+
+    def frame() -> None:
+        optimiser = factory(alone.space, np.random.default_rng(0), particles=PARTICLES, iterations=ITERATIONS)
+        minimise(alone.evaluate, optimiser, PARTICLES * (ITERATIONS + 1))
+
+    jobs: dict[str, Callable[[], object]] = {
+        "one": lambda: alone.evaluate(proposals),
+        "all": lambda: together.evaluate(proposals),
+        "opencv": lambda: opencv_costs(alone, proposals[: POSES // 5]),
+        "frame": frame,
+    }
+    seconds = {name: np.inf for name in jobs}
+    cv2_threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        for name, job in jobs.items():
+            job()
+        for _ in range(ROUNDS):  # in turn, so that a slow moment of the machine falls on all
+            for name, job in jobs.items():
+                began = time.perf_counter()
+                job()
+                seconds[name] = min(seconds[name], time.perf_counter() - began)
+    finally:
+        cv2.setNumThreads(cv2_threads)
+    difference = np.abs(alone.evaluate(proposals) - opencv_costs(alone, proposals))
+    one = seconds["one"] / POSES
+    return {
+        "kernel_us_per_pose_1_thread": 1e6 * one,
+        "kernel_us_per_pose_all_threads": 1e6 * seconds["all"] / POSES,
+        "opencv_us_per_pose": 1e6 * seconds["opencv"] / (POSES // 5),
+        "sapso_frame_ms": 1e3 * seconds["frame"],
+        "sapso_overhead": seconds["frame"] / (PARTICLES * (ITERATIONS + 1) * one),
+        "kernel_speedup": seconds["opencv"] / (POSES // 5) / one,
+        "threads": many,
+        "threads_speedup": seconds["one"] / seconds["all"],
+        "poses_per_second_1_thread": 1.0 / one,
+        "mean_cost_difference_to_opencv": float(difference.mean()),
+        "size": list(SIZE),
+        "poses": POSES,
+    }

@@ -1,0 +1,34 @@
+"""The table a track prints: the method beside what anybody can reach without it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+_NAMES = {
+    "mean_pose": "mean training pose",
+    "persistence": "first true pose, held",
+    "nearest": "best training pose",
+}
+
+
+def table(summary: Mapping[str, Any]) -> str:
+    """Return the lines that `posefit track` prints."""
+    lines = [
+        f"{summary['motion']}: {summary['frames']} frames, {summary['method']}, seed {summary['seed']}, "
+        f"translation {summary['translation']}, trained on {', '.join(summary['train'])}"
+    ]
+    error = summary["error_degrees"]
+    if error is not None:
+        lines.append(f"{'':24} {'error deg':>9} {'skill':>7}")
+        lines.append(f"{summary['method']:24} {error['mean']:9.2f}")
+        for name, baseline in summary["baselines_degrees"].items():
+            lines.append(f"{_NAMES[name]:24} {baseline:9.2f} {summary['skill'][name]:7.2f}")
+        lines.append(f"{'floor of the prior':24} {summary['prior_floor_degrees']:9.2f}")
+        lines.append(
+            f"MPJPE {summary['mpjpe_mm']:.0f} mm, PA-MPJPE {summary['pa_mpjpe_mm']:.0f} mm, left/right swapped "
+            f"{100 * summary['swap_rate']:.0f} %, lost {100 * summary['lost_rate']:.0f} % of frames"
+        )
+    lines.append(
+        f"IoU {summary['iou']:.3f}, {1e3 * summary['seconds_per_frame']:.1f} ms a frame, "
+        f"{summary['evaluations_per_second']:,.0f} poses a second"
+    )
+    return "\n".join(lines)
