@@ -1,0 +1,109 @@
+"""How far an estimate is from the truth. Poses are (T, 66) radians, joints (T, 27, 3) metres."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.geometry.rotation import Array, geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
+from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR
+
+LOST_MM = 150.0  # MPJPE above which a frame counts as lost
+
+_PAIRED = np.array([j for j in range(len(JOINTS)) if MIRROR[j] != j])
+
+
+def pose_error_degrees(truth: Array, estimate: Array, dimensions: NDArray[np.bool_] | None = None) -> Array:
+    """Return the mean absolute difference of the angles (T,) in degrees, wrapped. SAPSO (8), Reading S13.
+
+    All 66 angles count, padding too, unless `dimensions` (66,) chooses some.
+    """
+    truth, estimate = _pair("estimate", truth, estimate, (ANGLES,))
+    difference = np.degrees(np.abs(wrapped(truth - estimate)))
+    return np.asarray((difference if dimensions is None else difference[:, dimensions]).mean(axis=1))  # SAPSO (8)
+
+
+def mean_error(errors: Array) -> float:
+    """Return the mean of a sequence's errors (T,). SAPSO (9)."""
+    return float(np.mean(errors))  # SAPSO (9)
+
+
+def error_spread(errors: Array) -> float:
+    """Return the standard deviation of a sequence's errors (T,), with divisor T. SAPSO (10)."""
+    return float(np.std(errors))  # SAPSO (10)
+
+
+def geodesic_degrees(truth: Array, estimate: Array) -> Array:
+    """Return the mean angle (T,) in degrees between true and estimated rotations of the root and 21 inner joints."""
+    truth, estimate = _pair("estimate", truth, estimate, (ANGLES,))
+    root = geodesic(rotation_from_root_angles(truth[:, :3]), rotation_from_root_angles(estimate[:, :3]))
+    inner = [rotation_from_joint_angles(poses[:, 3:].reshape(len(poses), -1, 3)) for poses in (truth, estimate)]
+    return np.asarray(np.degrees(np.column_stack([root, geodesic(*inner)])).mean(axis=1))
+
+
+def mpjpe_mm(truth: Array, joints: Array) -> Array:
+    """Return the mean distance (T,) of the joints in millimetres, both roots at one point."""
+    truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
+    return np.asarray(1e3 * _distances(_rooted(truth), _rooted(joints)).mean(axis=1))
+
+
+def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
+    """Return the mean distance (T,) of the joints in millimetres after the best rotation, scale and translation."""
+    truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
+    target = truth - truth.mean(axis=1, keepdims=True)
+    source = joints - joints.mean(axis=1, keepdims=True)
+    left, spread, right = np.linalg.svd(np.swapaxes(source, 1, 2) @ target)
+    sign = np.sign(np.linalg.det(left @ right))
+    left[:, :, -1] *= sign[:, None]  # a rotation, never a reflection
+    spread[:, -1] *= sign
+    size = (source**2).sum(axis=(1, 2))
+    scale = spread.sum(axis=1) / np.where(size > 0.0, size, 1.0)
+    moved = scale[:, None, None] * (source @ left @ right)
+    return np.asarray(1e3 * _distances(target, moved).mean(axis=1))
+
+
+def iou(areas: NDArray[np.int64]) -> Array:
+    """Return the intersection over union (n,) of areas R, B, Y (n, 3); 1 where both are empty."""
+    total = areas.sum(axis=1)
+    return np.asarray(np.where(total > 0, areas[:, 2] / np.maximum(total, 1), 1.0))
+
+
+def swapped(truth: Array, joints: Array) -> NDArray[np.bool_]:
+    """Return whether each frame (T,) comes nearer to the truth when its left and right limbs trade names.
+
+    Distances are those of the joints that have a counterpart, both roots at one point. Reading S15.
+    """
+    truth, joints = (_rooted(points) for points in _pair("joints", truth, joints, (len(JOINTS), 3)))
+    named = _distances(truth[:, _PAIRED], joints[:, _PAIRED]).mean(axis=1)
+    traded = _distances(truth[:, _PAIRED], joints[:, np.array(MIRROR)[_PAIRED]]).mean(axis=1)
+    return np.asarray(traded < named)
+
+
+def swap_rate(truth: Array, joints: Array) -> float:
+    """Return the share of frames with left and right swapped. Reading S15."""
+    return float(swapped(truth, joints).mean())
+
+
+def lost_rate(mpjpe: Array) -> float:
+    """Return the share of frames whose MPJPE (T,) in millimetres is above 150."""
+    return float((np.asarray(mpjpe) > LOST_MM).mean())
+
+
+def skill(error: float, baseline: float) -> float | None:
+    """Return 1 - error / baseline: 1 is perfect, 0 no better than the baseline; None where the baseline is 0."""
+    return 1.0 - error / baseline if baseline > 0.0 else None
+
+
+def _pair(name: str, truth: Array, other: Array, tail: tuple[int, ...]) -> tuple[Array, Array]:
+    truth, other = np.asarray(truth, dtype=np.float64), np.asarray(other, dtype=np.float64)
+    if truth.shape[1:] != tail or not len(truth):
+        raise ValueError(f"truth must have shape (T, {', '.join(map(str, tail))}), got {truth.shape}")
+    if other.shape != truth.shape:
+        raise ValueError(f"{name} must have the truth's shape {truth.shape}, got {other.shape}")
+    return truth, other
+
+
+def _rooted(joints: Array) -> Array:
+    return joints - joints[:, :1]
+
+
+def _distances(first: Array, second: Array) -> Array:
+    return np.asarray(np.linalg.norm(first - second, axis=-1))

@@ -1,0 +1,141 @@
+"""Fits the built-in motions and the average skeleton to CMU clips: `python -m posefit.motion.fit_library CMU_DIR`.
+
+A motion is a period and, for each free angle and the root's path, a Fourier series over that period. What is stored
+are these few numbers, no recorded frame. It is run by hand when a motion is added; its result, library.json, is
+what the package carries.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
+from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton
+from posefit.motion.amc import read_clip
+from posefit.motion.asf import read_asf
+
+ORIGIN = (
+    "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "The database was created with funding from NSF EIA-0196217."
+)
+HARMONICS = 5
+DIGITS = 5  # decimals of radians and metres
+SUBJECTS = ("02", "05", "09", "13", "14", "16", "17", "49", "127")
+
+
+class Clip(NamedTuple):
+    """Where a style comes from: the steady part of a clip, and its shortest and longest possible period in seconds."""
+
+    path: str
+    start: int
+    stop: int | None
+    shortest: float
+    longest: float
+
+
+CLIPS = {
+    "walk-a": Clip("16/16_15", 0, None, 0.9, 1.35),
+    "walk-b": Clip("02/02_01", 0, None, 0.9, 1.35),
+    "walk-c": Clip("05/05_01", 0, 380, 0.9, 1.35),
+    "run-a": Clip("16/16_35", 0, None, 0.6, 0.95),
+    "run-b": Clip("09/09_01", 0, None, 0.6, 0.95),
+    "run-c": Clip("127/127_03", 40, 300, 0.6, 0.95),
+}
+
+
+def basis(phases: Array, harmonics: int) -> Array:
+    """Return 1, cosines and sines (T, 1 + 2 harmonics) of phases (T,) counted in cycles."""
+    turns = 2.0 * np.pi * np.outer(phases, np.arange(1, harmonics + 1))
+    return np.column_stack([np.ones(len(phases)), np.cos(turns), np.sin(turns)])
+
+
+def fitted(root: Path, clip: Clip) -> dict[str, Any]:
+    """Return the model of one style."""
+    folder, name = clip.path.split("/")
+    motion = read_clip(root / folder / f"{folder}.asf", root / folder / f"{name}.amc")
+    motion = motion.frames(clip.start, clip.stop or len(motion))
+    times = np.arange(len(motion)) / motion.fps
+    velocity = np.polyfit(times, motion.translations, 1)[0]
+    heading = np.arctan2(velocity[0], velocity[2])
+    turn = Rotation.from_euler("y", -heading).as_matrix()
+    path = motion.translations @ turn.T
+    speed = float(np.hypot(velocity[0], velocity[2]))
+    path[:, 2] -= speed * times
+    path[:, [0, 2]] -= path[:, [0, 2]].mean(axis=0)
+    series = np.column_stack([path, motion.poses])
+    series[:, 3] = (series[:, 3] - heading + np.pi) % (2.0 * np.pi) - np.pi
+    free = np.flatnonzero(motion.skeleton.free)
+    used = series[:, np.concatenate([[0, 1, 2], 3 + free])]
+
+    def residual(period: float) -> tuple[float, Array]:
+        columns = basis(times / period, HARMONICS)
+        # a little damping: a clip barely longer than its period leaves the highest harmonics undetermined
+        normal = columns.T @ columns + 1e-3 * np.eye(columns.shape[1])
+        found = np.linalg.solve(normal, columns.T @ used)
+        return float(np.abs(used - columns @ found)[:, 3:].sum() / len(used) / 66.0), found
+
+    periods = np.arange(clip.shortest, clip.longest, 0.0025)
+    period = float(periods[np.argmin([residual(p)[0] for p in periods])])
+    error, coefficients = residual(period)
+    return {
+        "source": name,
+        "period": round(period, 4),
+        "speed": round(speed, 4),
+        "residual_degrees": round(float(np.degrees(error)), 3),
+        "angles": free.tolist(),
+        "series": np.round(coefficients.T, DIGITS).tolist(),
+    }
+
+
+def average(skeletons: list[Skeleton]) -> dict[str, Any]:
+    """Return the mean of some skeletons and their mirror images."""
+    flip = np.diag([-1.0, 1.0, 1.0])
+    other = np.array(MIRROR)[1:] - 1
+    offsets = np.mean([half for one in skeletons for half in (one.offsets, one.offsets[other] @ flip)], axis=0)
+    frames = np.array([half for one in skeletons for half in (one.axes, flip @ one.axes[other] @ flip)])
+    axes = np.array([Rotation.from_matrix(frames[:, bone]).mean().as_matrix() for bone in range(len(BONES))])
+    inner = {JOINTS[joint] for joint in INNER}
+    return {
+        "offsets": np.round(offsets, DIGITS).tolist(),
+        "axes_degrees": np.round(np.degrees(joint_angles_from_rotation(axes)), 4).tolist(),
+        "channels": [[bone, list(free)] for bone, free in skeletons[0].channels if bone in inner],
+    }
+
+
+def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
+    """Shift a model's root height so that the lowest joint of its cycle is 3 cm above the ground, as thick as a toe."""
+    phases = np.linspace(0.0, 1.0, 120, endpoint=False)
+    values = basis(phases, HARMONICS) @ np.array(model["series"]).T
+    poses = np.zeros((len(phases), 66))
+    poses[:, model["angles"]] = values[:, 3:]
+    joints = skeleton.joints(poses, values[:, :3])
+    model["series"][1][0] = round(model["series"][1][0] + 0.03 - float(joints[..., 1].min()), DIGITS)
+
+
+def main(root: Path) -> None:
+    """Write library.json beside this file."""
+    bones = average([read_asf(root / subject / f"{subject}.asf") for subject in SUBJECTS])
+    skeleton = Skeleton(
+        "average",
+        np.array(bones["offsets"]),
+        rotation_from_joint_angles(np.radians(bones["axes_degrees"])),
+        tuple((bone, tuple(free)) for bone, free in bones["channels"]),
+    )
+    motions = {name: fitted(root, clip) for name, clip in CLIPS.items()}
+    for name, model in motions.items():
+        grounded(model, skeleton)
+        print(f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees")
+    target = Path(__file__).with_name("library.json")
+    text = json.dumps({"origin": ORIGIN, "skeleton": bones, "motions": motions}, separators=(",", ":"))
+    target.write_text(text + "\n", encoding="utf-8")
+    print(f"{target.name}: {len(text)} bytes")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("usage: python -m posefit.motion.fit_library CMU_DIR")
+    main(Path(sys.argv[1]))

@@ -1,0 +1,81 @@
+"""The built-in motions: small periodic models, so that everything runs without any data.
+
+Every kind has three styles, `walk-a` to `walk-c` and `run-a` to `run-c`, each from another person; `walk` and `run`
+stand for the first. They were fitted to CMU clips by `fit_library.py`. The data used in this project was obtained
+from mocap.cs.cmu.edu. The database was created with funding from NSF EIA-0196217.
+"""
+
+import json
+from difflib import get_close_matches
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from posefit.geometry.rotation import rotation_from_joint_angles
+from posefit.geometry.skeleton import ANGLES, Skeleton
+from posefit.motion.motion import Motion
+
+
+@lru_cache(maxsize=1)
+def _library() -> dict[str, Any]:
+    stored: dict[str, Any] = json.loads((files("posefit.motion") / "library.json").read_text(encoding="utf-8"))
+    return stored
+
+
+def names() -> tuple[str, ...]:
+    """Return the names that `built_in` takes."""
+    styles = tuple(_library()["motions"])
+    return tuple(dict.fromkeys(name.split("-")[0] for name in styles)) + styles
+
+
+def other_styles(name: str) -> tuple[str, ...]:
+    """Return the other styles of a motion's kind, what its prior is trained on by default."""
+    full = _full(name)
+    kind = full.split("-")[0]
+    return tuple(style for style in _library()["motions"] if style.split("-")[0] == kind and style != full)
+
+
+@lru_cache(maxsize=1)
+def average_skeleton() -> Skeleton:
+    """Return the skeleton of the built-in motions: the mean of nine people, left and right alike."""
+    stored = _library()["skeleton"]
+    return Skeleton(
+        "average",
+        np.array(stored["offsets"]),
+        rotation_from_joint_angles(np.radians(stored["axes_degrees"])),
+        tuple((bone, tuple(free)) for bone, free in stored["channels"]),
+    )
+
+
+def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0, phase: float = 0.0) -> Motion:
+    """Return a built-in motion of so many frames. It goes along +z, and half its way is behind the origin.
+
+    `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
+    lowest joint of the cycle is 3 cm above the ground y = 0. Raises ValueError for an unknown name.
+    """
+    if frames < 1:
+        raise ValueError(f"frames must be at least 1, got {frames}")
+    if not (np.isfinite(fps) and fps > 0.0 and np.isfinite(speed) and speed > 0.0):
+        raise ValueError(f"fps and speed must be positive, got {fps} and {speed}")
+    model = _library()["motions"][_full(name)]
+    series = np.array(model["series"])
+    times = np.arange(frames) * speed / fps
+    turns = 2.0 * np.pi * np.outer(times / model["period"] + phase, np.arange(1, series.shape[1] // 2 + 1))
+    values = np.column_stack([np.ones(frames), np.cos(turns), np.sin(turns)]) @ series.T
+    poses = np.zeros((frames, ANGLES))
+    poses[:, model["angles"]] = values[:, 3:]
+    translations = values[:, :3].copy()
+    translations[:, 2] += model["speed"] * (times - 0.5 * times[-1])
+    return Motion(name, average_skeleton(), poses, translations, fps)
+
+
+def _full(name: str) -> str:
+    motions = _library()["motions"]
+    full = name if name in motions else f"{name}-a"
+    if full not in motions:
+        near = get_close_matches(name, names(), 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ValueError(f"motion must be a file, a folder or one of {', '.join(names())}, got {name!r}{hint}")
+    return full
