@@ -136,7 +136,9 @@ def plugins(as_json: bool) -> None:
     offers = [offer for kind in registry().offers.values() for offer in kind.values()]
     rows = [(offer.kind, offer.name, f"{offer.distribution} {offer.version}", offer.summary) for offer in offers]
     if as_json:
-        click.echo(json.dumps([dict(zip(("kind", "name", "distribution", "summary"), row, strict=True)) for row in rows]))
+        click.echo(
+            json.dumps([dict(zip(("kind", "name", "distribution", "summary"), row, strict=True)) for row in rows])
+        )
         return
     for kind, name, distribution, summary in rows:
         click.echo(f"{kind:10} {name:10} {distribution:16} {summary}")

@@ -1,7 +1,7 @@
 """Finds plugins and what they offer. A broken plugin costs one warning; the others work on."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import lru_cache
@@ -41,11 +41,13 @@ class Registry:
 
     def optimiser(self, name: str) -> OptimiserFactory:
         """Return the optimiser factory of a name. Raises ValueError listing the known names."""
-        return self._find("optimiser", name)
+        factory: OptimiserFactory = self._find("optimiser", name)
+        return factory
 
     def prior(self, name: str) -> PriorFactory:
         """Return the prior factory of a name. Raises ValueError listing the known names."""
-        return self._find("prior", name)
+        factory: PriorFactory = self._find("prior", name)
+        return factory
 
     def _find(self, kind: Kind, name: str) -> Any:
         known = self.offers[kind]
@@ -62,32 +64,21 @@ def registry() -> Registry:
     return load(entry_points(group=hooks.PROJECT))
 
 
-def load(points: "tuple[EntryPoint, ...] | Any") -> Registry:
+def load(points: Iterable[EntryPoint]) -> Registry:
     """Return what the plugins behind these entry points offer.
 
     Each plugin that cannot be imported, misspells a hook, fails inside one or takes a name that is taken is warned
     of, with its distribution, and left out.
     """
     offers: dict[Kind, dict[str, Offer]] = {"optimiser": {}, "prior": {}}
-    for point in sorted(points, key=lambda point: (point.dist is not None and point.dist.name != "posefit", point.name)):
+    for point in sorted(points, key=_built_ins_first):
         distribution, version = (point.dist.name, point.dist.version) if point.dist else ("unknown", "")
-        mine: list[Offer] = []
-
-        def collect(kind: Kind) -> Callable[[str, Any], None]:
-            def register(name: str, factory: Any) -> None:
-                if name in offers[kind]:
-                    raise ValueError(f"{kind} {name!r} is already registered by {offers[kind][name].distribution}")
-                mine.append(Offer(kind, name, factory, distribution, version))
-
-            return register
-
         try:
-            manager = pluggy.PluginManager(hooks.PROJECT)
-            manager.add_hookspecs(hooks)
-            manager.register(point.load(), point.name)
-            manager.check_pending()
-            manager.hook.posefit_register_optimisers(register=collect("optimiser"))
-            manager.hook.posefit_register_priors(register=collect("prior"))
+            mine = [Offer(*one, distribution, version) for one in _registered(point)]
+            for offer in mine:
+                if offer.name in offers[offer.kind]:
+                    owner = offers[offer.kind][offer.name].distribution
+                    raise ValueError(f"{offer.kind} {offer.name!r} is already registered by {owner}")
         except Exception as error:  # whatever a plugin does, the others must work
             warnings.warn(
                 f"plugin {point.name!r} of {distribution} {version} is left out: {type(error).__name__}: {error}",
@@ -97,3 +88,19 @@ def load(points: "tuple[EntryPoint, ...] | Any") -> Registry:
         for offer in mine:
             offers[offer.kind][offer.name] = offer
     return Registry(offers)
+
+
+def _built_ins_first(point: EntryPoint) -> tuple[bool, str]:
+    return point.dist is None or point.dist.name != hooks.PROJECT, point.name
+
+
+def _registered(point: EntryPoint) -> list[tuple[Kind, str, Callable[..., Any]]]:
+    """Return (kind, name, factory) of everything one plugin registers."""
+    manager = pluggy.PluginManager(hooks.PROJECT)
+    manager.add_hookspecs(hooks)
+    manager.register(point.load(), point.name)
+    manager.check_pending()
+    mine: list[tuple[Kind, str, Callable[..., Any]]] = []
+    manager.hook.posefit_register_optimisers(register=lambda name, make: mine.append(("optimiser", name, make)))
+    manager.hook.posefit_register_priors(register=lambda name, make: mine.append(("prior", name, make)))
+    return mine

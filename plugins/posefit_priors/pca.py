@@ -57,7 +57,11 @@ class PCA:
         self.mean = angles.mean(axis=0)
         _, spread, directions = np.linalg.svd(angles - self.mean, full_matrices=False)  # SAPSO 2.1
         share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
-        kept = int(self._components) if self._components >= 1 else int(np.searchsorted(share.cumsum(), self._components)) + 1
+        kept = (
+            int(self._components)
+            if self._components >= 1
+            else int(np.searchsorted(share.cumsum(), self._components)) + 1
+        )
         self.explained, self.components = share[:kept].copy(), directions[:kept].copy()
         latents = self.transform(angles)
         self.low, self.high = latents.min(axis=0), latents.max(axis=0)  # SAPSO 2.2 constraint 1

@@ -79,8 +79,15 @@ class SAPSO:
         """Accept or refuse the move, remember the best, and fly on."""
         accepted = np.empty(len(costs), dtype=bool)
         leader = settle(  # Algorithm 1, steps 2d and 2b
-            proposals, np.asarray(costs, dtype=np.float64), self._rng.random(len(costs)), self._temperature,
-            self._position, self._cost, self._best, self._best_cost, accepted,
+            proposals,
+            np.asarray(costs, dtype=np.float64),
+            self._rng.random(len(costs)),
+            self._temperature,
+            self._position,
+            self._cost,
+            self._best,
+            self._best_cost,
+            accepted,
         )
         if self._zero_rejected:
             self._velocity[~accepted] = 0.0
@@ -126,8 +133,19 @@ class SAPSO:
             rand = self._rng.random((2, *shape))
         flown, moved = np.empty(shape), np.empty(shape)
         fly(
-            rows, inertia(self._iteration, self._iterations, self._inertia), self._acceleration, rand,
-            self._position, velocity, self._best, swarm_best, self._low, self._high, self._space.periodic, flown, moved,
+            rows,
+            inertia(self._iteration, self._iterations, self._inertia),
+            self._acceleration,
+            rand,
+            self._position,
+            velocity,
+            self._best,
+            swarm_best,
+            self._low,
+            self._high,
+            self._space.periodic,
+            flown,
+            moved,
         )
         return flown, moved
 

@@ -64,9 +64,7 @@ def settle(moved, costs, chances, temperature, position, position_costs, best, b
     for i in range(costs.size):
         rise = costs[i] - position_costs[i]
         # true of a first cost, which replaces +inf; false of nan
-        accepted[i] = (
-            rise <= 0.0 or costs[i] == position_costs[i] or math.exp(-rise / temperature) > chances[i]
-        )
+        accepted[i] = rise <= 0.0 or costs[i] == position_costs[i] or math.exp(-rise / temperature) > chances[i]
         if accepted[i]:
             position[i] = moved[i]
             position_costs[i] = costs[i]

@@ -46,5 +46,5 @@ def align(
                 gap = b * at[:, 2] - a * at[:, axis] - sign * scale * radii[outermost] - offset
                 normal += np.outer(row, row)
                 right = right + (gap / scale)[:, None] * row
-        translations = np.linalg.solve(normal, right[..., None])[..., 0]
+        translations = np.linalg.solve(normal, right[..., None])[..., 0].astype(np.float64)
     return translations

@@ -3,11 +3,10 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from posefit.fitting.space import SearchSpace
 from posefit.geometry.rotation import Array
 
 
@@ -23,13 +22,9 @@ class Optimiser(Protocol):
         ...
 
 
-class OptimiserFactory(Protocol):
-    """Builds an optimiser for one search: `factory(space, rng, **settings)`, settings keyword-only.
-
-    Randomness comes from `rng` alone.
-    """
-
-    def __call__(self, space: SearchSpace, rng: np.random.Generator, **settings: Any) -> Optimiser: ...
+# Builds an optimiser for one search, as `factory(space, rng, **settings)`: a SearchSpace, a numpy Generator that is the
+# only source of randomness, and keyword-only settings.
+OptimiserFactory = Callable[..., Optimiser]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,11 @@
 """What a prior is: a space of joint angles with few coordinates, in the manner of scikit-learn."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, Self
-
-from numpy.typing import NDArray
+from typing import Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.geometry.rotation import Array
 
@@ -42,7 +42,5 @@ class Prior(Protocol):
         ...
 
 
-class PriorFactory(Protocol):
-    """Builds an unfitted prior from its settings."""
-
-    def __call__(self, **settings: Any) -> Prior: ...
+# Builds an unfitted prior, as `factory(**settings)`.
+PriorFactory = Callable[..., Prior]

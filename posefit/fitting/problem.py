@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from posefit.fitting.alignment import align
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body

@@ -14,7 +14,7 @@ from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, SearchS
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
-from posefit.silhouette.cost import BETA
+from posefit.silhouette.cost import BETA, Areas
 from posefit.silhouette.mask import Silhouette
 
 SPREAD = 1.0  # k of Reading S5: Sigma's standard deviations, as multiples of the predicted step
@@ -36,7 +36,7 @@ class Frame:
     pose: Array = field(repr=False)  # (66,)
     translation: Array  # (3,) metres
     cost: float
-    areas: Array = field(repr=False)  # (views, 3): R, B, Y
+    areas: Areas = field(repr=False)  # (views, 3): R, B, Y
     evaluations: int
     seconds: float
     history: Array = field(repr=False)  # (populations,) best cost after each
@@ -91,9 +91,7 @@ class SynthesisTracker:
         if self.yaw is None:
             reach[0] = np.pi
         centre = np.array([self.yaw or 0.0, 0.0, 0.0])
-        return SearchSpace(
-            self.prior, centre, reach, self.anchor, self.translation, np.array(self.translation_range)
-        )
+        return SearchSpace(self.prior, centre, reach, self.anchor, self.translation, np.array(self.translation_range))
 
     def _next_space(self, space: SearchSpace, found: list[Array], observation: Observation) -> SearchSpace:
         """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""

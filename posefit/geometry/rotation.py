@@ -3,17 +3,20 @@
 Angles are radians. Matrices act on column vectors: `v_parent = rotation @ v_child`.
 """
 
+from typing import Final, Literal
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
+Order = Literal["YXZ", "xyz"]
 
 # Reading S3: yaw about the vertical is outermost, then pitch, then roll. With the paper's x, y, z order
 # the middle angle is the yaw, and a side view sits on the singularity.
-ROOT_ORDER = "YXZ"
+ROOT_ORDER: Final = "YXZ"
 # Acclaim files: rx first, so that the matrix is Rz @ Ry @ Rx.
-JOINT_ORDER = "xyz"
+JOINT_ORDER: Final = "xyz"
 
 
 def rotation_from_root_angles(angles: Array) -> Array:
@@ -44,18 +47,18 @@ def wrapped(angles: Array) -> Array:
 def geodesic(first: Array, second: Array) -> Array:
     """Return the angle (...), 0 to pi, of the rotation that takes `first` to `second`, both (..., 3, 3)."""
     relative = np.swapaxes(first, -1, -2) @ second
-    return _as_batch(relative).magnitude().reshape(relative.shape[:-2])
+    return np.asarray(_as_batch(relative).magnitude()).reshape(relative.shape[:-2])
 
 
 def _as_batch(rotations: Array) -> Rotation:
     return Rotation.from_matrix(np.asarray(rotations, dtype=np.float64).reshape(-1, 3, 3))
 
 
-def _matrices(order: str, angles: Array) -> Array:
+def _matrices(order: Order, angles: Array) -> Array:
     angles = np.asarray(angles, dtype=np.float64)
     return Rotation.from_euler(order, angles.reshape(-1, 3)).as_matrix().reshape(*angles.shape, 3)
 
 
-def _angles(order: str, rotations: Array) -> Array:
+def _angles(order: Order, rotations: Array) -> Array:
     # At the singularity one of the angles is free; scipy then takes zero for it.
-    return _as_batch(rotations).as_euler(order, suppress_warnings=True).reshape(*np.shape(rotations)[:-1])
+    return np.asarray(_as_batch(rotations).as_euler(order, suppress_warnings=True)).reshape(*np.shape(rotations)[:-1])

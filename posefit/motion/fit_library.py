@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
-from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton
+from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.motion.amc import read_clip
 from posefit.motion.asf import read_asf
 
@@ -38,12 +39,11 @@ class Clip(NamedTuple):
 
 
 CLIPS = {
-    "walk-a": Clip("16/16_15", 0, None, 0.9, 1.35),
+    "walk-a": Clip("16/16_15", 2, None, 0.9, 1.35),
     "walk-b": Clip("02/02_01", 0, None, 0.9, 1.35),
     "walk-c": Clip("05/05_01", 0, 380, 0.9, 1.35),
     "run-a": Clip("16/16_35", 0, None, 0.6, 0.95),
     "run-b": Clip("09/09_01", 0, None, 0.6, 0.95),
-    "run-c": Clip("127/127_03", 40, 300, 0.6, 0.95),
 }
 
 
@@ -75,12 +75,13 @@ def fitted(root: Path, clip: Clip) -> dict[str, Any]:
         columns = basis(times / period, HARMONICS)
         # a little damping: a clip barely longer than its period leaves the highest harmonics undetermined
         normal = columns.T @ columns + 1e-3 * np.eye(columns.shape[1])
-        found = np.linalg.solve(normal, columns.T @ used)
+        found: Array = np.linalg.solve(normal, columns.T @ used).astype(np.float64)
         return float(np.abs(used - columns @ found)[:, 3:].sum() / len(used) / 66.0), found
 
     periods = np.arange(clip.shortest, clip.longest, 0.0025)
     period = float(periods[np.argmin([residual(p)[0] for p in periods])])
     error, coefficients = residual(period)
+    coefficients = in_step(coefficients, free)
     return {
         "source": name,
         "period": round(period, 4),
@@ -89,6 +90,17 @@ def fitted(root: Path, clip: Clip) -> dict[str, Any]:
         "angles": free.tolist(),
         "series": np.round(coefficients.T, DIGITS).tolist(),
     }
+
+
+def in_step(coefficients: Array, free: NDArray[np.int64]) -> Array:
+    """Return coefficients (1 + 2 H, series) shifted: at phase 0 the left thigh is furthest ahead of the right."""
+    left, right = (3 + int(np.searchsorted(free, angle_index(JOINTS.index(bone)))) for bone in ("lfemur", "rfemur"))
+    swing = coefficients[:, right] - coefficients[:, left]  # rx is negative when the thigh is in front
+    shift = np.arctan2(swing[1 + HARMONICS], swing[1])
+    turns = shift * np.arange(1, HARMONICS + 1)[:, None]
+    cosines, sines = coefficients[1 : 1 + HARMONICS], coefficients[1 + HARMONICS :]
+    moved = cosines * np.cos(turns) + sines * np.sin(turns), sines * np.cos(turns) - cosines * np.sin(turns)
+    return np.vstack([coefficients[:1], *moved])
 
 
 def average(skeletons: list[Skeleton]) -> dict[str, Any]:

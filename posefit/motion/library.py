@@ -1,8 +1,10 @@
 """The built-in motions: small periodic models, so that everything runs without any data.
 
-Every kind has three styles, `walk-a` to `walk-c` and `run-a` to `run-c`, each from another person; `walk` and `run`
-stand for the first. They were fitted to CMU clips by `fit_library.py`. The data used in this project was obtained
-from mocap.cs.cmu.edu. The database was created with funding from NSF EIA-0196217.
+Every kind has styles, each from another person: `walk-a`, `walk-b`, `walk-c`, `run-a`, `run-b`. `walk` and `run`,
+without a letter, are somebody in between: the mean of the styles, in step. So `walk` is none of the motions that its
+prior is trained on, but within their reach; a prior trained on other people only, as for `walk-a`, is the harder case.
+They were fitted to CMU clips by `fit_library.py`. The data used in this project was obtained from mocap.cs.cmu.edu.
+The database was created with funding from NSF EIA-0196217.
 """
 
 import json
@@ -13,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.geometry.rotation import rotation_from_joint_angles
+from posefit.geometry.rotation import Array, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.motion.motion import Motion
 
@@ -32,9 +34,9 @@ def names() -> tuple[str, ...]:
 
 def other_styles(name: str) -> tuple[str, ...]:
     """Return the other styles of a motion's kind, what its prior is trained on by default."""
-    full = _full(name)
-    kind = full.split("-")[0]
-    return tuple(style for style in _library()["motions"] if style.split("-")[0] == kind and style != full)
+    _check(name)
+    kind = name.split("-")[0]
+    return tuple(style for style in _library()["motions"] if style.split("-")[0] == kind and style != name)
 
 
 @lru_cache(maxsize=1)
@@ -59,23 +61,29 @@ def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1
         raise ValueError(f"frames must be at least 1, got {frames}")
     if not (np.isfinite(fps) and fps > 0.0 and np.isfinite(speed) and speed > 0.0):
         raise ValueError(f"fps and speed must be positive, got {fps} and {speed}")
-    model = _library()["motions"][_full(name)]
-    series = np.array(model["series"])
+    angles, series, period, pace = _model(name)
     times = np.arange(frames) * speed / fps
-    turns = 2.0 * np.pi * np.outer(times / model["period"] + phase, np.arange(1, series.shape[1] // 2 + 1))
+    turns = 2.0 * np.pi * np.outer(times / period + phase, np.arange(1, series.shape[1] // 2 + 1))
     values = np.column_stack([np.ones(frames), np.cos(turns), np.sin(turns)]) @ series.T
     poses = np.zeros((frames, ANGLES))
-    poses[:, model["angles"]] = values[:, 3:]
+    poses[:, angles] = values[:, 3:]
     translations = values[:, :3].copy()
-    translations[:, 2] += model["speed"] * (times - 0.5 * times[-1])
+    translations[:, 2] += pace * (times - 0.5 * times[-1])
     return Motion(name, average_skeleton(), poses, translations, fps)
 
 
-def _full(name: str) -> str:
-    motions = _library()["motions"]
-    full = name if name in motions else f"{name}-a"
-    if full not in motions:
+def _model(name: str) -> tuple[list[int], Array, float, float]:
+    """Return the free angles, the series of path and angles, the period in seconds and the pace in m/s."""
+    _check(name)
+    styles = [name] if name in _library()["motions"] else other_styles(name)
+    models = [_library()["motions"][style] for style in styles]
+    means = (np.mean([model[key] for model in models], axis=0) for key in ("series", "period", "speed"))
+    series, period, pace = means
+    return models[0]["angles"], series, float(period), float(pace)
+
+
+def _check(name: str) -> None:
+    if name not in names():
         near = get_close_matches(name, names(), 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise ValueError(f"motion must be a file, a folder or one of {', '.join(names())}, got {name!r}{hint}")
-    return full

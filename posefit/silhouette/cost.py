@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +26,7 @@ Areas = NDArray[np.int64]  # (n, 3): R, B, Y
 
 def view_of(camera: Camera) -> kernels.View:
     """Return a camera as the kernel wants it."""
-    return kernels.View(
-        camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height
-    )
+    return kernels.View(camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height)
 
 
 def areas(
@@ -52,7 +51,7 @@ def areas(
 
     shares = max(1, min(threads, n // LEAST_SHARE))
     cuts = [n * share // shares for share in range(shares + 1)]
-    others = [_submit(threads, work, slice(a, b)) for a, b in zip(cuts[1:-1], cuts[2:], strict=True)]
+    others = [_submit(threads, work, slice(a, b)) for a, b in pairwise(cuts[1:])]
     work(slice(0, cuts[1]))
     for other in others:
         other.result()

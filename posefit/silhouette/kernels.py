@@ -56,13 +56,13 @@ def _popcount(bits):
 
 
 @intrinsic
-def _ctpop(_: Any, bits: Any) -> Any:
-    return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.ctpop(arguments[0])
+def _ctpop(typing_context: Any, bits: Any) -> Any:  # noqa: ARG001 - numba calls both functions by these names
+    return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.ctpop(arguments[0])  # noqa: ARG005
 
 
 @overload(_popcount)
-def _popcount_compiled(bits):
-    return lambda bits: _ctpop(bits)
+def _popcount_compiled(bits):  # noqa: ARG001
+    return lambda bits: _ctpop(bits)  # type: ignore[call-arg]
 
 
 @jit

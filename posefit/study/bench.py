@@ -98,11 +98,11 @@ def bench(threads: int | None = None) -> dict[str, Any]:
         "opencv": lambda: opencv_costs(alone, proposals[: POSES // 5]),
         "frame": frame,
     }
-    seconds = {name: np.inf for name in jobs}
+    seconds = dict.fromkeys(jobs, np.inf)
     cv2_threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        for name, job in jobs.items():
+        for job in jobs.values():
             job()
         for _ in range(ROUNDS):  # in turn, so that a slow moment of the machine falls on all
             for name, job in jobs.items():

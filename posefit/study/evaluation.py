@@ -41,7 +41,7 @@ class Evaluation:
         costs = np.zeros(len(poses))
         for camera, silhouette in zip(self._scene.cameras, observation.silhouettes, strict=True):
             costs += mismatch(areas(self._scene.body, camera, silhouette, poses, translations), self._beta)
-        return poses[costs.argmin()]
+        return np.array(poses[costs.argmin()])
 
     def close(self) -> tuple[list[dict[str, float]], dict[str, Any]]:
         """Return the rows of all frames and the summary's figures."""
@@ -51,8 +51,18 @@ class Evaluation:
             "iou": np.array([metrics.iou(frame.areas).mean() for frame in frames]),
         }
         summary: dict[str, Any] = dict.fromkeys(
-            ("error_degrees", "geodesic_degrees", "mpjpe_mm", "pa_mpjpe_mm", "iou", "swap_rate", "lost_rate", "skill",
-             "baselines_degrees", "prior_floor_degrees")
+            (
+                "error_degrees",
+                "geodesic_degrees",
+                "mpjpe_mm",
+                "pa_mpjpe_mm",
+                "iou",
+                "swap_rate",
+                "lost_rate",
+                "skill",
+                "baselines_degrees",
+                "prior_floor_degrees",
+            )
         )
         summary["iou"], summary["cost"] = float(columns["iou"].mean()), float(columns["cost"].mean())
         if self._scene.truth is not None:
@@ -82,7 +92,9 @@ class Evaluation:
         mpjpe = metrics.mpjpe_mm(true_joints, joints)
         aligned, geodesic = metrics.pa_mpjpe_mm(true_joints, joints), metrics.geodesic_degrees(truth, poses)
         swapped = metrics.swapped(true_joints, joints)
-        baselines = {name: float(metrics.pose_error_degrees(truth, pose).mean()) for name, pose in self._baselines(truth)}
+        baselines = {
+            name: float(metrics.pose_error_degrees(truth, pose).mean()) for name, pose in self._baselines(truth)
+        }
         floor = baselines.pop("prior_floor")
         summary |= {
             "error_degrees": {
@@ -101,7 +113,10 @@ class Evaluation:
             "prior_floor_degrees": floor,
         }
         return {
-            "error_degrees": errors, "geodesic_degrees": geodesic, "mpjpe_mm": mpjpe, "pa_mpjpe_mm": aligned,
+            "error_degrees": errors,
+            "geodesic_degrees": geodesic,
+            "mpjpe_mm": mpjpe,
+            "pa_mpjpe_mm": aligned,
             "swapped": swapped.astype(np.float64),
         }
 

@@ -57,7 +57,9 @@ class Painter:
         for k, (name, colour) in enumerate((("both", BOTH), ("observed only", MISSED), ("body only", SPILLED))):
             _write(image, name, (12 + 130 * k, PANEL - 14), colour)
         if self._count in self._wanted:
-            self._stills.append(np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8))
+            self._stills.append(
+                np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+            )
         self._count += 1
         return image
 
@@ -70,7 +72,7 @@ class Painter:
 
 
 def side_view(body: Body, camera: Camera, pose: Array, translation: Array, side: int) -> Image:
-    """Return the body (side, side, 3) seen from 90 degrees to the camera's right: left limbs orange, right ones blue."""
+    """Return the body (side, side, 3) seen from the camera's right: left limbs orange, right ones blue."""
     joints = body.skeleton.joints(pose, translation)
     middle = 0.5 * (joints.min(axis=0) + joints.max(axis=0))
     back = -camera.rotation[2]
@@ -86,7 +88,9 @@ def side_view(body: Body, camera: Camera, pose: Array, translation: Array, side:
         ends = (int(parents[bone]), int(bone) + 1)
         radii = body.radii[bone] * scale[list(ends)]
         shade = 1.0 - 0.25 * float(np.clip(depths[list(ends)].mean() - distance, -0.4, 0.4)) / 0.4
-        colour = MIDDLE if BONES[bone] in ("lowerback", "lowerneck") else {"l": LEFT, "r": RIGHT}.get(BONES[bone][0], MIDDLE)
+        colour = (
+            MIDDLE if BONES[bone] in ("lowerback", "lowerneck") else {"l": LEFT, "r": RIGHT}.get(BONES[bone][0], MIDDLE)
+        )
         _cone(image, pixels[list(ends)], radii, tuple(min(255.0, shade * c) for c in colour))
     return image
 

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -73,7 +74,7 @@ def track(
     out: str | Path | None = None,
     force: bool = False,
     progress: Callable[[Iterator[Frame], int], Iterator[Frame]] | None = None,
-    say: Callable[[str], None] = lambda message: None,
+    say: Callable[[str], None] | None = None,
 ) -> Track:
     """Return the motion followed through a source's silhouettes, with its errors where the truth is known.
 
@@ -83,6 +84,7 @@ def track(
     particles x (iterations + 1). With `out`, a new folder gets the poses, an .amc, a table, a video and a picture;
     it appears whole or not at all. Raises ValueError for every mistake in the arguments or files.
     """
+    say = say or _nothing
     if particles < 1:
         raise ValueError(f"particles must be at least 1, got {particles}")
     if iterations < 1:
@@ -99,8 +101,16 @@ def track(
     if mode == "known" and scene.truth is None:
         raise ValueError("translation must be searched or aligned where only masks are given, got known")
     tracker = SynthesisTracker(
-        scene.body, scene.cameras, learned, partial(factory, **settings), particles * (iterations + 1),
-        scene.yaw, scene.anchor, translation=mode, threads=threads, **(tracker_settings or {}),
+        scene.body,
+        scene.cameras,
+        learned,
+        partial(factory, **settings),
+        particles * (iterations + 1),
+        scene.yaw,
+        scene.anchor,
+        translation=mode,
+        threads=threads,
+        **(tracker_settings or {}),
     )
     evaluation = Evaluation(scene, learned, np.concatenate([motion.poses[:, 3:] for motion in trained]), tracker.beta)
     began = time.perf_counter()
@@ -108,7 +118,7 @@ def track(
         _warm_up(tracker, scene)
     say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
     found: list[Frame] = []
-    with folder or _nowhere() as files:
+    with folder or nullcontext() as files:
         seen = _Tee(scene.observations)
         results = tracker.track(seen, np.random.default_rng(seed))
         for frame in progress(results, scene.count) if progress else results:
@@ -117,8 +127,11 @@ def track(
                 files.picture(scene, frame, seen.latest, row)
             found.append(frame)
         estimate = Motion(
-            scene.name, scene.body.skeleton, np.array([frame.pose for frame in found]),
-            np.array([frame.translation for frame in found]), scene.fps,
+            scene.name,
+            scene.body.skeleton,
+            np.array([frame.pose for frame in found]),
+            np.array([frame.translation for frame in found]),
+            scene.fps,
         )
         rows, measured = evaluation.close()
         summary = {
@@ -134,7 +147,9 @@ def track(
             "size": [scene.cameras[0].width, scene.cameras[0].height],
             "fps": scene.fps,
             "settings": {
-                "optimiser": settings, "prior": dict(prior_settings or {}), "tracker": dict(tracker_settings or {})
+                "optimiser": settings,
+                "prior": dict(prior_settings or {}),
+                "tracker": dict(tracker_settings or {}),
             },
         }
         if files is not None:
@@ -153,8 +168,13 @@ def fit(source: Source = "walk", *, frame: int = 0, **settings: Any) -> Fit:
 
 
 def _scene(
-    source: Source, asf: str | Path | None, camera: Camera | str | Path | None, view_degrees: float | None,
-    size: tuple[int, int], fps: float, frames: Range,
+    source: Source,
+    asf: str | Path | None,
+    camera: Camera | str | Path | None,
+    view_degrees: float | None,
+    size: tuple[int, int],
+    fps: float,
+    frames: Range,
 ) -> Scene:
     if min(size) < 1 or max(size) > 16_384:
         raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {size[0]}x{size[1]}")
@@ -174,7 +194,9 @@ def _training(source: Source, train: Sequence[Source], asf: str | Path | None, f
         known = isinstance(source, str) and source in library.names()
         chosen = library.other_styles(str(source) if known else "walk")
     for one in chosen:
-        if one is source or (not isinstance(one, Motion) and not isinstance(source, Motion) and str(one) == str(source)):
+        if one is source or (
+            not isinstance(one, Motion) and not isinstance(source, Motion) and str(one) == str(source)
+        ):
             raise ValueError(f"train must not contain the source itself, got {one}")
     return [motion_of(one, asf, fps) for one in chosen]
 
@@ -201,27 +223,21 @@ def _warm_up(tracker: SynthesisTracker, scene: Scene) -> None:
     next(tracker.track([first], np.random.default_rng(0)))
 
 
-class _announced:
-    """Says that compiling takes its time, if it does."""
-
-    def __init__(self, say: Callable[[str], None]) -> None:
-        message = "compiling the kernels, once on this machine; this can take half a minute ..."
-        self._timer = threading.Timer(PATIENCE, say, (message,))
-        self._timer.daemon = True
-
-    def __enter__(self) -> None:
-        self._timer.start()
-
-    def __exit__(self, *_: object) -> None:
-        self._timer.cancel()
+def _nothing(_: str) -> None:
+    """Say nothing."""
 
 
-class _nowhere:
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, *_: object) -> None:
-        return None
+@contextmanager
+def _announced(say: Callable[[str], None]) -> Iterator[None]:
+    """Say that compiling takes its time, if it does."""
+    message = "compiling the kernels, once on this machine; this can take half a minute ..."
+    timer = threading.Timer(PATIENCE, say, (message,))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 class _Tee:

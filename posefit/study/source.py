@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +57,9 @@ def motion_of(source: str | Path | Motion, asf: str | Path | None, fps: float) -
 
     if path.exists() or path.suffix:
         _existing(path)
-        raise ValueError(f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}")
+        raise ValueError(
+            f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}"
+        )
     return library.built_in(str(source), fps=fps)
 
 
@@ -80,8 +83,15 @@ def synthetic(
         if not observations[k].silhouettes[0].mask.any():
             raise ValueError(f"camera must see the person, got an empty mask in frame {k}")
     return Scene(
-        motion.name, body, [camera], motion.fps, len(motion), float(motion.poses[0, 0]), motion.translations[0],
-        motion, observations,
+        motion.name,
+        body,
+        [camera],
+        motion.fps,
+        len(motion),
+        float(motion.poses[0, 0]),
+        motion.translations[0],
+        motion,
+        observations,
     )
 
 
@@ -134,7 +144,7 @@ class LazyMasks:
 
     path: Path
     files: Sequence[Path]
-    stack: NDArray[np.generic] | None = field(default=None, repr=False)
+    stack: NDArray[Any] | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, path: Path, frames: Range) -> "LazyMasks":
@@ -174,14 +184,14 @@ class LazyMasks:
     def silhouette(self, k: int) -> Silhouette:
         """Return mask k. Raises ValueError naming the file where it is no mask, or empty, or full."""
         mask = self.stack[k] if self.stack is not None else self._image(self.files[k])
-        person = mask > (127 if mask.max() > 1 else 0)
+        person = np.greater(mask, 127 if mask.max() > 1 else 0)
         if not person.any() or person.all():
             came = "an empty one" if not person.any() else "one without background"
             raise ValueError(f"{self.files[k]}: expected a mask with a person before a background, got {came}")
         return Silhouette.of(person)
 
     @staticmethod
-    def _image(path: Path) -> NDArray[np.generic]:
+    def _image(path: Path) -> NDArray[Any]:
         import cv2
 
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)

@@ -16,7 +16,16 @@ from posefit.motion.motion import Motion
 from posefit.study.picture import Painter
 from posefit.study.source import Scene
 
-FILES = ("poses.npz", "track.amc", "skeleton.asf", "camera.json", "frames.csv", "summary.json", "overlay.mp4", "summary.png")
+FILES = (
+    "poses.npz",
+    "track.amc",
+    "skeleton.asf",
+    "camera.json",
+    "frames.csv",
+    "summary.json",
+    "overlay.mp4",
+    "summary.png",
+)
 _VIDEO_CODE = "mp4v"
 
 
@@ -32,7 +41,9 @@ class OutputFolder:
         if self.path.exists():
             strange = sorted(entry.name for entry in self.path.iterdir() if entry.name not in FILES)
             if strange:
-                raise ValueError(f"{self.path}: expected a folder of earlier results to replace, got one with {strange[0]}")
+                raise ValueError(
+                    f"{self.path}: expected a folder of earlier results to replace, got one with {strange[0]}"
+                )
         self._painter: Painter | None = None
         self._video: Any = None
 
@@ -86,8 +97,12 @@ class OutputFolder:
         assert self._painter is not None
         folder = self._building
         np.savez_compressed(
-            folder / "poses.npz", poses=estimate.poses, translations=estimate.translations, fps=np.array(estimate.fps),
-            joints=np.array(JOINTS), costs=np.array([frame.cost for frame in frames]),
+            folder / "poses.npz",
+            poses=estimate.poses,
+            translations=estimate.translations,
+            fps=np.array(estimate.fps),
+            joints=np.array(JOINTS),
+            costs=np.array([frame.cost for frame in frames]),
         )
         write_asf(folder / "skeleton.asf", estimate.skeleton)
         write_amc(folder / "track.amc", estimate)
