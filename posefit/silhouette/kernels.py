@@ -156,8 +156,11 @@ def plan(bones, seen, bounds, box, items):
 
 
 @jit
-def fill(rows, lines, j, row, height, column):
-    """Set the pixels of cone j in eight rows of one word: from `row` of the cone on, from pixel `column` on."""
+def fill(rows, lines, j, row, column):
+    """Set the pixels of cone j in eight rows of one word: from `row` of the cone on, from pixel `column` on.
+
+    Rows below the cone cross neither disc nor tangent and stay as they are.
+    """
     x0, y0, s0 = lines[_X0 + j], lines[_Y0 + j], lines[_S0 + j]
     x1, y1, s1 = lines[_X1 + j], lines[_Y1 + j], lines[_S1 + j]
     xp, mp, pa, pb = lines[_XP + j], lines[_MP + j], lines[_PA + j], lines[_PB + j]
@@ -182,7 +185,6 @@ def fill(rows, lines, j, row, height, column):
         high = max(high, x if crosses else -_HUGE)
         first = np.int32(np.ceil(min(max(low - column, _ZERO), _WORD)))
         stop = np.int32(np.floor(min(max(high - column + _ONE, _ZERO), _WORD)))
-        stop = stop if row + k < height else np.int32(0)
         rows[k] |= _below(stop) & ~_below(first)
 
 
@@ -211,10 +213,11 @@ def draw(chain, radii, view, joints, seen, ends, lines, bounds, items, box, imag
         ends[_R1 + b] = joints[b + 1, 2] * radii[b, 1]
         seen[b] = (joints[p, 2] > 0.0) & (joints[b + 1, 2] > 0.0)
     outline(ends, lines, bounds, float(view.width), float(view.height))
+    pixels, stride = image.reshape(-1), image.shape[1]
     for i in range(plan(chain.parents.size, seen, bounds, box, items)):
         j, w, row = items[i] >> 32, (items[i] >> 16) & 0xFFFF, (items[i] & 0xFFFF) * BLOCK
-        y = bounds[_TOP + j] + row
-        fill(image[w][y : y + BLOCK], lines, j, row, bounds[_BOTTOM + j] - bounds[_TOP + j], np.float32(64 * w))
+        at = w * stride + bounds[_TOP + j] + row
+        fill(pixels[at : at + BLOCK], lines, j, row, np.float32(64 * w))
 
 
 @jit
