@@ -1,0 +1,16 @@
+import numpy as np
+import pytest
+
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.motion.library import average_skeleton
+
+
+@pytest.fixture(scope="session")
+def body() -> Body:
+    return Body.of(average_skeleton())
+
+
+@pytest.fixture
+def camera() -> Camera:
+    return Camera.around(np.zeros(3), 0.4, 4.0, (96, 72))
