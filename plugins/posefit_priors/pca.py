@@ -54,8 +54,8 @@ class PCA:
         if len(angles) < self._clusters or most < max(1.0, self._components):
             needed = int(max(self._clusters, self._components + 1, 2))
             raise ValueError(f"angles must hold at least {needed} frames, got {len(angles)}")
-        self.mean = angles.mean(axis=0)
-        _, spread, directions = np.linalg.svd(angles - self.mean, full_matrices=False)  # SAPSO 2.1
+        self.mean = angles.mean(axis=0)  # SAPSO 2.1.1
+        _, spread, directions = np.linalg.svd(angles - self.mean, full_matrices=False)  # SAPSO 2.1.2
         share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
         kept = (
             int(self._components)
@@ -77,7 +77,7 @@ class PCA:
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63): Projection. SAPSO 2.1."""
-        return (np.asarray(angles) - self.mean) @ self.components.T  # SAPSO 2.1
+        return (np.asarray(angles) - self.mean) @ self.components.T  # SAPSO 2.1.3 projection
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m): Recovery. SAPSO 2.1."""
@@ -122,7 +122,7 @@ def _recover(latents, components, mean, angles):
             angles[i, j] = mean[j]
         for k in range(components.shape[0]):
             for j in range(mean.size):
-                angles[i, j] += latents[i, k] * components[k, j]
+                angles[i, j] += latents[i, k] * components[k, j]  # SAPSO 2.1.3 recovery
 
 
 @jit

@@ -62,23 +62,22 @@ class SAPSO:
         self._zero_rejected = rejected_velocity == "zeroed"
         self._low, self._high = _velocity_limits(space, alpha, velocity_limits)
         self._iteration, self._everyone = 0, np.arange(particles)
-        # Algorithm 1, step 1: particles that meet both constraints
-        self._moved = space.draw(rng, particles)
+        self._moved = space.draw(rng, particles)  # SAPSO A1.1
         self._velocity = self._first_velocities()
         self._position, self._cost = self._moved.copy(), np.full(particles, np.inf)
         self._best, self._best_cost = self._moved.copy(), np.full(particles, np.inf)
 
     def ask(self) -> Array:
         """Return the particles (n, d) after their move; none once the iterations or the temperature are used up."""
-        # Algorithm 1, step 2: the loop's condition. Reading S10: the last generation is evaluated too.
-        if self._iteration > self._iterations or self._temperature <= self._stop:
+        # Reading S10: the last generation is evaluated too
+        if self._iteration > self._iterations or self._temperature <= self._stop:  # SAPSO A1.2
             return np.empty((0, self._space.dimensions))
         return self._moved.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Accept or refuse the move, remember the best, and fly on."""
         accepted = np.empty(len(costs), dtype=bool)
-        leader = settle(  # Algorithm 1, steps 2d and 2b
+        leader = settle(
             proposals,
             np.asarray(costs, dtype=np.float64),
             self._rng.random(len(costs)),
@@ -92,7 +91,7 @@ class SAPSO:
         if self._zero_rejected:
             self._velocity[~accepted] = 0.0
         if self._iteration > 0:
-            # Algorithm 1, step 2e; Reading S6
+            # SAPSO A1.2e, Reading S6
             self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
         if self._iteration < self._iterations:
             self._fly(self._best[leader].copy())
@@ -103,12 +102,13 @@ class SAPSO:
         start = self._space.start
         if start is None:
             return self._rng.uniform(self._low, self._high, shape)
-        # SAPSO (7); Reading S12: the bounds may be reversed
-        drawn = self._rng.uniform(np.minimum(0.0, start.velocity), np.maximum(0.0, start.velocity), shape)
+        # Reading S12: the bounds may be reversed
+        low, high = np.minimum(0.0, start.velocity), np.maximum(0.0, start.velocity)
+        drawn = self._rng.uniform(low, high, shape)  # SAPSO (7)
         return np.clip(drawn, self._low, self._high)
 
     def _fly(self, swarm_best: Array) -> None:
-        """Move every particle by (1) and (2), so that it meets the constraints: Algorithm 1, step 2c."""
+        """Move every particle by (1) and (2), so that it meets the constraints. Reading S7."""
         before, feasible = self._velocity, self._space.feasible
         self._velocity, self._moved = self._attempt(self._everyone, before, swarm_best)
         broken = np.flatnonzero(~feasible(self._moved))
@@ -116,10 +116,11 @@ class SAPSO:
         while left > 0 and len(broken):
             many = min(left, many)
             flown, moved = self._attempt(np.repeat(broken, many), before, swarm_best)
+            # SAPSO A1.2c
             broken = mend(broken, feasible(moved), flown, moved, self._velocity, self._moved)
             left, many = left - many, self._redraws
         if len(broken):
-            # Reading S7: clip and stop; where even that breaks constraint 2, the particle stays where it was
+            # clip and stop; where even that breaks constraint 2, the particle stays where it was
             clipped = np.clip(self._moved[broken], -1.0, 1.0)
             self._moved[broken] = np.where(feasible(clipped)[:, None], clipped, self._position[broken])
             self._velocity[broken] = 0.0
@@ -152,6 +153,7 @@ class SAPSO:
 
 def _velocity_limits(space: SearchSpace, alpha: float, kind: str) -> tuple[Array, Array]:
     """Return the lowest and highest velocity (d,) of the unit box. SAPSO 2.2 constraint 1, Reading S9."""
+    # SAPSO 2.2 velocity
     if kind == "symmetric":
         return np.full(space.dimensions, -alpha), np.full(space.dimensions, alpha)
     half = np.where(space.half > 0.0, space.half, 1.0)

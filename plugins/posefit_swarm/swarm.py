@@ -64,11 +64,12 @@ def settle(moved, costs, chances, temperature, position, position_costs, best, b
     for i in range(costs.size):
         rise = costs[i] - position_costs[i]
         # true of a first cost, which replaces +inf; false of nan
-        accepted[i] = rise <= 0.0 or costs[i] == position_costs[i] or math.exp(-rise / temperature) > chances[i]
+        same = costs[i] == position_costs[i]  # both may be infinite
+        accepted[i] = rise <= 0.0 or same or math.exp(-rise / temperature) > chances[i]  # SAPSO A1.2d
         if accepted[i]:
             position[i] = moved[i]
             position_costs[i] = costs[i]
-        if position_costs[i] < best_costs[i]:
+        if position_costs[i] < best_costs[i]:  # SAPSO A1.2b
             best[i] = position[i]
             best_costs[i] = position_costs[i]
     return best_costs.argmin()

@@ -40,7 +40,7 @@ class PoseProblem:
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4)."""
-        return self.cost(*self.decode(proposals))
+        return self.cost(*self.decode(proposals))  # SAPSO (5)
 
     def decode(self, proposals: Array) -> tuple[Array, Array]:
         """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space asks it."""

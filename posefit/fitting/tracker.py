@@ -101,7 +101,7 @@ class SynthesisTracker:
         if self.yaw is None:  # only the first frame looks all around
             space = self._narrowed(space)
         space = space.around(found[-1], anchor=anchor)
-        # SAPSO (7), Reading S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
+        # Reading S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
         back = 1 if self.prediction == "latest" else 2
         step = np.zeros(space.dimensions)
         if len(found) > back:

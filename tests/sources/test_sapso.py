@@ -1,0 +1,504 @@
+"""One test for each equation and step of the paper, sections 2 to 5, with numbers worked by hand or by a slow twin."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit import PoseProblem, SearchSpace, Silhouette, Start, minimise
+from posefit.fitting import metrics
+from posefit.fitting.tracker import Observation, SynthesisTracker
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array, rotation_from_root_angles
+from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
+from posefit.motion import library
+from posefit.silhouette.cost import areas, mismatch, project
+from posefit_priors.pca import PCA
+from posefit_swarm import sapso, swarm
+from posefit_swarm.sapso import SAPSO
+
+ROOT = Path(__file__).parents[2]
+TAGS = (
+    ["2.1.1", "2.1.2", "2.1.3 projection", "2.1.3 recovery"]
+    + ["2.2 constraint 1", "2.2 constraint 2", "2.2 velocity", "inertia"]
+    + [f"({n})" for n in range(1, 11)]
+    + ["A1.1", "A1.2", "A1.2b", "A1.2c", "A1.2d", "A1.2e"]
+)
+
+
+class Line:
+    """A prior of one latent, the first joint angle; feasible unless it lies in a gap."""
+
+    def __init__(self, gap: tuple[float, float] | None = None) -> None:
+        self.low, self.high, self.gap = np.array([-1.0]), np.array([1.0]), gap
+
+    def fit(self, angles: Array) -> "Line":
+        return self
+
+    def transform(self, angles: Array) -> Array:
+        return angles[:, :1]
+
+    def inverse_transform(self, latents: Array) -> Array:
+        return np.column_stack([latents, np.zeros((len(latents), 62))])
+
+    def feasible(self, latents: Array) -> Any:
+        if self.gap is None:
+            return np.ones(len(latents), dtype=bool)
+        return (latents[:, 0] <= self.gap[0]) | (latents[:, 0] >= self.gap[1])
+
+    def save(self, path: str | Path) -> None:
+        raise OSError(path)
+
+
+def line_space(gap: tuple[float, float] | None = None, start: Start | None = None) -> SearchSpace:
+    return SearchSpace(Line(gap), np.zeros(3), np.ones(3), np.zeros(3), start=start)
+
+
+class Fixed(np.random.Generator):
+    """A generator whose rand() is always the same number; its other draws are as usual."""
+
+    def __init__(self, value: float) -> None:
+        super().__init__(np.random.PCG64(0))
+        self.value = value
+
+    def random(self, size: Any = None, *_: Any, **__: Any) -> Any:
+        return np.full(size, self.value) if size is not None else self.value
+
+
+@pytest.fixture(scope="module")
+def walk() -> Array:
+    return np.concatenate([library.built_in(style).poses[:, 3:] for style in ("walk-a", "walk-b", "walk-c")])
+
+
+@pytest.mark.parametrize("tag", TAGS)
+def test_every_equation_and_step_has_one_home(tag: str) -> None:
+    pattern = re.compile(rf"# SAPSO {re.escape(tag)}(?![\w.(]| \w)")
+    homes = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for folder in ("posefit", "plugins")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if pattern.search(line)
+    ]
+    assert len(homes) == 1, homes
+
+
+# Section 2
+
+
+def test_the_skeleton_has_27_joints_and_66_angles() -> None:
+    assert (len(JOINTS), len(INNER), len(ENDS)) == (27, 21, 5)
+    assert 3 + 21 * 3 == ANGLES == 66
+    assert {JOINTS[end] for end in ENDS} == {"head", "lhand", "rhand", "ltoes", "rtoes"}
+
+
+def test_the_prior_is_blind_to_the_root(walk: Array) -> None:
+    prior = PCA().fit(walk)
+    assert prior.components.shape == (6, 63)  # m = 6 everywhere; 63 = 66 less the root's 3
+
+
+def test_2_1_1_the_centre_is_the_mean() -> None:
+    angles = np.zeros((6, 63))
+    angles[:, 0] = [0.0, 1.0, 2.0, 3.0, 4.0, 8.0]
+    assert PCA(components=1, clusters=1).fit(angles).mean[0] == pytest.approx(3.0)
+
+
+def test_2_1_2_the_directions_are_those_of_the_covariance(walk: Array) -> None:
+    prior = PCA().fit(walk)
+    values, vectors = np.linalg.eigh(np.cov(walk.T))
+    ours = np.abs(prior.components @ vectors[:, ::-1][:, :6])
+    np.testing.assert_allclose(ours, np.eye(6), atol=1e-6)
+    np.testing.assert_allclose(prior.explained, (values[::-1] / values.sum())[:6], rtol=1e-9)
+
+
+def test_2_1_a_share_of_the_variance_chooses_the_components(walk: Array) -> None:
+    prior = PCA(components=0.95).fit(walk)
+    assert prior.explained.sum() >= 0.95
+    assert prior.explained[:-1].sum() < 0.95
+
+
+def test_2_1_3_projection_and_recovery_by_hand() -> None:
+    prior = PCA(components=1, clusters=1)
+    prior.mean, prior.components = np.zeros(63), np.zeros((1, 63))
+    prior.mean[:2], prior.components[0, :2] = [1.0, 2.0], [0.6, 0.8]
+    x = np.zeros((1, 63))
+    x[0, :2] = [2.0, 4.0]
+    assert prior.transform(x)[0, 0] == pytest.approx(0.6 * 1.0 + 0.8 * 2.0)  # 2.2
+    np.testing.assert_allclose(prior.inverse_transform(np.array([[2.2]]))[0, :2], [1.0 + 1.32, 2.0 + 1.76])
+
+
+def test_2_1_3_projection_undoes_recovery(walk: Array) -> None:
+    prior = PCA().fit(walk)
+    latents = np.random.default_rng(0).normal(size=(20, 6))
+    np.testing.assert_allclose(prior.transform(prior.inverse_transform(latents)), latents, atol=1e-12)
+
+
+def test_2_2_constraint_1_is_the_range_of_the_training_latents(walk: Array) -> None:
+    prior = PCA().fit(walk)
+    latents = (walk - walk.mean(axis=0)) @ prior.components.T
+    np.testing.assert_allclose(prior.low, latents.min(axis=0), atol=1e-12)
+    np.testing.assert_allclose(prior.high, latents.max(axis=0), atol=1e-12)
+    space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
+    edge = np.concatenate([np.zeros(3), prior.high])
+    np.testing.assert_allclose(space.proposals(edge)[3:], 1.0)
+
+
+def test_2_2_constraint_2_by_hand() -> None:
+    prior = PCA(components=2, clusters=2)
+    prior.centres, prior.reach = np.array([[0.0, 0.0], [4.0, 0.0]]), np.array(1.0)
+    # D: (0.5 + 1) / 2 = 0.75; (2 + 0) / 2 = 1, from either centre, is not below chi; (1 + 0.5) / 2 from the second
+    assert prior.feasible(np.array([[0.5, 1.0], [2.0, 0.0], [5.0, 0.5], [4.0, 3.0]])).tolist() == [
+        True,
+        False,
+        True,
+        False,
+    ]
+
+
+def test_2_2_chi_is_the_99th_percentile_of_the_training_distances(walk: Array) -> None:
+    prior = PCA().fit(walk)
+    distances = np.abs(prior.centres[None] - prior.transform(walk)[:, None]).mean(axis=2).min(axis=1)
+    assert prior.centres.shape == (5, 6)  # K = 5
+    assert float(prior.reach) == pytest.approx(np.quantile(distances, 0.99))
+
+
+def test_2_2_velocities_keep_within_alpha_of_the_half_range() -> None:
+    low, high = sapso._velocity_limits(line_space(), 0.15, "symmetric")
+    np.testing.assert_allclose([low[3], high[3]], [-0.15, 0.15])
+
+
+def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None:
+    prior = Line()
+    prior.low, prior.high = np.array([2.0]), np.array([6.0])  # half-range 2: alpha 2 / 2 and alpha 6 / 2
+    space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
+    low, high = sapso._velocity_limits(space, 0.15, "literal")
+    np.testing.assert_allclose([low[3], high[3]], [0.15, 0.45])
+
+
+# Section 3
+
+
+def flown(**changed: Any) -> tuple[Array, Array]:
+    given: dict[str, Any] = {
+        "rows": np.array([0]),
+        "omega": 0.5,
+        "acceleration": 2.0,
+        "rand": np.array([[[0.25]], [[0.5]]]),
+        "position": np.array([[0.1]]),
+        "velocity": np.array([[0.2]]),
+        "best": np.array([[0.3]]),
+        "swarm_best": np.array([-0.1]),
+        "low": np.array([-9.0]),
+        "high": np.array([9.0]),
+        "periodic": np.array([False]),
+    }
+    velocity, position = np.empty((1, 1)), np.empty((1, 1))
+    swarm.fly(*{**given, **changed}.values(), velocity, position)
+    return velocity, position
+
+
+def test_eq_1_by_hand() -> None:
+    # 0.5 * 0.2 + 2 * 0.25 * (0.3 - 0.1) + 2 * 0.5 * (-0.1 - 0.1) = 0.1 + 0.1 - 0.2
+    assert flown()[0][0, 0] == pytest.approx(0.0)
+    assert flown(omega=1.0)[0][0, 0] == pytest.approx(0.1)
+
+
+def test_eq_2_by_hand() -> None:
+    assert flown(omega=1.0)[1][0, 0] == pytest.approx(0.1 + 0.1)
+
+
+def test_a_periodic_coordinate_flies_the_short_way_round() -> None:
+    # from 0.9 to -0.9 it is 0.2 ahead, over the seam
+    velocity, position = flown(
+        omega=0.0,
+        rand=np.array([[[0.0]], [[0.5]]]),
+        position=np.array([[0.9]]),
+        swarm_best=np.array([-0.9]),
+        periodic=np.array([True]),
+    )
+    assert velocity[0, 0] == pytest.approx(0.2)
+    assert position[0, 0] == pytest.approx(-0.9)
+
+
+def test_c1_and_c2_are_2_and_section_5_sets_the_rest() -> None:
+    assert swarm.ACCELERATION == 2.0
+    assert swarm.ALPHA == 0.15
+    assert (sapso.PARTICLES, sapso.ITERATIONS, sapso.TEMPERATURE, sapso.COOLING) == (40, 60, 1.0, 0.95)
+
+
+def test_inertia_falls_from_a_to_a_tenth() -> None:
+    assert swarm.inertia(0, 60, 0.9) == pytest.approx(0.9)
+    assert swarm.inertia(60, 60, 0.9) == pytest.approx(0.1)
+    # c = ln(9) / 2 half-way: 0.9 / 3
+    assert swarm.inertia(30, 60, 0.9) == pytest.approx(0.3)
+
+
+def test_eq_3_by_counting_pixels() -> None:
+    body = Body.of(library.average_skeleton())
+    camera = Camera.around(np.zeros(3), 0.3, 4.0, (100, 80))
+    rng = np.random.default_rng(0)
+    poses, translations = rng.normal(0.0, 0.3, (5, ANGLES)), rng.uniform(-0.2, 0.2, (5, 3))
+    observed = project(body, camera, poses[0], translations[0])
+    counted = areas(body, camera, Silhouette.of(observed), poses, translations)
+    for pose, translation, (r, b, y) in zip(poses, translations, counted, strict=True):
+        model = project(body, camera, pose, translation)
+        assert r == sum(f and not m for f, m in zip(observed.flat, model.flat, strict=True))
+        assert b == sum(m and not f for f, m in zip(observed.flat, model.flat, strict=True))
+        assert y == sum(f and m for f, m in zip(observed.flat, model.flat, strict=True))
+
+
+def test_eq_4_by_hand() -> None:
+    # R = 10, B = 20, Y = 30: 100 (0.5 * 20 / 50 + 0.5 * 10 / 40) = 20 + 12.5
+    assert mismatch(np.array([[10, 20, 30]]))[0] == pytest.approx(32.5)
+    # beta = 0.2: 100 (0.8 * 0.4 + 0.2 * 0.25)
+    assert mismatch(np.array([[10, 20, 30]]), 0.2)[0] == pytest.approx(37.0)
+
+
+def test_eq_4_is_zero_for_equal_masks_and_100_for_disjoint_ones() -> None:
+    assert mismatch(np.array([[0, 0, 7], [5, 9, 0]])).tolist() == [0.0, 100.0]
+
+
+def test_eq_4_counts_an_empty_denominator_as_1() -> None:  # Reading S2
+    assert mismatch(np.array([[8, 0, 0], [0, 8, 0], [0, 0, 0]])).tolist() == [100.0, 100.0, 100.0]
+
+
+def test_a1_1_the_first_particles_meet_both_constraints() -> None:
+    space = line_space(gap=(-0.8, 0.8))
+    first = SAPSO(space, np.random.default_rng(0), particles=200).ask()
+    assert (np.abs(first) <= 1.0).all()
+    assert (np.abs(first[:, 3]) >= 0.8).all()
+
+
+def run(optimiser: SAPSO, cost: Callable[[Array], Array]) -> list[Array]:
+    populations = []
+    while len(proposals := optimiser.ask()):
+        populations.append(proposals)
+        optimiser.tell(proposals, cost(proposals))
+    return populations
+
+
+def bowl(proposals: Array) -> Array:
+    return np.asarray(100.0 * ((proposals - 0.3) ** 2).mean(axis=1))
+
+
+def test_a1_2_there_are_c_moves_and_n_times_c_plus_1_evaluations() -> None:  # Reading S10
+    populations = run(SAPSO(line_space(), np.random.default_rng(0), particles=7, iterations=5), bowl)
+    assert sum(map(len, populations)) == 7 * (5 + 1)
+
+
+def test_a1_2_the_loop_ends_at_the_stop_temperature() -> None:
+    # 0.95^k <= 0.5 first at k = 14 moves: the first population and 14 more are evaluated
+    optimiser = SAPSO(line_space(), np.random.default_rng(0), stop_temperature=0.5)
+    assert len(run(optimiser, bowl)) == 1 + 14
+
+
+def settled(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool, float, float]:
+    position, costs = np.array([[0.1]]), np.array([2.0])
+    best, best_costs, accepted = np.array([[0.5]]), np.array([1.5]), np.empty(1, dtype=bool)
+    moved = np.array([[0.7]])
+    swarm.settle(
+        moved, np.array([cost]), np.array([chance]), temperature, position, costs, best, best_costs, accepted
+    )
+    return bool(accepted[0]), float(position[0, 0]), float(best[0, 0])
+
+
+def test_a1_2b_a_personal_best_changes_only_for_a_lower_cost() -> None:
+    assert settled(1.0, 0.5)[2] == 0.7
+    assert settled(1.8, 0.5)[2] == 0.5
+
+
+def test_a1_2d_a_rise_is_accepted_with_chance_exp_minus_de_over_t() -> None:
+    # dE = 1, T = 1: exp(-1) = 0.3679
+    assert settled(3.0, 0.367)[:2] == (True, 0.7)
+    assert settled(3.0, 0.368)[:2] == (False, 0.1)
+    # T = 0.5: exp(-2) = 0.1353
+    assert settled(3.0, 0.135, 0.5)[0]
+    assert not settled(3.0, 0.136, 0.5)[0]
+    # dE <= 0 always
+    assert settled(2.0, 0.9999)[0]
+    assert settled(1.0, 0.9999)[0]
+    assert not settled(np.nan, 0.0)[0]
+
+
+def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:
+    space = line_space(gap=(-0.5, 0.5))
+    for settings in ({}, {"redraws": 0}, {"rand": "scalar"}, {"velocity_limits": "literal"}):
+        for proposals in run(SAPSO(space, np.random.default_rng(1), particles=30, **settings), bowl):
+            assert space.feasible(proposals).all()
+
+
+def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border() -> None:  # Reading S7
+    space = line_space()
+    optimiser = SAPSO(space, Fixed(1.0), particles=2, redraws=0, alpha=1.0)
+    optimiser._position[:], optimiser._best[:] = 0.9, 0.9
+    optimiser._velocity[:] = 0.5
+    optimiser._fly(np.full(4, 0.9))
+    np.testing.assert_array_equal(optimiser._moved, 1.0)
+    np.testing.assert_array_equal(optimiser._velocity, 0.0)
+
+
+@pytest.mark.parametrize(("cool", "expected"), [("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))])
+def test_a1_2e_cools_once_an_iteration_or_once_an_acceptance(cool: Any, expected: float) -> None:  # Reading S6
+    optimiser = SAPSO(line_space(), np.random.default_rng(0), particles=4, iterations=9, cool=cool)
+    for _ in range(4):  # a flat cost: every move is accepted
+        optimiser.tell(optimiser.ask(), np.zeros(4))
+    assert optimiser._temperature == pytest.approx(expected)
+
+
+def test_a1_2e_read_literally_the_swarm_freezes_in_3_to_5_iterations() -> None:  # Reading S6
+    optimiser = SAPSO(line_space(), np.random.default_rng(0), cool="acceptance", stop_temperature=0.01)
+    assert 3 <= len(run(optimiser, bowl)) - 1 <= 5
+
+
+def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
+    space = line_space()
+    for kind, alike in (("scalar", True), ("dimension", False)):
+        optimiser = SAPSO(space, np.random.default_rng(0), particles=1, rand=kind, alpha=9.0)  # type: ignore[arg-type]
+        optimiser._position[:], optimiser._best[:], optimiser._velocity[:] = 0.0, 0.1, 0.0
+        optimiser._fly(np.full(4, 0.1))
+        assert (np.ptp(optimiser._moved) < 1e-12) == alike
+
+
+@pytest.mark.parametrize("kind", ["kept", "zeroed"])
+def test_s11_a_refused_move_keeps_or_loses_its_velocity(kind: Any) -> None:
+    optimiser = SAPSO(line_space(), Fixed(1.0), particles=1, iterations=2, rejected_velocity=kind, acceleration=0.0)
+    optimiser.tell(optimiser.ask(), np.array([0.0]))
+    before = optimiser._velocity.copy()
+    optimiser._position[:] = 0.0
+    optimiser.tell(optimiser.ask(), np.array([50.0]))
+    omega = swarm.inertia(1, 2, 0.9)
+    np.testing.assert_allclose(optimiser._velocity, omega * before if kind == "kept" else 0.0)
+
+
+# Section 4
+
+
+@pytest.fixture(scope="module")
+def scene(walk: Array) -> tuple[Body, Camera, PCA]:
+    body = Body.of(library.average_skeleton())
+    camera = Camera.around(np.array([0.0, 0.9, 0.0]), 0.8, 3.5, (160, 120))
+    return body, camera, PCA().fit(walk)
+
+
+def test_eq_5_the_search_returns_the_least_cost_it_saw(scene: tuple[Body, Camera, PCA]) -> None:
+    body, camera, prior = scene
+    motion = library.built_in("walk", frames=1)
+    silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
+    space = SearchSpace(prior, np.zeros(3), np.radians([45.0, 15.0, 15.0]), motion.translations[0])
+    problem = PoseProblem(body, [camera], [silhouette], space)
+    seen: list[float] = []
+
+    def evaluate(proposals: Array) -> Array:
+        costs = problem.evaluate(proposals)
+        seen.extend(costs)
+        return costs
+
+    best = minimise(evaluate, SAPSO(space, np.random.default_rng(0)), 2440)
+    assert best.evaluations == len(seen) == 40 * 61
+    assert best.cost == min(seen) == problem.evaluate(best.proposal[None])[0]
+    assert best.cost < 3.0
+
+
+def test_eq_6_the_first_population_is_normal_around_the_last_best() -> None:
+    start = Start(np.array([0.1, -0.2, 0.0, 0.3]), np.array([0.05, 0.1, 0.02, 0.2]), np.zeros(4))
+    drawn = line_space(start=start).draw(np.random.default_rng(0), 4000)
+    np.testing.assert_allclose(drawn.mean(axis=0), start.mean, atol=0.02)
+    np.testing.assert_allclose(drawn.std(axis=0), start.spread, rtol=0.06)
+
+
+def test_eq_7_first_velocities_are_uniform_from_zero_to_the_predicted_one() -> None:
+    velocity = np.array([0.1, -0.1, 0.0, 0.05])  # Reading S12: a negative bound is sorted, not refused
+    start = Start(np.zeros(4), np.full(4, 0.01), velocity)
+    optimiser = SAPSO(line_space(start=start), np.random.default_rng(0), particles=4000)
+    drawn = optimiser._velocity
+    np.testing.assert_allclose(drawn.min(axis=0), np.minimum(0.0, velocity), atol=2e-3)
+    np.testing.assert_allclose(drawn.max(axis=0), np.maximum(0.0, velocity), atol=2e-3)
+    np.testing.assert_allclose(drawn.mean(axis=0), velocity / 2.0, atol=2e-3)
+
+
+class Scripted:
+    """An optimiser that proposes one given point of the unit box a frame, and keeps the space it was given."""
+
+    def __init__(self, space: SearchSpace, point: Array) -> None:
+        self.space, self.point = space, point
+        self.asked = False
+
+    def ask(self) -> Array:
+        self.asked, asked = True, self.asked
+        return np.empty((0, len(self.point))) if asked else self.point[None]
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("prediction", "steps"), [("latest", [0.0, 0.2, -0.1]), ("literal", [0.0, 0.0, 0.2])]
+)
+def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
+    scene: tuple[Body, Camera, PCA], prediction: Any, steps: list[float]
+) -> None:  # Reading S12
+    body, camera, _ = scene
+    latents = [0.1, 0.3, 0.2, 0.2]
+    made: list[Scripted] = []
+
+    def make(space: SearchSpace, rng: np.random.Generator) -> Scripted:
+        made.append(Scripted(space, np.array([0.0, 0.0, 0.0, latents[len(made)]])))
+        return made[-1]
+
+    mask = project(body, camera, np.zeros(66), np.array([0.0, 0.9, 0.0]))
+    observation = Observation([Silhouette.of(mask)], np.array([0.0, 0.9, 0.0]))
+    tracker = SynthesisTracker(
+        body, [camera], Line(), make, 1, 0.0, np.array([0.0, 0.9, 0.0]), prediction=prediction, spread=2.0, floor=0.05
+    )
+    list(tracker.track([observation] * 4, np.random.default_rng(0)))
+    assert made[0].space.start is None  # frame 1 is an estimation
+    starts = [optimiser.space.start for optimiser in made[1:]]
+    for start, step, last in zip(starts, steps, latents, strict=False):
+        assert start is not None
+        assert start.velocity[3] == pytest.approx(step)
+        assert start.mean[3] == pytest.approx(last)
+        assert start.spread[3] == pytest.approx(max(2.0 * abs(step), 0.05))  # Reading S5
+
+
+# Section 5
+
+
+def test_eq_8_is_the_mean_absolute_difference_of_66_angles() -> None:
+    truth, estimate = np.zeros((1, 66)), np.zeros((1, 66))
+    estimate[0, 7] = np.radians(66.0)
+    assert metrics.pose_error_degrees(truth, estimate)[0] == pytest.approx(1.0)
+
+
+def test_eq_8_wraps_differences() -> None:  # Reading S13
+    truth, estimate = np.full((1, 66), np.radians(179.0)), np.full((1, 66), np.radians(-179.0))
+    assert metrics.pose_error_degrees(truth, estimate)[0] == pytest.approx(2.0)
+
+
+def test_eq_9_and_eq_10_by_hand() -> None:
+    errors = np.array([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0])
+    assert metrics.mean_error(errors) == 5.0
+    assert metrics.error_spread(errors) == 2.0  # a textbook example of the standard deviation with divisor T
+
+
+def test_s3_a_side_view_is_not_degenerate() -> None:
+    def independence(rotation: Callable[[Array], Array], angles: Array) -> float:
+        step = 1e-6
+        columns = [
+            (rotation(angles + step * axis) - rotation(angles - step * axis)).ravel() / (2 * step) for axis in np.eye(3)
+        ]
+        return float(np.linalg.svd(np.array(columns), compute_uv=False)[-1])
+
+    def papers(angles: Array) -> Array:
+        x, y, z = angles
+        one = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
+        two = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
+        three = np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
+        return np.asarray(one @ two @ three)
+
+    side = np.radians(90.0)
+    assert independence(rotation_from_root_angles, np.array([side, 0.05, -0.03])) > 0.9
+    assert independence(papers, np.array([0.05, side, -0.03])) < 1e-6
