@@ -300,9 +300,7 @@ def settled(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool,
     position, costs = np.array([[0.1]]), np.array([2.0])
     best, best_costs, accepted = np.array([[0.5]]), np.array([1.5]), np.empty(1, dtype=bool)
     moved = np.array([[0.7]])
-    swarm.settle(
-        moved, np.array([cost]), np.array([chance]), temperature, position, costs, best, best_costs, accepted
-    )
+    swarm.settle(moved, np.array([cost]), np.array([chance]), temperature, position, costs, best, best_costs, accepted)
     return bool(accepted[0]), float(position[0, 0]), float(best[0, 0])
 
 
@@ -435,9 +433,7 @@ class Scripted:
         pass
 
 
-@pytest.mark.parametrize(
-    ("prediction", "steps"), [("latest", [0.0, 0.2, -0.1]), ("literal", [0.0, 0.0, 0.2])]
-)
+@pytest.mark.parametrize(("prediction", "steps"), [("latest", [0.0, 0.2, -0.1]), ("literal", [0.0, 0.0, 0.2])])
 def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
     scene: tuple[Body, Camera, PCA], prediction: Any, steps: list[float]
 ) -> None:  # Reading S12

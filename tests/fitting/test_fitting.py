@@ -1,0 +1,153 @@
+"""The search space, the problem and the loop that drives an optimiser."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
+from posefit.fitting.alignment import align
+from posefit.geometry.rotation import Array
+from posefit.motion import library
+from posefit.silhouette.cost import project
+from posefit_priors.pca import PCA
+from posefit_swarm.random import Random
+from posefit_swarm.sapso import SAPSO
+
+
+@pytest.fixture(scope="module")
+def problem() -> PoseProblem:
+    motion = library.built_in("walk", frames=2)
+    angles = np.concatenate([library.built_in(style).poses[:, 3:] for style in ("walk-a", "walk-b")])
+    body = Body.of(motion.skeleton)
+    camera = Camera.around(motion.translations[0], 0.8, 3.5, (160, 120))
+    silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
+    space = SearchSpace(PCA().fit(angles), np.zeros(3), np.radians([45.0, 15.0, 15.0]), motion.translations[0])
+    return PoseProblem(body, [camera], [silhouette], space)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_cost_has_the_same_bits_whatever_stands_beside_it(problem: PoseProblem, threads: int) -> None:
+    problem = replace(problem, threads=threads)
+    proposals = problem.space.draw(np.random.default_rng(0), 300)
+    together = problem.evaluate(proposals)
+    np.testing.assert_array_equal(problem.evaluate(proposals[:40]), together[:40])
+    np.testing.assert_array_equal([problem.evaluate(one[None])[0] for one in proposals[:20]], together[:20])
+    np.testing.assert_array_equal(problem.evaluate(proposals[::-1])[::-1], together)
+
+
+def test_proposals_and_coordinates_are_inverse(problem: PoseProblem) -> None:
+    proposals = problem.space.draw(np.random.default_rng(0), 30)
+    back = [problem.space.proposals(one) for one in problem.space.coordinates(proposals)]
+    np.testing.assert_allclose(back, proposals, atol=1e-12)
+
+
+def test_a_searched_translation_has_three_more_dimensions(problem: PoseProblem) -> None:
+    space = replace(problem.space, translation="searched", anchor=np.array([1.0, 2.0, 3.0]))
+    assert space.dimensions == problem.space.dimensions + 3 == 12
+    poses, translations = space.decode(np.array([[0.0] * 3 + [1.0, 0.0, -0.5] + [0.0] * 6]))
+    np.testing.assert_allclose(translations, [[1.5, 2.0, 2.75]])
+    np.testing.assert_allclose(poses[0, :3], 0.0)
+
+
+def test_several_views_are_averaged(problem: PoseProblem) -> None:
+    other = Camera.around(problem.space.anchor, 2.1, 3.5, (100, 90))
+    motion = library.built_in("walk", frames=2)
+    seen = Silhouette.of(project(problem.body, other, motion.poses[0], motion.translations[0]))
+    second = replace(problem, cameras=[other], silhouettes=[seen])
+    both = replace(problem, cameras=[problem.cameras[0], other], silhouettes=[problem.silhouettes[0], seen])
+    proposals = problem.space.draw(np.random.default_rng(0), 20)
+    np.testing.assert_allclose(both.evaluate(proposals), (problem.evaluate(proposals) + second.evaluate(proposals)) / 2)
+
+
+def test_unknown_pixels_count_for_nothing(problem: PoseProblem) -> None:
+    mask = problem.silhouettes[0].mask
+    valid = np.ones_like(mask)
+    valid[60:] = False
+    spoilt = mask.copy()
+    spoilt[60:] = np.random.default_rng(0).random(spoilt[60:].shape) < 0.5
+    proposals = problem.space.draw(np.random.default_rng(0), 20)
+    clean, dirty = (replace(problem, silhouettes=[Silhouette.of(m, valid)]) for m in (mask, spoilt))
+    np.testing.assert_array_equal(clean.evaluate(proposals), dirty.evaluate(proposals))
+
+
+def test_aligning_finds_the_true_translation(problem: PoseProblem) -> None:
+    motion = library.built_in("walk", frames=8)
+    camera = problem.cameras[0]
+    for pose, translation in zip(motion.poses, motion.translations, strict=True):
+        where = translation + [0.2, -0.1, 0.3]
+        silhouette = Silhouette.of(project(problem.body, camera, pose, where))
+        found = align(problem.body, [camera], [silhouette], pose[None], translation[None])[0]
+        sideways, depth = camera.rotation[:2] @ (found - where), camera.rotation[2] @ (found - where)
+        assert np.abs(sideways).max() < 0.02  # metres; a pixel is 0.016 m here
+        assert abs(depth) < 0.15
+
+
+def test_a_problem_can_be_pickled(problem: PoseProblem) -> None:
+    proposals = problem.space.draw(np.random.default_rng(0), 5)
+    again = pickle.loads(pickle.dumps(problem))
+    np.testing.assert_array_equal(again.evaluate(proposals), problem.evaluate(proposals))
+
+
+def test_mistakes_are_named(problem: PoseProblem) -> None:
+    with pytest.raises(ValueError, match=r"proposals must have shape \(n, 9\), got \(4, 8\)"):
+        problem.evaluate(np.zeros((4, 8)))
+    with pytest.raises(ValueError, match="proposals must be finite"):
+        problem.evaluate(np.full((1, 9), np.nan))
+    with pytest.raises(ValueError, match=r"mask must have shape \(120, 160\), the camera's, got \(160, 120\)"):
+        replace(problem, silhouettes=[Silhouette.of(np.ones((160, 120)))])
+    with pytest.raises(ValueError, match="translation must be one of known, searched, aligned, got 'free'"):
+        replace(problem.space, translation="free")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"silhouettes must be one a camera \(1\), got 0"):
+        replace(problem, silhouettes=[])
+
+
+class Walker:
+    """Proposes fixed populations, whatever they cost."""
+
+    def __init__(self, size: int) -> None:
+        self.size, self.told = size, []  # type: ignore[var-annotated]
+
+    def ask(self) -> Array:
+        return np.full((self.size, 1), float(len(self.told)))
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        self.told.append((proposals, costs))
+
+
+def test_the_budget_is_spent_in_whole_populations() -> None:
+    walker = Walker(7)
+    best = minimise(lambda x: -x[:, 0], walker, 40)
+    assert best.evaluations == 35
+    assert len(walker.told) == 5
+    assert best.cost == -4.0
+    assert best.history.tolist() == [0.0, -1.0, -2.0, -3.0, -4.0]
+
+
+def test_nan_is_never_the_best_cost() -> None:
+    best = minimise(lambda x: np.where(x[:, 0] == 1.0, 5.0, np.nan), Walker(3), 9)
+    assert best.cost == 5.0
+    with pytest.raises(ValueError, match="costs must be numbers, got nan for all 9 proposals"):
+        minimise(lambda x: x[:, 0] * np.nan, Walker(3), 9)
+
+
+def test_a_budget_below_one_population_is_refused() -> None:
+    with pytest.raises(ValueError, match="evaluations must hold one population of 7, got 6"):
+        minimise(lambda x: x[:, 0], Walker(7), 6)
+
+
+def test_sapso_beats_random_search_at_the_same_cost(problem: PoseProblem) -> None:
+    found = {
+        factory: np.median(
+            [minimise(problem.evaluate, factory(problem.space, np.random.default_rng(s)), 2440).cost for s in range(5)]
+        )
+        for factory in (SAPSO, Random)
+    }
+    assert found[SAPSO] < 0.7 * found[Random]
+
+
+def test_a_full_circle_of_yaw_wraps(problem: PoseProblem) -> None:
+    space = replace(problem.space, root_range=np.array([np.pi, 0.2, 0.2]))
+    assert space.periodic.tolist() == [True] + [False] * 8
+    assert space.towards(np.array([0.9] + [0.0] * 8), np.array([-0.9] + [0.0] * 8))[0] == pytest.approx(0.2)

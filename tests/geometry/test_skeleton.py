@@ -1,0 +1,129 @@
+"""Kinematics by law and against a slow twin."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from posefit.geometry.kinematics import sines_cosines
+from posefit.geometry.rotation import (
+    Array,
+    geodesic,
+    joint_angles_from_rotation,
+    root_angles_from_rotation,
+    rotation_from_joint_angles,
+    rotation_from_root_angles,
+    wrapped,
+)
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton, angle_index
+from posefit.motion.library import average_skeleton
+
+angles = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
+
+
+def turn(axis: int, angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, -s, s, c
+    return matrix
+
+
+@given(angles)
+def test_root_angles_are_yaw_then_pitch_then_roll(a: Array) -> None:
+    np.testing.assert_allclose(rotation_from_root_angles(a), turn(1, a[0]) @ turn(0, a[1]) @ turn(2, a[2]), atol=1e-12)
+
+
+@given(angles)
+def test_joint_angles_turn_about_x_first(a: Array) -> None:
+    np.testing.assert_allclose(rotation_from_joint_angles(a), turn(2, a[2]) @ turn(1, a[1]) @ turn(0, a[0]), atol=1e-12)
+
+
+@given(angles)
+def test_angles_of_a_rotation_give_it_back(a: Array) -> None:
+    rotation = rotation_from_root_angles(a)
+    np.testing.assert_allclose(rotation_from_root_angles(root_angles_from_rotation(rotation)), rotation, atol=1e-6)
+    np.testing.assert_allclose(rotation_from_joint_angles(joint_angles_from_rotation(rotation)), rotation, atol=1e-6)
+
+
+@given(st.floats(-1e4, 1e4))
+def test_wrapping_keeps_the_direction_and_comes_into_half_a_turn(a: float) -> None:
+    w = float(wrapped(np.array(a)))
+    assert -np.pi <= w < np.pi
+    assert np.cos(w) == pytest.approx(np.cos(a), abs=1e-9)
+
+
+def test_the_geodesic_of_one_turn_is_its_angle() -> None:
+    assert geodesic(np.eye(3), turn(1, 0.7)) == pytest.approx(0.7)
+
+
+def test_polynomial_sines_are_numpys_over_many_turns() -> None:
+    x = np.linspace(-60.0, 60.0, 100_001)
+    s, c = np.empty_like(x), np.empty_like(x)
+    sines_cosines(x, s, c)
+    np.testing.assert_allclose(s, np.sin(x), atol=1e-10)
+    np.testing.assert_allclose(c, np.cos(x), atol=1e-10)
+
+
+def slow_joints(skeleton: Skeleton, pose: Array, translation: Array) -> Array:
+    """Return joints (27, 3) straight from Acclaim's definition."""
+    frames, joints = [turn(1, pose[0]) @ turn(0, pose[1]) @ turn(2, pose[2])], [translation]
+    for bone, parent in enumerate(PARENTS[1:]):
+        start, c = angle_index(bone + 1), skeleton.axes[bone]
+        own = np.eye(3)
+        if start >= 0:
+            x, y, z = pose[start : start + 3]
+            own = turn(2, z) @ turn(1, y) @ turn(0, x)
+        frames.append(frames[parent] @ c @ own @ c.T)
+        joints.append(joints[parent] + frames[-1] @ skeleton.offsets[bone])
+    return np.array(joints)
+
+
+def test_joints_equal_a_slow_twin() -> None:
+    rng = np.random.default_rng(0)
+    skeleton = average_skeleton()
+    poses, translations = rng.uniform(-3.0, 3.0, (50, ANGLES)), rng.normal(size=(50, 3))
+    slow = [slow_joints(skeleton, pose, where) for pose, where in zip(poses, translations, strict=True)]
+    np.testing.assert_allclose(skeleton.joints(poses, translations), slow, atol=1e-8)
+
+
+def test_bones_keep_their_lengths_in_any_pose() -> None:
+    skeleton = average_skeleton()
+    joints = skeleton.joints(np.random.default_rng(1).uniform(-3.0, 3.0, (20, ANGLES)))
+    lengths = np.linalg.norm(joints[:, 1:] - joints[:, list(PARENTS[1:])], axis=2)
+    np.testing.assert_allclose(lengths, np.broadcast_to(skeleton.lengths, lengths.shape), atol=1e-9)
+
+
+def test_any_lead_shape_goes_through() -> None:
+    skeleton = average_skeleton()
+    poses = np.random.default_rng(2).normal(size=(2, 3, ANGLES))
+    assert skeleton.joints(poses).shape == (2, 3, 27, 3)
+    np.testing.assert_array_equal(skeleton.joints(poses)[1, 2], skeleton.joints(poses[1, 2]))
+
+
+def test_the_mirror_pairs_left_with_right() -> None:
+    assert [JOINTS[MIRROR[JOINTS.index(name)]] for name in ("lfemur", "rhand", "lowerback", "root", "thorax")] == [
+        "rfemur",
+        "lhand",
+        "lowerback",
+        "root",
+        "thorax",
+    ]
+    assert [MIRROR[j] for j in MIRROR] == list(range(27))
+
+
+def test_the_average_skeleton_is_the_same_left_and_right() -> None:
+    skeleton = average_skeleton()
+    other = np.array(MIRROR)[1:] - 1
+    np.testing.assert_allclose(skeleton.offsets[other] * [-1.0, 1.0, 1.0], skeleton.offsets, atol=2e-5)
+
+
+def test_shapes_are_checked() -> None:
+    skeleton = average_skeleton()
+    with pytest.raises(ValueError, match=r"poses must have shape \(..., 66\), got \(2, 65\)"):
+        skeleton.joints(np.zeros((2, 65)))
+    with pytest.raises(ValueError, match=r"translations must have shape \(2, 3\), got \(3,\)"):
+        skeleton.joints(np.zeros((2, 66)), np.zeros(3))
+    with pytest.raises(ValueError, match=r"offsets must have shape \(26, 3\), got \(25, 3\)"):
+        Skeleton("x", np.zeros((25, 3)), np.zeros((26, 3, 3)), ())
+    assert len(BONES) == 26

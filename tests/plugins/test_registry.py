@@ -1,0 +1,113 @@
+"""Plugins come in by one door, and a broken one costs a warning."""
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit import hookimpl
+from posefit.motion import library
+from posefit.registry import load, registry
+from posefit_priors.pca import PCA
+
+
+class Point:
+    """Stands for an entry point of a distribution that is not installed."""
+
+    def __init__(self, name: str, module: Any) -> None:
+        self.name, self.module = name, module
+        self.dist = type("Distribution", (), {"name": f"posefit-{name}", "version": "1.0"})()
+
+    def load(self) -> Any:
+        if isinstance(self.module, Exception):
+            raise self.module
+        return self.module
+
+
+def plugin(**hooks: Any) -> ModuleType:
+    module = ModuleType("plugin")
+    for name, hook in hooks.items():
+        setattr(module, name, hookimpl(hook))
+    return module
+
+
+def offering(name: str) -> ModuleType:
+    def posefit_register_optimisers(register: Any) -> None:
+        register(name, PCA)
+
+    return plugin(posefit_register_optimisers=posefit_register_optimisers)
+
+
+def test_the_built_ins_are_there_under_their_names() -> None:
+    offers = registry().offers
+    assert {"sapso", "random"} <= set(offers["optimiser"])
+    assert "pca" in offers["prior"]
+    assert offers["optimiser"]["sapso"].distribution == "posefit"
+
+
+def test_a_third_partys_optimiser_is_found_like_a_built_in() -> None:
+    assert load([Point("mine", offering("mine"))]).optimiser("mine") is PCA  # type: ignore[list-item]
+
+
+@pytest.mark.parametrize(
+    ("broken", "cause"),
+    [
+        (ImportError("no module named 'lost'"), "ImportError: no module named 'lost'"),
+        (plugin(posefit_register_optimizers=lambda register: None), "posefit_register_optimizers"),
+        (plugin(posefit_register_priors=lambda register: 1 / 0), "ZeroDivisionError"),
+    ],
+)
+def test_a_broken_plugin_costs_one_warning_that_names_it(broken: Any, cause: str) -> None:
+    with pytest.warns(UserWarning, match="posefit-bad") as caught:
+        found = load([Point("bad", broken), Point("good", offering("good"))])  # type: ignore[list-item]
+    assert len(caught) == 1
+    assert cause in str(caught[0].message)
+    assert list(found.offers["optimiser"]) == ["good"]
+
+
+def test_a_taken_name_is_refused() -> None:
+    with pytest.warns(UserWarning, match="'one' is already registered by posefit-a"):
+        found = load([Point("a", offering("one")), Point("b", offering("one"))])  # type: ignore[list-item]
+    assert found.offers["optimiser"]["one"].distribution == "posefit-a"
+
+
+def test_an_unknown_name_lists_the_known_and_the_nearest() -> None:
+    with pytest.raises(
+        ValueError, match=r"optimiser must be one of random, sapso, got 'sapzo'; did you mean 'sapso'\?"
+    ):
+        load(
+            EntryPoint(f"p{k}", module, "posefit") for k, module in enumerate(["posefit_swarm", "posefit_priors"])
+        ).optimiser("sapzo")
+
+
+def test_a_prior_survives_its_file(tmp_path: Path) -> None:
+    prior = PCA().fit(library.built_in("walk-a").poses[:, 3:])
+    prior.save(tmp_path / "prior.npz")
+    again = PCA.load(tmp_path / "prior.npz")
+    latents = np.random.default_rng(0).uniform(prior.low, prior.high, (50, 6))
+    np.testing.assert_array_equal(again.inverse_transform(latents), prior.inverse_transform(latents))
+    np.testing.assert_array_equal(again.feasible(latents), prior.feasible(latents))
+
+
+def test_a_file_that_is_no_prior_is_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", mean=np.zeros(3))
+    (tmp_path / "b.npz").write_bytes(b"nothing of the kind")
+    np.savez(tmp_path / "c.npz", mean=np.array([{}], dtype=object))
+    for name in "abc":
+        with pytest.raises(ValueError, match=r"\.npz: expected an \.npz file with mean"):
+            PCA.load(tmp_path / f"{name}.npz")
+
+
+def test_settings_are_checked() -> None:
+    for settings, message in (
+        ({"components": 2.5}, "components must be a whole number or a share"),
+        ({"clusters": 0}, "clusters must be at least 1, got 0"),
+        ({"quantile": 0.0}, "quantile must lie in 0 to 1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            PCA(**settings)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="angles must hold at least 7 frames, got 3"):
+        PCA().fit(np.zeros((3, 63)))

@@ -1,0 +1,296 @@
+"""What a user types, and what comes back: results, files, and one line for every mistake."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import posefit
+from posefit.cli import main
+from posefit.motion import library
+from posefit.motion.amc import read_clip, write_amc
+from posefit.motion.asf import write_asf
+
+QUICK = ["--particles", "10", "--iterations", "4", "--size", "120x90"]
+FILES = {
+    "poses.npz",
+    "track.amc",
+    "skeleton.asf",
+    "camera.json",
+    "frames.csv",
+    "summary.json",
+    "overlay.mp4",
+    "summary.png",
+}
+KEYS = {
+    "motion",
+    "method",
+    "seed",
+    "frames",
+    "error_degrees",
+    "mpjpe_mm",
+    "pa_mpjpe_mm",
+    "iou",
+    "swap_rate",
+    "lost_rate",
+    "skill",
+    "prior_floor_degrees",
+    "evaluations",
+    "seconds_per_frame",
+    "evaluations_per_second",
+}
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def fails(*words: object) -> str:
+    """Return the one line on stderr of a command that must fail with status 2 and print nothing."""
+    result = run(*words)
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    lines = [line for line in result.stderr.splitlines() if line.startswith(("posefit:", "Error:"))]
+    assert len(lines) == 1, result.stderr
+    assert "Traceback" not in result.stderr
+    return lines[0]
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> tuple[Path, Path]:
+    motion = library.built_in("walk-b", frames=12, fps=120.0)
+    write_asf(tmp_path / "one.asf", motion.skeleton)
+    write_amc(tmp_path / "one.amc", motion)
+    return tmp_path / "one.asf", tmp_path / "one.amc"
+
+
+def masks(folder: Path, count: int = 3) -> Path:
+    motion = library.built_in("walk", frames=count)
+    body = posefit.Body.of(motion.skeleton)
+    camera = posefit.Camera.around(np.array([0.0, 0.9, 0.0]), 0.8, 4.0, (120, 90))
+    folder.mkdir(parents=True, exist_ok=True)
+    from posefit.silhouette.cost import project
+
+    for k, (pose, where) in enumerate(zip(motion.poses, motion.translations, strict=True)):
+        cv2.imwrite(str(folder / f"{k:04}.png"), project(body, camera, pose, where).astype(np.uint8) * 255)
+    return folder
+
+
+def test_track_prints_one_json_object_with_every_key(tmp_path: Path) -> None:
+    result = run("track", "walk", "--frames", "0:4", "--json", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert set(summary) >= KEYS
+    assert set(summary["error_degrees"]) == {"mean", "std", "max"}
+    assert set(summary["skill"]) == {"mean_pose", "persistence", "nearest"}
+    assert summary["frames"] == 4
+    assert summary["evaluations"] == 4 * 10 * 5
+    assert summary["version"] == posefit.__version__
+
+
+def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "out"
+    result = run("track", "walk", "--frames", "0:5", "--out", out, *QUICK)
+    assert result.exit_code == 0, result.stderr
+    assert {path.name for path in out.iterdir()} == FILES
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
+    assert "error deg" in result.stdout
+    assert "mean training pose" in result.stdout
+    stored = np.load(out / "poses.npz")
+    assert stored["poses"].shape == (5, 66)
+    again = read_clip(out / "skeleton.asf", out / "track.amc", fps=30.0)
+    difference = (again.poses - stored["poses"] + np.pi) % (2 * np.pi) - np.pi
+    np.testing.assert_allclose(difference, 0.0, atol=1e-8)
+    np.testing.assert_allclose(again.translations, stored["translations"], atol=1e-9)
+    with (out / "frames.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 5
+    summary = json.loads((out / "summary.json").read_text())
+    assert np.mean([float(row["error_degrees"]) for row in rows]) == pytest.approx(summary["error_degrees"]["mean"])
+    video = cv2.VideoCapture(str(out / "overlay.mp4"))
+    frames = 0
+    while video.read()[0]:
+        frames += 1
+    assert frames == 5
+    assert cv2.imread(str(out / "summary.png")).shape[1] > 600
+    assert posefit.Camera.from_json(out / "camera.json").width == 120
+
+
+def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None:
+    tracks = [
+        posefit.track("walk", frames=(0, 4), particles=40, iterations=5, seed=3, threads=threads) for threads in (1, 2)
+    ]
+    np.testing.assert_array_equal(tracks[0].motion.poses, tracks[1].motion.poses)
+    other = posefit.track("walk", frames=(0, 4), particles=40, iterations=5, seed=4)
+    assert np.abs(other.motion.poses - tracks[0].motion.poses).max() > 0.0
+
+
+def test_the_command_is_the_typed_call() -> None:
+    printed = json.loads(run("track", "walk", "--frames", "0:3", "--seed", "7", "--json", *QUICK).stdout)
+    called = posefit.track("walk", frames=(0, 3), seed=7, particles=10, iterations=4, size=(120, 90)).summary
+    for key in KEYS - {"seconds_per_frame", "evaluations_per_second"}:
+        assert printed[key] == called[key]
+
+
+def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
+    result = run("fit", "walk", "--frame", "7", "--json", "--out", tmp_path / "fit", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    printed = json.loads(result.stdout)
+    assert len(printed["pose_degrees"]) == 66
+    assert printed["frames"] == 1
+    found = posefit.fit("walk", frame=7, particles=10, iterations=4, size=(120, 90))
+    np.testing.assert_allclose(np.degrees(found.pose), printed["pose_degrees"], atol=1e-5)
+    assert found.history.shape == (5,)
+
+
+def test_an_amc_is_followed_with_the_asf_beside_it(clip: tuple[Path, Path]) -> None:
+    result = run("track", clip[1], "--train", "walk-a", "--train", "walk-c", "--json", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert summary["frames"] == 3  # 12 frames at 120 Hz, at 30
+    assert summary["train"] == ["walk-a", "walk-c"]
+
+
+@pytest.mark.parametrize("mode", ["known", "searched", "aligned"])
+def test_the_translation_may_be_known_searched_or_aligned(mode: str) -> None:
+    result = run("track", "walk", "--frames", "0:3", "--translation", mode, "--json", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["translation"] == mode
+
+
+def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> None:
+    folder = masks(tmp_path / "masks")
+    stack = np.stack([cv2.imread(str(path), 0) for path in sorted(folder.iterdir())])
+    np.savez(tmp_path / "masks.npz", masks=stack > 0)
+    results = [
+        json.loads(run("track", source, "--view-degrees", "45", "--json", *QUICK).stdout)
+        for source in (folder, tmp_path / "masks.npz")
+    ]
+    assert results[0]["error_degrees"] is None
+    assert results[0]["iou"] == results[1]["iou"] > 0.5
+    assert results[0]["translation"] == "aligned"
+
+
+def test_memory_of_masks_in_a_folder_is_that_of_one(tmp_path: Path) -> None:
+    from posefit.study.source import LazyMasks
+
+    source = LazyMasks.of(masks(tmp_path / "masks"), (None, None))
+    assert source.stack is None
+    assert len(source) == 3
+
+
+def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("track", "walk", "--frames", "0:2", "--out", out, *QUICK).exit_code == 0
+    before = (out / "summary.json").read_text()
+    assert "expected a new folder" in fails("track", "walk", "--frames", "0:3", "--out", out, *QUICK)
+    assert (out / "summary.json").read_text() == before
+    assert run("track", "walk", "--frames", "0:3", "--out", out, "--force", *QUICK).exit_code == 0
+    assert json.loads((out / "summary.json").read_text())["frames"] == 3
+    (out / "precious.txt").write_text("mine")
+    assert "precious.txt" in fails("track", "walk", "--out", out, "--force", *QUICK)
+    assert (out / "precious.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["wlak"], "did you mean 'walk'?"),
+        (["lost.amc"], "lost.amc: expected a file, got nothing of that name"),
+        (["walk.txt"], "walk.txt: expected a file"),
+        (["walk", "--particles", "0"], "particles must be at least 1, got 0"),
+        (["walk", "--iterations", "0"], "iterations must be at least 1, got 0"),
+        (["walk", "--optimiser", "sapzo"], "optimiser must be one of"),
+        (["walk", "--prior", "pcb"], "prior must be one of"),
+        (["walk", "--size", "320"], "expected WIDTHxHEIGHT"),
+        (["walk", "--size", "0x9"], "size must be from 1x1"),
+        (["walk", "--frames", "3"], "expected A:B"),
+        (["walk", "--frames", "70:80"], "frames must choose some of the 60 frames, got 70:80"),
+        (["walk", "--fps", "0"], "fps and speed must be positive"),
+        (["walk", "--threads", "0"], "threads must be at least 1, got 0"),
+        (["walk", "--translation", "free"], "translation must be one of known, searched, aligned, got 'free'"),
+        (["walk", "--camera", "no.json"], "no.json"),
+        (["walk-a", "--train", "walk-a"], "train must not contain the source itself, got walk-a"),
+        (["walk", "--seed", "-1"], "seed must be 0 or more, got -1"),
+    ],
+)
+def test_a_mistake_is_one_line_and_status_2(words: list[str], message: str, tmp_path: Path) -> None:
+    assert message in fails("track", *words, "--out", tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bad_motion_files_are_refused(clip: tuple[Path, Path], tmp_path: Path) -> None:
+    asf, amc = clip
+    out = ["--out", tmp_path / "out"]
+    text = amc.read_text()
+    amc.write_text("")
+    assert "expected a file with content, got an empty one" in fails("track", amc, *out)
+    amc.write_text(text[: len(text) // 2].rpartition("\n")[0] + "\n")
+    assert f"{amc}:" in fails("track", amc, *out)
+    amc.write_text(text.replace("lfemur ", "lfemur nan ", 1).replace("\n", "\n", 1))
+    assert f"{amc}:" in fails("track", amc, *out)
+    amc.write_text(text)
+    skeleton = asf.read_text()
+    asf.write_text("\n".join(line for line in skeleton.splitlines() if "head" not in line))
+    assert str(asf) in fails("track", amc, *out)
+    asf.unlink()
+    assert "expected --asf or exactly one .asf file beside it, got 0" in fails("track", amc, *out)
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_masks_are_refused(tmp_path: Path) -> None:
+    folder, out = masks(tmp_path / "masks", 4), tmp_path / "out"
+    good = cv2.imread(str(folder / "0002.png"), 0)
+    for image, message in (
+        (np.zeros_like(good), "0002.png: expected a mask with a person before a background, got an empty one"),
+        (np.full_like(good, 255), "0002.png: expected a mask with a person before a background, got one without"),
+        (good[:, :60], "0002.png: mask must have shape (90, 120), got (90, 60)"),
+    ):
+        cv2.imwrite(str(folder / "0002.png"), image)
+        assert message in fails("track", folder, "--out", out, *QUICK)
+    (folder / "0002.png").write_bytes(b"no image")
+    assert "0002.png: expected an image" in fails("track", folder, "--out", out, *QUICK)
+    (tmp_path / "empty").mkdir()
+    assert "expected a folder with mask images" in fails("track", tmp_path / "empty")
+    np.savez(tmp_path / "a.npz", other=np.zeros(3))
+    np.savez(tmp_path / "b.npz", masks=np.zeros((3, 4)))
+    np.savez(tmp_path / "c.npz", masks=np.full((2, 9, 9), np.nan))
+    np.savez(tmp_path / "d.npz", masks=np.array([{}], dtype=object))
+    for name, message in (
+        ("a", "with the key masks"),
+        ("b", "masks must have shape (frames, height, width), got (3, 4)"),
+        ("c", "masks must be finite"),
+        ("d", "with the key masks"),
+    ):
+        assert message in fails("track", tmp_path / f"{name}.npz")
+    (tmp_path / "wide.json").write_text(posefit.Camera.around(np.zeros(3), 0.0, 4.0, (99, 90)).to_json())
+    (folder / "0002.png").unlink()
+    assert "mask must have shape (90, 99), the camera's, got (90, 120)" in fails(
+        "track", folder, "--camera", tmp_path / "wide.json"
+    )
+    assert "translation must be searched or aligned" in fails("track", folder, "--translation", "known")
+    assert not out.exists()
+
+
+def test_plugins_are_listed() -> None:
+    assert {(row["kind"], row["name"]) for row in json.loads(run("plugins", "--json").stdout)} >= {
+        ("optimiser", "sapso"),
+        ("optimiser", "random"),
+        ("prior", "pca"),
+    }
+    assert "sapso" in run("plugins").stdout
+
+
+def test_help_loads_nothing_heavy() -> None:
+    script = (
+        "import sys; from posefit.cli import main; main(['--help'], standalone_mode=False);"
+        "print([m for m in ('numba', 'scipy', 'cv2', 'sklearn', 'numpy') if m in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines()[-1] == "[]"
