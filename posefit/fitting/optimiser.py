@@ -54,12 +54,12 @@ def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluatio
         lowest = int(costs.argmin())
         if math.isnan(costs[lowest]):  # argmin prefers nan to any number
             lowest = int(np.where(np.isnan(costs), np.inf, costs).argmin())
-        if best is None or costs[lowest] < cost:
+        if best is None or math.isnan(cost) or costs[lowest] < cost:
             best, cost = proposals[lowest].copy(), float(costs[lowest])
         history.append(cost)
         optimiser.tell(proposals, costs)
     if best is None:
         raise ValueError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
-    if np.isnan(cost):
+    if math.isnan(cost):
         raise ValueError(f"costs must be numbers, got nan for all {used} proposals")
     return Minimum(best, cost, used, np.array(history))

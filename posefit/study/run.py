@@ -89,6 +89,8 @@ def track(
         raise ValueError(f"particles must be at least 1, got {particles}")
     if iterations < 1:
         raise ValueError(f"iterations must be at least 1, got {iterations}")
+    if seed < 0:
+        raise ValueError(f"seed must be 0 or more, got {seed}")
     folder = OutputFolder(out, force) if out is not None else None
     scene = _scene(source, asf, camera, view_degrees, size, fps, frames)
     trained = _training(source, train, asf, fps)

@@ -56,8 +56,8 @@ def test_a_third_partys_optimiser_is_found_like_a_built_in() -> None:
     ("broken", "cause"),
     [
         (ImportError("no module named 'lost'"), "ImportError: no module named 'lost'"),
-        (plugin(posefit_register_optimizers=lambda register: None), "posefit_register_optimizers"),
-        (plugin(posefit_register_priors=lambda register: 1 / 0), "ZeroDivisionError"),
+        (plugin(posefit_register_optimizers=lambda register: register), "posefit_register_optimizers"),
+        (plugin(posefit_register_priors=lambda register: register / 0), "TypeError"),
     ],
 )
 def test_a_broken_plugin_costs_one_warning_that_names_it(broken: Any, cause: str) -> None:

@@ -37,6 +37,7 @@ class Line:
         self.low, self.high, self.gap = np.array([-1.0]), np.array([1.0]), gap
 
     def fit(self, angles: Array) -> "Line":
+        assert angles.shape[1] == 63
         return self
 
     def transform(self, angles: Array) -> Array:
