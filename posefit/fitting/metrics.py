@@ -8,6 +8,7 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
 
+_LEFT_HIP, _RIGHT_HIP = JOINTS.index("lhipjoint"), JOINTS.index("rhipjoint")
 _PAIRED = np.array([j for j in range(len(JOINTS)) if MIRROR[j] != j])
 
 
@@ -67,13 +68,17 @@ def iou(areas: NDArray[np.int64]) -> Array:
 
 
 def swapped(truth: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return whether each frame (T,) comes nearer to the truth when its left and right limbs trade names.
+    """Return whether each frame (T,) comes nearer to the truth when the estimate is mirrored. Reading S15.
 
-    Distances are those of the joints that have a counterpart, both roots at one point. Reading S15.
+    The mirror is the plane through the root that the hips face each other across; left and right trade names. In a
+    side view a pose and its mirror image have nearly one silhouette. Only joints that have a counterpart count.
     """
     truth, joints = (_rooted(points) for points in _pair("joints", truth, joints, (len(JOINTS), 3)))
+    across = joints[:, _LEFT_HIP] - joints[:, _RIGHT_HIP]
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+    mirrored = joints - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]
     named = _distances(truth[:, _PAIRED], joints[:, _PAIRED]).mean(axis=1)
-    traded = _distances(truth[:, _PAIRED], joints[:, np.array(MIRROR)[_PAIRED]]).mean(axis=1)
+    traded = _distances(truth[:, _PAIRED], mirrored[:, np.array(MIRROR)[_PAIRED]]).mean(axis=1)
     return np.asarray(traded < named)
 
 
