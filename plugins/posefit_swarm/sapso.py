@@ -1,13 +1,13 @@
 """Simulated-annealed particle swarm optimisation: the paper's Algorithm 1."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit import SearchSpace
 from posefit.geometry.rotation import Array
-from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, fly, inertia, mend, settle
+from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, fly, inertia, mend, redrawable, settle
 
 PARTICLES = 40  # N, section 5.2
 ITERATIONS = 60  # C, section 5.2
@@ -15,7 +15,7 @@ TEMPERATURE = 1.0  # T, section 5.2
 COOLING = 0.95  # gamma, section 5.2
 STOP_TEMPERATURE = 0.0  # T0; Reading S5
 REDRAWS = 100  # Reading S7
-FIRST_REDRAWS = 8  # ours: how many of them are drawn at once; then all that are left
+FIRST_REDRAWS = 12  # ours: how many of them are drawn at once; then all that are left
 CHOICES = (
     ("iteration", "acceptance"),
     ("dimension", "scalar"),
@@ -112,18 +112,35 @@ class SAPSO:
         before, feasible = self._velocity, self._space.feasible
         self._velocity, self._moved = self._attempt(self._everyone, before, swarm_best)
         broken = np.flatnonzero(~feasible(self._moved))
+        if not len(broken):
+            return
+        stopped = np.zeros(len(before), dtype=bool)
+        stopped[broken] = True
         left, many = self._redraws, FIRST_REDRAWS
+        # what no draw could bring back into the box need not be drawn again
+        broken = redrawable(broken, *self._pull(before, swarm_best))
         while left > 0 and len(broken):
             many = min(left, many)
             flown, moved = self._attempt(np.repeat(broken, many), before, swarm_best)
             # SAPSO A1.2c
-            broken = mend(broken, feasible(moved), flown, moved, self._velocity, self._moved)
-            left, many = left - many, self._redraws
-        if len(broken):
-            # clip and stop; where even that breaks constraint 2, the particle stays where it was
-            clipped = np.clip(self._moved[broken], -1.0, 1.0)
-            self._moved[broken] = np.where(feasible(clipped)[:, None], clipped, self._position[broken])
-            self._velocity[broken] = 0.0
+            still = mend(broken, feasible(moved), flown, moved, self._velocity, self._moved)
+            stopped[broken], stopped[still] = False, True
+            broken, left, many = still, left - many, self._redraws
+        rows = np.flatnonzero(stopped)
+        if len(rows):
+            self._halt(rows)
+
+    def _halt(self, rows: NDArray[np.int64]) -> None:
+        """Clip particles into the box and stop them; where that breaks constraint 2, they stay where they were."""
+        clipped = np.minimum(np.maximum(self._moved[rows], -1.0), 1.0)
+        self._moved[rows] = np.where(self._space.feasible(clipped)[:, None], clipped, self._position[rows])
+        self._velocity[rows] = 0.0
+
+    def _pull(self, velocity: Array, swarm_best: Array) -> tuple[Any, ...]:
+        """Return everything but rand() that (1) depends on."""
+        omega = inertia(self._iteration, self._iterations, self._inertia)
+        limits = self._low, self._high, self._space.periodic
+        return omega, self._acceleration, self._position, velocity, self._best, swarm_best, *limits
 
     def _attempt(self, rows: NDArray[np.int64], velocity: Array, swarm_best: Array) -> tuple[Array, Array]:
         """Return new velocities and positions (k, d) of some particles, with fresh draws of rand()."""
@@ -133,21 +150,7 @@ class SAPSO:
         else:
             rand = self._rng.random((2, *shape))
         flown, moved = np.empty(shape), np.empty(shape)
-        fly(
-            rows,
-            inertia(self._iteration, self._iterations, self._inertia),
-            self._acceleration,
-            rand,
-            self._position,
-            velocity,
-            self._best,
-            swarm_best,
-            self._low,
-            self._high,
-            self._space.periodic,
-            flown,
-            moved,
-        )
+        fly(rows, rand, *self._pull(velocity, swarm_best), flown, moved)  # type: ignore[call-arg]
         return flown, moved
 
 

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from posefit.geometry.kinematics import jit
 
 INERTIA = 0.9  # A; Reading S5: the paper gives none, and it must be above 0.1
@@ -15,7 +17,7 @@ def inertia(step: int, steps: int, first: float = INERTIA) -> float:
 
 
 @jit
-def fly(rows, omega, acceleration, rand, position, velocity, best, swarm_best, low, high, periodic, flown, moved):
+def fly(rows, rand, omega, acceleration, position, velocity, best, swarm_best, low, high, periodic, flown, moved):
     """Write the next velocities and positions (k, d) of particles `rows` (k,), velocities kept within low and high.
 
     `rand` (2, k, d) scales the accelerations towards the personal and the swarm's best; a periodic coordinate flies the
@@ -39,6 +41,26 @@ def fly(rows, omega, acceleration, rand, position, velocity, best, swarm_best, l
 def wrap(x):
     """Return a unit coordinate brought into [-1, 1)."""
     return (x + 1.0) % 2.0 - 1.0
+
+
+@jit
+def redrawable(broken, omega, acceleration, position, velocity, best, swarm_best, low, high, periodic):
+    """Return those of the broken particles that some rand() in [0, 1] would keep within the box."""
+    left = 0
+    kept = np.empty_like(broken)
+    for i in broken:
+        hope = True
+        for j in range(low.size):
+            if not periodic[j]:
+                x, v = position[i, j], omega * velocity[i, j]
+                a, b = acceleration * (best[i, j] - x), acceleration * (swarm_best[j] - x)
+                least = min(max(v + min(a, 0.0) + min(b, 0.0), low[j]), high[j])
+                most = min(max(v + max(a, 0.0) + max(b, 0.0), low[j]), high[j])
+                hope &= x + least <= 1.0 and x + most >= -1.0
+        if hope:
+            kept[left] = i
+            left += 1
+    return kept[:left]
 
 
 @jit

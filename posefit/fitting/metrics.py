@@ -18,18 +18,23 @@ def pose_error_degrees(truth: Array, estimate: Array, dimensions: NDArray[np.boo
     All 66 angles count, padding too, unless `dimensions` (66,) chooses some.
     """
     truth, estimate = _pair("estimate", truth, estimate, (ANGLES,))
+    if dimensions is not None:
+        dimensions = np.asarray(dimensions)
+        if dimensions.shape != (ANGLES,) or dimensions.dtype != np.bool_ or not dimensions.any():
+            came = f"{dimensions.dtype} of shape {dimensions.shape}, {np.count_nonzero(dimensions)} of them not 0"
+            raise ValueError(f"dimensions must be {ANGLES} booleans, at least one of them true, got {came}")
     difference = np.degrees(np.abs(wrapped(truth - estimate)))
     return np.asarray((difference if dimensions is None else difference[:, dimensions]).mean(axis=1))  # SAPSO (8)
 
 
 def mean_error(errors: Array) -> float:
     """Return the mean of a sequence's errors (T,). SAPSO (9)."""
-    return float(np.mean(errors))  # SAPSO (9)
+    return float(np.mean(_series("errors", errors)))  # SAPSO (9)
 
 
 def error_spread(errors: Array) -> float:
     """Return the standard deviation of a sequence's errors (T,), with divisor T. SAPSO (10)."""
-    return float(np.std(errors))  # SAPSO (10)
+    return float(np.std(_series("errors", errors)))  # SAPSO (10)
 
 
 def geodesic_degrees(truth: Array, estimate: Array) -> Array:
@@ -41,7 +46,11 @@ def geodesic_degrees(truth: Array, estimate: Array) -> Array:
 
 
 def mpjpe_mm(truth: Array, joints: Array) -> Array:
-    """Return the mean distance (T,) of the joints in millimetres, both roots at one point."""
+    """Return the mean distance (T,) of the joints in millimetres, both roots at one point.
+
+    The root is moved to the origin on both sides, as is usual where one camera leaves the depth open. All 27 joints
+    count, the root with its zero.
+    """
     truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
     return np.asarray(1e3 * _distances(_rooted(truth), _rooted(joints)).mean(axis=1))
 
@@ -63,6 +72,9 @@ def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
 
 def iou(areas: NDArray[np.int64]) -> Array:
     """Return the intersection over union (n,) of areas R, B, Y (n, 3); 1 where both are empty."""
+    areas = np.asarray(areas)
+    if areas.ndim != 2 or areas.shape[1] != 3:
+        raise ValueError(f"areas must have shape (n, 3), got {areas.shape}")
     total = areas.sum(axis=1)
     return np.asarray(np.where(total > 0, areas[:, 2] / np.maximum(total, 1), 1.0))
 
@@ -89,7 +101,7 @@ def swap_rate(truth: Array, joints: Array) -> float:
 
 def lost_rate(mpjpe: Array) -> float:
     """Return the share of frames whose MPJPE (T,) in millimetres is above 150."""
-    return float((np.asarray(mpjpe) > LOST_MM).mean())
+    return float((_series("mpjpe", mpjpe) > LOST_MM).mean())
 
 
 def skill(error: float, baseline: float) -> float | None:
@@ -103,7 +115,17 @@ def _pair(name: str, truth: Array, other: Array, tail: tuple[int, ...]) -> tuple
         raise ValueError(f"truth must have shape (T, {', '.join(map(str, tail))}), got {truth.shape}")
     if other.shape != truth.shape:
         raise ValueError(f"{name} must have the truth's shape {truth.shape}, got {other.shape}")
+    for label, values in (("truth", truth), (name, other)):
+        if not np.isfinite(values).all():
+            raise ValueError(f"{label} must be finite, got {np.count_nonzero(~np.isfinite(values))} that are not")
     return truth, other
+
+
+def _series(name: str, values: Array) -> Array:
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim != 1 or not len(values):
+        raise ValueError(f"{name} must have shape (T,), at least one frame, got {values.shape}")
+    return values
 
 
 def _rooted(joints: Array) -> Array:

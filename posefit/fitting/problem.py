@@ -55,7 +55,7 @@ class PoseProblem:
         costs = mismatch(counts[0], self.beta)
         for more in counts[1:]:
             costs += mismatch(more, self.beta)
-        return costs / len(counts)
+        return costs if len(counts) == 1 else costs / len(counts)
 
     def areas(self, poses: Array, translations: Array) -> list[Areas]:
         """Return R, B, Y (n, 3) of each view."""

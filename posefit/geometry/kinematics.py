@@ -21,6 +21,7 @@ class Chain(NamedTuple):
     parents: NDArray[np.int64]  # (26,) joint a bone starts from; it ends in joint b + 1
     angles: NDArray[np.int64]  # (26,) index in the pose of the bone's rx, or -1 where it cannot turn
     turns: Array  # (26, 3, 3) parent's frame from this bone's frame, at rest
+    turned: NDArray[np.bool_]  # (26,) whether that is more than the identity, as it is for a third of the bones
     offsets: Array  # (26, 3) the bone in its own frame
 
 
@@ -29,7 +30,8 @@ def chain(parents: NDArray[np.int64], angles: NDArray[np.int64], axes: Array, of
     before = np.array([np.eye(3) if p == 0 else axes[p - 1] for p in parents])
     turns = np.swapaxes(before, 1, 2) @ axes
     own = np.einsum("bji,bj->bi", axes, offsets)
-    return Chain(parents.astype(np.int64), angles.astype(np.int64), turns, own)
+    turned = np.abs(turns - np.eye(3)).max(axis=(1, 2)) > 1e-12
+    return Chain(parents.astype(np.int64), angles.astype(np.int64), turns, turned, own)
 
 
 @jit
@@ -84,9 +86,12 @@ def place_joints(chain, pose, translation, sines, cosines, frames, joints):
         a = chain.angles[b]
         for i in range(3):
             # one row of parent @ turn, then of that times Rz @ Ry @ Rx
-            u = parent[i, 0] * turn[0, 0] + parent[i, 1] * turn[1, 0] + parent[i, 2] * turn[2, 0]
-            v = parent[i, 0] * turn[0, 1] + parent[i, 1] * turn[1, 1] + parent[i, 2] * turn[2, 1]
-            w = parent[i, 0] * turn[0, 2] + parent[i, 1] * turn[1, 2] + parent[i, 2] * turn[2, 2]
+            u, v, w = parent[i, 0], parent[i, 1], parent[i, 2]
+            if chain.turned[b]:
+                p, q, r = u, v, w
+                u = p * turn[0, 0] + q * turn[1, 0] + r * turn[2, 0]
+                v = p * turn[0, 1] + q * turn[1, 1] + r * turn[2, 1]
+                w = p * turn[0, 2] + q * turn[1, 2] + r * turn[2, 2]
             if a >= 0:
                 u, v = u * cosines[a + 2] + v * sines[a + 2], v * cosines[a + 2] - u * sines[a + 2]
                 u, w = u * cosines[a + 1] - w * sines[a + 1], w * cosines[a + 1] + u * sines[a + 1]

@@ -2,10 +2,11 @@
 
 A motion is a period and, for each free angle and the root's path, a Fourier series over that period. What is stored
 are these few numbers, no recorded frame. It is run by hand when a motion is added; its result, library.json, is
-what the package carries.
+what the package carries. Without an argument, CMU_DIR is the environment variable POSEFIT_CMU.
 """
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -38,6 +39,7 @@ class Clip(NamedTuple):
     longest: float
 
 
+# Not 127_03: it starts from standing and gathers speed to its last frame, so that no part is periodic.
 CLIPS = {
     "walk-a": Clip("16/16_15", 2, None, 0.9, 1.35),
     "walk-b": Clip("02/02_01", 0, None, 0.9, 1.35),
@@ -129,7 +131,11 @@ def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
 
 
 def main(root: Path) -> None:
-    """Write library.json beside this file."""
+    """Write library.json beside this file. Raises ValueError where a file it needs is missing."""
+    needed = [f"{subject}/{subject}.asf" for subject in SUBJECTS] + [f"{clip.path}.amc" for clip in CLIPS.values()]
+    for name in needed:
+        if not (root / name).is_file():
+            raise ValueError(f"CMU_DIR must hold {name}, got {root} without it")
     bones = average([read_asf(root / subject / f"{subject}.asf") for subject in SUBJECTS])
     skeleton = Skeleton(
         "average",
@@ -148,6 +154,10 @@ def main(root: Path) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    folders = sys.argv[1:] or [folder for folder in [os.environ.get("POSEFIT_CMU")] if folder]
+    if len(folders) != 1:
         sys.exit("usage: python -m posefit.motion.fit_library CMU_DIR")
-    main(Path(sys.argv[1]))
+    try:
+        main(Path(folders[0]))
+    except ValueError as error:
+        sys.exit(str(error))

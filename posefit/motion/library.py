@@ -55,13 +55,16 @@ def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1
     """Return a built-in motion of so many frames. It goes along +z, and half its way is behind the origin.
 
     `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
-    lowest joint of the cycle is 3 cm above the ground y = 0. Raises ValueError for an unknown name.
+    lowest joint of the cycle is about 3 cm above the ground y = 0, as thick as a toe. Raises ValueError for an unknown
+    name, and where a number is not what it should be.
     """
-    if frames < 1:
-        raise ValueError(f"frames must be at least 1, got {frames}")
+    angles, series, period, pace = _model(name)
+    if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 1:
+        raise ValueError(f"frames must be a whole number of at least 1, got {frames!r}")
     if not (np.isfinite(fps) and fps > 0.0 and np.isfinite(speed) and speed > 0.0):
         raise ValueError(f"fps and speed must be positive, got {fps} and {speed}")
-    angles, series, period, pace = _model(name)
+    if not np.isfinite(phase):
+        raise ValueError(f"phase must be finite, got {phase}")
     times = np.arange(frames) * speed / fps
     turns = 2.0 * np.pi * np.outer(times / period + phase, np.arange(1, series.shape[1] // 2 + 1))
     values = np.column_stack([np.ones(frames), np.cos(turns), np.sin(turns)]) @ series.T

@@ -44,12 +44,14 @@ def areas(
     chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
     observed, valid = silhouette.bits
 
-    def work(part: slice) -> None:
-        kernels.count_areas(  # SAPSO (3)
-            chain, radii, view, observed, valid, poses[part], translations[part], out[part]
-        )
+    shares = min(threads, n // LEAST_SHARE)
+    if shares <= 1:
+        kernels.count_areas(chain, radii, view, observed, valid, poses, translations, out)  # SAPSO (3)
+        return out
 
-    shares = max(1, min(threads, n // LEAST_SHARE))
+    def work(part: slice) -> None:
+        kernels.count_areas(chain, radii, view, observed, valid, poses[part], translations[part], out[part])
+
     cuts = [n * share // shares for share in range(shares + 1)]
     others = [_submit(threads, work, slice(a, b)) for a, b in pairwise(cuts[1:])]
     work(slice(0, cuts[1]))

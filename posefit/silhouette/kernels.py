@@ -231,8 +231,7 @@ def count(image, observed, valid, box):
         for y in range(column.size):
             body += np.uint64(_popcount(column[y] & known[y]))
             overlap += np.uint64(_popcount(column[y] & seen[y]))
-        column[:] = _NONE
-        image[w][box[1] : box[1] + BLOCK] = _NONE
+        image[w][box[0] : box[1] + BLOCK] = _NONE
     return body, overlap
 
 

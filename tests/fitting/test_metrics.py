@@ -2,11 +2,17 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from posefit.fitting import metrics
 from posefit.geometry.rotation import Array, rotation_from_joint_angles
 from posefit.geometry.skeleton import JOINTS, MIRROR, angle_index
 from posefit.motion import library
+
+seeds = st.integers(0, 2**32 - 1)
+rotations = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(lambda angles: rotation_from_joint_angles(np.array(angles)))
 
 
 @pytest.fixture(scope="module")
@@ -82,3 +88,160 @@ def test_shapes_are_checked() -> None:
         metrics.pose_error_degrees(np.zeros(66), np.zeros(66))
     with pytest.raises(ValueError, match=r"joints must have the truth's shape \(2, 27, 3\), got \(1, 27, 3\)"):
         metrics.mpjpe_mm(np.zeros((2, 27, 3)), np.zeros((1, 27, 3)))
+
+
+def test_one_angle_66_degrees_off_is_an_error_of_1_degree() -> None:
+    truth, estimate = np.zeros((3, 66)), np.zeros((3, 66))
+    estimate[1, 40] = np.radians(-66.0)
+    np.testing.assert_allclose(metrics.pose_error_degrees(truth, estimate), [0.0, 1.0, 0.0])
+
+
+def test_179_and_minus_179_degrees_differ_by_2() -> None:
+    truth, estimate = np.full((1, 66), np.radians(179.0)), np.full((1, 66), np.radians(-179.0))
+    for first, second in ((truth, estimate), (estimate, truth), (truth + 4.0 * np.pi, estimate)):
+        np.testing.assert_allclose(metrics.pose_error_degrees(first, second), 2.0)
+
+
+@given(seeds, st.integers(-3, 3))
+def test_the_pose_error_is_a_distance_of_directions(seed: int, turns: int) -> None:
+    a, b, c = np.random.default_rng(seed).uniform(-4.0, 4.0, (3, 2, 66))
+    error = metrics.pose_error_degrees(a, b)
+    assert (error >= 0.0).all()
+    assert (error <= 180.0).all()
+    np.testing.assert_allclose(metrics.pose_error_degrees(b, a), error)
+    np.testing.assert_allclose(metrics.pose_error_degrees(a + 2.0 * np.pi * turns, b), error)
+    np.testing.assert_allclose(metrics.pose_error_degrees(a, a), 0.0)
+    assert (error <= metrics.pose_error_degrees(a, c) + metrics.pose_error_degrees(c, b) + 1e-9).all()
+
+
+def test_the_mean_and_the_spread_of_a_sequence() -> None:
+    # deviations -3, -1, -1, 5: squares 9 + 1 + 1 + 25 = 36, over T = 4 frames 9
+    errors = np.array([1.0, 3.0, 3.0, 9.0])
+    assert metrics.mean_error(errors) == 4.0
+    assert metrics.error_spread(errors) == 3.0
+    assert metrics.error_spread(np.array([5.0])) == 0.0
+
+
+def test_the_geodesic_of_the_root_by_hand() -> None:
+    # A quarter turn of yaw and then of pitch is a turn of 120 degrees: 120 / 22.
+    truth, estimate = np.zeros((1, 66)), np.zeros((1, 66))
+    estimate[0, :2] = np.pi / 2
+    np.testing.assert_allclose(metrics.geodesic_degrees(truth, estimate), 120.0 / 22.0)
+
+
+def test_two_names_of_one_rotation_are_no_geodesic_error() -> None:
+    # x + 180, 180 - y, z + 180 is the same rotation as x, y, z: (8) counts it, the geodesic does not.
+    rng = np.random.default_rng(1)
+    truth = rng.uniform(-1.0, 1.0, (4, 66))
+    estimate = truth.copy()
+    estimate[:, 3::3] += np.pi
+    estimate[:, 4::3] = np.pi - truth[:, 4::3]
+    estimate[:, 5::3] += np.pi
+    np.testing.assert_allclose(metrics.geodesic_degrees(truth, estimate), 0.0, atol=1e-5)
+    assert metrics.pose_error_degrees(truth, estimate).min() > 90.0
+
+
+def test_mpjpe_by_hand() -> None:
+    truth, joints = np.zeros((2, 27, 3)), np.zeros((2, 27, 3))
+    joints[0, 4] = 0.03, 0.04, 0.0  # 50 mm
+    joints[0, 9] = 0.0, 0.0, -0.004  # 4 mm
+    joints[1, 0] = 0.001, 0.0, 0.0  # the root alone: all the others are 1 mm off
+    np.testing.assert_allclose(metrics.mpjpe_mm(truth, joints), [54.0 / 27.0, 26.0 / 27.0])
+
+
+@given(seeds, rotations, st.floats(0.2, 5.0))
+def test_pa_mpjpe_is_blind_to_similarities_alone(seed: int, rotation: Array, scale: float) -> None:
+    rng = np.random.default_rng(seed)
+    truth, estimate = rng.normal(0.0, 0.4, (2, 3, 27, 3))
+    found = metrics.pa_mpjpe_mm(truth, estimate)
+    moved = scale * estimate @ rotation.T + rng.normal(0.0, 3.0, 3)
+    np.testing.assert_allclose(metrics.pa_mpjpe_mm(truth, moved), found, rtol=1e-6)
+    np.testing.assert_allclose(metrics.pa_mpjpe_mm(truth, scale * truth @ rotation.T + 1.0), 0.0, atol=1e-6)
+    np.testing.assert_allclose(metrics.pa_mpjpe_mm(scale * truth, estimate), scale * found, rtol=1e-6)
+    assert (found > 0.0).all()
+
+
+@given(seeds)
+def test_pa_mpjpe_is_the_best_of_nearby_similarities(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth = rng.normal(0.0, 0.4, (27, 3))
+    turn = rotation_from_joint_angles(rng.uniform(-3.0, 3.0, 3))
+    noisy = truth @ turn.T + rng.normal(0.0, 0.05, (27, 3))
+    target, source = truth - truth.mean(axis=0), noisy - noisy.mean(axis=0)
+    rotation = Rotation.align_vectors(target, source)[0].as_matrix()
+    back = source @ rotation.T
+    scale = (back * target).sum() / (source**2).sum()
+    expected = 1e3 * np.linalg.norm(target - scale * back, axis=1).mean()
+    np.testing.assert_allclose(metrics.pa_mpjpe_mm(truth[None], noisy[None]), expected, rtol=1e-6)
+
+
+def test_an_estimate_in_one_point_is_at_the_centroid_for_pa_mpjpe() -> None:
+    truth = np.zeros((1, 27, 3))
+    truth[0, 0, 0] = 0.27  # the centroid is 10 mm along x: one joint 260 mm from it, 26 joints 10 mm
+    np.testing.assert_allclose(metrics.pa_mpjpe_mm(truth, np.ones((1, 27, 3))), (260.0 + 26 * 10.0) / 27.0)
+
+
+@given(st.lists(st.tuples(*[st.integers(0, 10**6)] * 3), min_size=1, max_size=5))
+def test_iou_lies_in_0_to_1_and_does_not_mind_who_is_who(rows: list[tuple[int, int, int]]) -> None:
+    found = metrics.iou(np.array(rows))
+    assert ((found >= 0.0) & (found <= 1.0)).all()
+    np.testing.assert_array_equal(metrics.iou(np.array(rows)[:, [1, 0, 2]]), found)
+
+
+def test_left_and_right_names_traded_count_as_swapped(joints: Array) -> None:
+    assert metrics.swapped(joints, joints[:, list(MIRROR)]).all()
+    assert metrics.swap_rate(joints, joints[:, list(MIRROR)] + [0.1, 0.2, 0.3]) == 1.0
+    half = joints.copy()
+    half[:5] = half[:5, list(MIRROR)]
+    assert metrics.swap_rate(joints, half) == 0.25
+
+
+@given(seeds, rotations)
+def test_where_the_pair_stands_and_faces_does_not_decide_a_swap(joints: Array, seed: int, rotation: Array) -> None:
+    rng = np.random.default_rng(seed)
+    estimate = joints + rng.normal(0.0, 0.05, joints.shape)
+    estimate[::2] = estimate[::2, list(MIRROR)]
+    found = metrics.swapped(joints, estimate)
+    moved = metrics.swapped(joints @ rotation.T + rng.normal(size=3), estimate @ rotation.T + rng.normal(size=3))
+    np.testing.assert_array_equal(moved, found)
+    assert found[::2].all()
+
+
+def test_an_untrue_number_is_named() -> None:
+    joints, poses = np.zeros((2, 27, 3)), np.zeros((2, 66))
+    holed, spoilt = joints.copy(), poses.copy()
+    holed[1, 3, 0], spoilt[1, :2] = np.nan, np.inf
+    for of_joints in (metrics.mpjpe_mm, metrics.pa_mpjpe_mm, metrics.swapped, metrics.swap_rate):
+        with pytest.raises(ValueError, match="joints must be finite, got 1 that are not"):
+            of_joints(joints, holed)
+        with pytest.raises(ValueError, match=r"truth must have shape \(T, 27, 3\), got \(0, 27, 3\)"):
+            of_joints(joints[:0], joints[:0])
+    for of_poses in (metrics.pose_error_degrees, metrics.geodesic_degrees):
+        with pytest.raises(ValueError, match="truth must be finite, got 2 that are not"):
+            of_poses(spoilt, poses)
+        with pytest.raises(ValueError, match=r"estimate must have the truth's shape \(2, 66\), got \(2, 65\)"):
+            of_poses(poses, poses[:, 1:])
+
+
+@pytest.mark.parametrize(
+    ("dimensions", "came"),
+    [
+        (np.ones(65, bool), r"bool of shape \(65,\), 65 of them not 0"),
+        (np.ones(66), r"float64 of shape \(66,\), 66 of them not 0"),
+        (np.zeros(66, bool), r"bool of shape \(66,\), 0 of them not 0"),
+    ],
+)
+def test_dimensions_are_checked(dimensions: Array, came: str) -> None:
+    with pytest.raises(ValueError, match=f"dimensions must be 66 booleans, at least one of them true, got {came}"):
+        metrics.pose_error_degrees(np.zeros((1, 66)), np.zeros((1, 66)), dimensions)
+
+
+def test_sequences_and_areas_are_checked() -> None:
+    for of_errors in (metrics.mean_error, metrics.error_spread):
+        with pytest.raises(ValueError, match=r"errors must have shape \(T,\), at least one frame, got \(0,\)"):
+            of_errors(np.zeros(0))
+    with pytest.raises(ValueError, match=r"mpjpe must have shape \(T,\), at least one frame, got \(2, 1\)"):
+        metrics.lost_rate(np.zeros((2, 1)))
+    for shape in ((3,), (4, 2)):
+        with pytest.raises(ValueError, match=r"areas must have shape \(n, 3\), got \("):
+            metrics.iou(np.zeros(shape, dtype=np.int64))

@@ -2,14 +2,22 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from posefit.geometry.body import PROPORTIONS, Body
-from posefit.geometry.camera import Camera
+from posefit.geometry.camera import MARGIN, Camera
+from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.motion.library import average_skeleton
+
+UNCAUGHT = pytest.mark.xfail(
+    strict=True, reason="from_json lets RecursionError, OverflowError and a bare ValueError out"
+)
 
 
 def test_a_point_is_projected_by_hand() -> None:
@@ -100,3 +108,114 @@ def test_radii_are_in_proportion_to_the_bones() -> None:
     np.testing.assert_allclose(
         body.joint_radii()[JOINTS.index("lfemur")], max(body.radii[bone, 1], body.radii[bone + 1, 0])
     )
+
+
+def test_around_by_hand_from_the_side() -> None:
+    # It stands at (4 + 1, 2, 3) and looks along -x; its right is -z, so who walks along +z walks to the left.
+    camera = Camera.around(np.array([1.0, 2.0, 3.0]), np.pi / 2, 4.0, (320, 240), field_of_view=np.pi / 2)
+    np.testing.assert_allclose(camera.position, [5.0, 2.0, 3.0], atol=1e-12)
+    # 90 degrees across 320 pixels: focal 160. One metre is 40 pixels at 4 m and 80 pixels at 2 m.
+    points = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 4.0], [1.0, 3.0, 3.0], [3.0, 2.0, 2.0]])
+    pixels, depths = camera.project(points)
+    np.testing.assert_allclose(pixels, [[160, 120], [120, 120], [160, 80], [240, 120]], atol=1e-9)
+    np.testing.assert_allclose(depths, [4.0, 4.0, 4.0, 2.0])
+
+
+@pytest.mark.parametrize("size", [(320, 240), (240, 320)])
+def test_the_field_of_view_spans_the_larger_side(size: tuple[int, int]) -> None:
+    camera = Camera.around(np.zeros(3), 0.0, 3.0, size, field_of_view=0.7)
+    reach = 3.0 * np.tan(0.35)
+    edge, _ = camera.project(np.array([reach, 0.0, 0.0] if size[0] > size[1] else [0.0, -reach, 0.0]))
+    np.testing.assert_allclose(edge, [320.0, 120.0] if size[0] > size[1] else [120.0, 320.0])
+
+
+@given(
+    st.floats(-4.0, 4.0),
+    st.floats(0.5, 20.0),
+    st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)).map(np.array),
+)
+def test_around_stands_where_it_says_and_sees_its_target(azimuth: float, distance: float, target: Array) -> None:
+    camera = Camera.around(target, azimuth, distance, (320, 240))
+    where = target + distance * np.array([np.sin(azimuth), 0.0, np.cos(azimuth)])
+    np.testing.assert_allclose(camera.position, where, atol=1e-9)
+    pixel, depth = camera.project(target)
+    np.testing.assert_allclose(pixel, [160.0, 120.0], atol=1e-6)
+    assert depth == pytest.approx(distance)
+
+
+def test_a_face_towards_the_camera_has_its_left_on_the_images_right() -> None:
+    camera = Camera.around(np.zeros(3), 0.0, 4.0, (320, 240))
+    # The body faces +z, where the camera stands; its left is up x forward = y x z = +x.
+    pixels, depths = camera.project(np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.0, 0.0, 0.2], [0.0, 0.0, -0.2]]))
+    assert pixels[0, 0] > 160.0 > pixels[1, 0]
+    assert depths[2] < depths[3]  # the chest is nearer than the back
+
+
+@pytest.mark.parametrize("size", [(200, 150), (150, 200), (64, 64)])
+def test_framing_is_the_nearest_camera_that_does(size: tuple[int, int]) -> None:
+    rng = np.random.default_rng(1)
+    points, radii = rng.normal(size=(40, 3)), rng.uniform(0.0, 0.2, 40)
+    camera = Camera.framing(points, radii, 0.3, size)
+    pixels, depths = camera.project(points)
+    reach = np.abs(pixels - camera.centre) + (camera.focal[0] * radii / depths)[:, None]
+    assert (reach / (0.5 * np.array(size))).max() == pytest.approx(1.0 - MARGIN)
+    np.testing.assert_allclose(camera.rotation, Camera.around(np.zeros(3), 0.3, 1.0, size).rotation)
+
+
+def test_framing_stands_off_from_one_small_ball() -> None:
+    # The one ball is the target; the distance must clear it by half a metre.
+    camera = Camera.framing(np.array([[1.0, 2.0, 3.0]]), np.array([0.01]), 0.0, (64, 48))
+    np.testing.assert_allclose(camera.position, [1.0, 2.0, 3.51])
+
+
+def test_a_camera_is_copied_and_cannot_be_written_to() -> None:
+    focal = np.array([50.0, 60.0])
+    camera = Camera(100, 80, focal, [50.0, 40.0], np.eye(3), np.zeros(3))
+    focal[0] = 1.0
+    assert camera.focal[0] == 50.0
+    with pytest.raises(ValueError, match="read-only"):
+        camera.rotation[0, 0] = 2.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"width": 0}, "width must be a whole number from 1 to 16384, got 0"),
+        ({"height": 16385}, "height must be a whole number from 1 to 16384, got 16385"),
+        ({"width": True}, "width must be a whole number from 1 to 16384, got True"),
+        ({"focal": [50.0]}, r"focal must be finite numbers of shape \(2,\), got \[50.0\]"),
+        ({"focal": [50.0, -1.0]}, r"focal must be positive, got \[50.0, -1.0\]"),
+        ({"translation": [0.0, np.nan, 0.0]}, r"translation must be finite numbers of shape \(3,\), got"),
+        ({"rotation": 2.0 * np.eye(3)}, "rotation must be orthonormal and right-handed, got"),
+        ({"rotation": np.diag([1.0, 1.0, -1.0])}, "rotation must be orthonormal and right-handed, got"),
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused(change: dict[str, Any], message: str) -> None:
+    values = {"width": 100, "height": 80, "focal": [50.0, 60.0], "centre": [50.0, 40.0]}
+    with pytest.raises(ValueError, match=message):
+        Camera(**{**values, "rotation": np.eye(3), "translation": np.zeros(3), **change})
+
+
+def test_a_camera_file_of_more_than_a_megabyte_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "camera.json").write_text(" " * 1_000_001)
+    with pytest.raises(ValueError, match="expected a camera file of at most 1 MB, got 1000001 bytes"):
+        Camera.from_json(tmp_path / "camera.json")
+
+
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        pytest.param("focal", "[" * 100_000, id="nested", marks=UNCAUGHT),
+        pytest.param("focal", f"[{10**400}, 1]", id="huge", marks=UNCAUGHT),
+        pytest.param("width", "9" * 5000, id="digits", marks=UNCAUGHT),
+        pytest.param("camera_from_world", "[[1], [1, 2]]", id="ragged"),
+    ],
+)
+def test_a_hostile_camera_file_is_refused_in_one_line(tmp_path: Path, key: str, text: str) -> None:
+    path = tmp_path / "camera.json"
+    values = json.loads(Camera.around(np.zeros(3), 0.4, 5.0, (32, 24)).to_json())
+    path.write_text(json.dumps({**values, key: "here"}).replace('"here"', text))
+    with pytest.raises(ValueError) as caught:
+        Camera.from_json(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)

@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,8 +12,9 @@ import pytest
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
-from posefit.geometry.skeleton import ANGLES, PARENTS
+from posefit.geometry.skeleton import ANGLES, PARENTS, Skeleton
 from posefit.silhouette.cost import areas, project
+from posefit.silhouette.kernels import FAR, NEAR
 from posefit.silhouette.mask import Silhouette
 from tests.silhouette.twin import body_distance, hull_distance
 
@@ -179,3 +181,142 @@ def test_three_poses_equal_the_twin_even_uncompiled(body: Body) -> None:
         mask = project(body, camera, pose, np.zeros(3))
         counted = areas(body, camera, Silhouette.of(mask), pose[None], np.zeros((1, 3)))
         assert counted.tolist() == [[0, 0, mask.sum()]]
+
+
+def one_cone(bone: Array, r0: float, r1: float) -> Body:
+    """Return a body of one bone (3,) that starts in the root; all else is points without width."""
+    offsets, radii = np.zeros((26, 3)), np.zeros((26, 2))
+    offsets[0], radii[0] = bone, (r0, r1)
+    return Body(Skeleton("one", offsets, np.tile(np.eye(3), (26, 1, 1)), ()), radii)
+
+
+# At a depth of 1 m a metre is 100 pixels, and the world's origin is the image's top left corner.
+FLAT = Camera(120, 90, np.array([100.0, 100.0]), np.zeros(2), np.eye(3), np.array([0.0, 0.0, 1.0]))
+
+
+def flat_cone(u: float, v: float, du: float, dv: float, r0: float, r1: float) -> tuple[Body, Camera, Array, Array]:
+    """Return what `project` wants for a cone given in pixels."""
+    return (
+        one_cone(np.array([du, dv, 0.0]) / 100, r0 / 100, r1 / 100),
+        FLAT,
+        np.zeros(ANGLES),
+        np.array([u, v, 0]) / 100,
+    )
+
+
+def test_cones_by_hand() -> None:
+    # a lying cylinder: 20.1 to 60.1 along row 30.2, radius 5: rows 25 to 34 have their centres within 25.2 to 35.2
+    mask = project(*flat_cone(20.1, 30.2, 40.0, 0.0, 5.0, 5.0))
+    assert np.flatnonzero(mask[:, 40]).tolist() == list(range(25, 35))
+    assert np.flatnonzero(mask[30]).tolist() == list(range(15, 65))  # centres within 15.1 and 65.1 but for the bulge
+    # the same standing
+    mask = project(*flat_cone(30.2, 20.1, 0.0, 40.0, 5.0, 5.0))
+    assert np.flatnonzero(mask[40]).tolist() == list(range(25, 35))
+    assert np.flatnonzero(mask[:, 30]).tolist() == list(range(15, 65))
+    # a disc of radius 1.6 on a pixel's centre: the 3 x 3 block (its corners are 1.41 away), and nothing at 2
+    mask = project(*flat_cone(50.5, 40.5, 0.0, 0.0, 1.6, 1.6))
+    assert mask.sum() == 9
+    assert mask[39:42, 49:52].all()
+    # a large disc hides a small one within it
+    np.testing.assert_array_equal(
+        project(*flat_cone(50.3, 40.7, 3.0, 1.0, 20.0, 2.0)), project(*flat_cone(50.3, 40.7, 0.0, 0.0, 20.0, 20.0))
+    )
+
+
+def test_single_cones_of_every_kind_equal_the_twin() -> None:
+    rng = np.random.default_rng(12)
+    for k in range(600):
+        (u, v), (du, dv) = rng.uniform(-30.0, 150.0, 2), rng.normal(0.0, 40.0, 2)
+        r0, r1 = rng.uniform(0.1, 30.0, 2)
+        kind = k % 6
+        du, dv = (0.0 if kind in (0, 5) else du), (0.0 if kind in (1, 5) else dv)  # standing, lying, a point
+        if kind == 2:
+            r1 = r0
+        elif kind == 3:
+            du, dv = 0.05 * du, 0.05 * dv  # one disc is mostly within the other
+        elif kind == 4:
+            u, v, du, dv = (round(value * 2.0) / 2.0 + 0.01 for value in (u, v, du, dv))
+        assert_equals_the_twin(*flat_cone(u, v, du, dv, r0, r1))
+
+
+@pytest.mark.parametrize("size", [(1, 1), (63, 40), (64, 8), (65, 9), (127, 61), (130, 7), (321, 50), (1920, 1080)])
+@pytest.mark.parametrize("depth", [3.0, 0.9, 0.2])
+def test_counted_areas_equal_the_masks_for_any_size_and_place(body: Body, size: tuple[int, int], depth: float) -> None:
+    rng = np.random.default_rng(13)
+    camera = Camera.around(np.zeros(3), 0.0, depth, size, field_of_view=0.8)
+    poses = random_poses(rng, 8)
+    translations = rng.normal(0.0, 0.4, (8, 3)) * [1.0, 1.0, 0.2]
+    valid = rng.random(size[::-1]) < 0.9
+    seen = (rng.random(size[::-1]) < 0.5) & valid
+    masks = [project(body, camera, p, t) & valid for p, t in zip(poses, translations, strict=True)]
+    expected = [[(seen & ~m).sum(), (m & ~seen).sum(), (m & seen).sum()] for m in masks]
+    found = areas(body, camera, Silhouette.of(seen, valid), poses, translations)
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_a_body_across_the_near_plane_is_drawn_in_part(body: Body) -> None:
+    camera = Camera.around(np.zeros(3), 0.0, 0.3, (96, 72), field_of_view=1.5)
+    rng = np.random.default_rng(14)
+    compared = 0
+    for pose in random_poses(rng, 12):
+        depths = camera.project(body.skeleton.joints(pose))[1]
+        drawn = (depths[1:] >= NEAR) & (depths[list(PARENTS[1:])] >= NEAR)
+        assert_equals_the_twin(body, camera, pose, np.zeros(3))
+        compared += bool(drawn.any() and not drawn.all())
+    assert compared >= 6
+
+
+@pytest.mark.parametrize("depth", [NEAR - 1e-9, NEAR + 1e-9, FAR - 1e-3, FAR + 1e-3])
+def test_a_joint_is_drawn_from_5_cm_to_the_far_end(depth: float) -> None:
+    camera = Camera(40, 30, np.full(2, 10.0), np.array([20.0, 15.0]), np.eye(3), np.zeros(3))
+    point = one_cone(np.zeros(3), 0.5 * depth, 0.5 * depth)  # a disc of radius 5 pixels, whatever its depth
+    mask = project(point, camera, np.zeros(ANGLES), np.array([0.0, 0.0, depth]))
+    assert mask.any() == (NEAR <= depth <= FAR)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300, 1e20])
+@pytest.mark.parametrize("angle", [0, 9, slice(None)])
+def test_an_angle_that_is_no_number_spoils_no_other_pose(body: Body, camera: Camera, angle: Any, bad: float) -> None:
+    rng = np.random.default_rng(15)
+    poses, translations = random_poses(rng, 5), rng.uniform(-0.3, 0.3, (5, 3))
+    silhouette = Silhouette.of(project(body, camera, poses[0], translations[0]))
+    expected = areas(body, camera, silhouette, poses, translations)
+    poses[2, angle] = bad
+    found = areas(body, camera, silhouette, poses, translations)
+    np.testing.assert_array_equal(np.delete(found, 2, axis=0), np.delete(expected, 2, axis=0))
+    assert found[2, 0] + found[2, 2] == silhouette.mask.sum()
+    assert (found[2] >= 0).all()
+
+
+@pytest.mark.pure
+def test_small_images_equal_the_twin_even_uncompiled(body: Body) -> None:
+    camera = Camera.around(np.zeros(3), 0.4, 4.0, (40, 30))
+    towards = camera.rotation.T @ np.array([0.0, 0.0, -1.0])
+    poses = random_poses(np.random.default_rng(16), 5)
+    # in the middle, cut by the image's edge, across the near plane, behind the camera, nowhere
+    places = [0.0 * towards, np.array([0.9, 0.5, 0.0]), 3.9 * towards, 9.0 * towards, np.full(3, np.nan)]
+    for pose, place in zip(poses, places, strict=True):
+        assert_equals_the_twin(body, camera, pose, place)
+
+
+def test_masks_are_those_that_opencv_draws_eight_times_as_large(body: Body) -> None:
+    small, large = (Camera.around(np.zeros(3), 0.4, 3.0, (160 * k, 120 * k)) for k in (1, 8))
+    for pose in random_poses(np.random.default_rng(17), 20):
+        pixels, depths = large.project(body.skeleton.joints(pose))
+        image = np.zeros((large.height, large.width), np.uint8)
+        for bone, parent in enumerate(PARENTS[1:]):
+            ends = (pixels[[parent, bone + 1]] - 0.5) * 16
+            reach = large.focal[0] * body.radii[bone] / depths[[parent, bone + 1]] * 16
+            for end, radius in zip(ends, reach, strict=True):
+                cv2.circle(image, tuple(np.rint(end).astype(int).tolist()), round(radius), 1, cv2.FILLED, shift=4)
+            axis = ends[1] - ends[0]
+            length = float(np.hypot(*axis))
+            if length <= abs(reach[0] - reach[1]):
+                continue
+            along, sine = axis / length, (reach[0] - reach[1]) / length
+            across = np.sqrt(1.0 - sine**2) * np.array([-along[1], along[0]])
+            normals = [sine * along + across, sine * along - across]
+            corners = [ends[e] + reach[e] * normals[n] for e, n in ((0, 0), (1, 0), (1, 1), (0, 1))]
+            cv2.fillConvexPoly(image, np.rint(corners).astype(np.int32), 1, shift=4)
+        theirs, ours = image[4::8, 4::8] > 0, project(body, small, pose, np.zeros(3))
+        assert (ours & theirs).sum() / (ours | theirs).sum() > 0.98

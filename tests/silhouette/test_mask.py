@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posefit.silhouette.kernels import PAD
 from posefit.silhouette.mask import Silhouette, pack, unpack
 
 
@@ -46,3 +47,50 @@ def test_shapes_are_checked() -> None:
         Silhouette.of(np.zeros(3))
     with pytest.raises(ValueError, match=r"valid must have the mask's shape \(2, 3\), got \(3, 2\)"):
         Silhouette.of(np.zeros((2, 3)), np.zeros((3, 2)))
+
+
+@pytest.mark.parametrize("width", [1, 63, 64, 65, 127, 128, 130, 321])
+def test_bits_beyond_the_image_stay_clear(width: int) -> None:
+    bits = pack(np.ones((3, width), dtype=bool))
+    assert bits.dtype == np.uint64
+    assert bits.shape == ((width + 63) // 64, 3 + PAD)
+    assert sum(int(word).bit_count() for word in bits.flat) == 3 * width
+    assert not bits[:, 3:].any()
+
+
+def test_any_value_but_0_is_the_person() -> None:
+    for values in (np.array([[0, 255], [1, 0]], np.uint8), np.array([[0.0, 0.5], [-1.0, 0.0]])):
+        assert Silhouette.of(values).mask.tolist() == [[False, True], [True, False]]
+    silhouette = Silhouette.of(np.ones((2, 3)), np.array([[255, 0, 1], [0, 0, 2]]))
+    assert silhouette.valid.tolist() == silhouette.mask.tolist() == [[True, False, True], [False, False, True]]
+    assert silhouette.size == (3, 2)
+
+
+@given(st.integers(1, 150), st.integers(1, 10), st.integers(0, 2**32 - 1))
+def test_the_bits_of_a_silhouette_lie_within_the_known_ones(width: int, height: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    silhouette = Silhouette.of(rng.random((height, width)) < 0.5, rng.random((height, width)) < 0.5)
+    observed, valid = silhouette.bits
+    assert not (observed & ~valid).any()
+    np.testing.assert_array_equal(unpack(observed, width), silhouette.mask)
+
+
+def test_a_silhouette_does_not_follow_later_changes_of_the_image() -> None:
+    image = np.zeros((2, 2), dtype=bool)
+    silhouette = Silhouette.of(image)
+    image[0, 0] = True
+    assert not silhouette.mask.any()
+
+
+def test_nobody_has_no_extent_and_one_pixel_has_its_own() -> None:
+    assert np.isnan(Silhouette.of(np.zeros((4, 5))).extent).all()
+    one = np.zeros((4, 5))
+    one[2, 3] = 1
+    assert Silhouette.of(one).extent == (3.0, 2.0, 4.0, 3.0)
+    assert np.isnan(Silhouette.of(np.ones((4, 5))).extent).all()
+
+
+@pytest.mark.parametrize("shape", [(), (0, 3), (3, 0), (2, 2, 3)])
+def test_a_mask_has_two_sides(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match=r"mask must have shape \(height, width\), got \("):
+        Silhouette.of(np.zeros(shape))

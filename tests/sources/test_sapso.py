@@ -186,9 +186,9 @@ def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None:
 def flown(**changed: Any) -> tuple[Array, Array]:
     given: dict[str, Any] = {
         "rows": np.array([0]),
+        "rand": np.array([[[0.25]], [[0.5]]]),
         "omega": 0.5,
         "acceleration": 2.0,
-        "rand": np.array([[[0.25]], [[0.5]]]),
         "position": np.array([[0.1]]),
         "velocity": np.array([[0.2]]),
         "best": np.array([[0.3]]),
@@ -328,6 +328,23 @@ def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:
     for settings in ({}, {"redraws": 0}, {"rand": "scalar"}, {"velocity_limits": "literal"}):
         for proposals in run(SAPSO(space, np.random.default_rng(1), particles=30, **settings), bowl):
             assert space.feasible(proposals).all()
+
+
+def test_a1_2c_only_a_particle_that_no_rand_could_keep_in_the_box_is_not_redrawn() -> None:  # Reading S7
+    rng = np.random.default_rng(2)
+    position, best = rng.uniform(-1.0, 1.0, (2, 300, 2))
+    velocity = rng.uniform(-0.3, 0.3, (300, 2))
+    low, high, periodic = np.full(2, -0.15), np.full(2, 0.15), np.zeros(2, dtype=bool)
+    pull = (0.9, 2.0, position, velocity, best, np.array([0.99, -0.99]), low, high, periodic)
+    everyone = np.arange(300)
+    hopeful = set(swarm.redrawable(everyone, *pull).tolist())
+    flown, moved, ever = np.empty((300, 2)), np.empty((300, 2)), np.zeros(300, dtype=bool)
+    for corner in np.ndindex(2, 2, 2, 2):  # rand() of 0 or 1: the extremes of each coordinate
+        rand = np.broadcast_to(np.array(corner, dtype=float).reshape(2, 1, 2), (2, 300, 2)).copy()
+        swarm.fly(everyone, rand, *pull, flown, moved)
+        ever |= (np.abs(moved) <= 1.0).all(axis=1)
+    assert 0 < len(hopeful) < 300
+    assert set(np.flatnonzero(ever)) <= hopeful
 
 
 def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border() -> None:  # Reading S7

@@ -1,0 +1,76 @@
+"""The body's radii by hand, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from posefit.geometry.body import PROPORTIONS, Body
+from posefit.geometry.skeleton import BONES, JOINTS, MIRROR, PARENTS
+from posefit.motion.library import average_skeleton
+
+
+def test_radii_are_shares_of_the_bones_length() -> None:
+    skeleton = average_skeleton()
+    radii = Body.of(skeleton).radii
+    assert radii.shape == (26, 2)
+    for name in ("lfemur", "rfemur"):
+        bone = BONES.index(name)
+        np.testing.assert_allclose(radii[bone], skeleton.lengths[bone] * np.array([0.205, 0.130]))
+    head = BONES.index("head")
+    np.testing.assert_allclose(radii[head], skeleton.lengths[head] * np.array([0.88, 0.86]))
+
+
+def test_every_bone_has_a_proportion_and_every_proportion_a_bone() -> None:
+    named = {bone if bone in PROPORTIONS else bone[1:] for bone in BONES}
+    assert named == set(PROPORTIONS)
+
+
+def test_girth_scales_every_radius() -> None:
+    skeleton = average_skeleton()
+    np.testing.assert_allclose(Body.of(skeleton, 1.5).radii, 1.5 * Body.of(skeleton).radii)
+    assert not Body.of(skeleton, 0.0).radii.any()
+
+
+def test_the_average_body_is_as_wide_left_as_right() -> None:
+    other = np.array(MIRROR)[1:] - 1
+    radii = Body.of(average_skeleton()).radii
+    np.testing.assert_allclose(radii[other], radii, atol=2e-5)
+
+
+def test_a_joint_is_as_wide_as_the_widest_bone_that_meets_there() -> None:
+    radii = np.zeros((26, 2))
+    radii[BONES.index("lhipjoint")] = 0.1, 0.2
+    radii[BONES.index("rhipjoint")] = 0.3, 0.0
+    radii[BONES.index("lfemur")] = 0.15, 0.05
+    radii[BONES.index("head")] = 0.0, 0.4
+    found = Body(average_skeleton(), radii).joint_radii()
+    by_hand = {"root": 0.3, "lhipjoint": 0.2, "lfemur": 0.05, "head": 0.4}
+    np.testing.assert_allclose(found, [by_hand.get(name, 0.0) for name in JOINTS])
+
+
+def test_no_bone_is_wider_than_its_joints() -> None:
+    body = Body.of(average_skeleton())
+    joint_radii = body.joint_radii()
+    assert (body.radii[:, 0] <= joint_radii[list(PARENTS[1:])]).all()
+    assert (body.radii[:, 1] <= joint_radii[1:]).all()
+
+
+def test_radii_are_copied_and_cannot_be_written_to() -> None:
+    radii = np.ones((26, 2))
+    body = Body(average_skeleton(), radii)
+    radii[0, 0] = 7.0
+    assert body.radii[0, 0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        body.radii[0, 0] = 2.0
+
+
+def test_radii_are_checked() -> None:
+    skeleton = average_skeleton()
+    with pytest.raises(ValueError, match=r"radii must have shape \(26, 2\), got \(2, 26\)"):
+        Body(skeleton, np.zeros((2, 26)))
+    for bad in (-0.1, np.nan, np.inf):
+        radii = np.ones((26, 2))
+        radii[3, 1] = bad
+        with pytest.raises(ValueError, match="radii must be finite and not negative, got"):
+            Body(skeleton, radii)
+    with pytest.raises(ValueError, match="radii must be finite and not negative"):
+        Body.of(skeleton, -1.0)

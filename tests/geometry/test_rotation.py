@@ -1,0 +1,160 @@
+"""Rotations by law and by hand, and why the root's yaw comes first. Reading S3."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from posefit.geometry.rotation import (
+    Array,
+    geodesic,
+    joint_angles_from_rotation,
+    root_angles_from_rotation,
+    rotation_from_joint_angles,
+    rotation_from_root_angles,
+    wrapped,
+)
+
+QUARTER = np.pi / 2.0
+turns = st.floats(-np.pi, np.pi)
+tilts = st.floats(-1.5, 1.5)  # the middle angle, away from its singularity at a quarter turn
+triples = st.tuples(turns, turns, turns).map(np.array)
+
+
+def about(axis: int, angle: float) -> Array:
+    """Return the rotation about one axis, written out."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array(
+        [
+            [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]],
+            [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]],
+            [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]],
+        ][axis]
+    )
+
+
+def papers_root(angles: Array) -> Array:
+    """Return the rotation of root angles in the paper's order x, y, z; y is the yaw."""
+    return about(0, angles[0]) @ about(1, angles[1]) @ about(2, angles[2])
+
+
+def jacobian(rotation: Callable[[Array], Array], angles: Array) -> Array:
+    """Return the derivatives (9, 3) of a rotation's elements by its angles."""
+    step = 1e-6
+    columns = [rotation(angles + step * axis) - rotation(angles - step * axis) for axis in np.eye(3)]
+    return np.array(columns).reshape(3, 9).T / (2.0 * step)
+
+
+def least_singular_value(matrix: Array) -> float:
+    return float(np.linalg.svd(matrix, compute_uv=False)[-1])
+
+
+@pytest.mark.parametrize("yaw", [QUARTER, -QUARTER])
+@pytest.mark.parametrize(("pitch", "roll"), [(0.0, 0.0), (0.2, -0.1), (-0.35, 0.35)])
+def test_a_side_view_is_not_degenerate(yaw: float, pitch: float, roll: float) -> None:  # Reading S3
+    angles = np.array([yaw, pitch, roll])
+    # The axes that pitch and roll turn about stand at right angles; yaw's leans towards roll's by the pitch.
+    by_hand = np.sqrt(2.0 * (1.0 - abs(np.sin(pitch))))
+    assert least_singular_value(jacobian(rotation_from_root_angles, angles)) == pytest.approx(by_hand, abs=1e-6)
+    assert by_hand > 1.1
+    found = root_angles_from_rotation(rotation_from_root_angles(angles))
+    np.testing.assert_allclose(found, angles, rtol=0.0, atol=1e-9)
+    # In the paper's order the yaw is the middle angle, and x and z turn about one and the same axis there.
+    assert least_singular_value(jacobian(papers_root, np.array([pitch, yaw, roll]))) < 1e-6
+    same = papers_root(np.array([pitch + 0.3, yaw, roll - np.sign(yaw) * 0.3]))
+    np.testing.assert_allclose(same, papers_root(np.array([pitch, yaw, roll])), rtol=0.0, atol=1e-12)
+
+
+@given(turns, tilts, turns)
+def test_how_far_the_root_is_from_degenerate_depends_on_the_pitch_alone(yaw: float, pitch: float, roll: float) -> None:
+    found = least_singular_value(jacobian(rotation_from_root_angles, np.array([yaw, pitch, roll])))
+    assert found == pytest.approx(np.sqrt(2.0 * (1.0 - abs(np.sin(pitch)))), abs=1e-6)
+
+
+@given(turns, tilts, turns)
+def test_root_angles_come_back(yaw: float, pitch: float, roll: float) -> None:
+    angles = np.array([yaw, pitch, roll])
+    difference = wrapped(root_angles_from_rotation(rotation_from_root_angles(angles)) - angles)
+    np.testing.assert_allclose(difference, 0.0, rtol=0.0, atol=1e-9)
+
+
+@given(turns, tilts, turns)
+def test_joint_angles_come_back(x: float, y: float, z: float) -> None:
+    angles = np.array([x, y, z])
+    difference = wrapped(joint_angles_from_rotation(rotation_from_joint_angles(angles)) - angles)
+    np.testing.assert_allclose(difference, 0.0, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("roll", [0.0, 0.7, -2.0])
+@pytest.mark.parametrize("pitch", [QUARTER, -QUARTER])
+def test_on_the_singularity_the_rotation_still_comes_back(pitch: float, roll: float) -> None:
+    rotation = rotation_from_root_angles(np.array([0.4, pitch, roll]))
+    again = rotation_from_root_angles(root_angles_from_rotation(rotation))
+    np.testing.assert_allclose(again, rotation, rtol=0.0, atol=1e-7)
+
+
+def test_a_quarter_turn_by_hand() -> None:
+    x, y, z = np.eye(3)
+    yaw, pitch, roll = (rotation_from_root_angles(QUARTER * axis) for axis in np.eye(3))
+    np.testing.assert_allclose([yaw @ z, pitch @ y, roll @ x], [x, z, y], atol=1e-12)
+    # Who pitches and then yaws faces where the yaw turns the pitched direction: z -> -y -> -y.
+    both = rotation_from_root_angles(np.array([QUARTER, QUARTER, 0.0]))
+    np.testing.assert_allclose(both @ z, -y, atol=1e-12)
+    np.testing.assert_allclose(both @ y, x, atol=1e-12)
+    # rx acts first, rz last: y -> z -> z -> z and z -> -y -> -y -> x.
+    joint = rotation_from_joint_angles(np.array([QUARTER, 0.0, QUARTER]))
+    np.testing.assert_allclose([joint @ y, joint @ z], [z, x], atol=1e-12)
+
+
+@given(triples)
+def test_a_rotation_is_orthonormal_and_right_handed(angles: Array) -> None:
+    for rotation in (rotation_from_root_angles(angles), rotation_from_joint_angles(angles)):
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+@given(turns, turns, turns, turns)
+def test_yaws_add_up(yaw: float, more: float, pitch: float, roll: float) -> None:
+    first = rotation_from_root_angles(np.array([more, 0.0, 0.0]))
+    then = rotation_from_root_angles(np.array([yaw, pitch, roll]))
+    np.testing.assert_allclose(first @ then, rotation_from_root_angles(np.array([yaw + more, pitch, roll])), atol=1e-12)
+
+
+@given(triples, triples, triples)
+def test_the_geodesic_is_a_distance(a: Array, b: Array, c: Array) -> None:
+    first, second, third = (rotation_from_joint_angles(angles) for angles in (a, b, c))
+    distance = float(geodesic(first, second))
+    assert 0.0 <= distance <= np.pi + 1e-9
+    assert float(geodesic(second, first)) == pytest.approx(distance, abs=1e-6)
+    assert float(geodesic(third @ first, third @ second)) == pytest.approx(distance, abs=1e-6)
+    assert distance <= float(geodesic(first, third)) + float(geodesic(third, second)) + 1e-6
+
+
+@given(turns, st.integers(0, 2), triples)
+def test_the_geodesic_of_a_turn_about_one_axis_is_its_angle(angle: float, axis: int, start: Array) -> None:
+    first = rotation_from_joint_angles(start)
+    assert float(geodesic(first, first @ about(axis, angle))) == pytest.approx(abs(angle), abs=1e-6)
+
+
+def test_two_quarter_turns_about_two_axes_are_120_degrees() -> None:
+    # They move x -> y -> z -> x in a ring: a third of a turn about the diagonal.
+    both = about(0, QUARTER) @ about(2, QUARTER)
+    assert np.degrees(geodesic(np.eye(3), both)) == pytest.approx(120.0)
+
+
+def test_any_lead_shape_goes_through() -> None:
+    angles = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 4, 3))
+    rotations = rotation_from_root_angles(angles)
+    assert rotations.shape == (2, 4, 3, 3)
+    np.testing.assert_array_equal(rotations[1, 2], rotation_from_root_angles(angles[1, 2]))
+    np.testing.assert_allclose(root_angles_from_rotation(rotations), angles, rtol=0.0, atol=1e-9)
+    assert geodesic(rotations, rotations).shape == (2, 4)
+
+
+def test_wrapping_by_hand() -> None:
+    angles = np.radians([0.0, 180.0, -180.0, 190.0, -190.0, 540.0, 725.0])
+    np.testing.assert_allclose(
+        np.degrees(wrapped(angles)), [0.0, -180.0, -180.0, -170.0, 170.0, -180.0, 5.0], atol=1e-9
+    )

@@ -1,0 +1,249 @@
+"""The built-in motions walk and run like people, repeat themselves, and differ where a test needs them to."""
+
+import json
+from importlib.resources import files
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, angle_index
+from posefit.motion import library
+from posefit.motion.amc import read_clip
+from posefit.motion.motion import Motion
+
+# Clip, and the frames that were fitted: the walk of 05_01 ends in a turn.
+CLIPS = {
+    "walk-a": ("16/16_15", 2, None),
+    "walk-b": ("02/02_01", 0, None),
+    "walk-c": ("05/05_01", 0, 380),
+    "run-a": ("16/16_35", 0, None),
+    "run-b": ("09/09_01", 0, None),
+}
+RESIDUAL_DEGREES = 1.0  # the largest mean error over all 66 angles that a style may have
+CYCLE = 240  # frames
+
+each = pytest.mark.parametrize("name", library.names())
+
+
+def stored() -> dict[str, Any]:
+    text = (files("posefit.motion") / "library.json").read_text(encoding="utf-8")
+    models: dict[str, Any] = json.loads(text)["motions"]
+    return models
+
+
+def means(name: str, key: str) -> float:
+    """Return a style's number, or the mean over a kind's styles."""
+    styles = [name] if name in stored() else library.other_styles(name)
+    return float(np.mean([stored()[style][key] for style in styles]))
+
+
+def cycle(name: str, cycles: int = 1, **settings: Any) -> Motion:
+    """Return whole cycles of a motion, CYCLE frames each."""
+    return library.built_in(name, frames=cycles * CYCLE, fps=CYCLE / means(name, "period"), **settings)
+
+
+def joints(motion: Motion) -> Array:
+    return motion.skeleton.joints(motion.poses, motion.translations)
+
+
+def test_names_are_the_kinds_and_their_styles() -> None:
+    assert library.names() == ("walk", "run", "walk-a", "walk-b", "walk-c", "run-a", "run-b")
+
+
+def test_the_other_styles_of_a_motion_never_contain_it() -> None:
+    assert library.other_styles("walk-b") == ("walk-a", "walk-c")
+    assert library.other_styles("run") == ("run-a", "run-b")
+    for name in library.names():
+        others = library.other_styles(name)
+        assert others
+        assert name not in others
+        assert {other.split("-")[0] for other in others} == {name.split("-")[0]}
+
+
+@each
+def test_a_motion_repeats_itself_one_travel_further(name: str) -> None:
+    motion = cycle(name, 2)
+    np.testing.assert_allclose(motion.poses[CYCLE:], motion.poses[:CYCLE], atol=1e-9)
+    travel = [0.0, 0.0, means(name, "speed") * means(name, "period")]
+    moved = motion.translations[CYCLE:] - motion.translations[:CYCLE]
+    np.testing.assert_allclose(moved, np.tile(travel, (CYCLE, 1)), atol=1e-9)
+
+
+@each
+def test_no_joint_jumps_anywhere_in_the_cycle(name: str) -> None:
+    motion = cycle(name, 2)
+    steps = np.linalg.norm(np.diff(joints(motion), axis=0), axis=-1) * motion.fps
+    assert steps.max() < 12.0  # m/s; a runner's foot swings forward at two to three times the pace
+
+
+@each
+def test_a_motion_goes_along_z_and_has_its_middle_over_the_origin(name: str) -> None:
+    motion = cycle(name, 4)
+    root = motion.translations
+    assert np.abs(root[:, 0]).max() < 0.1
+    np.testing.assert_allclose(root[:, [0, 2]].mean(axis=0), 0.0, atol=0.02)
+    assert (np.diff(root[:, 2]) > 0.0).all()
+    assert abs(np.degrees(motion.poses[:, 0].mean())) < 5.0  # yaw 0 faces +z
+    placed = joints(motion)
+    # y is up and +z in front, so that +x is on the left
+    assert (placed[:, JOINTS.index("lhipjoint"), 0] > placed[:, JOINTS.index("rhipjoint"), 0]).all()
+    for side in "lr":
+        ankle, toe = (placed[:, JOINTS.index(side + bone)] for bone in ("tibia", "foot"))
+        standing = toe[:, 1] < toe[:, 1].min() + 0.015
+        assert (toe[standing, 2] > ankle[standing, 2]).all()
+
+
+@each
+def test_the_feet_stay_above_the_ground_and_reach_it(name: str) -> None:
+    lowest = joints(cycle(name))[..., 1].min(axis=1)
+    assert 0.025 < lowest.min() < 0.035
+    assert lowest.max() < (0.08 if name.startswith("walk") else 0.15)  # only a runner flies
+
+
+@each
+def test_a_foot_on_the_ground_hardly_slides(name: str) -> None:
+    motion = cycle(name)
+    for foot in ("lfoot", "rfoot"):
+        path = joints(motion)[:, JOINTS.index(foot)]
+        down = path[:, 1] < path[:, 1].min() + 0.015
+        slides = np.linalg.norm(np.gradient(path, 1.0 / motion.fps, axis=0)[down][:, [0, 2]], axis=1)
+        assert slides.mean() < 0.2 * means(name, "speed")
+
+
+@each
+def test_an_arm_swings_with_the_leg_of_the_other_side(name: str) -> None:
+    motion = cycle(name)
+    ahead = joints(motion)[..., 2] - motion.translations[:, None, 2]
+    for arm, leg in (("lwrist", "rfoot"), ("rwrist", "lfoot")):
+        assert np.corrcoef(ahead[:, JOINTS.index(arm)], ahead[:, JOINTS.index(leg)])[0, 1] > 0.5
+
+
+@each
+def test_at_phase_0_the_left_thigh_is_ahead(name: str) -> None:
+    left, right = (angle_index(JOINTS.index(bone)) for bone in ("lfemur", "rfemur"))
+    poses = cycle(name).poses
+    swing = poses[:, right] - poses[:, left]
+    turns = 2.0 * np.pi * np.arange(CYCLE) / CYCLE
+    assert swing @ np.cos(turns) > 0.0
+    assert abs(swing @ np.sin(turns)) < 1e-3 * (swing @ np.cos(turns))
+
+
+@pytest.mark.parametrize("kind", ["walk", "run"])
+def test_styles_of_a_kind_differ_by_some_degrees(kind: str) -> None:
+    poses = {name: cycle(name).poses for name in (kind, *library.other_styles(kind))}
+    for first, second in combinations(poses, 2):
+        assert 1.0 < np.degrees(np.abs(poses[first] - poses[second]).mean()) < 15.0, (first, second)
+
+
+@pytest.mark.parametrize("kind", ["walk", "run"])
+def test_a_kind_without_a_letter_is_the_mean_of_its_styles(kind: str) -> None:
+    styles = [cycle(style).poses for style in library.other_styles(kind)]
+    np.testing.assert_allclose(cycle(kind).poses, np.mean(styles, axis=0), atol=1e-9)
+
+
+@each
+def test_twice_the_speed_is_every_second_frame(name: str) -> None:
+    slow, fast = library.built_in(name, frames=39), library.built_in(name, frames=20, speed=2.0)
+    np.testing.assert_allclose(fast.poses, slow.poses[::2], atol=1e-12)
+    np.testing.assert_allclose(fast.translations, slow.translations[::2], atol=1e-12)
+
+
+@each
+def test_a_phase_starts_later_in_the_cycle(name: str) -> None:
+    plain, shifted = cycle(name, 2), cycle(name, phase=0.25)
+    np.testing.assert_allclose(shifted.poses, plain.poses[CYCLE // 4 : CYCLE // 4 + CYCLE], atol=1e-9)
+    np.testing.assert_allclose(cycle(name, phase=1.0).poses, cycle(name).poses, atol=1e-9)
+
+
+def test_frames_and_rate_are_as_asked() -> None:
+    motion = library.built_in("walk")
+    assert (len(motion), motion.fps, motion.name) == (60, 30.0, "walk")
+    motion = library.built_in("run-b", frames=7, fps=120)
+    assert (len(motion), motion.fps, motion.name) == (7, 120.0, "run-b")
+    twice = library.built_in("walk", frames=21, fps=60.0)
+    np.testing.assert_allclose(twice.poses[::2], library.built_in("walk", frames=11).poses, atol=1e-12)
+
+
+def test_the_skeleton_is_its_own_mirror_image() -> None:
+    skeleton = library.average_skeleton()
+    flip, other = np.diag([-1.0, 1.0, 1.0]), np.array(MIRROR)[1:] - 1
+    np.testing.assert_allclose(skeleton.offsets, skeleton.offsets[other] @ flip, atol=1e-12)
+    np.testing.assert_allclose(skeleton.axes, flip @ skeleton.axes[other] @ flip, atol=1e-12)
+    np.testing.assert_allclose(
+        skeleton.axes @ np.swapaxes(skeleton.axes, 1, 2), np.tile(np.eye(3), (26, 1, 1)), atol=1e-9
+    )
+
+
+def test_the_skeleton_has_a_grown_up_s_size_and_only_inner_joints_turn() -> None:
+    skeleton = library.average_skeleton()
+    assert 1.4 < np.ptp(skeleton.joints(np.zeros(66))[:, 1]) < 1.8  # from the sole to the head's joint
+    assert {bone for bone, _ in skeleton.channels} <= {JOINTS[joint] for joint in INNER}
+    assert len(skeleton.lengths) == len(BONES)
+
+
+@each
+def test_only_free_angles_move(name: str) -> None:
+    motion = cycle(name)
+    assert motion.skeleton is library.average_skeleton()
+    assert not motion.poses[:, ~motion.skeleton.free].any()
+
+
+@pytest.mark.parametrize("name", CLIPS)
+def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -> None:
+    path, start, stop = CLIPS[name]
+    folder, clip = path.split("/")
+    model = stored()[name]
+    assert model["source"] == clip
+    recorded = read_clip(cmu / folder / f"{folder}.asf", cmu / folder / f"{clip}.amc")
+    recorded = recorded.frames(start, stop or len(recorded))
+    times = np.arange(len(recorded)) / recorded.fps
+    direction = np.polyfit(times, recorded.translations, 1)[0]
+    assert np.hypot(direction[0], direction[2]) == pytest.approx(model["speed"], abs=1e-3)
+    poses = recorded.poses.copy()
+    poses[:, 0] -= np.arctan2(direction[0], direction[2])
+
+    def error(phase: float) -> float:
+        made = library.built_in(name, frames=len(recorded), fps=recorded.fps, phase=phase)
+        # a clip may have whole turns more
+        return float(np.degrees(np.abs((made.poses - poses + np.pi) % (2.0 * np.pi) - np.pi).mean()))
+
+    least = min(error(phase) for phase in np.arange(400) / 400)
+    assert least < RESIDUAL_DEGREES
+    assert least == pytest.approx(model["residual_degrees"], abs=0.05)
+
+
+def test_the_library_is_small_and_states_its_origin() -> None:
+    text = (files("posefit.motion") / "library.json").read_text(encoding="utf-8")
+    assert len(text.encode()) < 60_000
+    origin = json.loads(text)["origin"]
+    assert "The data used in this project was obtained from mocap.cs.cmu.edu." in origin
+    assert "The database was created with funding from NSF EIA-0196217." in origin
+
+
+@pytest.mark.parametrize("ask", [library.built_in, library.other_styles])
+def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
+    with pytest.raises(ValueError, match=r"one of walk, run, walk-a, .* got 'wlak'; did you mean 'walk'\?"):
+        ask("wlak")
+    with pytest.raises(ValueError, match="got 'zzz'$"):
+        ask("zzz")
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"frames": 0}, "frames must be a whole number of at least 1, got 0"),
+        ({"frames": 60.5}, "frames must be a whole number of at least 1, got 60.5"),
+        ({"frames": True}, "frames must be a whole number of at least 1, got True"),
+        ({"fps": 0.0}, "fps and speed must be positive, got 0.0 and 1.0"),
+        ({"speed": -1.0}, "fps and speed must be positive, got 30.0 and -1.0"),
+        ({"speed": np.inf}, "fps and speed must be positive, got 30.0 and inf"),
+        ({"phase": np.nan}, "phase must be finite, got nan"),
+    ],
+)
+def test_mistakes_are_named(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        library.built_in("walk", **settings)

@@ -1,0 +1,149 @@
+"""The cost by hand, and the areas by law."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import ANGLES
+from posefit.motion.library import average_skeleton
+from posefit.silhouette.cost import LEAST_SHARE, add_mismatch, areas, mismatch, project
+from posefit.silhouette.mask import Silhouette
+
+counts = st.tuples(*[st.integers(0, 10**9)] * 3)
+
+
+def scene(seed: int, count: int) -> tuple[Array, Array, Silhouette, Camera, Body]:
+    """Return poses, translations and what a camera saw of the first one, a tenth of its pixels unknown."""
+    rng = np.random.default_rng(seed)
+    body, camera = Body.of(average_skeleton()), Camera.around(np.zeros(3), 0.4, 3.0, (101, 75))
+    poses, translations = rng.normal(0.0, 0.4, (count, ANGLES)), rng.uniform(-0.6, 0.6, (count, 3))
+    mask = project(body, camera, poses[0], translations[0])
+    return poses, translations, Silhouette.of(mask, rng.random(mask.shape) < 0.9), camera, body
+
+
+@pytest.mark.pure
+def test_the_mismatch_by_hand() -> None:
+    # 100 (0.5 * 20 / 50 + 0.5 * 10 / 40), and 100 (0.5 * 10 / 20 + 0.5 * 30 / 40)
+    np.testing.assert_allclose(mismatch(np.array([[10, 20, 30], [30, 10, 10]])), [32.5, 62.5])
+    # beta weighs what is missed: 100 (0.75 * 10 / 20 + 0.25 * 30 / 40)
+    np.testing.assert_allclose(mismatch(np.array([[30, 10, 10]]), 0.25), 56.25)
+    assert mismatch(np.array([[0, 0, 30], [5, 7, 0]])).tolist() == [0.0, 100.0]
+    # Reading S2: no body seen, no silhouette seen, neither; each empty denominator makes its term 1
+    assert mismatch(np.array([[9, 0, 0], [0, 9, 0], [0, 0, 0]])).tolist() == [100.0, 100.0, 100.0]
+    assert mismatch(np.zeros((0, 3), dtype=np.int64)).shape == (0,)
+
+
+@given(counts, st.floats(0.0, 1.0))
+def test_the_mismatch_lies_in_0_to_100_and_is_linear_in_beta(area: tuple[int, int, int], beta: float) -> None:
+    row = np.array([area])
+    found, spilled, missed = (float(mismatch(row, b)[0]) for b in (beta, 0.0, 1.0))
+    assert 0.0 <= found <= 100.0
+    assert found == pytest.approx((1.0 - beta) * spilled + beta * missed)
+
+
+@given(counts)
+def test_at_half_beta_body_and_silhouette_may_trade_places(area: tuple[int, int, int]) -> None:
+    r, b, y = area
+    assert mismatch(np.array([[r, b, y]]))[0] == pytest.approx(mismatch(np.array([[b, r, y]]))[0])
+
+
+@given(counts, st.integers(1, 10**6))
+def test_more_overlap_never_costs_more(area: tuple[int, int, int], more: int) -> None:
+    r, b, y = area
+    assert mismatch(np.array([[r, b, y + more]]))[0] <= mismatch(np.array([area]))[0]
+
+
+def test_costs_of_several_views_add_up() -> None:
+    costs = np.array([1.0, 2.0])
+    add_mismatch(np.array([[10, 20, 30], [0, 0, 5]]), 10.0, 0.5, costs)
+    np.testing.assert_allclose(costs, [4.25, 2.0])
+
+
+def test_areas_add_up_to_the_silhouette_and_to_the_body() -> None:
+    poses, translations, silhouette, camera, body = scene(0, 40)
+    found = areas(body, camera, silhouette, poses, translations)
+    assert (found >= 0).all()
+    assert (found[:, 0] + found[:, 2] == silhouette.mask.sum()).all()
+    bodies = [(project(body, camera, p, t) & silhouette.valid).sum() for p, t in zip(poses, translations, strict=True)]
+    np.testing.assert_array_equal(found[:, 1] + found[:, 2], bodies)
+
+
+def test_known_and_unknown_pixels_add_up_to_all() -> None:
+    poses, translations, silhouette, camera, body = scene(1, 20)
+    mask = project(body, camera, poses[0], translations[0])
+    known, unknown, everything = (
+        areas(body, camera, Silhouette.of(mask, valid), poses, translations)
+        for valid in (silhouette.valid, ~silhouette.valid, None)
+    )
+    np.testing.assert_array_equal(known + unknown, everything)
+    nothing = areas(body, camera, Silhouette.of(mask, np.zeros_like(mask)), poses, translations)
+    assert not nothing.any()
+    assert (mismatch(nothing) == 100.0).all()
+
+
+def test_unknown_pixels_count_for_nothing_whatever_they_show() -> None:
+    poses, translations, silhouette, camera, body = scene(2, 20)
+    noise = np.random.default_rng(3).random(silhouette.mask.shape) < 0.5
+    other = Silhouette.of(np.where(silhouette.valid, silhouette.mask, noise), silhouette.valid)
+    np.testing.assert_array_equal(
+        areas(body, camera, other, poses, translations), areas(body, camera, silhouette, poses, translations)
+    )
+
+
+def test_any_layout_and_type_of_array_gives_the_same_areas_and_none_is_written_to() -> None:
+    poses, translations, silhouette, camera, body = scene(4, 6)
+    poses = poses.astype(np.float32).astype(np.float64)
+    translations = translations.astype(np.float32).astype(np.float64)
+    before, expected = poses.copy(), areas(body, camera, silhouette, poses, translations)
+    np.testing.assert_array_equal(poses, before)
+    frozen = poses.copy(), translations.copy()
+    for array in frozen:
+        array.setflags(write=False)
+    others = [
+        frozen,
+        (np.asfortranarray(poses), np.asfortranarray(translations)),
+        (np.repeat(poses, 2, axis=0)[::2], np.repeat(translations, 2, axis=0)[::2]),
+        (poses.astype(np.float32), translations.astype(np.float32)),
+    ]
+    for same in others:
+        np.testing.assert_array_equal(areas(body, camera, silhouette, *same), expected)
+    none = areas(body, camera, silhouette, np.zeros((0, ANGLES)), np.zeros((0, 3)), threads=2)
+    assert none.shape == (0, 3)
+
+
+@pytest.mark.parametrize("count", [LEAST_SHARE - 1, 2 * LEAST_SHARE - 1, 2 * LEAST_SHARE, 5 * LEAST_SHARE + 1])
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_every_pose_is_counted_once_however_the_work_is_shared(count: int, threads: int) -> None:
+    poses, translations, silhouette, camera, body = scene(5, count)
+    np.testing.assert_array_equal(
+        areas(body, camera, silhouette, poses, translations, threads),
+        areas(body, camera, silhouette, poses, translations, 1),
+    )
+
+
+def test_callers_may_ask_for_different_numbers_of_threads_at_once() -> None:
+    poses, translations, silhouette, camera, body = scene(6, 100)
+    alone = areas(body, camera, silhouette, poses, translations)
+    with ThreadPoolExecutor(4) as pool:
+        jobs = [pool.submit(areas, body, camera, silhouette, poses, translations, 2 + k % 3) for k in range(60)]
+        for job in jobs:
+            np.testing.assert_array_equal(job.result(timeout=60), alone)
+
+
+@pytest.mark.pure
+def test_areas_of_two_poses_by_counting_even_uncompiled() -> None:
+    rng = np.random.default_rng(7)
+    body, camera = Body.of(average_skeleton()), Camera.around(np.zeros(3), 0.4, 4.0, (40, 30))
+    poses, translations = rng.normal(0.0, 0.4, (2, ANGLES)), rng.uniform(-0.3, 0.3, (2, 3))
+    masks = [project(body, camera, p, t) for p, t in zip(poses, translations, strict=True)]
+    valid = rng.random((30, 40)) < 0.9
+    seen = masks[0] & valid
+    expected = [[(seen & ~m).sum(), (m & valid & ~seen).sum(), (seen & m).sum()] for m in masks]
+    found = areas(body, camera, Silhouette.of(masks[0], valid), poses, translations)
+    np.testing.assert_array_equal(found, expected)
