@@ -35,7 +35,7 @@ class Camera:
         for name, shape in (("focal", (2,)), ("centre", (2,)), ("rotation", (3, 3)), ("translation", (3,))):
             try:
                 value = np.array(getattr(self, name), dtype=np.float64)
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 raise ValueError(f"{name} must be numbers of shape {shape}, got {getattr(self, name)!r}") from None
             if value.shape != shape or not np.isfinite(value).all():
                 raise ValueError(f"{name} must be finite numbers of shape {shape}, got {value.tolist()}")
@@ -106,7 +106,7 @@ class Camera:
             raise ValueError(f"{path}: expected a camera file of at most 1 MB, got {path.stat().st_size} bytes")
         try:
             values = json.loads(path.read_text(encoding="utf-8"))
-        except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        except (ValueError, RecursionError) as error:  # bad UTF-8, bad JSON, endless digits, endless nesting
             raise ValueError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {error}") from None
         if not isinstance(values, dict) or set(values) != set(_KEYS):
             keys = sorted(values) if isinstance(values, dict) else type(values).__name__
@@ -118,5 +118,5 @@ class Camera:
             return cls(
                 values["width"], values["height"], values["focal"], values["centre"], matrix[:3, :3], matrix[:3, 3]
             )
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise ValueError(f"{path}: {error}") from None

@@ -204,7 +204,6 @@ def test_where_the_pair_stands_and_faces_does_not_decide_a_swap(joints: Array, s
     found = metrics.swapped(joints, estimate)
     moved = metrics.swapped(joints @ rotation.T + rng.normal(size=3), estimate @ rotation.T + rng.normal(size=3))
     np.testing.assert_array_equal(moved, found)
-    assert found[::2].all()
 
 
 def test_an_untrue_number_is_named() -> None:

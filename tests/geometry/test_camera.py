@@ -15,10 +15,6 @@ from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.motion.library import average_skeleton
 
-UNCAUGHT = pytest.mark.xfail(
-    strict=True, reason="from_json lets RecursionError, OverflowError and a bare ValueError out"
-)
-
 
 def test_a_point_is_projected_by_hand() -> None:
     camera = Camera(100, 80, [50.0, 60.0], [50.0, 40.0], np.eye(3), np.zeros(3))
@@ -205,9 +201,9 @@ def test_a_camera_file_of_more_than_a_megabyte_is_not_read(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("key", "text"),
     [
-        pytest.param("focal", "[" * 100_000, id="nested", marks=UNCAUGHT),
-        pytest.param("focal", f"[{10**400}, 1]", id="huge", marks=UNCAUGHT),
-        pytest.param("width", "9" * 5000, id="digits", marks=UNCAUGHT),
+        pytest.param("focal", "[" * 100_000, id="nested"),
+        pytest.param("focal", f"[{10**400}, 1]", id="huge"),
+        pytest.param("width", "9" * 5000, id="digits"),
         pytest.param("camera_from_world", "[[1], [1, 2]]", id="ragged"),
     ],
 )
