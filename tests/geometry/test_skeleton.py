@@ -211,3 +211,15 @@ def test_one_pose_equals_the_slow_twin_even_uncompiled() -> None:
     pose = np.random.default_rng(6).uniform(-3.0, 3.0, ANGLES)
     place = np.array([0.1, 0.2, 0.3])
     np.testing.assert_allclose(skeleton.joints(pose, place), slow_joints(skeleton, pose, place), rtol=0.0, atol=1e-9)
+
+
+def test_joints_equal_the_slow_twin_whatever_the_frames_of_the_angles() -> None:
+    rng = np.random.default_rng(7)
+    for share in (0.0, 0.5, 1.0):  # of the bones, those whose frame is turned
+        axes = np.tile(np.eye(3), (26, 1, 1))
+        turned = rng.random(26) < share
+        axes[turned] = rotation_from_joint_angles(rng.uniform(-3.0, 3.0, (int(turned.sum()), 3)))
+        skeleton = Skeleton("x", rng.normal(0.0, 0.3, (26, 3)), axes, ())
+        poses, places = rng.uniform(-3.0, 3.0, (10, ANGLES)), rng.normal(size=(10, 3))
+        slow = [slow_joints(skeleton, pose, place) for pose, place in zip(poses, places, strict=True)]
+        np.testing.assert_allclose(skeleton.joints(poses, places), slow, rtol=0.0, atol=1e-9)
