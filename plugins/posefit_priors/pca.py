@@ -87,8 +87,7 @@ class PCA:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
-        distances = _nearest(self.centres, writeable(latents))
-        return np.asarray(distances < self.reach)  # SAPSO 2.2 constraint 2
+        return np.asarray(_near(self.centres, writeable(latents), self.reach))
 
     def save(self, path: str | Path) -> None:
         """Write the learned space to an .npz file."""
@@ -126,18 +125,25 @@ def _recover(latents, components, mean, angles):
 
 
 @jit
-def _distances(centres, latents, nearest):
+def _distance(centres, latent):
+    """Return D: the mean absolute difference of a latent pose (m,) from the nearest centre."""
+    nearest = np.inf
+    for c in range(centres.shape[0]):
+        total = 0.0
+        for j in range(centres.shape[1]):
+            total += abs(centres[c, j] - latent[j])
+        nearest = min(nearest, total / centres.shape[1])
+    return nearest
+
+
+@jit
+def _near(centres, latents, reach):
+    near = np.empty(latents.shape[0], np.bool_)
     for i in range(latents.shape[0]):
-        nearest[i] = np.inf
-        for c in range(centres.shape[0]):
-            total = 0.0
-            for j in range(centres.shape[1]):
-                total += abs(centres[c, j] - latents[i, j])
-            nearest[i] = min(nearest[i], total / centres.shape[1])
+        near[i] = _distance(centres, latents[i]) < reach[()]  # SAPSO 2.2 constraint 2
+    return near
 
 
 def _nearest(centres: Array, latents: Array) -> Array:
-    """Return D (n,): the mean absolute difference to the nearest centre."""
-    nearest = np.empty(len(latents))
-    _distances(centres, latents, nearest)
-    return nearest
+    """Return D (n,) of latents (n, m)."""
+    return np.array([_distance(centres, latent) for latent in latents])

@@ -15,7 +15,7 @@ TEMPERATURE = 1.0  # T, section 5.2
 COOLING = 0.95  # gamma, section 5.2
 STOP_TEMPERATURE = 0.0  # T0; Reading S5
 REDRAWS = 100  # Reading S7
-FIRST_REDRAWS = 12  # ours: how many of them are drawn at once; then all that are left
+FIRST_REDRAWS = 6  # ours: how many of them are drawn at once; then all that are left
 CHOICES = (
     ("iteration", "acceptance"),
     ("dimension", "scalar"),
@@ -109,19 +109,19 @@ class SAPSO:
 
     def _fly(self, swarm_best: Array) -> None:
         """Move every particle by (1) and (2), so that it meets the constraints. Reading S7."""
-        before, feasible = self._velocity, self._space.feasible
-        self._velocity, self._moved = self._attempt(self._everyone, before, swarm_best)
+        pull, feasible = self._pull(swarm_best), self._space.feasible
+        self._velocity, self._moved = self._attempt(self._everyone, pull)
         broken = np.flatnonzero(~feasible(self._moved))
         if not len(broken):
             return
-        stopped = np.zeros(len(before), dtype=bool)
+        stopped = np.zeros(len(self._moved), dtype=bool)
         stopped[broken] = True
         left, many = self._redraws, FIRST_REDRAWS
         # what no draw could bring back into the box need not be drawn again
-        broken = redrawable(broken, *self._pull(before, swarm_best))
+        broken = redrawable(broken, *pull)
         while left > 0 and len(broken):
             many = min(left, many)
-            flown, moved = self._attempt(np.repeat(broken, many), before, swarm_best)
+            flown, moved = self._attempt(np.repeat(broken, many), pull)
             # SAPSO A1.2c
             still = mend(broken, feasible(moved), flown, moved, self._velocity, self._moved)
             stopped[broken], stopped[still] = False, True
@@ -136,13 +136,13 @@ class SAPSO:
         self._moved[rows] = np.where(self._space.feasible(clipped)[:, None], clipped, self._position[rows])
         self._velocity[rows] = 0.0
 
-    def _pull(self, velocity: Array, swarm_best: Array) -> tuple[Any, ...]:
+    def _pull(self, swarm_best: Array) -> tuple[Any, ...]:
         """Return everything but rand() that (1) depends on."""
         omega = inertia(self._iteration, self._iterations, self._inertia)
         limits = self._low, self._high, self._space.periodic
-        return omega, self._acceleration, self._position, velocity, self._best, swarm_best, *limits
+        return omega, self._acceleration, self._position, self._velocity, self._best, swarm_best, *limits
 
-    def _attempt(self, rows: NDArray[np.int64], velocity: Array, swarm_best: Array) -> tuple[Array, Array]:
+    def _attempt(self, rows: NDArray[np.int64], pull: tuple[Any, ...]) -> tuple[Array, Array]:
         """Return new velocities and positions (k, d) of some particles, with fresh draws of rand()."""
         shape = (len(rows), self._space.dimensions)
         if self._scalar:  # Reading S8
@@ -150,7 +150,7 @@ class SAPSO:
         else:
             rand = self._rng.random((2, *shape))
         flown, moved = np.empty(shape), np.empty(shape)
-        fly(rows, rand, *self._pull(velocity, swarm_best), flown, moved)  # type: ignore[call-arg]
+        fly(rows, rand, *pull, flown, moved)  # type: ignore[call-arg]
         return flown, moved
 
 

@@ -1,5 +1,7 @@
 """Metrics by numbers worked by hand, and by law."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -230,7 +232,7 @@ def test_an_untrue_number_is_named() -> None:
         (np.zeros(66, bool), r"bool of shape \(66,\), 0 of them not 0"),
     ],
 )
-def test_dimensions_are_checked(dimensions: Array, came: str) -> None:
+def test_dimensions_are_checked(dimensions: Any, came: str) -> None:
     with pytest.raises(ValueError, match=f"dimensions must be 66 booleans, at least one of them true, got {came}"):
         metrics.pose_error_degrees(np.zeros((1, 66)), np.zeros((1, 66)), dimensions)
 

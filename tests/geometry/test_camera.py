@@ -166,7 +166,7 @@ def test_framing_stands_off_from_one_small_ball() -> None:
 
 def test_a_camera_is_copied_and_cannot_be_written_to() -> None:
     focal = np.array([50.0, 60.0])
-    camera = Camera(100, 80, focal, [50.0, 40.0], np.eye(3), np.zeros(3))
+    camera = Camera(100, 80, focal, np.array([50.0, 40.0]), np.eye(3), np.zeros(3))
     focal[0] = 1.0
     assert camera.focal[0] == 50.0
     with pytest.raises(ValueError, match="read-only"):

@@ -1,5 +1,7 @@
 """Kinematics by law and against a slow twin."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -190,7 +192,8 @@ def test_any_layout_and_type_of_array_is_taken_and_none_is_written_to() -> None:
     before, expected = poses.copy(), skeleton.joints(poses)
     frozen = poses.copy()
     frozen.setflags(write=False)
-    for same in (frozen, np.asfortranarray(poses), np.repeat(poses, 2, axis=0)[::2], poses.astype(np.float32)):
+    others: list[Any] = [frozen, np.asfortranarray(poses), np.repeat(poses, 2, axis=0)[::2], poses.astype(np.float32)]
+    for same in others:
         np.testing.assert_array_equal(skeleton.joints(same), expected)
     np.testing.assert_array_equal(poses, before)
     assert skeleton.joints(np.zeros((0, ANGLES))).shape == (0, 27, 3)

@@ -1,6 +1,7 @@
 """The cost by hand, and the areas by law."""
 
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,14 +106,14 @@ def test_any_layout_and_type_of_array_gives_the_same_areas_and_none_is_written_t
     frozen = poses.copy(), translations.copy()
     for array in frozen:
         array.setflags(write=False)
-    others = [
+    others: list[tuple[Any, Any]] = [
         frozen,
         (np.asfortranarray(poses), np.asfortranarray(translations)),
         (np.repeat(poses, 2, axis=0)[::2], np.repeat(translations, 2, axis=0)[::2]),
         (poses.astype(np.float32), translations.astype(np.float32)),
     ]
     for same in others:
-        np.testing.assert_array_equal(areas(body, camera, silhouette, *same), expected)
+        np.testing.assert_array_equal(areas(body, camera, silhouette, same[0], same[1]), expected)
     none = areas(body, camera, silhouette, np.zeros((0, ANGLES)), np.zeros((0, 3)), threads=2)
     assert none.shape == (0, 3)
 
