@@ -113,8 +113,8 @@ class Camera:
             raise ValueError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {keys}")
         try:
             matrix = np.array(values["camera_from_world"], dtype=np.float64)
-            if matrix.shape != (4, 4):
-                raise ValueError(f"camera_from_world must have shape (4, 4), got {matrix.shape}")
+            if matrix.shape != (4, 4) or matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+                raise ValueError(f"camera_from_world must be 4 x 4 with last row 0 0 0 1, got {matrix.tolist()}")
             return cls(
                 values["width"], values["height"], values["focal"], values["centre"], matrix[:3, :3], matrix[:3, 3]
             )

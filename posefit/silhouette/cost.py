@@ -14,6 +14,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette import kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
 
@@ -40,6 +41,12 @@ def areas(
     # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
     poses, translations = writeable(poses), writeable(translations)
     n = len(poses)
+    if poses.ndim != 2 or poses.shape[1] != ANGLES:
+        raise ValueError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
+    if translations.shape != (n, 3):
+        raise ValueError(f"translations must have shape {(n, 3)}, got {translations.shape}")
+    if silhouette.mask.shape != (camera.height, camera.width):
+        raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
     out = np.empty((n, 3), dtype=np.int64)
     chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
     observed, valid = silhouette.bits
@@ -80,6 +87,9 @@ def mismatch(areas: Areas, beta: float = BETA) -> Array:
 
 def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask:
     """Return the mask (height, width) of one body, pose (66,), root at translation (3,)."""
+    if np.shape(pose) != (ANGLES,) or np.shape(translation) != (3,):
+        came = f"{np.shape(pose)} and {np.shape(translation)}"
+        raise ValueError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
     bits = kernels.draw_bits(
         body.skeleton.chain,
         body.radii,

@@ -21,7 +21,8 @@ def table(summary: Mapping[str, Any]) -> str:
         lines.append(f"{'':24} {'error deg':>9} {'skill':>7}")
         lines.append(f"{summary['method']:24} {error['mean']:9.2f}")
         for name, baseline in summary["baselines_degrees"].items():
-            lines.append(f"{_NAMES[name]:24} {baseline:9.2f} {summary['skill'][name]:7.2f}")
+            skill = summary["skill"][name]  # None where the baseline has no error at all
+            lines.append(f"{_NAMES[name]:24} {baseline:9.2f} " + (f"{'-':>7}" if skill is None else f"{skill:7.2f}"))
         lines.append(f"{'floor of the prior':24} {summary['prior_floor_degrees']:9.2f}")
         lines.append(
             f"MPJPE {summary['mpjpe_mm']:.0f} mm, PA-MPJPE {summary['pa_mpjpe_mm']:.0f} mm, left/right swapped "

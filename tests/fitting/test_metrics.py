@@ -163,12 +163,14 @@ def test_pa_mpjpe_is_blind_to_similarities_alone(seed: int, rotation: Array, sca
     assert (found > 0.0).all()
 
 
-@given(seeds)
-def test_pa_mpjpe_is_the_best_of_nearby_similarities(seed: int) -> None:
+@given(seeds, st.booleans())
+def test_pa_mpjpe_is_that_of_the_best_proper_rotation_and_its_scale(seed: int, mirrored: bool) -> None:
     rng = np.random.default_rng(seed)
     truth = rng.normal(0.0, 0.4, (27, 3))
     turn = rotation_from_joint_angles(rng.uniform(-3.0, 3.0, 3))
     noisy = truth @ turn.T + rng.normal(0.0, 0.05, (27, 3))
+    if mirrored:
+        noisy[:, 2] *= -1.0
     target, source = truth - truth.mean(axis=0), noisy - noisy.mean(axis=0)
     rotation = Rotation.align_vectors(target, source)[0].as_matrix()
     back = source @ rotation.T

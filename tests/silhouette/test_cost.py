@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posefit.geometry.body import Body
@@ -40,6 +40,7 @@ def test_the_mismatch_by_hand() -> None:
     assert mismatch(np.zeros((0, 3), dtype=np.int64)).shape == (0,)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(counts, st.floats(0.0, 1.0))
 def test_the_mismatch_lies_in_0_to_100_and_is_linear_in_beta(area: tuple[int, int, int], beta: float) -> None:
     row = np.array([area])
@@ -48,12 +49,14 @@ def test_the_mismatch_lies_in_0_to_100_and_is_linear_in_beta(area: tuple[int, in
     assert found == pytest.approx((1.0 - beta) * spilled + beta * missed)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(counts)
 def test_at_half_beta_body_and_silhouette_may_trade_places(area: tuple[int, int, int]) -> None:
     r, b, y = area
     assert mismatch(np.array([[r, b, y]]))[0] == pytest.approx(mismatch(np.array([[b, r, y]]))[0])
 
 
+@settings(deadline=None)  # the first call compiles
 @given(counts, st.integers(1, 10**6))
 def test_more_overlap_never_costs_more(area: tuple[int, int, int], more: int) -> None:
     r, b, y = area
@@ -148,3 +151,16 @@ def test_areas_of_two_poses_by_counting_even_uncompiled() -> None:
     expected = [[(seen & ~m).sum(), (m & valid & ~seen).sum(), (seen & m).sum()] for m in masks]
     found = areas(body, camera, Silhouette.of(masks[0], valid), poses, translations)
     np.testing.assert_array_equal(found, expected)
+
+
+def test_shapes_that_do_not_fit_are_refused_before_the_kernel_sees_them(body: Body, camera: Camera) -> None:
+    silhouette = Silhouette.of(np.ones((camera.height, camera.width)))
+    for poses, translations, seen, message in (
+        (np.zeros((2, 40)), np.zeros((2, 3)), silhouette, r"poses must have shape \(n, 66\), got \(2, 40\)"),
+        (np.zeros((3, 66)), np.zeros((1, 3)), silhouette, r"translations must have shape \(3, 3\), got \(1, 3\)"),
+        (np.zeros((1, 66)), np.zeros((1, 3)), Silhouette.of(np.ones((10, 10))), r"mask must have shape \(72, 96\)"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            areas(body, camera, seen, poses, translations)
+    with pytest.raises(ValueError, match=r"pose and translation must have shapes"):
+        project(body, camera, np.zeros(40), np.zeros(3))

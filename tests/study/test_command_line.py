@@ -149,6 +149,12 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
     assert found.history.shape == (5,)
 
 
+def test_one_frame_has_a_table_too() -> None:  # the pose held from the first frame has no error to compare with
+    result = run("fit", "walk", "--frame", "3", *QUICK)
+    assert result.exit_code == 0, result.output
+    assert "first true pose, held         0.00       -" in result.stdout
+
+
 def test_an_amc_is_followed_with_the_asf_beside_it(clip: tuple[Path, Path]) -> None:
     result = run("track", clip[1], "--train", "walk-a", "--train", "walk-c", "--json", *QUICK)
     assert result.exit_code == 0, result.stderr
