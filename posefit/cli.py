@@ -16,6 +16,9 @@ class _Mistakes(click.Group):
     def invoke(self, context: click.Context) -> Any:
         try:
             return super().invoke(context)
+        except click.UsageError as error:
+            click.echo(f"posefit: {' '.join(error.format_message().split())}", err=True)
+            context.exit(2)
         except (ValueError, FileNotFoundError, PermissionError, ImportError) as error:
             click.echo(f"posefit: {' '.join(str(error).split())}", err=True)
             context.exit(2)
@@ -118,7 +121,7 @@ def bench(threads: int | None, as_json: bool) -> None:
 
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, got {threads}")
-    _say("timing; this takes about half a minute ...")
+    _say("timing; this takes about ten seconds ...")
     figures = run(threads)
     if as_json:
         click.echo(json.dumps(figures))

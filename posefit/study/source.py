@@ -44,6 +44,10 @@ def motion_of(source: str | Path | Motion, asf: str | Path | None, fps: float) -
     """
     if isinstance(source, Motion):
         return source.resampled(fps)
+    from posefit.motion import library
+
+    if source in library.names():
+        return library.built_in(str(source), fps=fps)
     path = Path(source)
     if path.suffix.lower() == ".amc":
         from posefit.motion.amc import read_clip
@@ -53,8 +57,6 @@ def motion_of(source: str | Path | Motion, asf: str | Path | None, fps: float) -
         from posefit.motion.bvh import read_bvh
 
         return read_bvh(_existing(path)).resampled(fps)
-    from posefit.motion import library
-
     if path.exists() or path.suffix:
         _existing(path)
         raise ValueError(
@@ -64,8 +66,12 @@ def motion_of(source: str | Path | Motion, asf: str | Path | None, fps: float) -
 
 
 def is_masks(source: str | Path | Motion) -> bool:
-    """Return whether a source names masks: a folder, or an .npz file."""
-    return not isinstance(source, Motion) and (Path(source).is_dir() or Path(source).suffix.lower() == ".npz")
+    """Return whether a source names masks: a folder, or an .npz file. A built-in motion's name is never a folder."""
+    from posefit.motion import library
+
+    if isinstance(source, Motion) or source in library.names():
+        return False
+    return Path(source).is_dir() or Path(source).suffix.lower() == ".npz"
 
 
 def synthetic(
