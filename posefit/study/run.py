@@ -240,6 +240,7 @@ def _announced(say: Callable[[str], None]) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+        timer.join()  # it may be in the middle of saying it
 
 
 class _Tee:
