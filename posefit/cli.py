@@ -49,12 +49,19 @@ _OPTIONS = (
     click.option("--camera", metavar="FILE", help="Camera as JSON; guessed where absent."),
     click.option("--optimiser", default="sapso", show_default=True, help="See `posefit plugins`."),
     click.option("--prior", default="pca", show_default=True, help="See `posefit plugins`."),
+    click.option("--tracker", help="A tracker instead of optimiser and prior; see `posefit plugins`."),
+    click.option(
+        "--set", "settings", multiple=True, metavar="NAME.SETTING=VALUE", help="Such as sapso.cooling=0.9; repeatable."
+    ),
     click.option("--train", multiple=True, metavar="SOURCE", help="Motion the prior learns from; may be repeated."),
     click.option("--view-degrees", type=float, help="Where the camera stands: 0 in front, 90 to the side."),
     click.option("--size", default="320x240", show_default=True, callback=_size, help="Image of a rendered motion."),
     click.option("--fps", type=float, default=30.0, show_default=True, help="Rate to resample a motion to."),
-    click.option("--particles", type=int, default=40, show_default=True, help="N"),
-    click.option("--iterations", type=int, default=60, show_default=True, help="C"),
+    click.option("--evaluations", type=int, help="Budget of a frame; by default N (C + 1) = 2440."),
+    click.option("--particles", type=int, help="N, by default 40."),
+    click.option("--iterations", type=int, help="C, by default 60."),
+    click.option("--first-pose", default="searched", show_default=True, help="searched, or given (the true one)."),
+    click.option("--ask-seconds", type=float, help="How long a plugin may take to propose a population."),
     click.option("--translation", help="Root translation: known, searched or aligned."),
     click.option("--seed", type=int, default=0, show_default=True),
     click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),
@@ -83,6 +90,7 @@ def track(as_json: bool, **options: Any) -> None:
     """Follow a person through SOURCE: a built-in motion, an .amc or .bvh file, a folder or .npz of masks."""
     from posefit.study.run import track as run
 
+    options |= _settings(options)
     result = run(options.pop("source"), progress=_progress, say=_say, **options)
     if as_json:
         click.echo(json.dumps(result.summary))
@@ -101,6 +109,7 @@ def fit(as_json: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE."""
     from posefit.study.run import fit as run
 
+    options |= _settings(options)
     result = run(options.pop("source"), say=_say, **options)
     if as_json:
         click.echo(json.dumps({**result.summary, "pose_degrees": _degrees(result.pose)}))
@@ -145,6 +154,16 @@ def plugins(as_json: bool) -> None:
         return
     for kind, name, distribution, summary in rows:
         click.echo(f"{kind:10} {name:10} {distribution:16} {summary}")
+
+
+def _settings(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Take `--set` out of the options and return the settings of optimiser, prior and tracker, as their types ask.
+
+    `tracker.` also sets the tracker that an optimiser and a prior are driven by.
+    """
+    from posefit.study.method import parse_settings
+
+    return parse_settings(options.pop("settings"), options["optimiser"], options["prior"], options["tracker"])
 
 
 def _say(message: str) -> None:

@@ -1,21 +1,50 @@
 """What a plugin may offer. A plugin is a module named in the entry-point group `posefit`."""
 
-from collections.abc import Callable
+from typing import Any, Protocol
 
 from pluggy import HookspecMarker
 
-from posefit.fitting.optimiser import OptimiserFactory
+from posefit.fitting.optimiser import NextFrame, OptimiserFactory
 from posefit.fitting.prior import PriorFactory
+from posefit.fitting.tracker import TrackerFactory
 
 PROJECT = "posefit"
 hookspec = HookspecMarker(PROJECT)
 
+# The module a factory imports when it is called, and what to install where it is absent: ("cma", "posefit[pycma]").
+Needs = tuple[str, str]
+
+
+class RegisterOptimiser(Protocol):
+    """Offers an optimiser under a name, says what becomes of it in the next frame, and what it needs."""
+
+    def __call__(
+        self, name: str, factory: OptimiserFactory, *, next_frame: NextFrame = "start", needs: Needs | None = None
+    ) -> None: ...
+
+
+class RegisterPrior(Protocol):
+    """Offers a prior under a name, and says what it needs."""
+
+    def __call__(self, name: str, factory: PriorFactory, *, needs: Needs | None = None) -> None: ...
+
+
+class RegisterTracker(Protocol):
+    """Offers a tracker under a name, and says what it needs."""
+
+    def __call__(self, name: str, factory: TrackerFactory, *, needs: Needs | None = None) -> None: ...
+
 
 @hookspec
-def posefit_register_optimisers(register: Callable[[str, OptimiserFactory], None]) -> None:
+def posefit_register_optimisers(register: RegisterOptimiser) -> Any:
     """Call `register(name, factory)` for each optimiser; see `posefit.fitting.optimiser`."""
 
 
 @hookspec
-def posefit_register_priors(register: Callable[[str, PriorFactory], None]) -> None:
+def posefit_register_priors(register: RegisterPrior) -> Any:
     """Call `register(name, factory)` for each prior; see `posefit.fitting.prior`."""
+
+
+@hookspec
+def posefit_register_trackers(register: RegisterTracker) -> Any:
+    """Call `register(name, factory)` for each tracker; see `posefit.fitting.tracker`."""

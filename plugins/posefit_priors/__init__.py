@@ -1,13 +1,17 @@
-"""Priors for posefit: `pca`, the paper's compact pose space."""
-
-from collections.abc import Callable
+"""Priors for posefit: `pca`, the paper's compact pose space; `full`, all angles; `union`; and scikit-learn's."""
 
 from posefit import hookimpl
-from posefit.fitting.prior import PriorFactory
+from posefit.hooks import RegisterPrior
 
 
 @hookimpl
-def posefit_register_priors(register: Callable[[str, PriorFactory], None]) -> None:
+def posefit_register_priors(register: RegisterPrior) -> None:
+    from posefit_priors.full import Full
     from posefit_priors.pca import PCA
+    from posefit_priors.sklearn import Transformed
+    from posefit_priors.union import Union
 
     register("pca", PCA)
+    register("full", Full)
+    register("union", Union)
+    register("sklearn", Transformed)

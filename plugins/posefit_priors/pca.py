@@ -6,14 +6,25 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.fitting.check import at_least
 from posefit.geometry.arrays import writeable
 from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import Skeleton
+from posefit_priors.arrays import angles_of, load_arrays
 
 COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
 QUANTILE = 0.99  # Reading S5: chi is this quantile of the training distances
-_ARRAYS = ("mean", "components", "low", "high", "centres", "reach", "explained")
+_SHAPES = {
+    "mean": (63,),
+    "components": ("m", 63),
+    "low": ("m",),
+    "high": ("m",),
+    "centres": ("k", "m"),
+    "reach": (),
+    "explained": ("m",),
+}
 
 
 class PCA:
@@ -39,41 +50,24 @@ class PCA:
         quantile: float = QUANTILE,
         seed: int = 0,
     ) -> None:
-        if components <= 0 or (components >= 1 and components != int(components)):
-            raise ValueError(f"components must be a whole number or a share of variance below 1, got {components}")
-        if clusters < 1:
-            raise ValueError(f"clusters must be at least 1, got {clusters}")
+        check_components(components)
+        at_least("clusters", clusters, 1)
         if not 0.0 < quantile <= 1.0:
             raise ValueError(f"quantile must lie in 0 to 1, got {quantile}")
+        at_least("seed", seed, 0)
         self._components, self._clusters, self._quantile, self._seed = components, clusters, quantile, seed
 
-    def fit(self, angles: Array) -> Self:
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:  # noqa: ARG002, this prior needs none
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
-        angles = np.asarray(angles, dtype=np.float64)
-        most = min(len(angles) - 1, angles.shape[1])
-        if len(angles) < self._clusters or most < max(1.0, self._components):
-            needed = int(max(self._clusters, self._components + 1, 2))
-            raise ValueError(f"angles must hold at least {needed} frames, got {len(angles)}")
+        least = int(self._components) + 1 if self._components >= 1 else 2
+        angles = angles_of(angles, max(self._clusters, least))
         self.mean = angles.mean(axis=0)  # SAPSO 2.1.1
-        _, spread, directions = np.linalg.svd(angles - self.mean, full_matrices=False)  # SAPSO 2.1.2
-        share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
-        kept = (
-            int(self._components)
-            if self._components >= 1
-            else int(np.searchsorted(share.cumsum(), self._components)) + 1
-        )
-        self.explained, self.components = share[:kept].copy(), directions[:kept].copy()
+        self.components, self.explained = principal(angles - self.mean, self._components)
         latents = self.transform(angles)
         self.low, self.high = latents.min(axis=0), latents.max(axis=0)  # SAPSO 2.2 constraint 1
-        self.centres = self._cluster(latents)
-        self.reach = np.array(np.quantile(_nearest(self.centres, latents), self._quantile))  # Reading S5
+        self.centres = clustered(latents, self._clusters, self._seed)[0]
+        self.reach = reach_of(self.centres, latents, self._quantile)
         return self
-
-    def _cluster(self, latents: Array) -> Array:
-        from sklearn.cluster import KMeans
-
-        found = KMeans(self._clusters, n_init=10, random_state=self._seed).fit(latents)
-        return np.array(found.cluster_centers_, dtype=np.float64)
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63): Projection. SAPSO 2.1."""
@@ -82,40 +76,50 @@ class PCA:
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m): Recovery. SAPSO 2.1."""
         angles = np.empty((len(latents), len(self.mean)))
-        _recover(writeable(latents), self.components, self.mean, angles)
+        recover(writeable(latents), self.components, self.mean, angles)
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
-        return np.asarray(_near(self.centres, writeable(latents), self.reach))
+        return np.asarray(near(self.centres, writeable(latents), self.reach))
 
     def save(self, path: str | Path) -> None:
         """Write the learned space to an .npz file."""
-        np.savez(path, **{name: getattr(self, name) for name in _ARRAYS})
+        np.savez(path, **{name: getattr(self, name) for name in _SHAPES})
 
     @classmethod
     def load(cls, path: str | Path) -> "PCA":
         """Return the space that `save` wrote. Raises ValueError where the file is not one."""
-        try:
-            with np.load(path, allow_pickle=False) as stored:
-                arrays = {name: np.array(stored[name], dtype=np.float64) for name in _ARRAYS}
-        except (KeyError, ValueError, OSError) as error:
-            if isinstance(error, FileNotFoundError):
-                raise
-            raise ValueError(f"{path}: expected an .npz file with {', '.join(_ARRAYS)}, got {error}") from None
+        arrays = load_arrays(path, _SHAPES)
         m = len(arrays["components"])
-        shapes = ((63,), (m, 63), (m,), (m,), (len(arrays["centres"]), m), (), (m,))
-        for name, shape in zip(_ARRAYS, shapes, strict=True):
-            if arrays[name].shape != shape or not np.isfinite(arrays[name]).all():
-                raise ValueError(f"{path}: {name} must be finite and of shape {shape}, got {arrays[name].shape}")
         prior = cls(components=m, clusters=len(arrays["centres"]))
         for name, value in arrays.items():
             setattr(prior, name, value)
         return prior
 
 
+def check_components(components: float) -> None:
+    """Return nothing. Raises ValueError where it is neither a number of components nor a share of variance."""
+    if not 0.0 < components < np.inf or (components >= 1 and components != int(components)):
+        raise ValueError(f"components must be a whole number or a share of variance below 1, got {components}")
+
+
+def principal(centred: Array, components: float) -> tuple[Array, Array]:
+    """Return the principal directions (m, 63) of centred joint angles (T, 63), and each one's share of variance (m,).
+
+    Raises ValueError where the frames are too few for so many.
+    """
+    most = min(len(centred) - 1, centred.shape[1])
+    if most < components:
+        raise ValueError(f"angles must hold at least {int(components) + 1} frames, got {len(centred)}")
+    _, spread, directions = np.linalg.svd(centred, full_matrices=False)  # SAPSO 2.1.2
+    share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
+    kept = int(components) if components >= 1 else int(np.searchsorted(share.cumsum(), components)) + 1
+    return directions[:kept].copy(), share[:kept].copy()
+
+
 @jit
-def _recover(latents, components, mean, angles):
+def recover(latents, components, mean, angles):
     for i in range(latents.shape[0]):
         for j in range(mean.size):
             angles[i, j] = mean[j]
@@ -137,13 +141,21 @@ def _distance(centres, latent):
 
 
 @jit
-def _near(centres, latents, reach):
-    near = np.empty(latents.shape[0], np.bool_)
+def near(centres, latents, reach):
+    within = np.empty(latents.shape[0], np.bool_)
     for i in range(latents.shape[0]):
-        near[i] = _distance(centres, latents[i]) < reach[()]  # SAPSO 2.2 constraint 2
-    return near
+        within[i] = _distance(centres, latents[i]) < reach[()]  # SAPSO 2.2 constraint 2
+    return within
 
 
-def _nearest(centres: Array, latents: Array) -> Array:
-    """Return D (n,) of latents (n, m)."""
-    return np.array([_distance(centres, latent) for latent in latents])
+def reach_of(centres: Array, latents: Array, quantile: float) -> Array:
+    """Return chi (): this quantile of the distances D of training latents (n, m) from their nearest centres (K, m)."""
+    return np.array(np.quantile([_distance(centres, latent) for latent in latents], quantile))  # Reading S5
+
+
+def clustered(latents: Array, clusters: int, seed: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return the centres (K, m) that K-means finds among latents (n, m), and each one's cluster (n,)."""
+    from sklearn.cluster import KMeans
+
+    found = KMeans(clusters, n_init=10, random_state=seed).fit(latents)
+    return np.array(found.cluster_centers_, dtype=np.float64), np.asarray(found.labels_, dtype=np.int64)

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
+from posefit.fitting.box import Space
 from posefit.geometry.rotation import Array
 
 
@@ -22,9 +23,22 @@ class Optimiser(Protocol):
         ...
 
 
-# Builds an optimiser for one search, as `factory(space, rng, **settings)`: a SearchSpace, a numpy Generator that is the
-# only source of randomness, and keyword-only settings.
+class Filter(Optimiser, Protocol):
+    """An optimiser that carries its particles from frame to frame."""
+
+    def advance(self, space: Space) -> None:
+        """Go on to the next frame, whose box is `space`; its `start` holds the tracker's prediction."""
+        ...
+
+
+# Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a numpy Generator that is the
+# only source of randomness, and keyword-only settings. The driver fills in the settings `evaluations`, the budget of
+# one search, and `iterations`, the populations after the first that this budget holds, for a factory that takes them.
 OptimiserFactory = Callable[..., Optimiser]
+
+# What an optimiser does when the next frame comes: it is built anew to start around the prediction, SAPSO (6), (7); it
+# is a `Filter`, built once, and carries its particles; or it is built anew and starts anywhere.
+NextFrame = Literal["start", "carry", "forget"]
 
 
 @dataclass(frozen=True, eq=False)

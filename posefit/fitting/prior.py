@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import Skeleton
 
 
 class Prior(Protocol):
@@ -21,8 +22,8 @@ class Prior(Protocol):
     low: Array  # (m,) the range of the latents, constraint 1
     high: Array  # (m,)
 
-    def fit(self, angles: Array) -> Self:
-        """Learn from joint angles (T, 63) in radians and return itself."""
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
+        """Learn from joint angles (T, 63) in radians, of a person with this skeleton, and return itself."""
         ...
 
     def transform(self, angles: Array) -> Array:

@@ -6,6 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.fitting import box
+from posefit.fitting.box import Space, Start
 from posefit.fitting.prior import Prior
 from posefit.geometry.arrays import writeable
 from posefit.geometry.kinematics import jit
@@ -15,18 +17,8 @@ from posefit.geometry.skeleton import ANGLES
 Translation = Literal["known", "searched", "aligned"]  # Reading S4
 TRANSLATIONS: tuple[Translation, ...] = ("known", "searched", "aligned")
 
-REDRAWS = 100  # Reading S7
 ROOT_RANGE_DEGREES = (45.0, 15.0, 15.0)  # ours: how far yaw, pitch and roll are searched to either side
 TRANSLATION_RANGE = (0.5, 0.5, 0.5)  # ours: metres to either side
-
-
-@dataclass(frozen=True, eq=False)
-class Start:
-    """The distribution of a first population around a prediction, in the unit box. SAPSO (6), (7)."""
-
-    mean: Array  # (d,)
-    spread: Array  # (d,) standard deviations
-    velocity: Array  # (d,) v_pred
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,31 +111,20 @@ class SearchSpace:
         return self.wrap(target - origin)
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Return a first population (count, d) of feasible proposals, from `start` or uniform. SAPSO (6).
+        """Return a first population (count, d) of feasible proposals; see `box.draw`. SAPSO (6)."""
+        return box.draw(self, rng, count)
 
-        Each is redrawn at most 100 times (Reading S7); what is then still infeasible becomes the start's mean, or
-        the copy of one that is feasible. Raises ValueError where none is.
-        """
-        drawn = np.empty((count, self.dimensions))
-        wanted = np.arange(count)
-        for _ in range(REDRAWS):
-            drawn[wanted] = self._sample(rng, len(wanted))
-            wanted = wanted[~self.feasible(drawn[wanted])]
-            if not len(wanted):
-                return drawn
-        if self.start is not None and self.feasible(self.start.mean[None])[0]:
-            drawn[wanted] = self.start.mean
-            return drawn
-        found = np.setdiff1d(np.arange(count), wanted)
-        if not len(found):
-            raise ValueError(f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws")
-        drawn[wanted] = drawn[rng.choice(found, len(wanted))]
-        return drawn
+    def scatter(self, rng: np.random.Generator, means: Array, spread: Array) -> Array:
+        """Return a feasible normal draw (n, d) around each of n feasible means; see `box.scatter`."""
+        return box.scatter(self, rng, means, spread)
 
-    def _sample(self, rng: np.random.Generator, count: int) -> Array:
-        if self.start is None:
-            return rng.uniform(-1.0, 1.0, (count, self.dimensions))
-        return self.wrap(rng.normal(self.start.mean, self.start.spread, (count, self.dimensions)))  # SAPSO (6)
+    def repair(self, proposals: Array, home: Array) -> Array:
+        """Return proposals (n, d), those that are not feasible moved towards `home` (d,); see `box.repair`."""
+        return box.repair(self, proposals, home)
+
+    def moved(self, proposals: Array, origin: Space) -> Array:
+        """Return the proposals (n, d), the nearest in the box, that mean here what these mean in `origin`."""
+        return self.proposals(origin.centre + origin.half * proposals)
 
 
 @jit

@@ -85,9 +85,12 @@ class Skeleton:
     offsets: Array = field(repr=False)  # (26, 3) from a bone's start to its end, at rest, in the world frame
     axes: Array = field(repr=False)  # (26, 3, 3) world_from_bone at rest: the frame of the bone's angles
     channels: Channels = field(repr=False)  # the .amc layout after the root: (bone, its free angles) in file order
+    # (63, 2) radians: lowest and highest of each joint angle, 0 for padding; None where nobody says
+    limits: Array | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        for name, shape in (("offsets", (26, 3)), ("axes", (26, 3, 3))):
+        shapes = {"offsets": (26, 3), "axes": (26, 3, 3)} | ({} if self.limits is None else {"limits": (63, 2)})
+        for name, shape in shapes.items():
             value = np.array(getattr(self, name), dtype=np.float64)
             if value.shape != shape:
                 raise ValueError(f"{name} must have shape {shape}, got {value.shape}")
@@ -95,6 +98,8 @@ class Skeleton:
                 raise ValueError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+        if self.limits is not None and (self.limits[:, 0] > self.limits[:, 1]).any():
+            raise ValueError("limits must not be reversed, got a lowest angle above the highest")
 
     @cached_property
     def lengths(self) -> Array:

@@ -1,13 +1,13 @@
 """Acclaim skeletons (.asf): read into a `Skeleton`, and written from one."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
-from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, Channels, Skeleton
+from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Channels, Skeleton, angle_index
 
 INCH = 0.0254  # metres
 METRES_PER_UNIT = INCH / 0.45  # CMU's files say `length 0.45`: a unit is 1 / 0.45 inch
@@ -68,6 +68,7 @@ class _Bone:
     vector: Array  # (3,) file units
     axis: Array  # (3,) radians
     free: tuple[str, ...]
+    limits: Array | None  # (free, 2) radians
 
 
 def read_asf(path: str | Path) -> Skeleton:
@@ -94,8 +95,22 @@ def parse_asf(path: str | Path) -> tuple[Skeleton, float]:
         offsets=np.array([bone.vector for bone in kept]) * metres,
         axes=rotation_from_joint_angles(np.array([bone.axis for bone in kept])),
         channels=tuple((name, bone.free) for name, bone in bones.items() if bone.free),
+        limits=_limits(bones),
     )
     return skeleton, metres
+
+
+def _limits(bones: dict[str, _Bone]) -> Array | None:
+    """Return the limits (63, 2) of the joint angles; None where a free angle has none."""
+    limits = np.zeros((ANGLES - 3, 2))
+    for joint in INNER:
+        bone = bones[JOINTS[joint]]
+        if bone.free and bone.limits is None:
+            return None
+        for k, angle in enumerate(bone.free):
+            assert bone.limits is not None
+            limits[angle_index(joint) - 3 + "xyz".index(angle[1])] = bone.limits[k]
+    return limits
 
 
 def _sections(path: Path) -> dict[str, list[_Line]]:
@@ -169,6 +184,8 @@ def _bones(lines: list[_Line], radians: float) -> dict[str, _Bone]:
                 raise block["name"].mistake("one new name")
             bones[name] = _bone(block, radians)
             block = None
+        elif line.words[0].startswith("(") and "limits" in block:
+            block["limits"] = replace(block["limits"], words=[*block["limits"].words, *line.words])
         else:
             block[line.key] = line
     if block is not None:
@@ -190,7 +207,21 @@ def _bone(block: dict[str, _Line], radians: float) -> _Bone:
     free = tuple(word.lower() for word in block["dof"].words[1:]) if "dof" in block else ()
     if not set(free) <= {"rx", "ry", "rz"} or sorted(set(free)) != list(free):
         raise block["dof"].mistake("dof out of rx ry rz, in this order")
-    return _Bone(direction / norm * length if length > 0.0 else np.zeros(3), axis * radians, free)
+    limits = _read_limits(block["limits"], len(free)) * radians if "limits" in block else None
+    return _Bone(direction / norm * length if length > 0.0 else np.zeros(3), axis * radians, free, limits)
+
+
+def _read_limits(line: _Line, free: int) -> Array:
+    """Return (lowest, highest) for each free angle, from words such as `(-160.0 20.0)` on one line or several."""
+    text = " ".join(line.words[1:]).replace("(", " ").replace(")", " ")
+    expected = f"limits (lowest highest) for each of {free} free angles"
+    try:
+        limits = np.array([float(word) for word in text.split()]).reshape(free, 2)
+    except ValueError:
+        raise line.mistake(expected) from None
+    if not (np.abs(limits) < LARGEST).all() or (limits[:, 0] > limits[:, 1]).any():
+        raise line.mistake(f"{expected}, finite and in order")
+    return limits
 
 
 def _check_tree(path: Path, lines: list[_Line], bones: Iterable[str]) -> None:
@@ -239,6 +270,10 @@ def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = 
             if length > 0.0:
                 direction = (skeleton.offsets[bone] / length).tolist()
         dof = f"    dof {' '.join(free)}\n" if free else ""
+        if free and skeleton.limits is not None and name in JOINTS:
+            start = angle_index(JOINTS.index(name)) - 3
+            rows = np.degrees(skeleton.limits[[start + "xyz".index(angle[1]) for angle in free]]).tolist()
+            dof += "    limits " + "\n           ".join(f"({low!r} {high!r})" for low, high in rows) + "\n"
         text.append(
             f"  begin\n    id {number}\n    name {name}\n    direction {_spaced(direction)}\n"
             f"    length {length / unit!r}\n    axis {_spaced(axis)} XYZ\n{dof}  end\n"

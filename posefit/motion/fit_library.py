@@ -117,7 +117,16 @@ def average(skeletons: list[Skeleton]) -> dict[str, Any]:
         "offsets": np.round(offsets, DIGITS).tolist(),
         "axes_degrees": np.round(np.degrees(joint_angles_from_rotation(axes)), 4).tolist(),
         "channels": [[bone, list(free)] for bone, free in skeletons[0].channels if bone in inner],
+        "limits_degrees": limits_degrees(skeletons),
     }
+
+
+def limits_degrees(skeletons: list[Skeleton]) -> list[list[float]]:
+    """Return the widest of the joint limits that some skeletons state."""
+    stated = np.array([one.limits for one in skeletons if one.limits is not None])
+    low, high = np.degrees(stated[..., 0].min(axis=0)), np.degrees(stated[..., 1].max(axis=0))
+    widest: list[list[float]] = np.round(np.column_stack([low, high]), 4).tolist()
+    return widest
 
 
 def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
@@ -142,6 +151,7 @@ def main(root: Path) -> None:
         np.array(bones["offsets"]),
         rotation_from_joint_angles(np.radians(bones["axes_degrees"])),
         tuple((bone, tuple(free)) for bone, free in bones["channels"]),
+        np.radians(bones["limits_degrees"]),
     )
     motions = {name: fitted(root, clip) for name, clip in CLIPS.items()}
     for name, model in motions.items():

@@ -48,6 +48,7 @@ def average_skeleton() -> Skeleton:
         np.array(stored["offsets"]),
         rotation_from_joint_angles(np.radians(stored["axes_degrees"])),
         tuple((bone, tuple(free)) for bone, free in stored["channels"]),
+        np.radians(stored["limits_degrees"]),
     )
 
 

@@ -19,7 +19,7 @@ class Evaluation:
     training pose of least cost in each frame; `prior_floor`, the truth's own projection into the prior.
     """
 
-    def __init__(self, scene: Scene, prior: Prior, training: Array, beta: float) -> None:
+    def __init__(self, scene: Scene, prior: Prior | None, training: Array, beta: float) -> None:
         self._scene, self._prior, self._training, self._beta = scene, prior, training, beta
         self._frames: list[Frame] = []
         self._nearest: list[Array] = []
@@ -95,7 +95,7 @@ class Evaluation:
         baselines = {
             name: float(metrics.pose_error_degrees(truth, pose).mean()) for name, pose in self._baselines(truth)
         }
-        floor = baselines.pop("prior_floor")
+        floor = baselines.pop("prior_floor", None)
         summary |= {
             "error_degrees": {
                 "mean": float(metrics.mean_error(errors)),
@@ -124,10 +124,12 @@ class Evaluation:
         def with_root(angles: Array) -> Array:
             return np.column_stack([truth[:, :3], np.broadcast_to(angles, (len(truth), truth.shape[1] - 3))])
 
-        floor = self._prior.inverse_transform(self._prior.transform(truth[:, 3:]))
-        return [
+        baselines = [
             ("mean_pose", with_root(self._training.mean(axis=0))),
             ("persistence", np.tile(truth[0], (len(truth), 1))),
             ("nearest", np.array(self._nearest)),
-            ("prior_floor", with_root(floor)),
         ]
+        if self._prior is not None:
+            floor = self._prior.inverse_transform(self._prior.transform(truth[:, 3:]))
+            baselines.append(("prior_floor", with_root(floor)))
+        return baselines

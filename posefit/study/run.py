@@ -5,9 +5,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,14 +14,14 @@ import posefit
 from posefit.fitting.optimiser import OptimiserFactory
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import Translation
-from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
+from posefit.fitting.tracker import Frame, Observation, Task, Tracker, TrackerFactory
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
 from posefit.motion import library
 from posefit.motion.motion import Motion
-from posefit.registry import registry
 from posefit.study.evaluation import Evaluation
+from posefit.study.method import Choice, prepare, training_angles
 from posefit.study.source import Range, Scene, is_masks, motion_of, observed, synthetic
 from posefit.study.writing import OutputFolder
 
@@ -58,16 +57,20 @@ def track(
     camera: Camera | str | Path | None = None,
     optimiser: str | OptimiserFactory = "sapso",
     prior: str | Prior = "pca",
+    tracker: str | TrackerFactory | None = None,
     train: Sequence[Source] = (),
     view_degrees: float | None = None,
     size: tuple[int, int] = (320, 240),
     fps: float = 30.0,
     frames: Range = (None, None),
-    particles: int = 40,
-    iterations: int = 60,
+    particles: int | None = None,
+    iterations: int | None = None,
+    evaluations: int | None = None,
     translation: Translation | None = None,
+    first_pose: Literal["searched", "given"] = "searched",
     seed: int = 0,
     threads: int = 1,
+    ask_seconds: float | None = None,
     optimiser_settings: Mapping[str, Any] | None = None,
     prior_settings: Mapping[str, Any] | None = None,
     tracker_settings: Mapping[str, Any] | None = None,
@@ -80,49 +83,58 @@ def track(
 
     `source` is a built-in motion's name, a `Motion`, an .amc or .bvh file, a folder of mask images or an .npz of masks.
     `train` names the motions a prior learns from; by default the other styles of a built-in motion, else the built-in
-    walks. `translation` is "known" where the truth is, else "aligned". The evaluations a frame are
-    particles x (iterations + 1). With `out`, a new folder gets the poses, an .amc, a table, a video and a picture;
-    it appears whole or not at all. Raises ValueError for every mistake in the arguments or files.
+    walks. The method is `optimiser` with `prior`, or `tracker`. The budget of a frame is `evaluations`, by default
+    particles x (iterations + 1) = 40 x 61, the same for every method. `translation` is "known" where the truth is, else
+    "aligned". A `first_pose` that is "given" starts the first frame around the true one. `ask_seconds` is how long a
+    plugin may take to propose a population. With `out`, a new folder gets the poses, an .amc, a table, a video and a
+    picture; it appears whole or not at all. Raises ValueError for every mistake in the arguments or files.
     """
     say = say or _nothing
-    if particles < 1:
-        raise ValueError(f"particles must be at least 1, got {particles}")
-    if iterations < 1:
-        raise ValueError(f"iterations must be at least 1, got {iterations}")
+    choice = Choice(
+        optimiser,
+        prior,
+        tracker,
+        optimiser_settings or {},
+        prior_settings or {},
+        tracker_settings or {},
+        particles,
+        iterations,
+        evaluations,
+        ask_seconds,
+    )
+    budget = choice.budget()
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
     folder = OutputFolder(out, force) if out is not None else None
     scene = _scene(source, asf, camera, view_degrees, size, fps, frames)
     trained = _training(source, train, asf, fps)
-    factory = registry().optimiser(optimiser) if isinstance(optimiser, str) else optimiser
-    settings: dict[str, Any] = {"particles": particles, **(optimiser_settings or {})}
-    if _takes(factory, "iterations"):
-        settings.setdefault("iterations", iterations)
-    learned = _learned(prior, prior_settings or {}, trained)
     mode: Translation = translation or ("known" if scene.truth is not None else "aligned")
     if mode == "known" and scene.truth is None:
         raise ValueError("translation must be searched or aligned where only masks are given, got known")
-    tracker = SynthesisTracker(
+    if first_pose not in ("searched", "given"):
+        raise ValueError(f"first_pose must be one of searched, given, got {first_pose!r}")
+    task = Task(
         scene.body,
         scene.cameras,
-        learned,
-        partial(factory, **settings),
-        particles * (iterations + 1),
+        budget,
         scene.yaw,
         scene.anchor,
         translation=mode,
+        fps=scene.fps,
+        training=trained,
+        first_pose=_first_pose(scene) if first_pose == "given" else None,
         threads=threads,
-        **(tracker_settings or {}),
     )
-    evaluation = Evaluation(scene, learned, np.concatenate([motion.poses[:, 3:] for motion in trained]), tracker.beta)
+    method = prepare(choice, task)
+    evaluation = Evaluation(scene, method.prior, training_angles(task), method.beta)
     began = time.perf_counter()
     with _announced(say):
-        _warm_up(tracker, scene)
+        _warm_up(method.warm_up, scene)
     say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
     found: list[Frame] = []
     with folder or nullcontext() as files:
         seen = _Tee(scene.observations)
-        results = tracker.track(seen, np.random.default_rng(seed))
+        results = method.tracker.track(seen, np.random.default_rng(seed))
         for frame in progress(results, scene.count) if progress else results:
             row = evaluation.add(frame, seen.latest)
             if files is not None:
@@ -138,21 +150,19 @@ def track(
         rows, measured = evaluation.close()
         summary = {
             "motion": scene.name,
-            "method": f"{_name(optimiser)} + {_name(prior)}",
+            "method": method.name,
             "seed": seed,
             "frames": len(found),
             **measured,
+            "evaluations_per_frame": budget,
             "version": posefit.__version__,
             "train": [motion.name for motion in trained],
             "view_degrees": view_degrees,
             "translation": mode,
+            "first_pose": first_pose,
             "size": [scene.cameras[0].width, scene.cameras[0].height],
             "fps": scene.fps,
-            "settings": {
-                "optimiser": settings,
-                "prior": dict(prior_settings or {}),
-                "tracker": dict(tracker_settings or {}),
-            },
+            "settings": method.settings,
         }
         if files is not None:
             files.finish(estimate, found, rows, summary)
@@ -203,23 +213,13 @@ def _training(source: Source, train: Sequence[Source], asf: str | Path | None, f
     return [motion_of(one, asf, fps) for one in chosen]
 
 
-def _learned(prior: str | Prior, settings: Mapping[str, Any], trained: Sequence[Motion]) -> Prior:
-    if not isinstance(prior, str):
-        return prior
-    return registry().prior(prior)(**settings).fit(np.concatenate([motion.poses[:, 3:] for motion in trained]))
+def _first_pose(scene: Scene) -> Array:
+    if scene.truth is None:
+        raise ValueError("first_pose must be searched where only masks are given, got given")
+    return scene.truth.poses[0, 3:]
 
 
-def _takes(factory: Callable[..., Any], setting: str) -> bool:
-    import inspect
-
-    return setting in inspect.signature(factory).parameters
-
-
-def _name(plugin: Any) -> str:
-    return plugin if isinstance(plugin, str) else getattr(plugin, "__name__", type(plugin).__name__)
-
-
-def _warm_up(tracker: SynthesisTracker, scene: Scene) -> None:
+def _warm_up(tracker: Tracker, scene: Scene) -> None:
     """Compile what is not compiled yet, on the first frame."""
     first = next(iter(scene.observations))
     next(tracker.track([first], np.random.default_rng(0)))

@@ -23,13 +23,15 @@ def table(summary: Mapping[str, Any]) -> str:
         for name, baseline in summary["baselines_degrees"].items():
             skill = summary["skill"][name]  # None where the baseline has no error at all
             lines.append(f"{_NAMES[name]:24} {baseline:9.2f} " + (f"{'-':>7}" if skill is None else f"{skill:7.2f}"))
-        lines.append(f"{'floor of the prior':24} {summary['prior_floor_degrees']:9.2f}")
+        if summary["prior_floor_degrees"] is not None:  # a tracker of its own may have no prior
+            lines.append(f"{'floor of the prior':24} {summary['prior_floor_degrees']:9.2f}")
         lines.append(
             f"MPJPE {summary['mpjpe_mm']:.0f} mm, PA-MPJPE {summary['pa_mpjpe_mm']:.0f} mm, left/right swapped "
             f"{100 * summary['swap_rate']:.0f} %, lost {100 * summary['lost_rate']:.0f} % of frames"
         )
+    used = summary["evaluations"] / summary["frames"]
     lines.append(
-        f"IoU {summary['iou']:.3f}, {1e3 * summary['seconds_per_frame']:.1f} ms a frame, "
-        f"{summary['evaluations_per_second']:,.0f} poses a second"
+        f"IoU {summary['iou']:.3f}, {used:,.0f} of {summary['evaluations_per_frame']:,} evaluations and "
+        f"{1e3 * summary['seconds_per_frame']:.1f} ms a frame, {summary['evaluations_per_second']:,.0f} poses a second"
     )
     return "\n".join(lines)

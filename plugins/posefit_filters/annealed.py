@@ -1,0 +1,97 @@
+"""The annealed particle filter of Deutscher and Reid.
+
+J. Deutscher, I. Reid, Articulated body motion capture by stochastic search, International Journal of Computer Vision
+61(2), 2005. Where we choose ourselves, the constant says so.
+"""
+
+import numpy as np
+
+from posefit.fitting.box import Space
+from posefit.fitting.check import at_least, between, positive
+from posefit.geometry.rotation import Array
+from posefit_filters.weights import sharpness, systematic, weigh
+
+EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
+LAYERS = 10
+SURVIVAL = 0.5  # alpha, the share of particles that survive a layer
+DIFFUSION = 1.0  # ours: the noise of a layer, as a multiple of the particles' own spread
+NOISE = 0.1  # ours: P0, the motion from frame to frame, in half-ranges of the box
+
+
+class Annealed:
+    """Layers of resampling with an ever sharper likelihood exp(-beta cost), every frame anew.
+
+    In each of `layers`, beta is what lets `survival` of the particles survive; each survivor moves by normal noise whose
+    standard deviations are `diffusion` times those of the weighted particles, so that the search narrows where the
+    particles agree. With `crossover`, survivors first trade a run of neighbouring coordinates in pairs. `noise` is the
+    motion from frame to frame. What a frame commits is its best particle.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        evaluations: int = EVALUATIONS,
+        layers: int = LAYERS,
+        survival: float = SURVIVAL,
+        diffusion: float = DIFFUSION,
+        noise: float = NOISE,
+        crossover: bool = False,
+    ) -> None:
+        at_least("evaluations", evaluations, 1)
+        at_least("layers", layers, 1)
+        between("survival", survival, 0.0, 1.0, ends=False)
+        positive("diffusion", diffusion)
+        positive("noise", noise)
+        self._space, self._rng = space, rng
+        self._layers, self._survival, self._crossover = min(layers, evaluations), survival, crossover
+        self._diffusion, self._noise = diffusion, noise
+        self._particles = space.draw(rng, evaluations // self._layers)
+        self._costs = np.zeros(len(self._particles))
+        self._layer = 0
+
+    def ask(self) -> Array:
+        """Return the particles (n, d) of the next layer; none after the last one of a frame."""
+        return self._particles.copy() if self._layer < self._layers else self._particles[:0].copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Weigh the particles, and unless this was the last layer, go on with the survivors."""
+        self._particles, self._costs = np.array(proposals), np.array(costs, dtype=np.float64)
+        self._layer += 1
+        if self._layer < self._layers:
+            self._descend()
+
+    def advance(self, space: Space) -> None:
+        """Carry the survivors of the last layer into the next frame."""
+        rows = self._survivors()[0]
+        moved = space.moved(self._particles[rows], self._space)
+        spread = np.full(space.dimensions, self._noise)
+        self._particles = space.scatter(self._rng, moved, spread)  # DEUTSCHER2005 (next frame)
+        self._space, self._layer = space, 0
+
+    def _survivors(self) -> tuple[Array, Array]:
+        """Return which rows (n,) survive, and the weights (n,) of all."""
+        weights = weigh(self._costs, sharpness(self._costs, self._survival))
+        return systematic(weights, self._rng.random()), weights
+
+    def _descend(self) -> None:
+        rows, weights = self._survivors()
+        around = self._space.towards(self._particles[weights.argmax()], self._particles)
+        mean = weights @ around
+        spread = np.sqrt(weights @ (around - mean) ** 2)
+        survivors = self._particles[rows]
+        if self._crossover:
+            survivors = self._traded(survivors)
+        self._particles = self._space.scatter(
+            self._rng, survivors, self._diffusion * spread
+        )  # DEUTSCHER2005 (diffusion)
+
+    def _traded(self, survivors: Array) -> Array:
+        """Return survivors that have traded a run of coordinates with a partner, where both remain feasible."""
+        n, d = survivors.shape
+        partners = survivors[self._rng.permutation(n)]
+        first, last = np.sort(self._rng.integers(0, d + 1, (2, n)), axis=0)
+        run = (np.arange(d) >= first[:, None]) & (np.arange(d) < last[:, None])
+        children = np.where(run, partners, survivors)  # DEUTSCHER2005 (crossover)
+        return np.where(self._space.feasible(children)[:, None], children, survivors)

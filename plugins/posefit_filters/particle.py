@@ -1,0 +1,65 @@
+"""The particle filter that the SAPSO paper compares with: sampling, importance weights, resampling.
+
+N. Gordon, D. Salmond, A. Smith, Novel approach to nonlinear/non-Gaussian Bayesian state estimation, IEE Proceedings F
+140(2), 1993. The paper gives no numbers for it; those here are ours.
+"""
+
+import numpy as np
+
+from posefit.fitting.box import Space
+from posefit.fitting.check import at_least, positive
+from posefit.geometry.rotation import Array
+from posefit_filters.weights import systematic, weigh
+
+EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
+SHARPNESS = 1.0  # how fast the likelihood falls with the cost
+NOISE = 0.1  # standard deviation of the motion from frame to frame, in half-ranges of the box
+
+
+class Particle:
+    """A bootstrap filter: all evaluations of a frame are one population.
+
+    A particle of the last frame survives with likelihood exp(-`sharpness` cost), moves by `drift` times the predicted
+    velocity and normal `noise`, and is weighted by the new silhouette. What a frame commits is its best particle.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        evaluations: int = EVALUATIONS,
+        sharpness: float = SHARPNESS,
+        noise: float = NOISE,
+        drift: float = 0.0,
+    ) -> None:
+        at_least("evaluations", evaluations, 1)
+        positive("sharpness", sharpness)
+        positive("noise", noise)
+        at_least("drift", drift, 0.0)
+        self._space, self._rng = space, rng
+        self._sharpness, self._noise, self._drift = sharpness, noise, drift
+        self._particles = space.draw(rng, evaluations)
+        self._weights = np.full(evaluations, 1.0 / evaluations)
+        self._due = True
+
+    def ask(self) -> Array:
+        """Return the particles (n, d) of this frame, once; then none."""
+        return self._particles.copy() if self._due else self._particles[:0].copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Weigh the particles."""
+        self._particles = np.array(proposals)
+        self._weights = weigh(np.array(costs, dtype=np.float64), self._sharpness)
+        self._due = False
+
+    def advance(self, space: Space) -> None:
+        """Let the particles survive by their weights, and move into the next frame."""
+        rows = systematic(self._weights, self._rng.random())
+        moved = space.moved(self._particles[rows], self._space)
+        if self._drift and space.start is not None:
+            drifted = space.repair(moved + self._drift * space.start.velocity, moved[0])
+            moved = drifted
+        spread = np.full(space.dimensions, self._noise)
+        self._particles = space.scatter(self._rng, moved, spread)  # GORDON1993 (motion)
+        self._space, self._due = space, True

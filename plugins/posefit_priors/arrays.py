@@ -1,0 +1,46 @@
+"""What the priors share: joint angles checked, and arrays read back from a file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from posefit.geometry.rotation import Array
+
+Shape = tuple[str | int, ...]
+
+
+def angles_of(angles: Array, least: int) -> Array:
+    """Return joint angles (T, 63) as float64. Raises ValueError where they are not, or fewer than `least` frames."""
+    angles = np.asarray(angles, dtype=np.float64)
+    if angles.ndim != 2 or angles.shape[1] != 63:
+        raise ValueError(f"angles must have shape (T, 63), got {angles.shape}")
+    if len(angles) < least:
+        raise ValueError(f"angles must hold at least {least} frames, got {len(angles)}")
+    if not np.isfinite(angles).all():
+        raise ValueError(f"angles must be finite, got {np.count_nonzero(~np.isfinite(angles))} that are not")
+    return angles
+
+
+def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Array]:
+    """Return the arrays of an .npz file by name. A letter in a shape is a size that all its places share.
+
+    Raises ValueError where an array is missing, has another shape or is not finite.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: np.array(stored[name], dtype=np.float64) for name in shapes}
+    except FileNotFoundError:
+        raise
+    except (KeyError, ValueError, OSError) as error:
+        raise ValueError(f"{path}: expected an .npz file with {', '.join(shapes)}, got {error}") from None
+    sizes: dict[str, int] = {}
+    for name, shape in shapes.items():
+        came = arrays[name].shape
+        for letter, size in zip(shape, came, strict=False):
+            if isinstance(letter, str):
+                sizes.setdefault(letter, size)
+        wanted = tuple(sizes.get(one, 0) if isinstance(one, str) else one for one in shape)
+        if came != wanted or not np.isfinite(arrays[name]).all():
+            raise ValueError(f"{path}: {name} must be finite and of shape {wanted}, got {came}")
+    return arrays

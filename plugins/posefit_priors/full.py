@@ -1,0 +1,81 @@
+"""The full space: every joint angle that is free, between its limits. No compact space, and no constraint 2."""
+
+from pathlib import Path
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.fitting.check import at_least, one_of
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import Skeleton
+from posefit_priors.arrays import angles_of, load_arrays
+
+_SHAPES = {"low": ("m",), "high": ("m",), "angles": ("m",), "rest": (63,)}
+
+
+class Full:
+    """The joint angles themselves are the latents, those that are free, with a range for each.
+
+    `limits` "asf" are the joint limits that the skeleton's file states, widened where training poses pass them;
+    "training" is the range of the training poses, widened by `margin` times itself to either side. An angle without
+    range stays at its training mean and is no latent.
+    """
+
+    low: Array  # (m,) radians
+    high: Array  # (m,)
+
+    def __init__(self, *, limits: Literal["asf", "training"] = "asf", margin: float = 0.0) -> None:
+        one_of("limits", limits, ("asf", "training"))
+        at_least("margin", margin, 0.0)
+        self._limits, self._margin = limits, margin
+
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
+        """Take the limits from the skeleton, or the range of joint angles (T, 63).
+
+        Raises ValueError where limits are asked for that the skeleton does not state, or where nothing moves.
+        """
+        angles = angles_of(angles, 1)
+        low, high = angles.min(axis=0), angles.max(axis=0)
+        reach = self._margin * (high - low)
+        low, high = low - reach, high + reach
+        if self._limits == "asf":
+            if skeleton is None or skeleton.limits is None:
+                name = "no skeleton" if skeleton is None else f"{skeleton.name}, whose file states none"
+                raise ValueError(
+                    f"limits must be training where the skeleton states no joint limits, got asf and {name}"
+                )
+            low, high = np.minimum(low, skeleton.limits[:, 0]), np.maximum(high, skeleton.limits[:, 1])
+        self.angles = np.flatnonzero(high > low)
+        if not len(self.angles):
+            raise ValueError(f"angles must differ somewhere, got {len(angles)} equal frames")
+        self.rest = angles.mean(axis=0)
+        self.low, self.high = low[self.angles], high[self.angles]
+        return self
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63): the free ones."""
+        return np.asarray(angles, dtype=np.float64)[:, self.angles]
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        angles = np.tile(self.rest, (len(latents), 1))
+        angles[:, self.angles] = latents
+        return angles
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return that all latents (n, m) are poses (n,): the box is the only constraint."""
+        return np.ones(len(latents), dtype=bool)
+
+    def save(self, path: str | Path) -> None:
+        """Write the ranges to an .npz file."""
+        np.savez(path, low=self.low, high=self.high, angles=self.angles, rest=self.rest)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Full":
+        """Return the space that `save` wrote. Raises ValueError where the file is not one."""
+        arrays = load_arrays(path, _SHAPES)
+        prior = cls()
+        prior.low, prior.high, prior.rest = arrays["low"], arrays["high"], arrays["rest"]
+        prior.angles = arrays["angles"].astype(np.int64)
+        return prior

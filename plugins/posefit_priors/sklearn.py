@@ -1,0 +1,159 @@
+"""Any transformer of scikit-learn that has an inverse, as a prior: `sklearn:KernelPCA`, `sklearn:FactorAnalysis`."""
+
+import importlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.fitting.check import at_least
+from posefit.geometry.arrays import writeable
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import Skeleton
+from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, clustered, near, reach_of, recover
+
+MODULES = ("decomposition", "manifold", "preprocessing", "random_projection", "cross_decomposition")
+DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}}
+
+
+class Transformed:
+    """A space that a scikit-learn transformer learns, with the paper's constraints 1 and 2 on its latents.
+
+    `variant` is the class, `components` its n_components, `options` its other parameters as a JSON object; `clusters`,
+    `quantile` and `seed` as for `pca`. A linear transformer is inverted by our own loop; any other is asked row by row,
+    about 100 us each, since the same row must always give the same bits.
+    """
+
+    low: Array  # (m,)
+    high: Array  # (m,)
+    centres: Array  # (K, m)
+    reach: Array  # ()
+
+    def __init__(
+        self,
+        *,
+        variant: str = "KernelPCA",
+        components: int = COMPONENTS,
+        options: str = "{}",
+        clusters: int = CLUSTERS,
+        quantile: float = QUANTILE,
+        seed: int = 0,
+    ) -> None:
+        at_least("components", components, 1)
+        at_least("clusters", clusters, 1)
+        if not 0.0 < quantile <= 1.0:
+            raise ValueError(f"quantile must lie in 0 to 1, got {quantile}")
+        at_least("seed", seed, 0)
+        self._variant, self._components, self._options = variant, components, options
+        self._clusters, self._quantile, self._seed = clusters, quantile, seed
+        _built(variant, components, options, seed)
+
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:  # noqa: ARG002, this prior needs none
+        """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
+        self._angles = angles_of(angles, max(self._clusters, self._components + 1))
+        self._model = _built(self._variant, self._components, self._options, self._seed)
+        self._model.fit(self._angles)
+        latents = self.transform(self._angles)
+        if latents.ndim != 2 or latents.shape[1] < 1 or not np.isfinite(latents).all():
+            raise ValueError(f"variant must give finite latents (n, m), got {latents.shape} from {self._variant}")
+        self._linear = _linear(self._model, latents.shape[1])
+        self.low, self.high = latents.min(axis=0), latents.max(axis=0)
+        self.centres = clustered(latents, self._clusters, self._seed)[0]
+        self.reach = reach_of(self.centres, latents, self._quantile)
+        return self
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63)."""
+        return np.asarray(self._model.transform(np.asarray(angles)), dtype=np.float64)
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        from sklearn import config_context
+
+        angles = np.empty((len(latents), 63))
+        if self._linear is not None:
+            recover(writeable(latents), *self._linear, angles)
+            return angles
+        with config_context(assume_finite=True, skip_parameter_validation=True):
+            for row, latent in enumerate(np.asarray(latents)):
+                angles[row] = self._model.inverse_transform(latent[None])[0]
+        return angles
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). As SAPSO 2.2."""
+        return np.asarray(near(self.centres, writeable(latents), self.reach))
+
+    def save(self, path: str | Path) -> None:
+        """Write what the space was learned from to an .npz file; `load` learns it again."""
+        words = [self._variant, self._components, self._options, self._clusters, self._quantile, self._seed]
+        text = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
+        np.savez(path, angles=self._angles, words=text)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Transformed":
+        """Return the space that `save` wrote. Raises ValueError where the file is not one."""
+        arrays = load_arrays(path, {"angles": ("n", 63), "words": ("k",)})
+        names = ("variant", "components", "options", "clusters", "quantile", "seed")
+        try:
+            words = json.loads(arrays["words"].astype(np.uint8).tobytes())
+            settings = dict(zip(names, words, strict=True))
+        except (ValueError, TypeError) as error:
+            raise ValueError(f"{path}: expected the settings of a prior, got {error}") from None
+        return cls(**settings).fit(arrays["angles"])
+
+
+def _built(variant: str, components: int, options: str, seed: int) -> Any:
+    """Return the transformer. Raises ValueError where there is none of that name, or its parameters are others."""
+    kind = _class(variant)
+    try:
+        given = json.loads(options)
+        if not isinstance(given, dict):
+            raise TypeError(type(given).__name__)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"options must be a JSON object, got {options!r} ({error})") from None
+    known = kind().get_params()
+    usual = {"n_components": components, "random_state": seed, **DEFAULTS.get(variant, {})}
+    unknown = sorted(set(given) - set(known))
+    if unknown:
+        raise ValueError(f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}")
+    return kind(**{name: value for name, value in usual.items() if name in known} | given)
+
+
+def _class(variant: str) -> Callable[..., Any]:
+    choices = []
+    for module in MODULES:
+        home = importlib.import_module(f"sklearn.{module}")
+        for name in home.__all__:
+            kind = getattr(home, name)
+            if isinstance(kind, type) and hasattr(kind, "transform") and _inverts(kind):
+                choices.append(name)
+                if name == variant:
+                    return kind
+    raise ValueError(
+        f"variant must be a transformer with an inverse, such as {', '.join(sorted(choices))}, got {variant!r}"
+    )
+
+
+def _inverts(kind: type) -> bool:
+    return hasattr(kind, "inverse_transform") or kind.__name__ == "FactorAnalysis"  # linear, so we can
+
+
+def _linear(model: Any, components: int) -> tuple[Array, Array] | None:
+    """Return the matrix (m, 63) and the mean (63,) of a transformer whose inverse is linear; None of another."""
+    if type(model).__name__ == "FactorAnalysis":
+        return writeable(model.components_), writeable(model.mean_)
+    probe = np.vstack([np.zeros(components), np.eye(components), np.full(components, 0.5)])
+    try:
+        images = np.asarray(model.inverse_transform(probe), dtype=np.float64)
+    except (ValueError, AttributeError) as error:
+        raise ValueError(f"variant must have an inverse, got {type(model).__name__}: {error}") from None
+    if images.shape != (len(probe), 63):
+        raise ValueError(f"variant must give back 63 angles, got {images.shape[1:]} from {type(model).__name__}")
+    matrix = images[1:-1] - images[0]
+    if np.allclose(images[-1], images[0] + 0.5 * matrix.sum(axis=0), rtol=0.0, atol=1e-9):
+        return writeable(matrix), writeable(images[0])
+    return None

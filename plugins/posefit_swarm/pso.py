@@ -1,0 +1,83 @@
+"""Particle swarm optimisation: Kennedy and Eberhart's, with a falling inertia or Clerc and Kennedy's constriction.
+
+J. Kennedy, R. Eberhart, Particle swarm optimization, ICNN 1995; M. Clerc, J. Kennedy, The particle swarm: explosion,
+stability, and convergence in a multidimensional complex space, IEEE Trans. Evolutionary Computation 6(1), 2002.
+"""
+
+import math
+from typing import Literal
+
+import numpy as np
+
+from posefit.fitting.box import REDRAWS, Space
+from posefit.fitting.check import at_least, one_of, positive
+from posefit.geometry.rotation import Array
+from posefit_swarm.flock import Flock, speed_limits
+from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, inertia
+
+PARTICLES = 40
+ITERATIONS = 60
+PHI = 4.1  # Clerc and Kennedy's usual sum of the two accelerations; chi is then 0.7298
+ALWAYS = math.inf  # a temperature at which every move is accepted
+
+
+def constriction(phi: float) -> float:
+    """Return chi of two accelerations that sum up to phi > 4: the swarm neither explodes nor stands still."""
+    return 2.0 / abs(2.0 - phi - math.sqrt(phi * phi - 4.0 * phi))  # CLERC2002 (constriction)
+
+
+class PSO:
+    """A particle swarm with the whole swarm as everybody's neighbourhood; every move is accepted.
+
+    `velocity` is "constricted" by chi, with `phi` the sum of both accelerations, or has an "inertia" that falls as the
+    SAPSO paper's does. Velocities stay within `alpha` times the half-range of the box, as there; a particle that breaks
+    a constraint is redrawn as there.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        particles: int = PARTICLES,
+        iterations: int = ITERATIONS,
+        velocity: Literal["constricted", "inertia"] = "constricted",
+        phi: float = PHI,
+        inertia: float = INERTIA,
+        acceleration: float = ACCELERATION,
+        alpha: float = ALPHA,
+        redraws: int = REDRAWS,
+    ) -> None:
+        at_least("particles", particles, 1)
+        at_least("iterations", iterations, 1)
+        one_of("velocity", velocity, ("constricted", "inertia"))
+        if not phi > 4.0:
+            raise ValueError(f"phi must be above 4, got {phi}")
+        if not inertia > 0.1:
+            raise ValueError(f"inertia must be above 0.1, got {inertia}")
+        at_least("acceleration", acceleration, 0.0)
+        positive("alpha", alpha)
+        at_least("redraws", redraws, 0)
+        self._chi = constriction(phi) if velocity == "constricted" else None
+        self._phi, self._inertia, self._acceleration = phi, inertia, acceleration
+        self._iteration, self._iterations = 0, iterations
+        limits = speed_limits(space, alpha, "symmetric")
+        self._flock = Flock(space, rng, particles, limits, redraws, "dimension")
+
+    def ask(self) -> Array:
+        """Return the particles (n, d) after their move."""
+        return self._flock.moved.copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Remember the bests and fly on."""
+        _, leader = self._flock.settle(proposals, costs, ALWAYS)  # KENNEDY1995 (pbest, gbest)
+        omega, acceleration = self._weights()
+        self._flock.fly(omega, acceleration, self._flock.best[leader].copy())
+        self._iteration += 1
+
+    def _weights(self) -> tuple[float, float]:
+        """Return what multiplies the old velocity, and each of the two random pulls."""
+        if self._chi is not None:
+            return self._chi, self._chi * self._phi / 2.0  # CLERC2002 (velocity)
+        step = min(self._iteration, self._iterations)
+        return inertia(step, self._iterations, self._inertia), self._acceleration

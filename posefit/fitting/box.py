@@ -1,0 +1,157 @@
+"""What an optimiser may know of the space it searches, and ways to draw from it that always end."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.geometry.rotation import Array
+
+REDRAWS = 100  # Reading S7
+MANY = 8  # ours: after the first, so many redraws are made at once
+STEPS = 32  # ours: how finely `repair` looks along its line
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """The distribution of a first population around a prediction, in the unit box. SAPSO (6), (7)."""
+
+    mean: Array  # (d,)
+    spread: Array  # (d,) standard deviations
+    velocity: Array  # (d,) v_pred
+
+
+class Space(Protocol):
+    """The box [-1, 1]^d, of which some is feasible. `SearchSpace` is one; an optimiser needs no more than this."""
+
+    @property
+    def dimensions(self) -> int:
+        """d."""
+        ...
+
+    @property
+    def start(self) -> Start | None:
+        """Where to start; None for anywhere."""
+        ...
+
+    @property
+    def periodic(self) -> NDArray[np.bool_]:
+        """Which coordinates wrap around (d,)."""
+        ...
+
+    @property
+    def centre(self) -> Array:
+        """The coordinates (d,), radians, metres or latents, of the box's middle."""
+        ...
+
+    @property
+    def half(self) -> Array:
+        """Half the sides of the box (d,), in the same units."""
+        ...
+
+    def feasible(self, proposals: Array) -> NDArray[np.bool_]:
+        """Return which proposals (n, d) lie in the box and are allowed (n,)."""
+        ...
+
+    def wrap(self, proposals: Array) -> Array:
+        """Return proposals with their periodic coordinates brought into [-1, 1)."""
+        ...
+
+    def towards(self, origin: Array, target: Array) -> Array:
+        """Return target - origin, the short way round where a coordinate is periodic."""
+        ...
+
+    def draw(self, rng: np.random.Generator, count: int) -> Array:
+        """Return a first population (count, d), feasible, from `start` or uniform."""
+        ...
+
+    def scatter(self, rng: np.random.Generator, means: Array, spread: Array) -> Array:
+        """Return a feasible normal draw (n, d) around each of n feasible means, standard deviations `spread`."""
+        ...
+
+    def repair(self, proposals: Array, home: Array) -> Array:
+        """Return proposals (n, d), those that are not feasible moved towards the feasible point `home` (d,)."""
+        ...
+
+    def moved(self, proposals: Array, origin: "Space") -> Array:
+        """Return the proposals (n, d) that mean here what these mean in the space `origin`."""
+        ...
+
+
+def draw(space: Space, rng: np.random.Generator, count: int) -> Array:
+    """Return a first population (count, d) of feasible proposals, from the start or uniform. SAPSO (6).
+
+    Each is redrawn at most 100 times (Reading S7); one still out of the box is then folded back into it. What is
+    infeasible even so becomes the start's mean, or the copy of one that is feasible. Raises ValueError where none is.
+    """
+    drawn = np.empty((count, space.dimensions))
+    wanted = np.arange(count)
+    for _ in range(REDRAWS):
+        drawn[wanted] = _sample(space, rng, len(wanted))
+        wanted = wanted[~space.feasible(drawn[wanted])]
+        if not len(wanted):
+            return drawn
+    drawn[wanted] = fold(space, drawn[wanted])
+    wanted = wanted[~space.feasible(drawn[wanted])]
+    if space.start is not None and space.feasible(space.start.mean[None])[0]:
+        drawn[wanted] = space.start.mean
+        return drawn
+    found = np.setdiff1d(np.arange(count), wanted)
+    if not len(found):
+        raise ValueError(f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws")
+    drawn[wanted] = drawn[rng.choice(found, len(wanted))]
+    return drawn
+
+
+def _sample(space: Space, rng: np.random.Generator, count: int) -> Array:
+    if space.start is None:
+        return rng.uniform(-1.0, 1.0, (count, space.dimensions))
+    return space.wrap(rng.normal(space.start.mean, space.start.spread, (count, space.dimensions)))  # SAPSO (6)
+
+
+def scatter(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:
+    """Return a normal draw (n, d) around each of n feasible means, standard deviations `spread` (d,) or (n, d).
+
+    A coordinate that leaves the box is folded back into it, as at a mirror; what the prior finds infeasible is redrawn
+    at most 100 times and then stays at its mean.
+    """
+    spread = np.broadcast_to(spread, means.shape)
+    drawn = fold(space, means + spread * rng.standard_normal(means.shape))
+    broken = np.flatnonzero(~space.feasible(drawn))
+    left = REDRAWS - 1
+    while left > 0 and len(broken):
+        many = min(left, MANY)
+        rows = np.repeat(broken, many)
+        again = fold(space, means[rows] + spread[rows] * rng.standard_normal((len(rows), means.shape[1])))
+        works = space.feasible(again).reshape(-1, many)
+        mended = works.any(axis=1)
+        first = many * np.flatnonzero(mended) + works[mended].argmax(axis=1)
+        drawn[broken[mended]] = again[first]
+        broken, left = broken[~mended], left - many
+    drawn[broken] = means[broken]
+    return drawn
+
+
+def fold(space: Space, proposals: Array) -> Array:
+    """Return proposals (n, d) folded into the box: mirrored at its sides, periodic coordinates wrapped."""
+    folded = np.abs((proposals + 3.0) % 4.0 - 2.0) - 1.0
+    return np.where(space.periodic, space.wrap(proposals), folded) if space.periodic.any() else folded
+
+
+def repair(space: Space, proposals: Array, home: Array) -> Array:
+    """Return proposals (n, d), each infeasible one moved towards the feasible point `home` (d,) until it is feasible.
+
+    It becomes the farthest of 32 evenly spaced points on the line between them, so this always ends.
+    """
+    mended = np.clip(space.wrap(np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
+    mended = np.where(np.isfinite(mended), mended, home)
+    broken = np.flatnonzero(~space.feasible(mended))
+    if len(broken):
+        way = space.towards(home, mended[broken])
+        shares = np.arange(STEPS - 1, 0, -1) / STEPS
+        line = np.clip(space.wrap(home + shares[:, None, None] * way), -1.0, 1.0)
+        works = space.feasible(line.reshape(-1, space.dimensions)).reshape(line.shape[:2])
+        farthest = line[works.argmax(axis=0), np.arange(len(broken))]
+        mended[broken] = np.where(works.any(axis=0)[:, None], farthest, home)
+    return mended

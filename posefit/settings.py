@@ -1,0 +1,117 @@
+"""The settings of a plugin: read from its signature, so that a mistake is found before anything runs."""
+
+import inspect
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any, Literal, Union, get_args, get_origin
+
+PLANNED = ("evaluations", "iterations")  # the driver fills these in
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A keyword-only parameter of a factory."""
+
+    name: str
+    annotation: Any
+    default: Any  # inspect.Parameter.empty where it must be given
+
+    @property
+    def type(self) -> str:
+        """The type as it is shown: `float`, or the choices there are."""
+        return _shown(self.annotation, self.default)
+
+
+def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
+    """Return the settings that a factory takes, in the order of its signature."""
+    try:
+        signature = inspect.signature(factory, eval_str=True)
+    except (NameError, TypeError, ValueError):  # an annotation that cannot be resolved is no annotation
+        signature = inspect.signature(factory)
+    return tuple(
+        Setting(one.name, one.annotation, one.default)
+        for one in signature.parameters.values()
+        if one.kind is inspect.Parameter.KEYWORD_ONLY
+    )
+
+
+def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> None:
+    """Return nothing. Raises ValueError where a setting is unknown, listing the known, or its type is wrong."""
+    known = {setting.name: setting for setting in settings_of(factory)}
+    for name, value in given.items():
+        setting = _known(plugin, name, known)
+        if not accepts(setting.annotation, value):
+            raise ValueError(f"{plugin}.{name} must be {setting.type}, got {value!r}")
+
+
+def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) -> dict[str, Any]:
+    """Return settings that were given as text, as the values their types ask for.
+
+    Raises ValueError where one is unknown or its text does not fit its type.
+    """
+    known = {setting.name: setting for setting in settings_of(factory)}
+    values = {}
+    for name, text in given.items():
+        setting = _known(plugin, name, known)
+        readings = [value for value in _readings(text) if accepts(setting.annotation, value)]
+        if not readings:
+            raise ValueError(f"{plugin}.{name} must be {setting.type}, got {text!r}")
+        values[name] = readings[0]
+    return values
+
+
+def accepts(annotation: Any, value: Any) -> bool:
+    """Return whether a value fits an annotation; one that is not understood accepts everything."""
+    origin = get_origin(annotation)
+    if origin is Literal:
+        return value in get_args(annotation)
+    if origin in (Union, types.UnionType):
+        return any(accepts(one, value) for one in get_args(annotation))
+    if origin is tuple:
+        parts = get_args(annotation)
+        return isinstance(value, tuple) and len(value) == len(parts) and all(map(accepts, parts, value))
+    if annotation in (None, type(None)):
+        return value is None
+    if annotation is float:
+        return isinstance(value, float | int) and not isinstance(value, bool)
+    if annotation is int:
+        return isinstance(value, int) and not isinstance(value, bool)
+    return not (annotation in (bool, str) and not isinstance(value, annotation))
+
+
+def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
+    if name not in known:
+        near = get_close_matches(name, known, 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        listed = f"one of {', '.join(known)}" if known else "none, it takes none"
+        raise ValueError(f"a setting of {plugin} must be {listed}, got {name!r}{hint}")
+    return known[name]
+
+
+def _readings(text: str) -> list[Any]:
+    """Return everything a text may mean, the most special first."""
+    words = {"true": [True], "false": [False], "none": [None]}.get(text.lower(), [])
+    numbers: list[Any] = []
+    for kind in (int, float):
+        try:
+            numbers.append(kind(text))
+        except ValueError:
+            continue
+    if "," in text:
+        numbers.append(tuple(_readings(part)[0] for part in text.split(",")))
+    return [*words, *numbers, text]
+
+
+def _shown(annotation: Any, default: Any) -> str:
+    if annotation is inspect.Parameter.empty:
+        return "any" if default in (None, inspect.Parameter.empty) else type(default).__name__
+    origin = get_origin(annotation)
+    if origin is Literal:
+        return " | ".join(map(str, get_args(annotation)))
+    if origin in (Union, types.UnionType):
+        return " | ".join(_shown(one, default) for one in get_args(annotation))
+    if annotation is type(None):
+        return "none"
+    return annotation.__name__ if isinstance(annotation, type) else str(annotation)
