@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Literal, Union, get_args, get_origin
 
-PLANNED = ("evaluations", "iterations")  # the driver fills these in
+PARTICLES = 40  # a population where nobody says: N of the SAPSO paper, section 5.2
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,27 @@ def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) ->
         setting = _known(plugin, name, known)
         if not accepts(setting.annotation, value):
             raise ValueError(f"{plugin}.{name} must be {setting.type}, got {value!r}")
+
+
+def planned(
+    factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int, particles: int | None = None
+) -> dict[str, Any]:
+    """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
+
+    That is `evaluations` itself; `particles`, where somebody chose their number; and `iterations`, the populations
+    after the first. What is given stays as it is.
+    """
+    known = {setting.name: setting.default for setting in settings_of(factory)}
+    filled = dict(given)
+    if particles is not None and "particles" in known:
+        filled.setdefault("particles", particles)
+    if "evaluations" in known:
+        filled.setdefault("evaluations", evaluations)
+    if "iterations" in known:
+        size = filled.get("particles", known.get("particles", PARTICLES))
+        if isinstance(size, int) and size > 0:
+            filled.setdefault("iterations", max(1, evaluations // size - 1))
+    return filled
 
 
 def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) -> dict[str, Any]:

@@ -5,17 +5,18 @@ strategy with increasing population size, CEC 2005.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from cmaes import CMA
 
 from posefit.fitting.box import Space
+from posefit.fitting.bridge import bearable
 from posefit.fitting.check import at_least, positive
 from posefit.geometry.rotation import Array
 
 SPREAD = 0.5  # sigma_0 in an unknown place, in half-ranges of the box
 GROWTH = 2  # IPOP: each restart has a population so many times as large
-WORST = 1e30  # stands for a cost that is nan or infinite
 
 
 class CMAES:
@@ -52,12 +53,12 @@ class CMAES:
             self._home = start.mean.copy()
         size = math.sqrt(float((spread**2).mean()))
         covariance = np.diag(np.maximum(spread / size, 1e-6) ** 2)
-        seed = int(self._rng.integers(2**31))
-        self._strategy = CMA(self._home.copy(), size, seed=seed, population_size=self._population, cov=covariance)
+        self._strategy = CMA(self._home.copy(), size, population_size=self._population, cov=covariance)
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
         if self._asked is None:
+            self._strategy.reseed_rng(int(self._rng.integers(2**31)))  # its own generator is lost in a pickle
             drawn = np.array([self._strategy.ask() for _ in range(self._population)])  # HANSEN2016 (38)-(40)
             mean = self._space.repair(self._strategy.mean[None], self._home)[0]
             self._asked = self._space.repair(drawn, mean)
@@ -65,9 +66,20 @@ class CMAES:
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Adapt mean, step size and covariance, and restart where the search has come to an end."""
-        known = np.where(np.isfinite(costs), costs, WORST)
+        if len(proposals) != self._population:
+            raise ValueError(f"tell must get a population of {self._population}, got {len(proposals)}")
+        known = bearable(costs)
         self._strategy.tell([(row, float(cost)) for row, cost in zip(proposals, known, strict=True)])
         self._home, self._asked = proposals[known.argmin()].copy(), None
         if self._strategy.should_stop():
             self._population *= self._growth
             self._restart(np.full(self._space.dimensions, self._spread))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # the library's own pickle rounds the covariance, and the copy would drift away from the original
+        return {**self.__dict__, "_strategy": vars(self._strategy)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._strategy = CMA(np.zeros(2), 1.0)
+        self._strategy.__dict__.update(state["_strategy"])

@@ -14,17 +14,17 @@ from posefit_filters.weights import sharpness, systematic, weigh
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10
 SURVIVAL = 0.5  # alpha, the share of particles that survive a layer
-DIFFUSION = 1.0  # ours: the noise of a layer, as a multiple of the particles' own spread
+DIFFUSION = 0.35  # ours: the noise of a layer, as a multiple of the particles' own spread
 NOISE = 0.1  # ours: P0, the motion from frame to frame, in half-ranges of the box
 
 
 class Annealed:
     """Layers of resampling with an ever sharper likelihood exp(-beta cost), every frame anew.
 
-    In each of `layers`, beta is what lets `survival` of the particles survive; each survivor moves by normal noise whose
-    standard deviations are `diffusion` times those of the weighted particles, so that the search narrows where the
-    particles agree. With `crossover`, survivors first trade a run of neighbouring coordinates in pairs. `noise` is the
-    motion from frame to frame. What a frame commits is its best particle.
+    In each of `layers`, beta is what lets `survival` of the particles survive; each survivor moves by normal noise
+    whose standard deviations are `diffusion` times those of the weighted particles, so that the search narrows where
+    the particles agree. With `crossover`, survivors first trade a run of neighbouring coordinates in pairs. `noise` is
+    the motion from frame to frame. What a frame commits is its best particle.
     """
 
     def __init__(

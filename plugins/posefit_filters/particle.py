@@ -13,7 +13,7 @@ from posefit_filters.weights import systematic, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost
-NOISE = 0.1  # standard deviation of the motion from frame to frame, in half-ranges of the box
+NOISE = 0.15  # standard deviation of the motion from frame to frame, in half-ranges of the box
 
 
 class Particle:

@@ -57,7 +57,7 @@ class PCA:
         at_least("seed", seed, 0)
         self._components, self._clusters, self._quantile, self._seed = components, clusters, quantile, seed
 
-    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:  # noqa: ARG002, this prior needs none
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
         least = int(self._components) + 1 if self._components >= 1 else 2
         angles = angles_of(angles, max(self._clusters, least))

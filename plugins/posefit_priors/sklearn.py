@@ -52,7 +52,7 @@ class Transformed:
         self._clusters, self._quantile, self._seed = clusters, quantile, seed
         _built(variant, components, options, seed)
 
-    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:  # noqa: ARG002, this prior needs none
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
         self._angles = angles_of(angles, max(self._clusters, self._components + 1))
         self._model = _built(self._variant, self._components, self._options, self._seed)

@@ -69,7 +69,7 @@ class Union:
         self._components, self._clusters, self._breadth = components, clusters, breadth
         self._quantile, self._seed = quantile, seed
 
-    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:  # noqa: ARG002, this prior needs none
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from the joint angles (T, 63) of all motions together.
 
         Raises ValueError where there are too few frames.

@@ -38,6 +38,8 @@ class Flock:
 
     def settle(self, proposals: Array, costs: Array, temperature: float) -> tuple[NDArray[np.bool_], int]:
         """Accept or refuse each move, remember the bests; return who was accepted (n,) and the swarm's best row."""
+        if proposals.shape != self.moved.shape or len(costs) != len(self.moved):
+            raise ValueError(f"tell must get the population of shape {self.moved.shape}, got {proposals.shape}")
         accepted = np.empty(len(costs), dtype=bool)
         leader = settle(
             proposals,

@@ -61,7 +61,7 @@ class Guarded:
     @contextmanager
     def _watched(self, what: str) -> Iterator[None]:
         try:
-            with _timed(self._limit):
+            with timed(self._limit):
                 yield
         except TimeoutError:
             raise self._broken(f"{what} must return within {self._limit:g} s, and did not") from None
@@ -73,7 +73,7 @@ class Guarded:
 
 
 @contextmanager
-def _timed(limit: float | None) -> Iterator[None]:
+def timed(limit: float | None) -> Iterator[None]:
     """Raise TimeoutError in the body once it has run for `limit` seconds."""
     if limit is None or not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield

@@ -19,7 +19,7 @@ from posefit.geometry.rotation import Array
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 
-PARTICLES, ITERATIONS = 40, 60  # N and C of the SAPSO paper, section 5.2
+ITERATIONS = 60  # C of the SAPSO paper, section 5.2
 COMPILING = 60.0  # seconds that a plugin's first calls may take longer than its limit
 
 Settings = Mapping[str, Any]
@@ -53,7 +53,7 @@ class Choice:
             raise ValueError(f"ask_seconds must be above 0, got {self.ask_seconds}")
         if self.evaluations is not None and self.iterations is not None:
             raise ValueError("evaluations and iterations must not both be given: a budget has so many iterations")
-        return self.evaluations or (self.particles or PARTICLES) * ((self.iterations or ITERATIONS) + 1)
+        return self.evaluations or (self.particles or settings.PARTICLES) * ((self.iterations or ITERATIONS) + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +76,8 @@ def prepare(choice: Choice, task: Task) -> Method:
     """
     if choice.tracker is not None:
         return _tracker(choice, task)
-    offer, mine = _offered("optimiser", choice.optimiser), dict(choice.optimiser_settings)
-    taken = {setting.name for setting in settings.settings_of(offer.factory)}
-    if choice.particles is not None and "particles" in taken:
-        mine.setdefault("particles", choice.particles)
-    if "evaluations" in taken:
-        mine.setdefault("evaluations", task.evaluations)
-    if "iterations" in taken:
-        size = mine.get("particles", _default(offer.factory, "particles", PARTICLES))
-        mine.setdefault("iterations", max(1, task.evaluations // max(size, 1) - 1))
+    offer = _offered("optimiser", choice.optimiser)
+    mine = settings.planned(offer.factory, choice.optimiser_settings, task.evaluations, choice.particles)
     settings.check(offer.name, offer.factory, mine)
     settings.check("tracker", _driver, choice.tracker_settings)
     prior, learned = _prior(choice, task)
@@ -239,10 +232,3 @@ def _offered(kind: Kind, chosen: str | Callable[..., Any]) -> Offer:
         return registry().offer(kind, chosen)
     frames: NextFrame = "carry" if hasattr(chosen, "advance") else "start"
     return Offer(kind, getattr(chosen, "__name__", type(chosen).__name__), chosen, "the caller", "", frames)
-
-
-def _default(factory: Callable[..., Any], name: str, otherwise: int) -> int:
-    for setting in settings.settings_of(factory):
-        if setting.name == name and isinstance(setting.default, int):
-            return setting.default
-    return otherwise

@@ -1,0 +1,47 @@
+"""Samplers of Optuna for posefit: `optuna:SAMPLER`, such as `optuna:TPESampler` or `optuna:GPSampler`."""
+
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from posefit import hookimpl
+from posefit.fitting.box import Space
+from posefit.fitting.bridge import Bridged, Objective
+from posefit.fitting.check import at_least, one_of
+from posefit.hooks import RegisterOptimiser
+
+Variant = Literal["TPESampler", "CmaEsSampler", "GPSampler", "NSGAIISampler", "QMCSampler", "RandomSampler"]
+VARIANTS = ("TPESampler", "CmaEsSampler", "GPSampler", "NSGAIISampler", "QMCSampler", "RandomSampler")
+
+
+def optuna(space: Space, rng: np.random.Generator, *, variant: Variant = "TPESampler", particles: int = 40) -> Bridged:
+    """A study of Optuna with that sampler, asked for so many `particles` at a time; the first come from the start.
+
+    Optuna is made for objectives that take seconds, not microseconds: expect milliseconds a proposal.
+    """
+    at_least("particles", particles, 1)
+    one_of("variant", variant, VARIANTS)
+    return Bridged(space, rng, partial(_run, variant, particles))
+
+
+def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    sampler = getattr(optuna.samplers, variant)(seed=int(rng.integers(2**31)))
+    study = optuna.create_study(sampler=sampler)
+    names = [f"x{k:03}" for k in range(space.dimensions)]
+    box = {name: optuna.distributions.FloatDistribution(-1.0, 1.0) for name in names}
+    for proposal in space.draw(rng, particles).tolist():
+        study.enqueue_trial(dict(zip(names, proposal, strict=True)))
+    while True:
+        trials = [study.ask(box) for _ in range(particles)]
+        costs = objective(np.array([[trial.params[name] for name in names] for trial in trials]))
+        for trial, cost in zip(trials, costs.tolist(), strict=True):
+            study.tell(trial, cost)
+
+
+@hookimpl
+def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    register("optuna", optuna, needs=("optuna", "posefit[optuna]"))

@@ -1,0 +1,41 @@
+"""CMA-ES as the library pycma implements it, for posefit: `pycma`."""
+
+from functools import partial
+
+import numpy as np
+
+from posefit import hookimpl
+from posefit.fitting.box import Space
+from posefit.fitting.bridge import Bridged, Objective
+from posefit.fitting.check import at_least, positive
+from posefit.hooks import RegisterOptimiser
+
+
+def pycma(space: Space, rng: np.random.Generator, *, population: int = 0, spread: float = 0.5) -> Bridged:
+    """pycma's evolution strategy with its own handling of the box; `population` of 0 is its own choice.
+
+    It starts around the prediction with its spread, or anywhere with `spread`, and again where it has stopped.
+    """
+    if population != 0:
+        at_least("population", population, 5)
+    positive("spread", spread)
+    return Bridged(space, rng, partial(_evolve, population, spread))
+
+
+def _evolve(population: int, spread: float, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+    from cma import CMAEvolutionStrategy
+
+    stds = np.full(space.dimensions, spread) if space.start is None else np.maximum(space.start.spread, 1e-6)
+    options = {"bounds": [-1, 1], "CMA_stds": stds, "verbose": -9} | ({"popsize": population} if population else {})
+    # without a seed, and with our generator, it leaves numpy's global one alone
+    options |= {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
+    while True:
+        strategy = CMAEvolutionStrategy(space.draw(rng, 1)[0], 1.0, options)
+        while not strategy.stop():
+            asked = strategy.ask()
+            strategy.tell(asked, objective(np.array(asked)).tolist())
+
+
+@hookimpl
+def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    register("pycma", pycma, needs=("cma", "posefit[pycma]"))

@@ -1,0 +1,45 @@
+"""Optimisers of pymoo for posefit: `pymoo:NAME`, one of its single-objective algorithms with a population."""
+
+from functools import partial
+from importlib import import_module
+from typing import Literal
+
+import numpy as np
+
+from posefit import hookimpl
+from posefit.fitting.box import Space
+from posefit.fitting.bridge import Bridged, Objective
+from posefit.fitting.check import at_least, one_of
+from posefit.hooks import RegisterOptimiser
+
+Variant = Literal["DE", "PSO", "GA", "ES", "SRES", "ISRES"]
+
+
+def pymoo(space: Space, rng: np.random.Generator, *, variant: Variant = "DE", particles: int = 40) -> Bridged:
+    """An algorithm of pymoo, with so many `particles` drawn from the start."""
+    at_least("particles", particles, 5)
+    one_of("variant", variant, ("DE", "PSO", "GA", "ES", "SRES", "ISRES"))
+    return Bridged(space, rng, partial(_run, variant, particles))
+
+
+def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+    from pymoo.config import Config
+    from pymoo.core.problem import Problem
+    from pymoo.core.termination import NoTermination
+    from pymoo.problems.static import StaticProblem
+
+    Config.warnings["not_compiled"] = False
+    kind = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{variant.lower()}"), variant)
+    algorithm = kind(pop_size=particles, sampling=space.draw(rng, particles))
+    problem = Problem(n_var=space.dimensions, n_obj=1, xl=-1.0, xu=1.0)
+    algorithm.setup(problem, termination=NoTermination(), seed=int(rng.integers(2**31)))
+    while True:
+        asked = algorithm.ask()
+        costs = objective(asked.get("X").astype(np.float64))
+        algorithm.evaluator.eval(StaticProblem(problem, F=costs[:, None]), asked)
+        algorithm.tell(infills=asked)
+
+
+@hookimpl
+def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    register("pymoo", pymoo, needs=("pymoo", "posefit[pymoo]"))

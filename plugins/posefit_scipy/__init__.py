@@ -1,0 +1,50 @@
+"""Optimisers of SciPy for posefit: `scipy:differential_evolution` and `scipy:dual_annealing`."""
+
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from posefit import hookimpl
+from posefit.fitting.box import Space
+from posefit.fitting.bridge import Bridged, Objective
+from posefit.fitting.check import at_least, one_of
+from posefit.hooks import RegisterOptimiser
+
+Variant = Literal["differential_evolution", "dual_annealing"]
+
+
+def scipy(
+    space: Space, rng: np.random.Generator, *, variant: Variant = "differential_evolution", particles: int = 40
+) -> Bridged:
+    """SciPy's differential evolution, or its dual annealing, which proposes one at a time.
+
+    A search that has converged starts again. Dual annealing goes without its local search, which needs gradients.
+    """
+    at_least("particles", particles, 5)
+    one_of("variant", variant, ("differential_evolution", "dual_annealing"))
+    return Bridged(space, rng, partial(_evolve, particles) if variant == "differential_evolution" else _anneal)
+
+
+def _evolve(particles: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+    from scipy.optimize import differential_evolution
+
+    box = [(-1.0, 1.0)] * space.dimensions
+    settings = {"vectorized": True, "updating": "deferred", "polish": False, "maxiter": 10**9, "tol": 0.0}
+    while True:
+        first = space.draw(rng, particles)
+        differential_evolution(lambda columns: objective(columns.T), box, init=first, rng=rng, **settings)
+
+
+def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> None:
+    from scipy.optimize import dual_annealing
+
+    box = [(-1.0, 1.0)] * space.dimensions
+    while True:
+        first = space.draw(rng, 1)[0]
+        dual_annealing(lambda row: objective(row[None])[0], box, x0=first, rng=rng, no_local_search=True)
+
+
+@hookimpl
+def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    register("scipy", scipy)

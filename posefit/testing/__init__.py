@@ -1,0 +1,75 @@
+"""Is a plugin right? Checks for optimisers, priors and trackers, for an author's own tests.
+
+    from posefit.testing import check_optimiser
+    assert check_optimiser(Mine)
+
+or one test a rule:
+
+    from posefit.testing import optimiser_checks, parametrize
+
+    @parametrize(optimiser_checks(Mine))
+    def test_kit(check):
+        check()
+
+The same checks run for an installed plugin as `posefit check optimiser NAME`.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from posefit.fitting.optimiser import NextFrame
+from posefit.testing import prior_rules, protocol_rules, repeat_rules, search_rules, tracker_rules
+from posefit.testing.case import Case, checklist
+from posefit.testing.report import Check, Report, Result, parametrize, report
+
+__all__ = [
+    "Check",
+    "Report",
+    "Result",
+    "check_optimiser",
+    "check_prior",
+    "check_tracker",
+    "optimiser_checks",
+    "parametrize",
+    "prior_checks",
+    "tracker_checks",
+]
+_LISTS = protocol_rules, repeat_rules, search_rules  # importing them fills the list
+
+
+def optimiser_checks(
+    factory: Callable[..., Any], *, next_frame: NextFrame = "start", settings: dict[str, Any] | None = None
+) -> list[Check]:
+    """Return the checks of an optimiser's factory; `next_frame` as it is registered."""
+    return checklist.of(Case(factory, next_frame, settings or {}))
+
+
+def check_optimiser(
+    factory: Callable[..., Any], *, next_frame: NextFrame = "start", settings: dict[str, Any] | None = None
+) -> Report:
+    """Return what the checks say of an optimiser's factory: true where none failed."""
+    return report(_name(factory), optimiser_checks(factory, next_frame=next_frame, settings=settings))
+
+
+def prior_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
+    """Return the checks of a prior's factory."""
+    return prior_rules.checklist.of(prior_rules.Case(factory, settings or {}))
+
+
+def check_prior(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
+    """Return what the checks say of a prior's factory: true where none failed."""
+    return report(_name(factory), prior_checks(factory, settings=settings))
+
+
+def tracker_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
+    """Return the checks of a tracker's factory."""
+    return tracker_rules.checklist.of(tracker_rules.Case(factory, settings or {}))
+
+
+def check_tracker(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
+    """Return what the checks say of a tracker's factory: true where none failed."""
+    return report(_name(factory), tracker_checks(factory, settings=settings))
+
+
+def _name(factory: Callable[..., Any]) -> str:
+    return getattr(factory, "__name__", None) or getattr(getattr(factory, "func", None), "__name__", repr(factory))

@@ -1,0 +1,264 @@
+"""Is a prior right: shapes, ranges, the same bits for a row whatever stands beside it, and does it learn anything?"""
+
+import copy
+import inspect
+import pickle
+import random
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_origin
+
+import numpy as np
+
+from posefit.fitting.prior import Prior
+from posefit.fitting.space import SearchSpace
+from posefit.geometry.rotation import Array
+from posefit.motion import library
+from posefit.settings import settings_of
+from posefit.testing.problem import training_angles
+from posefit.testing.report import Checklist, SkippedError, expect, refusal
+
+ROWS = 100
+checklist = Checklist()
+
+
+@dataclass(frozen=True)
+class Case:
+    """A factory with its settings."""
+
+    factory: Callable[..., Any]
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    def fitted(self) -> Prior:
+        """Return the prior after it has learned the built-in walks."""
+        prior: Prior = self.factory(**self.settings)
+        return prior.fit(training_angles(), library.average_skeleton())
+
+    def latents(self, prior: Prior) -> Array:
+        """Return some latents (ROWS, m) within the range."""
+        low, high = np.asarray(prior.low), np.asarray(prior.high)
+        return np.random.default_rng(0).uniform(low, high, (ROWS, len(low)))
+
+
+@checklist
+def construction(case: Case) -> None:
+    """A factory takes keyword-only settings and nothing else."""
+    kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
+    expect(all(kind is inspect.Parameter.KEYWORD_ONLY for kind in kinds), "settings must be named and keyword-only")
+
+
+@checklist
+def fit(case: Case) -> None:
+    """The method fit returns the prior itself."""
+    prior = case.factory(**case.settings)
+    expect(
+        prior.fit(training_angles(), library.average_skeleton()) is prior, "fit must return self, got another object"
+    )
+
+
+@checklist
+def ranges(case: Case) -> str:
+    """The range of the latents is finite and not reversed."""
+    prior = case.fitted()
+    low, high = np.asarray(prior.low), np.asarray(prior.high)
+    expect(low.ndim == 1 and low.shape == high.shape and len(low), f"low and high must be (m,), got {low.shape}")
+    expect(np.isfinite(low).all() and np.isfinite(high).all(), "low and high must be finite, got nan or infinity")
+    expect((low <= high).all(), "low must not be above high, got a range that is reversed")
+    return f"{len(low)} latents"
+
+
+@checklist
+def transform(case: Case) -> None:
+    """Joint angles (n, 63) become latents (n, m)."""
+    prior = case.fitted()
+    for rows in (1, 7):
+        latents = np.asarray(prior.transform(training_angles()[:rows]))
+        expect(
+            latents.shape == (rows, len(prior.low)),
+            f"transform must return {(rows, len(prior.low))}, got {latents.shape}",
+        )
+        expect(latents.dtype == np.float64, f"transform must return float64, got {latents.dtype}")
+        expect(np.isfinite(latents).all(), "transform must return finite latents, got nan or infinity")
+
+
+@checklist
+def inverse(case: Case) -> None:
+    """Latents (n, m) become finite joint angles (n, 63), in every corner of the range too."""
+    prior = case.fitted()
+    corners = np.where(np.random.default_rng(1).random((64, len(prior.low))) < 0.5, prior.low, prior.high)
+    for latents in (corners, case.latents(prior), case.latents(prior)[:1]):
+        angles = np.asarray(prior.inverse_transform(latents))
+        expect(angles.shape == (len(latents), 63), f"inverse_transform must return (n, 63), got {angles.shape}")
+        expect(angles.dtype == np.float64, f"inverse_transform must return float64, got {angles.dtype}")
+        expect(np.isfinite(angles).all(), "inverse_transform must return finite angles, got nan or infinity")
+
+
+@checklist
+def training_in_range(case: Case) -> None:
+    """The training poses lie within the range."""
+    prior = case.fitted()
+    latents = np.asarray(prior.transform(training_angles()))
+    slack = 1e-9 * (1.0 + np.abs(latents).max())
+    out = (latents < np.asarray(prior.low) - slack) | (latents > np.asarray(prior.high) + slack)
+    expect(not out.any(), f"training poses must lie in low to high, got {int(out.any(axis=1).sum())} that do not")
+
+
+@checklist
+def training_feasible(case: Case) -> str:
+    """Nine of ten training poses are feasible."""
+    prior = case.fitted()
+    feasible = np.asarray(prior.feasible(prior.transform(training_angles())))
+    expect(feasible.shape == (len(training_angles()),), f"feasible must return (n,), got {feasible.shape}")
+    expect(feasible.dtype == np.bool_, f"feasible must return booleans, got {feasible.dtype}")
+    expect(feasible.mean() >= 0.9, f"90 % of the training poses must be feasible, got {100 * feasible.mean():.0f} %")
+    return f"{100 * feasible.mean():.0f} %"
+
+
+@checklist
+def same_bits(case: Case) -> None:
+    """A row has the same bits whatever rows stand beside it."""
+    prior = case.fitted()
+    latents = case.latents(prior)
+    whole, feasible = prior.inverse_transform(latents), prior.feasible(latents)
+    for rows in (slice(0, 1), slice(3, 10), slice(None, None, -1)):
+        same = np.array_equal(prior.inverse_transform(latents[rows]), whole[rows])
+        expect(same, "inverse_transform must give a row the same bits in any company, got others")
+        expect(np.array_equal(prior.feasible(latents[rows]), feasible[rows]), "feasible must not depend on other rows")
+
+
+@checklist
+def same_again(case: Case) -> None:
+    """The same poses teach the same space."""
+    first, second = case.fitted(), case.fitted()
+    latents = case.latents(first)
+    same = np.array_equal(first.low, second.low) and np.array_equal(
+        first.inverse_transform(latents), second.inverse_transform(latents)
+    )
+    expect(same, "fitting twice must give the same space, got two")
+
+
+@checklist
+def inputs(case: Case) -> None:
+    """What a method gets stays as it was."""
+    angles = training_angles()
+    before = angles.copy()
+    prior = case.factory(**case.settings).fit(angles, library.average_skeleton())
+    latents = case.latents(prior)
+    kept = latents.copy()
+    prior.transform(angles), prior.inverse_transform(latents), prior.feasible(latents)
+    expect(np.array_equal(angles, before), "joint angles must stay as they are, got others")
+    expect(np.array_equal(latents, kept), "latents must stay as they are, got others")
+
+
+@checklist
+def global_randomness(case: Case) -> None:
+    """The global random generators are left alone."""
+    before = np.random.get_state()[1].tobytes(), random.getstate()  # type: ignore[union-attr]  # noqa: NPY002
+    prior = case.fitted()
+    prior.inverse_transform(case.latents(prior))
+    after = np.random.get_state()[1].tobytes(), random.getstate()  # type: ignore[union-attr]  # noqa: NPY002
+    expect(before == after, "the global random state must stay as it is, got another")
+
+
+@checklist
+def copies(case: Case) -> None:
+    """A deep copy and what comes out of a pickle are the same space."""
+    prior = case.fitted()
+    latents = case.latents(prior)
+    for twin in (copy.deepcopy(prior), pickle.loads(pickle.dumps(prior))):
+        expect(
+            np.array_equal(twin.inverse_transform(latents), prior.inverse_transform(latents)), "a copy must be the same"
+        )
+
+
+@checklist
+def file(case: Case) -> None:
+    """What is saved is loaded again, and is the same space."""
+    prior = case.fitted()
+    load = getattr(type(prior), "load", None)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "prior.npz"
+        prior.save(path)
+        expect(path.is_file(), "save must write the file it is given, got none")
+        if load is None:
+            raise SkippedError("it has no load; save wrote its file")
+        latents = case.latents(prior)
+        again = load(path)
+        same = np.array_equal(again.inverse_transform(latents), prior.inverse_transform(latents))
+        expect(
+            same and np.array_equal(again.feasible(latents), prior.feasible(latents)), "load must give the same space"
+        )
+
+
+@checklist
+def learns(case: Case) -> str:
+    """Training poses come back nearer than their mean is."""
+    prior, angles = case.fitted(), training_angles()
+    back = prior.inverse_transform(prior.transform(angles))
+    error, mean = np.abs(back - angles).mean(), np.abs(angles.mean(axis=0) - angles).mean()
+    expect(
+        error < 0.9 * mean,
+        f"poses must come back, got {np.degrees(error):.2f} degrees; their mean has {np.degrees(mean):.2f}",
+    )
+    return f"{np.degrees(error):.2f} degrees, the mean pose {np.degrees(mean):.2f}"
+
+
+@checklist
+def bad_input(case: Case) -> None:
+    """Joint angles of a wrong shape, with nan, or too few are refused."""
+    angles = training_angles()
+    spoilt = angles.copy()
+    spoilt[3, 3] = np.nan
+    for what, value in (("60 columns", angles[:, :60]), ("nan", spoilt), ("no frames", angles[:0])):
+        with refusal(ValueError) as refused:
+            case.factory(**case.settings).fit(value, library.average_skeleton())
+        expect(refused, f"fit must raise ValueError for {what}, got a prior")
+
+
+@checklist
+def nonsense_settings(case: Case) -> str:
+    """Nonsense in a setting is refused."""
+    refused = []
+    for setting in settings_of(case.factory):
+        kind = setting.annotation if setting.annotation is not inspect.Parameter.empty else type(setting.default)
+        choice = get_origin(kind) is Literal or setting.name == "variant"
+        nonsense: object = (
+            -1 if kind is int else float("nan") if kind is float else "no such choice" if choice else None
+        )
+        if nonsense is None:
+            continue
+        with refusal(ValueError) as refusals:
+            case.factory(**{**case.settings, setting.name: nonsense})
+        expect(refusals, f"{setting.name}={nonsense} must raise ValueError, got a prior")
+        refused.append(setting.name)
+    if not refused:
+        raise SkippedError("it has no settings that could be nonsense")
+    return f"refused: {', '.join(refused)}"
+
+
+@checklist
+def searchable(case: Case) -> str:
+    """A search space on it can be drawn from."""
+    prior = case.fitted()
+    space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
+    drawn = space.draw(np.random.default_rng(0), ROWS)
+    expect(space.feasible(drawn).all(), "a first population must be feasible, got some that are not")
+    uniform = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, space.dimensions))
+    return f"{100 * space.feasible(uniform).mean():.2g} % of the box is feasible"
+
+
+@checklist
+def speed(case: Case) -> str:
+    """A pose is recovered in less than 5 ms."""
+    prior = case.fitted()
+    latents = case.latents(prior)
+    spent = np.inf
+    for _ in range(3):
+        began = time.perf_counter()
+        prior.inverse_transform(latents)
+        spent = min(spent, (time.perf_counter() - began) / ROWS)
+    expect(spent < 5e-3, f"a pose must be recovered in less than 5 ms, got {1e3 * spent:.3g}")
+    return f"{1e6 * spent:.2f} us a pose"

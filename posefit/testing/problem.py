@@ -1,0 +1,34 @@
+"""A small real problem for the kit: one frame of the built-in walk."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array
+from posefit.motion import library
+from posefit.registry import registry
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
+
+SIZE = (160, 120)
+
+
+def training_angles() -> Array:
+    """Return the joint angles (T, 63) of the built-in walks but `walk` itself."""
+    return np.concatenate([library.built_in(style).poses[:, 3:] for style in library.other_styles("walk")])
+
+
+@lru_cache(maxsize=1)
+def pose_problem() -> PoseProblem:
+    """Return the problem: known translation, prior `pca`, seen from 45 degrees."""
+    motion = library.built_in("walk", frames=1)
+    body = Body.of(motion.skeleton)
+    prior = registry().prior("pca")().fit(training_angles())
+    camera = Camera.around(motion.translations[0], 0.8, 3.5, SIZE)
+    space = SearchSpace(prior, np.zeros(3), np.radians([45.0, 15.0, 15.0]), motion.translations[0])
+    silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
+    return PoseProblem(body, [camera], [silhouette], space)

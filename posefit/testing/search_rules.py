@@ -1,0 +1,101 @@
+"""Does an optimiser search: does it heed the start, carry its particles, and find more than chance does?"""
+
+import time
+from typing import cast
+
+import numpy as np
+
+from posefit.fitting.box import Start
+from posefit.fitting.optimiser import Filter
+from posefit.testing.case import Case, Evaluate, check_population, checklist
+from posefit.testing.problem import pose_problem
+from posefit.testing.report import SkippedError, expect
+from posefit.testing.toy import Toy, sphere
+
+BUDGET = 800
+SEEDS = range(3)
+SLOW = 0.05  # seconds a proposal: twenty thousand times what a pose costs
+
+
+@checklist
+def start(case: Case) -> str:
+    """The first population comes from the start that the space gives."""
+    if case.next_frame == "forget":
+        raise SkippedError("it is registered to forget")
+    mean = np.where(np.arange(6) % 2, 0.5, -0.4)
+    given = Start(mean, np.full(6, 0.02), np.zeros(6))
+    first = case.build(Toy(6, start=given)).ask()
+    away = float(np.median(np.abs(first - mean)))
+    expect(away < 0.1, f"the first population must be around the start, spread 0.02, got {away:.3g} away from it")
+    return f"{away:.3g} away, spread 0.02"
+
+
+@checklist
+def next_frame(case: Case) -> str:
+    """A filter carries its particles into the next frame; another optimiser has no such method."""
+    if case.next_frame != "carry":
+        raise SkippedError(f"it is registered to {case.next_frame}, not to carry")
+    space = Toy(4)
+    optimiser = case.build(space)
+    expect(hasattr(optimiser, "advance"), "what is registered to carry must have advance(space), got none")
+    for _ in range(3):
+        for _ in _frame(optimiser):
+            pass
+        cast(Filter, optimiser).advance(space)
+    proposals = optimiser.ask()
+    expect(len(proposals), "after advance, ask must return a population, got an empty one")
+    check_population(proposals, space)
+    near, chance = sphere(proposals).mean(), sphere(space.draw(np.random.default_rng(0), 1000)).mean()
+    expect(
+        near < 0.7 * chance, f"particles must be carried, got a mean cost of {near:.3g} where chance has {chance:.3g}"
+    )
+    return f"mean cost {near:.3g}, by chance {chance:.3g}"
+
+
+def _frame(optimiser: object) -> object:
+    """Yield after each population of a frame."""
+    while len(proposals := optimiser.ask()):  # type: ignore[attr-defined]
+        optimiser.tell(proposals, sphere(proposals))  # type: ignore[attr-defined]
+        yield
+
+
+@checklist
+def sphere_problem(case: Case) -> str:
+    """A sphere is solved better than by chance."""
+    return _beats_chance(case, Toy(6), sphere)
+
+
+@checklist
+def real_problem(case: Case) -> str:
+    """A real pose problem is solved better than by chance."""
+    problem = pose_problem()
+    return _beats_chance(case, problem.space, problem.evaluate)
+
+
+def _beats_chance(case: Case, space: object, evaluate: Evaluate) -> str:
+    if getattr(case.factory, "__module__", "") == "posefit_swarm.random":
+        raise SkippedError("it is the baseline itself")
+    found = float(np.median([case.best(space, evaluate, seed, BUDGET) for seed in SEEDS]))  # type: ignore[arg-type]
+    chance = float(np.median([_by_chance(space, evaluate, seed) for seed in SEEDS]))
+    expect(found < 0.95 * chance, f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {found:.4g}")
+    return f"cost {found:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
+
+
+def _by_chance(space: object, evaluate: Evaluate, seed: int) -> float:
+    drawn = space.draw(np.random.default_rng(seed), BUDGET)  # type: ignore[attr-defined]
+    return float(evaluate(drawn).min())
+
+
+@checklist
+def speed(case: Case) -> str:
+    """A proposal costs less than 50 ms to make."""
+    space = Toy(9)
+    spent, count = np.inf, 0
+    for seed in range(3):
+        optimiser = case.build(space, seed)
+        began, count = time.perf_counter(), 0
+        for proposals, _ in case.steps(optimiser, space, sphere, 10):
+            count += len(proposals)
+        spent = min(spent, (time.perf_counter() - began) / max(count, 1))
+    expect(spent < SLOW, f"a proposal must take less than {1e3 * SLOW:g} ms, got {1e3 * spent:.3g}")
+    return f"{1e6 * spent:.1f} us a proposal"
