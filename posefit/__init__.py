@@ -15,16 +15,20 @@ from typing import TYPE_CHECKING, Any
 from pluggy import HookimplMarker
 
 if TYPE_CHECKING:
+    from posefit.fitting.box import Space as Space
+    from posefit.fitting.box import Start as Start
+    from posefit.fitting.optimiser import Filter as Filter
     from posefit.fitting.optimiser import Minimum as Minimum
     from posefit.fitting.optimiser import Optimiser as Optimiser
     from posefit.fitting.optimiser import minimise as minimise
     from posefit.fitting.prior import Prior as Prior
     from posefit.fitting.problem import PoseProblem as PoseProblem
     from posefit.fitting.space import SearchSpace as SearchSpace
-    from posefit.fitting.space import Start as Start
     from posefit.fitting.tracker import Frame as Frame
     from posefit.fitting.tracker import Observation as Observation
     from posefit.fitting.tracker import SynthesisTracker as SynthesisTracker
+    from posefit.fitting.tracker import Task as Task
+    from posefit.fitting.tracker import Tracker as Tracker
     from posefit.geometry.body import Body as Body
     from posefit.geometry.camera import Camera as Camera
     from posefit.geometry.skeleton import Skeleton as Skeleton
@@ -44,11 +48,12 @@ _HOMES = {
     "geometry.skeleton": ("Skeleton",),
     "silhouette.mask": ("Silhouette",),
     "motion.motion": ("Motion",),
-    "fitting.optimiser": ("Minimum", "Optimiser", "minimise"),
+    "fitting.box": ("Space", "Start"),
+    "fitting.optimiser": ("Filter", "Minimum", "Optimiser", "minimise"),
     "fitting.prior": ("Prior",),
     "fitting.problem": ("PoseProblem",),
-    "fitting.space": ("SearchSpace", "Start"),
-    "fitting.tracker": ("Frame", "Observation", "SynthesisTracker"),
+    "fitting.space": ("SearchSpace",),
+    "fitting.tracker": ("Frame", "Observation", "SynthesisTracker", "Task", "Tracker"),
     "study.run": ("Fit", "Track", "fit", "track"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -91,8 +91,12 @@ def accepts(annotation: Any, value: Any) -> bool:
     if origin in (Union, types.UnionType):
         return any(accepts(one, value) for one in get_args(annotation))
     if origin is tuple:
-        parts = get_args(annotation)
-        return isinstance(value, tuple) and len(value) == len(parts) and all(map(accepts, parts, value))
+        parts: tuple[Any, ...] = get_args(annotation)
+        return (
+            isinstance(value, tuple)
+            and len(value) == len(parts)
+            and all(accepts(part, one) for part, one in zip(parts, value, strict=True))
+        )
     if annotation in (None, type(None)):
         return value is None
     if annotation is float:

@@ -41,6 +41,8 @@ def _run(
         box = ng.p.Array(init=space.draw(rng, 1)[0]).set_mutation(sigma=spread).set_bounds(-1.0, 1.0, method="clipping")
         box.random_state = np.random.RandomState(int(rng.integers(2**31)))
         optimiser = ng.optimizers.registry[variant](box, budget=evaluations, num_workers=particles)
+        for proposal in space.draw(rng, particles):
+            optimiser.suggest(proposal)
     while True:
         with borrowed:
             asked = [optimiser.ask() for _ in range(particles)]

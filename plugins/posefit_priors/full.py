@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from posefit.fitting.check import at_least, one_of
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import Skeleton
-from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.arrays import Shape, angles_of, load_arrays
 
-_SHAPES = {"low": ("m",), "high": ("m",), "angles": ("m",), "rest": (63,)}
+_SHAPES: dict[str, Shape] = {"low": ("m",), "high": ("m",), "angles": ("m",), "rest": (63,)}
 
 
 class Full:

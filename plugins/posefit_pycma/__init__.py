@@ -25,15 +25,17 @@ def pycma(space: Space, rng: np.random.Generator, *, population: int = 0, spread
 def _evolve(population: int, spread: float, space: Space, rng: np.random.Generator, objective: Objective) -> None:
     from cma import CMAEvolutionStrategy
 
+    spare = np.zeros(1 if space.dimensions == 1 else 0)  # it cannot search a single dimension
     stds = np.full(space.dimensions, spread) if space.start is None else np.maximum(space.start.spread, 1e-6)
+    stds = np.append(stds, spare + spread)
     options = {"bounds": [-1, 1], "CMA_stds": stds, "verbose": -9} | ({"popsize": population} if population else {})
     # without a seed, and with our generator, it leaves numpy's global one alone
     options |= {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
     while True:
-        strategy = CMAEvolutionStrategy(space.draw(rng, 1)[0], 1.0, options)
+        strategy = CMAEvolutionStrategy(np.append(space.draw(rng, 1)[0], spare), 1.0, options)
         while not strategy.stop():
             asked = strategy.ask()
-            strategy.tell(asked, objective(np.array(asked)).tolist())
+            strategy.tell(asked, objective(np.array(asked)[:, : space.dimensions]).tolist())
 
 
 @hookimpl

@@ -1,7 +1,7 @@
 """Optimisers of SciPy for posefit: `scipy:differential_evolution` and `scipy:dual_annealing`."""
 
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -29,20 +29,28 @@ def scipy(
 def _evolve(particles: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
     from scipy.optimize import differential_evolution
 
-    box = [(-1.0, 1.0)] * space.dimensions
-    settings = {"vectorized": True, "updating": "deferred", "polish": False, "maxiter": 10**9, "tol": 0.0}
+    box: Any = [(-1.0, 1.0)] * space.dimensions
+    settings: Any = {"vectorized": True, "updating": "deferred", "polish": False, "maxiter": 10**9, "tol": 0.0}
+
+    def columns(proposals: Any) -> Any:
+        return objective(proposals.T)
+
     while True:
-        first = space.draw(rng, particles)
-        differential_evolution(lambda columns: objective(columns.T), box, init=first, rng=rng, **settings)
+        first: Any = space.draw(rng, particles)
+        differential_evolution(columns, box, init=first, rng=rng, **settings)
 
 
 def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> None:
     from scipy.optimize import dual_annealing
 
-    box = [(-1.0, 1.0)] * space.dimensions
+    box: Any = [(-1.0, 1.0)] * space.dimensions
+
+    def row(proposal: Any) -> Any:
+        return float(objective(proposal[None])[0])
+
     while True:
         first = space.draw(rng, 1)[0]
-        dual_annealing(lambda row: objective(row[None])[0], box, x0=first, rng=rng, no_local_search=True)
+        dual_annealing(row, box, x0=first, rng=rng, no_local_search=True)
 
 
 @hookimpl

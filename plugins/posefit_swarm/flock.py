@@ -56,8 +56,8 @@ class Flock:
 
     def fly(self, omega: float, acceleration: float, swarm_best: Array) -> None:
         """Move every particle by SAPSO (1) and (2), so that it meets the constraints. Reading S7."""
-        pull = omega, acceleration, self.position, self.velocity, self.best, swarm_best, *self._limits
-        pull += (self._space.periodic,)
+        pull: tuple[Any, ...] = omega, acceleration, self.position, self.velocity, self.best, swarm_best
+        pull += (*self._limits, self._space.periodic)
         feasible = self._space.feasible
         self.velocity, self.moved = self._attempt(self._everyone, pull)
         broken = np.flatnonzero(~feasible(self.moved))
@@ -67,7 +67,7 @@ class Flock:
         stopped[broken] = True
         left, many = self._redraws, FIRST_REDRAWS
         # what no draw could bring back into the box need not be drawn again
-        broken = redrawable(broken, *pull)
+        broken = redrawable(broken, *pull)  # type: ignore[call-arg]
         while left > 0 and len(broken):
             many = min(left, many)
             flown, moved = self._attempt(np.repeat(broken, many), pull)

@@ -153,5 +153,6 @@ def repair(space: Space, proposals: Array, home: Array) -> Array:
         line = np.clip(space.wrap(home + shares[:, None, None] * way), -1.0, 1.0)
         works = space.feasible(line.reshape(-1, space.dimensions)).reshape(line.shape[:2])
         farthest = line[works.argmax(axis=0), np.arange(len(broken))]
-        mended[broken] = np.where(works.any(axis=0)[:, None], farthest, home)
+        found: NDArray[np.bool_] = np.asarray(works.any(axis=0))
+        mended[broken] = np.where(found[:, None], farthest, home)
     return mended

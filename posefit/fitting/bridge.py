@@ -95,7 +95,7 @@ class Bridged:
         return np.empty((0, self._space.dimensions)) if asked is None else self._space.repair(asked, self._home)
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Give the library the costs of what `ask` returned. Raises ValueError where it asked for another number."""
+        """Give the library the costs of what it asked for; ValueError where their number is another."""
         self._bridge.tell(costs)
 
 

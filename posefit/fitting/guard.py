@@ -32,7 +32,7 @@ class Guarded:
         with self._watched("ask"):
             proposals = self._optimiser.ask()
         shape = getattr(proposals, "shape", None)
-        if not isinstance(proposals, np.ndarray) or len(proposals.shape) != 2 or shape[1] != self._space.dimensions:
+        if not isinstance(proposals, np.ndarray) or proposals.shape[1:] != (self._space.dimensions,):
             came = type(proposals).__name__ if shape is None else f"shape {shape}"
             raise self._broken(f"ask must return an array of shape (n, {self._space.dimensions}), got {came}")
         if proposals.dtype.kind != "f":

@@ -110,8 +110,8 @@ def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: st
         places["tracker"] = "tracker", _driver
     else:
         chosen = [("tracker", tracker)]
-    for kind, name in chosen:
-        places[name.partition(":")[0]] = kind, registry().offer(kind, name).factory
+    for one, name in chosen:
+        places[name.partition(":")[0]] = one, registry().offer(one, name).factory
     given: dict[str, dict[str, str]] = {name: {} for name in places}
     for text in texts:
         left, equals, value = text.partition("=")

@@ -32,6 +32,7 @@ __all__ = [
     "optimiser_checks",
     "parametrize",
     "prior_checks",
+    "report",
     "tracker_checks",
 ]
 _LISTS = protocol_rules, repeat_rules, search_rules  # importing them fills the list
@@ -72,4 +73,4 @@ def check_tracker(factory: Callable[..., Any], *, settings: dict[str, Any] | Non
 
 
 def _name(factory: Callable[..., Any]) -> str:
-    return getattr(factory, "__name__", None) or getattr(getattr(factory, "func", None), "__name__", repr(factory))
+    return str(getattr(getattr(factory, "func", factory), "__name__", repr(factory)))

@@ -1,14 +1,14 @@
 """Does an optimiser speak the protocol: populations, box, feasibility, costs of every kind, budget, order?"""
 
 import inspect
-from typing import Literal, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
 from posefit.fitting.box import Start
 from posefit.geometry.rotation import Array
 from posefit.settings import settings_of
-from posefit.testing.case import REFUSALS, Case, check_population, checklist, needs_settings
+from posefit.testing.case import REFUSALS, Case, Evaluate, check_population, checklist, needs_settings
 from posefit.testing.report import SkippedError, expect, refusal
 from posefit.testing.toy import Toy, ball, shell, sphere
 
@@ -115,10 +115,9 @@ def order(case: Case) -> str:
     def spoilt(x: Array) -> Array:
         return shuffled.permutation(sphere(x))
 
-    def last(evaluate: object, seed: int) -> float:
+    def last(evaluate: Evaluate, seed: int) -> float:
         costs = [
-            sphere(proposals).mean()
-            for proposals, _ in case.steps(case.build(Toy(4), seed), Toy(4), evaluate, 40)  # type: ignore[arg-type]
+            sphere(proposals).mean() for proposals, _ in case.steps(case.build(Toy(4), seed), Toy(4), evaluate, 40)
         ]
         return float(np.mean(costs[len(costs) // 2 :]))
 
@@ -198,7 +197,8 @@ def unknown_setting(case: Case) -> None:
 def nonsense_settings(case: Case) -> str:
     """Nonsense in a setting is refused or harmless."""
     needs_settings(case)
-    refused, harmless = [], []
+    refused: list[str] = []
+    harmless: list[str] = []
     for setting in settings_of(case.factory):
         kind = setting.annotation if setting.annotation is not inspect.Parameter.empty else type(setting.default)
         nonsense: object
@@ -211,8 +211,9 @@ def nonsense_settings(case: Case) -> str:
         else:
             continue
         assert nonsense not in get_args(kind)
+        nonsensical: dict[str, Any] = {setting.name: nonsense}
         with refusal(ValueError) as refusals:
-            for proposals, _ in case.steps(case.build(Toy(5), **{setting.name: nonsense}), Toy(5), sphere, 3):
+            for proposals, _ in case.steps(case.build(Toy(5), **nonsensical), Toy(5), sphere, 3):
                 check_population(proposals, Toy(5))
         (refused if refusals else harmless).append(setting.name)
     return f"refused: {', '.join(refused) or 'none'}" + (f"; harmless: {', '.join(harmless)}" if harmless else "")

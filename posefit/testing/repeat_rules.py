@@ -3,7 +3,6 @@
 import copy
 import multiprocessing
 import pickle
-import random
 import subprocess
 import sys
 import threading
@@ -14,6 +13,7 @@ import numpy as np
 
 from posefit.geometry.rotation import Array
 from posefit.testing.case import Case, checklist, same
+from posefit.testing.randomness import left_alone, seeded
 from posefit.testing.report import BrokenError, SkippedError, expect
 from posefit.testing.toy import Toy, ball, sphere
 
@@ -50,27 +50,14 @@ def new_process(case: Case) -> None:
     )
 
 
-def _state() -> tuple[Any, ...]:
-    kind, keys, *rest = np.random.get_state()  # noqa: NPY002, the state to be left alone
-    return random.getstate(), kind, np.asarray(keys).tobytes(), *rest
-
-
 @checklist
 def global_randomness(case: Case) -> None:
     """The global random generators are neither used nor changed."""
-    kept = np.random.get_state(), random.getstate()  # noqa: NPY002
-    try:
-        traces = []
-        for seed in (1, 2):
-            np.random.seed(seed)  # noqa: NPY002
-            random.seed(seed)
-            before = _state()
+    traces = []
+    for seed in (1, 2):
+        with seeded(seed), left_alone():
             traces.append(case.trace(SPACE, sphere))
-            expect(_state() == before, "the global random state must stay as it is, got another")
-        expect(same(*traces), "global seeds must not matter, got two traces")
-    finally:
-        np.random.set_state(kept[0])  # noqa: NPY002
-        random.setstate(kept[1])
+    expect(same(*traces), "global seeds must not matter, got two traces")
 
 
 @checklist

@@ -1,19 +1,20 @@
 """Does an optimiser search: does it heed the start, carry its particles, and find more than chance does?"""
 
 import time
+from collections.abc import Iterator
 from typing import cast
 
 import numpy as np
 
-from posefit.fitting.box import Start
-from posefit.fitting.optimiser import Filter
+from posefit.fitting.box import Space, Start
+from posefit.fitting.optimiser import Filter, Optimiser
 from posefit.testing.case import Case, Evaluate, check_population, checklist
 from posefit.testing.problem import pose_problem
 from posefit.testing.report import SkippedError, expect
 from posefit.testing.toy import Toy, sphere
 
 BUDGET = 800
-SEEDS = range(3)
+SEEDS = range(5)
 SLOW = 0.05  # seconds a proposal: twenty thousand times what a pose costs
 
 
@@ -52,10 +53,10 @@ def next_frame(case: Case) -> str:
     return f"mean cost {near:.3g}, by chance {chance:.3g}"
 
 
-def _frame(optimiser: object) -> object:
+def _frame(optimiser: Optimiser) -> Iterator[None]:
     """Yield after each population of a frame."""
-    while len(proposals := optimiser.ask()):  # type: ignore[attr-defined]
-        optimiser.tell(proposals, sphere(proposals))  # type: ignore[attr-defined]
+    while len(proposals := optimiser.ask()):
+        optimiser.tell(proposals, sphere(proposals))
         yield
 
 
@@ -72,17 +73,17 @@ def real_problem(case: Case) -> str:
     return _beats_chance(case, problem.space, problem.evaluate)
 
 
-def _beats_chance(case: Case, space: object, evaluate: Evaluate) -> str:
+def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     if getattr(case.factory, "__module__", "") == "posefit_swarm.random":
         raise SkippedError("it is the baseline itself")
-    found = float(np.median([case.best(space, evaluate, seed, BUDGET) for seed in SEEDS]))  # type: ignore[arg-type]
+    found = float(np.median([case.best(space, evaluate, seed, BUDGET) for seed in SEEDS]))
     chance = float(np.median([_by_chance(space, evaluate, seed) for seed in SEEDS]))
     expect(found < 0.95 * chance, f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {found:.4g}")
     return f"cost {found:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
 
 
-def _by_chance(space: object, evaluate: Evaluate, seed: int) -> float:
-    drawn = space.draw(np.random.default_rng(seed), BUDGET)  # type: ignore[attr-defined]
+def _by_chance(space: Space, evaluate: Evaluate, seed: int) -> float:
+    drawn = space.draw(np.random.default_rng(seed), BUDGET)
     return float(evaluate(drawn).min())
 
 
