@@ -117,7 +117,7 @@ def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
 
 def _readings(text: str) -> list[Any]:
     """Return everything a text may mean, the most special first."""
-    words = {"true": [True], "false": [False], "none": [None]}.get(text.lower(), [])
+    words: dict[str, Any] = {"true": True, "false": False, "none": None}
     numbers: list[Any] = []
     for kind in (int, float):
         try:
@@ -126,7 +126,7 @@ def _readings(text: str) -> list[Any]:
             continue
     if "," in text:
         numbers.append(tuple(_readings(part)[0] for part in text.split(",")))
-    return [*words, *numbers, text]
+    return [*([words[text.lower()]] if text.lower() in words else []), *numbers, text]
 
 
 def _shown(annotation: Any, default: Any) -> str:

@@ -94,7 +94,7 @@ class Bridged:
         asked = self._bridge.ask()
         return np.empty((0, self._space.dimensions)) if asked is None else self._space.repair(asked, self._home)
 
-    def tell(self, proposals: Array, costs: Array) -> None:
+    def tell(self, proposals: Array, costs: Array) -> None:  # noqa: ARG002, the library knows what it asked
         """Give the library the costs of what it asked for; ValueError where their number is another."""
         self._bridge.tell(costs)
 

@@ -20,7 +20,7 @@ from typing import Any
 from posefit.fitting.optimiser import NextFrame
 from posefit.testing import prior_rules, protocol_rules, repeat_rules, search_rules, tracker_rules
 from posefit.testing.case import Case, checklist
-from posefit.testing.report import Check, Report, Result, parametrize, report
+from posefit.testing.results import Check, Report, Result, parametrize, report
 
 __all__ = [
     "Check",

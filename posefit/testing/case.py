@@ -10,7 +10,7 @@ from posefit.fitting.box import Space
 from posefit.fitting.optimiser import Filter, NextFrame, Optimiser
 from posefit.geometry.rotation import Array
 from posefit.settings import planned, settings_of
-from posefit.testing.report import Checklist, SkippedError, expect
+from posefit.testing.results import Checklist, SkippedError, expect
 
 EVALUATIONS = 400  # a search's budget where a check needs no special one
 REFUSALS = (ValueError, RuntimeError)

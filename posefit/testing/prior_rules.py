@@ -19,7 +19,7 @@ from posefit.motion import library
 from posefit.settings import settings_of
 from posefit.testing.problem import training_angles
 from posefit.testing.randomness import left_alone
-from posefit.testing.report import Checklist, SkippedError, expect, refusal
+from posefit.testing.results import Checklist, SkippedError, expect, refusal
 
 ROWS = 100
 checklist = Checklist()

@@ -9,7 +9,7 @@ from posefit.fitting.box import Start
 from posefit.geometry.rotation import Array
 from posefit.settings import settings_of
 from posefit.testing.case import REFUSALS, Case, Evaluate, check_population, checklist, needs_settings
-from posefit.testing.report import SkippedError, expect, refusal
+from posefit.testing.results import SkippedError, expect, refusal
 from posefit.testing.toy import Toy, ball, shell, sphere
 
 

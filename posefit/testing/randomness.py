@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from posefit.testing.report import expect
+from posefit.testing.results import expect
 
 
 def _state() -> tuple[object, ...]:

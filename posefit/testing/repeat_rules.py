@@ -14,7 +14,7 @@ import numpy as np
 from posefit.geometry.rotation import Array
 from posefit.testing.case import Case, checklist, same
 from posefit.testing.randomness import left_alone, seeded
-from posefit.testing.report import BrokenError, SkippedError, expect
+from posefit.testing.results import BrokenError, SkippedError, expect
 from posefit.testing.toy import Toy, ball, sphere
 
 SPACE = Toy(5, ball)

@@ -10,7 +10,7 @@ from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Filter, Optimiser
 from posefit.testing.case import Case, Evaluate, check_population, checklist
 from posefit.testing.problem import pose_problem
-from posefit.testing.report import SkippedError, expect
+from posefit.testing.results import SkippedError, expect
 from posefit.testing.toy import Toy, sphere
 
 BUDGET = 800

@@ -19,7 +19,7 @@ from posefit.silhouette.cost import areas, mismatch, project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import SIZE
 from posefit.testing.randomness import left_alone
-from posefit.testing.report import Checklist, SkippedError, expect
+from posefit.testing.results import Checklist, SkippedError, expect
 
 FRAMES = 12
 EVALUATIONS = 400

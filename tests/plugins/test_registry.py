@@ -76,7 +76,7 @@ def test_a_taken_name_is_refused() -> None:
 
 def test_an_unknown_name_lists_the_known_and_the_nearest() -> None:
     with pytest.raises(
-        ValueError, match=r"optimiser must be one of random, sapso, got 'sapzo'; did you mean 'sapso'\?"
+        ValueError, match=r"optimiser must be one of pso, random, sapso, got 'sapzo'; did you mean 'sapso'\?"
     ):
         load(
             EntryPoint(f"p{k}", module, "posefit") for k, module in enumerate(["posefit_swarm", "posefit_priors"])

@@ -10,7 +10,7 @@ import pytest
 
 from posefit import PoseProblem, SearchSpace, Silhouette, Start, minimise
 from posefit.fitting import metrics
-from posefit.fitting.tracker import Observation, SynthesisTracker
+from posefit.fitting.tracker import Observation, SynthesisTracker, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array, rotation_from_root_angles
@@ -18,7 +18,7 @@ from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import library
 from posefit.silhouette.cost import areas, mismatch, project
 from posefit_priors.pca import PCA
-from posefit_swarm import sapso, swarm
+from posefit_swarm import flock, sapso, swarm
 from posefit_swarm.sapso import SAPSO
 
 ROOT = Path(__file__).parents[2]
@@ -36,7 +36,7 @@ class Line:
     def __init__(self, gap: tuple[float, float] | None = None) -> None:
         self.low, self.high, self.gap = np.array([-1.0]), np.array([1.0]), gap
 
-    def fit(self, angles: Array) -> "Line":
+    def fit(self, angles: Array, skeleton: object = None) -> "Line":
         assert angles.shape[1] == 63
         return self
 
@@ -168,7 +168,7 @@ def test_2_2_chi_is_the_99th_percentile_of_the_training_distances(walk: Array) -
 
 
 def test_2_2_velocities_keep_within_alpha_of_the_half_range() -> None:
-    low, high = sapso._velocity_limits(line_space(), 0.15, "symmetric")
+    low, high = flock.speed_limits(line_space(), 0.15, "symmetric")
     np.testing.assert_allclose([low[3], high[3]], [-0.15, 0.15])
 
 
@@ -176,7 +176,7 @@ def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None:
     prior = Line()
     prior.low, prior.high = np.array([2.0]), np.array([6.0])  # half-range 2: alpha 2 / 2 and alpha 6 / 2
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
-    low, high = sapso._velocity_limits(space, 0.15, "literal")
+    low, high = flock.speed_limits(space, 0.15, "literal")
     np.testing.assert_allclose([low[3], high[3]], [0.15, 0.45])
 
 
@@ -350,11 +350,11 @@ def test_a1_2c_only_a_particle_that_no_rand_could_keep_in_the_box_is_not_redrawn
 def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border() -> None:  # Reading S7
     space = line_space()
     optimiser = SAPSO(space, Fixed(1.0), particles=2, redraws=0, alpha=1.0)
-    optimiser._position[:], optimiser._best[:] = 0.9, 0.9
-    optimiser._velocity[:] = 0.5
-    optimiser._fly(np.full(4, 0.9))
-    np.testing.assert_array_equal(optimiser._moved, 1.0)
-    np.testing.assert_array_equal(optimiser._velocity, 0.0)
+    optimiser._flock.position[:], optimiser._flock.best[:] = 0.9, 0.9
+    optimiser._flock.velocity[:] = 0.5
+    optimiser._flock.fly(0.9, 2.0, np.full(4, 0.9))
+    np.testing.assert_array_equal(optimiser._flock.moved, 1.0)
+    np.testing.assert_array_equal(optimiser._flock.velocity, 0.0)
 
 
 @pytest.mark.parametrize(("cool", "expected"), [("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))])
@@ -374,20 +374,20 @@ def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
     space = line_space()
     for kind, alike in (("scalar", True), ("dimension", False)):
         optimiser = SAPSO(space, np.random.default_rng(0), particles=1, rand=kind, alpha=9.0)  # type: ignore[arg-type]
-        optimiser._position[:], optimiser._best[:], optimiser._velocity[:] = 0.0, 0.1, 0.0
-        optimiser._fly(np.full(4, 0.1))
-        assert (np.ptp(optimiser._moved) < 1e-12) == alike
+        optimiser._flock.position[:], optimiser._flock.best[:], optimiser._flock.velocity[:] = 0.0, 0.1, 0.0
+        optimiser._flock.fly(0.9, 2.0, np.full(4, 0.1))
+        assert (np.ptp(optimiser._flock.moved) < 1e-12) == alike
 
 
 @pytest.mark.parametrize("kind", ["kept", "zeroed"])
 def test_s11_a_refused_move_keeps_or_loses_its_velocity(kind: Any) -> None:
     optimiser = SAPSO(line_space(), Fixed(1.0), particles=1, iterations=2, rejected_velocity=kind, acceleration=0.0)
     optimiser.tell(optimiser.ask(), np.array([0.0]))
-    before = optimiser._velocity.copy()
-    optimiser._position[:] = 0.0
+    before = optimiser._flock.velocity.copy()
+    optimiser._flock.position[:] = 0.0
     optimiser.tell(optimiser.ask(), np.array([50.0]))
     omega = swarm.inertia(1, 2, 0.9)
-    np.testing.assert_allclose(optimiser._velocity, omega * before if kind == "kept" else 0.0)
+    np.testing.assert_allclose(optimiser._flock.velocity, omega * before if kind == "kept" else 0.0)
 
 
 # Section 4
@@ -430,7 +430,7 @@ def test_eq_7_first_velocities_are_uniform_from_zero_to_the_predicted_one() -> N
     velocity = np.array([0.1, -0.1, 0.0, 0.05])  # Reading S12: a negative bound is sorted, not refused
     start = Start(np.zeros(4), np.full(4, 0.01), velocity)
     optimiser = SAPSO(line_space(start=start), np.random.default_rng(0), particles=4000)
-    drawn = optimiser._velocity
+    drawn = optimiser._flock.velocity
     np.testing.assert_allclose(drawn.min(axis=0), np.minimum(0.0, velocity), atol=2e-3)
     np.testing.assert_allclose(drawn.max(axis=0), np.maximum(0.0, velocity), atol=2e-3)
     np.testing.assert_allclose(drawn.mean(axis=0), velocity / 2.0, atol=2e-3)
@@ -465,9 +465,8 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
 
     mask = project(body, camera, np.zeros(66), np.array([0.0, 0.9, 0.0]))
     observation = Observation([Silhouette.of(mask)], np.array([0.0, 0.9, 0.0]))
-    tracker = SynthesisTracker(
-        body, [camera], Line(), make, 1, 0.0, np.array([0.0, 0.9, 0.0]), prediction=prediction, spread=2.0, floor=0.05
-    )
+    task = Task(body, [camera], 1, 0.0, np.array([0.0, 0.9, 0.0]))
+    tracker = SynthesisTracker(task, Line(), make, prediction=prediction, spread=2.0, floor=0.05)
     list(tracker.track([observation] * 4, np.random.default_rng(0)))
     assert made[0].space.start is None  # frame 1 is an estimation
     starts = [optimiser.space.start for optimiser in made[1:]]

@@ -1,0 +1,393 @@
+"""Optimisers, priors and trackers that each break one rule on purpose. The kit has to find every one of them."""
+
+import random
+import threading
+import time
+from typing import Any
+
+import numpy as np
+
+from posefit import Frame, SearchSpace, Task
+from posefit.geometry.rotation import Array
+from posefit_filters.annealed import Annealed
+from posefit_priors.pca import PCA
+
+
+class Sound:
+    """Shrinks a cloud around the best point; nothing is wrong with it, and the others each spoil one thing."""
+
+    def __init__(
+        self, space: SearchSpace, rng: np.random.Generator, *, particles: int = 40, shrink: float = 0.9
+    ) -> None:
+        if particles < 1:
+            raise ValueError(f"particles must be at least 1, got {particles}")
+        self.space, self.rng, self.shrink = space, rng, shrink
+        self.population = space.draw(rng, particles)
+        self.best, self.cost, self.width = self.population[0].copy(), np.inf, 0.5
+
+    def ask(self) -> Array:
+        return self.population.copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        costs = np.where(np.isnan(costs), np.inf, costs)
+        if costs.min() < self.cost:
+            self.best, self.cost = proposals[costs.argmin()].copy(), float(costs.min())
+        self.width *= self.shrink
+        spread = np.full(self.space.dimensions, self.width)
+        self.population = self.space.scatter(self.rng, np.tile(self.best, (len(self.population), 1)), spread)
+
+
+class SwallowsSettings(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator, **settings: Any) -> None:
+        super().__init__(space, rng)
+
+
+class PositionalSettings(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator, particles: int = 40) -> None:
+        super().__init__(space, rng, particles=particles)
+
+
+class AsksOneRow(Sound):
+    def ask(self) -> Array:
+        return super().ask()[0]
+
+
+class AsksList(Sound):
+    def ask(self) -> Any:
+        return super().ask().tolist()
+
+
+class AsksFloat32(Sound):
+    def ask(self) -> Any:
+        return super().ask().astype(np.float32)
+
+
+class LeavesTheBox(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        self.population = self.best + 0.6 * self.rng.standard_normal(self.population.shape)
+
+
+class ForgetsFeasible(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        self.population = np.clip(self.best + 0.3 * self.rng.standard_normal(self.population.shape), -1.0, 1.0)
+
+
+class WaitsForFeasible(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        while True:
+            self.population = self.rng.uniform(-1.0, 1.0, self.population.shape)
+            if self.space.feasible(self.population).all():
+                return
+
+
+class SpreadsNan(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        weights = np.exp(-costs)
+        mean = np.clip(weights @ proposals / weights.sum(), -1.0, 1.0)
+        if not self.space.feasible(mean[None])[0] and np.isfinite(mean).all():
+            mean = self.best
+        self.population = np.tile(mean, (len(proposals), 1))
+
+
+class DividesByTheRange(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        rank = (costs - costs.min()) / (costs.max() - costs.min())
+        assert not np.isnan(rank).any(), "costs are all equal"
+        super().tell(proposals, costs)
+
+
+class AsksForMore(Sound):
+    """Has a second population so large that most of a budget is left over."""
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        self.population = np.tile(self.population[:1], (1000, 1))
+
+
+class MixesRows(Sound):
+    """Hands the rows out in another order than it keeps them in."""
+
+    def ask(self) -> Array:
+        return self.population[::-1].copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(self.population, costs)
+
+
+class Maximises(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, -costs)
+
+
+class Stubborn(Sound):
+    """Heeds no cost and stays where it was drawn."""
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        noise = 1e-3 * self.rng.standard_normal(self.population.shape)
+        moved = np.clip(self.population + noise, -1.0, 1.0)
+        self.population = np.where(self.space.feasible(moved)[:, None], moved, self.population)
+
+
+class NeedsAsk(Sound):
+    """Breaks where it is told something unasked."""
+
+    asked = 0
+
+    def ask(self) -> Array:
+        self.asked += 1
+        return super().ask()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        self.last = {}[0] if not self.asked else self.asked  # type: ignore[var-annotated]
+        super().tell(proposals, costs)
+
+
+class AskChanges(Sound):
+    """A second ask gives nothing, as if the first had used it up."""
+
+    def ask(self) -> Array:
+        given, self.population = self.population, self.population[:0]
+        return given
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        self.population = proposals
+        super().tell(proposals, costs)
+
+
+class OneDimensionFails(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, rng)
+        self.partner = int(rng.integers(1, space.dimensions))  # fails where there is but one
+
+
+class FewDimensionsOnly(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, rng)
+        self.corners = np.zeros((9, 9))[: space.dimensions, : space.dimensions] + np.eye(space.dimensions)
+
+
+class UsesGlobalNumpy(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        np.random.rand()  # noqa: NPY002
+
+
+class UsesGlobalRandom(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, np.random.default_rng(random.getrandbits(32)))
+
+
+class UsesTheClock(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, np.random.default_rng(time.perf_counter_ns()))
+
+
+class IgnoresTheSeed(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, np.random.default_rng(0))
+
+
+class HashesNames(Sound):
+    """Depends on the order of a set of words, which every process shuffles anew."""
+
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, np.random.default_rng(abs(hash("posefit"))))
+        self.population = space.draw(np.random.default_rng([abs(hash("posefit")), int(rng.integers(9**9))]), 40)
+
+
+class SortsInPlace(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        super().tell(proposals, costs)
+        costs.sort()
+
+
+class HoldsALock(Sound):
+    """Cannot be copied."""
+
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, rng)
+        self.lock = threading.Lock()
+
+
+class SharesItsGenerator(Sound):
+    """Keeps its generator outside itself, so that copies draw from one."""
+
+    generators: dict[int, np.random.Generator] = {}  # noqa: RUF012
+
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, rng)
+        self.key = id(rng)
+        SharesItsGenerator.generators[self.key], self.rng = rng, rng
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        self.rng = SharesItsGenerator.generators[self.key]
+        super().tell(proposals, costs)
+
+
+class LeavesThreads(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, rng)
+        threading.Thread(target=time.sleep, args=(5.0,), daemon=True).start()
+
+
+class IgnoresTheStart(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, rng)
+        drawn = rng.uniform(-1.0, 1.0, (2000, space.dimensions))
+        allowed = drawn[space.feasible(drawn)][:40]
+        self.population = allowed if len(allowed) == 40 else self.population
+
+
+class Slow(Sound):
+    def ask(self) -> Array:
+        time.sleep(0.06 * len(self.population))
+        return super().ask()
+
+
+class HangsOnNonsense(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator, *, particles: int = 40, tries: int = 5) -> None:
+        super().__init__(space, rng, particles=particles)
+        while tries != 0:
+            tries -= 1
+            if tries < -10:
+                raise OverflowError("tries went below 0")
+
+
+class ForgetsParticles(Annealed):
+    """Starts every frame anew, though it is registered to carry."""
+
+    def advance(self, space: Any) -> None:
+        super().advance(space)
+        self._particles = space.draw(self._rng, len(self._particles))
+
+
+class ShiftsWithTheCompany(PCA):
+    """Centres what it gets by its mean, so that a row depends on the others."""
+
+    def inverse_transform(self, latents: Array) -> Array:
+        return super().inverse_transform(latents) + 1e-9 * np.mean(latents)
+
+
+class NarrowRange(PCA):
+    def fit(self, angles: Array, skeleton: Any = None) -> Any:
+        super().fit(angles)
+        self.low, self.high = 0.5 * self.low, 0.5 * self.high
+        return self
+
+
+class RefusesAll(PCA):
+    def feasible(self, latents: Array) -> Any:
+        return np.zeros(len(latents), dtype=bool)
+
+
+class ReturnsNone(PCA):
+    def fit(self, angles: Array, skeleton: Any = None) -> Any:
+        super().fit(angles)
+
+
+class TakesNan(PCA):
+    def fit(self, angles: Array, skeleton: Any = None) -> Any:
+        return super().fit(np.nan_to_num(np.asarray(angles)))
+
+
+class Holds:
+    """A tracker that gives the first training pose in every frame; each below spoils one thing."""
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.pose = np.concatenate([np.zeros(3), task.training[0].poses[0, 3:]])
+
+    def frame(self, observation: Any) -> Frame:
+        from posefit.silhouette.cost import areas, mismatch
+
+        where = observation.translation
+        counts = areas(self.task.body, self.task.cameras[0], observation.silhouettes[0], self.pose[None], where[None])
+        return Frame(self.pose, where, float(mismatch(counts)[0]), counts, 1, 0.0, np.zeros(1))
+
+    def track(self, observations: Any, rng: Any) -> Any:
+        for observation in observations:
+            yield self.frame(observation)
+
+
+class ReadsAhead(Holds):
+    def track(self, observations: Any, rng: Any) -> Any:
+        yield from super().track(list(observations), rng)
+
+
+class DropsFrames(Holds):
+    def track(self, observations: Any, rng: Any) -> Any:
+        yield from list(super().track(observations, rng))[::2]
+
+
+class Flatters(Holds):
+    def frame(self, observation: Any) -> Frame:
+        frame = super().frame(observation)
+        return Frame(frame.pose, frame.translation, 0.5 * frame.cost, frame.areas, 1, 0.0, frame.history)
+
+
+class Spends(Holds):
+    def frame(self, observation: Any) -> Frame:
+        frame = super().frame(observation)
+        return Frame(frame.pose, frame.translation, frame.cost, frame.areas, 10**6, 0.0, frame.history)
+
+
+class Remembers(Holds):
+    count = 0
+
+    def track(self, observations: Any, rng: Any) -> Any:
+        self.count += 1
+        self.pose = self.pose + 0.01 * self.count
+        yield from super().track(observations, rng)
+
+
+# what each breaks: the checks of which at least the first must fail
+OPTIMISERS: dict[type, tuple[str, ...]] = {
+    SwallowsSettings: ("construction", "unknown_setting"),
+    PositionalSettings: ("construction",),
+    AsksOneRow: ("shape",),
+    AsksList: ("shape",),
+    AsksFloat32: ("dtype",),
+    LeavesTheBox: ("box",),
+    ForgetsFeasible: ("feasible",),
+    WaitsForFeasible: ("hardly_feasible",),
+    SpreadsNan: ("nan_costs",),
+    DividesByTheRange: ("equal_costs",),
+    AsksForMore: ("budget",),
+    MixesRows: ("order",),
+    Maximises: ("sphere_problem", "real_problem"),
+    Stubborn: ("sphere_problem", "real_problem"),
+    NeedsAsk: ("tell_without_ask",),
+    AskChanges: ("ask_twice",),
+    OneDimensionFails: ("one_dimension",),
+    FewDimensionsOnly: ("many_dimensions",),
+    UsesGlobalNumpy: ("global_randomness",),
+    UsesGlobalRandom: ("global_randomness",),
+    UsesTheClock: ("same_seed",),
+    IgnoresTheSeed: ("other_seed",),
+    HashesNames: ("new_process",),
+    SortsInPlace: ("inputs",),
+    HoldsALock: ("deep_copy", "pickled"),
+    SharesItsGenerator: ("deep_copy", "pickled"),
+    LeavesThreads: ("nothing_left",),
+    IgnoresTheStart: ("start",),
+    Slow: ("speed",),
+    HangsOnNonsense: ("nonsense_settings",),
+}
+PRIORS: dict[type, tuple[str, ...]] = {
+    ShiftsWithTheCompany: ("same_bits",),
+    NarrowRange: ("training_in_range",),
+    RefusesAll: ("training_feasible",),
+    ReturnsNone: ("fit",),
+    TakesNan: ("bad_input",),
+}
+TRACKERS: dict[type, tuple[str, ...]] = {
+    ReadsAhead: ("as_they_come",),
+    DropsFrames: ("one_frame_each",),
+    Flatters: ("honest_cost",),
+    Spends: ("budget",),
+    Remembers: ("used_twice",),
+}

@@ -1,0 +1,101 @@
+"""The kit passes what is right and fails what is wrong, for the reason that was planted."""
+
+from functools import partial
+from typing import Any
+
+import pytest
+
+from posefit.fitting.tracker import SynthesisTracker, Task
+from posefit.registry import registry
+from posefit.testing import check_optimiser, check_prior, check_tracker, optimiser_checks, parametrize, report, results
+from posefit_priors.pca import PCA
+from posefit_swarm.sapso import SAPSO
+from tests.testing import planted
+
+SHIPPED = ("sapso", "pso", "random", "particle", "annealed", "cma", "scipy", "scipy:dual_annealing")
+ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna")
+
+
+@pytest.mark.parametrize("name", SHIPPED + ADAPTERS)
+def test_it_passes_every_shipped_optimiser(name: str) -> None:
+    offer = registry().offer("optimiser", name)
+    result = check_optimiser(offer.factory, next_frame=offer.next_frame)
+    assert result, str(result)
+    ran = len(result.of("passed"))
+    assert ran >= 28
+    assert f"{ran} checks ran, 0 failed" in str(result)
+
+
+@pytest.mark.parametrize("name", ["pca", "full", "union", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA"])
+def test_it_passes_every_shipped_prior(name: str) -> None:
+    result = check_prior(registry().offer("prior", name).factory)
+    assert result, str(result)
+
+
+def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
+    from posefit.study.method import training_angles
+
+    make = partial(SAPSO, particles=20, iterations=task.evaluations // 20 - 1)
+    return SynthesisTracker(task, PCA().fit(training_angles(task)), make, floor=floor)
+
+
+def test_it_passes_the_papers_tracker() -> None:
+    result = check_tracker(synthesis)
+    assert result, str(result)
+    assert len(result.of("passed")) >= 13
+
+
+@pytest.mark.parametrize("name", ["Sound"])
+def test_it_passes_a_sound_plugin(name: str) -> None:
+    result = check_optimiser(getattr(planted, name))
+    assert result, str(result)
+
+
+@pytest.mark.parametrize(("bug", "checks"), planted.OPTIMISERS.items(), ids=lambda one: getattr(one, "__name__", ""))
+def test_it_finds_each_bug_planted_in_an_optimiser(bug: Any, checks: tuple[str, ...], monkeypatch: Any) -> None:
+    monkeypatch.setattr(results, "SECONDS", 3.0)
+    wanted = [check for check in optimiser_checks(bug) if check.name in checks]
+    assert len(wanted) == len(checks)
+    for result in (check.run() for check in wanted):
+        assert result.outcome == "failed", result
+
+
+def test_it_finds_a_filter_that_forgets() -> None:
+    result = check_optimiser(planted.ForgetsParticles, next_frame="carry")
+    assert "next_frame" in {one.name for one in result.of("failed")}
+    assert "next_frame" in {one.name for one in check_optimiser(planted.Sound, next_frame="carry").of("failed")}
+
+
+@pytest.mark.parametrize(("bug", "checks"), planted.PRIORS.items(), ids=lambda one: getattr(one, "__name__", ""))
+def test_it_finds_each_bug_planted_in_a_prior(bug: Any, checks: tuple[str, ...]) -> None:
+    assert set(checks) <= {one.name for one in check_prior(bug).of("failed")}
+
+
+@pytest.mark.parametrize(("bug", "checks"), planted.TRACKERS.items(), ids=lambda one: getattr(one, "__name__", ""))
+def test_it_finds_each_bug_planted_in_a_tracker(bug: Any, checks: tuple[str, ...]) -> None:
+    failed = {one.name for one in check_tracker(bug).of("failed")}
+    assert set(checks) <= failed
+    assert check_tracker(planted.Holds)
+
+
+def test_a_skipped_check_is_visible() -> None:
+    result = check_optimiser(registry().optimiser("random"), next_frame="forget")
+    assert [one.detail for one in result.of("skipped")].count("it is the baseline itself") == 2
+    assert "5 skipped" in result.summary
+    assert "skipped  start" in str(result)
+
+
+def test_a_report_is_false_where_a_check_failed() -> None:
+    assert not check_optimiser(planted.AsksList)
+    assert report("nothing", [])
+
+
+@parametrize(optimiser_checks(planted.Sound))
+def test_an_author_can_have_a_test_for_each_rule(check: Any) -> None:
+    check()
+
+
+def test_a_check_that_fails_says_the_rule_and_what_came() -> None:
+    check = next(one for one in optimiser_checks(planted.AsksOneRow) if one.name == "shape")
+    with pytest.raises(AssertionError, match=r"returns an array \(n, d\): ask must return \(n, 9\), got \(9,\)"):
+        check()
