@@ -41,7 +41,7 @@ class CMAES:
         positive("spread", spread)
         at_least("growth", growth, 1)
         self._space, self._rng, self._spread, self._growth = space, rng, spread, growth
-        self._population = population or 4 + math.floor(3 * math.log(space.dimensions))  # HANSEN2016 (48)
+        self._population = population or 4 + math.floor(3 * math.log(space.dimensions))  # HANSEN2016 (population)
         self._population = max(self._population, 5)
         self._asked: Array | None = None
         self._restart(space.start.spread if space.start is not None else np.full(space.dimensions, spread))
@@ -59,7 +59,7 @@ class CMAES:
         """Return the next population (n, d)."""
         if self._asked is None:
             self._strategy.reseed_rng(int(self._rng.integers(2**31)))  # its own generator is lost in a pickle
-            drawn = np.array([self._strategy.ask() for _ in range(self._population)])  # HANSEN2016 (38)-(40)
+            drawn = np.array([self._strategy.ask() for _ in range(self._population)])  # HANSEN2016 (sampling)
             mean = self._space.repair(self._strategy.mean[None], self._home)[0]
             self._asked = self._space.repair(drawn, mean)
         return self._asked.copy()
@@ -69,10 +69,12 @@ class CMAES:
         if len(proposals) != self._population:
             raise ValueError(f"tell must get a population of {self._population}, got {len(proposals)}")
         known = bearable(costs)
-        self._strategy.tell([(row, float(cost)) for row, cost in zip(proposals, known, strict=True)])
+        self._strategy.tell(
+            [(row, float(cost)) for row, cost in zip(proposals, known, strict=True)]
+        )  # HANSEN2016 (update)
         self._home, self._asked = proposals[known.argmin()].copy(), None
         if self._strategy.should_stop():
-            self._population *= self._growth
+            self._population *= self._growth  # AUGER2005 (restart)
             self._restart(np.full(self._space.dimensions, self._spread))
 
     def __getstate__(self) -> dict[str, Any]:

@@ -83,9 +83,8 @@ class Annealed:
         survivors = self._particles[rows]
         if self._crossover:
             survivors = self._traded(survivors)
-        self._particles = self._space.scatter(
-            self._rng, survivors, self._diffusion * spread
-        )  # DEUTSCHER2005 (diffusion)
+        noise = self._diffusion * spread  # DEUTSCHER2005 (diffusion)
+        self._particles = self._space.scatter(self._rng, survivors, noise)
 
     def _traded(self, survivors: Array) -> Array:
         """Return survivors that have traded a run of coordinates with a partner, where both remain feasible."""

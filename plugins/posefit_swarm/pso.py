@@ -29,9 +29,9 @@ def constriction(phi: float) -> float:
 class PSO:
     """A particle swarm with the whole swarm as everybody's neighbourhood; every move is accepted.
 
-    `velocity` is "constricted" by chi, with `phi` the sum of both accelerations, or has an "inertia" that falls as the
-    SAPSO paper's does. Velocities stay within `alpha` times the half-range of the box, as there; a particle that breaks
-    a constraint is redrawn as there.
+    `velocity` is "constricted" by chi, with `phi` the sum of both accelerations; or has an "inertia" that falls as the
+    SAPSO paper's does; or is the "original", which keeps all of the old one. Velocities stay within `alpha` times the
+    half-range of the box, and a particle that breaks a constraint is redrawn, both as in that paper.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class PSO:
         *,
         particles: int = PARTICLES,
         iterations: int = ITERATIONS,
-        velocity: Literal["constricted", "inertia"] = "constricted",
+        velocity: Literal["constricted", "inertia", "original"] = "constricted",
         phi: float = PHI,
         inertia: float = INERTIA,
         acceleration: float = ACCELERATION,
@@ -50,7 +50,7 @@ class PSO:
     ) -> None:
         at_least("particles", particles, 1)
         at_least("iterations", iterations, 1)
-        one_of("velocity", velocity, ("constricted", "inertia"))
+        one_of("velocity", velocity, ("constricted", "inertia", "original"))
         if not phi > 4.0:
             raise ValueError(f"phi must be above 4, got {phi}")
         if not inertia > 0.1:
@@ -58,8 +58,8 @@ class PSO:
         at_least("acceleration", acceleration, 0.0)
         positive("alpha", alpha)
         at_least("redraws", redraws, 0)
-        self._chi = constriction(phi) if velocity == "constricted" else None
-        self._phi, self._inertia, self._acceleration = phi, inertia, acceleration
+        self._kind, self._chi, self._phi = velocity, constriction(phi), phi
+        self._inertia, self._acceleration = inertia, acceleration
         self._iteration, self._iterations = 0, iterations
         limits = speed_limits(space, alpha, "symmetric")
         self._flock = Flock(space, rng, particles, limits, redraws, "dimension")
@@ -77,7 +77,9 @@ class PSO:
 
     def _weights(self) -> tuple[float, float]:
         """Return what multiplies the old velocity, and each of the two random pulls."""
-        if self._chi is not None:
+        if self._kind == "constricted":
             return self._chi, self._chi * self._phi / 2.0  # CLERC2002 (velocity)
+        if self._kind == "original":
+            return 1.0, self._acceleration  # KENNEDY1995 (velocity)
         step = min(self._iteration, self._iterations)
         return inertia(step, self._iterations, self._inertia), self._acceleration

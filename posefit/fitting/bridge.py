@@ -54,7 +54,8 @@ class Bridge:
 
     def ask(self) -> Array | None:
         """Return the proposals (n, d) whose costs the library waits for; None once it has ended."""
-        if self._line is None or not self._line.thread.is_alive():  # never begun, copied, or in a forked process
+        ended = self._line is not None and self._asked is None
+        if not ended and (self._line is None or not self._line.thread.is_alive()):  # not begun, copied, or forked
             self._line = _Line(self._library)
             weakref.finalize(self, self._line.close)
             self._asked = self._line.question()

@@ -1,7 +1,7 @@
 """The methods that the README compares, at one budget: `python -m posefit.study.methods CMU_DIR [given]`.
 
-Five optimisers in three priors follow a walk and a run of CMU, seen from three sides, with five seeds each. With `given`
-the first frame starts around the true pose, as in papers that begin by hand; without, it has to be found.
+Five optimisers in three priors follow a walk and a run of CMU, seen from three sides, with five seeds each. With
+`given` the first frame starts around the true pose, as in papers that begin by hand; without, it has to be found.
 """
 
 import sys

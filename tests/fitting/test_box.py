@@ -1,0 +1,108 @@
+"""Ways to draw from a box of which only some is feasible: they always end, and what they give is allowed."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from posefit import SearchSpace, Start
+from posefit.fitting import box
+from posefit.geometry.rotation import Array
+from posefit.motion import library
+from posefit.testing.toy import Toy, anywhere, ball, shell
+from posefit_priors.pca import PCA
+
+
+def nowhere(proposals: Array) -> Array:
+    return np.zeros(len(proposals), dtype=bool)
+
+
+def corner(proposals: Array) -> Array:
+    return np.asarray((proposals > 0.9).all(axis=1))
+
+
+@given(st.floats(-50.0, 50.0))
+def test_folding_mirrors_at_the_sides(x: float) -> None:
+    folded = box.fold(Toy(1), np.array([[x]]))[0, 0]
+    assert -1.0 <= folded <= 1.0
+    # a triangle wave of period 4: the angle whose sine runs from -1 to 1 with it
+    assert np.arcsin(np.sin(0.5 * np.pi * x)) == pytest.approx(0.5 * np.pi * folded, abs=1e-6)
+
+
+def test_folding_leaves_the_inside_and_wraps_what_is_periodic() -> None:
+    space = Toy(2, wrapping=1)
+    np.testing.assert_allclose(box.fold(space, np.array([[1.2, 1.2], [0.3, -0.4]])), [[-0.8, 0.8], [0.3, -0.4]])
+
+
+def test_a_scatter_is_normal_around_its_means() -> None:
+    means = np.repeat([[0.2, -0.3], [-0.5, 0.4]], 20_000, axis=0)
+    drawn = Toy(2).scatter(np.random.default_rng(0), means, np.array([0.05, 0.1]))
+    for rows in (slice(0, 20_000), slice(20_000, None)):
+        np.testing.assert_allclose(drawn[rows].mean(axis=0), means[rows][0], atol=3e-3)
+        np.testing.assert_allclose(drawn[rows].std(axis=0), [0.05, 0.1], rtol=0.03)
+
+
+def test_a_scatter_is_feasible_and_redraws_only_what_is_not() -> None:
+    space = Toy(3, ball)
+    means = space.draw(np.random.default_rng(0), 500)
+    drawn = space.scatter(np.random.default_rng(1), means, np.full(3, 0.3))
+    assert space.feasible(drawn).all()
+    free = Toy(3).scatter(np.random.default_rng(1), means, np.full(3, 0.3))
+    kept = space.feasible(free)
+    assert 0.5 < kept.mean() < 1.0
+    np.testing.assert_array_equal(drawn[kept], free[kept])
+
+
+def test_a_scatter_that_finds_nothing_stays_at_its_means() -> None:
+    means = np.zeros((4, 2))
+    drawn = Toy(2, nowhere).scatter(np.random.default_rng(0), means, np.full(2, 0.1))
+    np.testing.assert_array_equal(drawn, means)
+
+
+def test_a_repair_moves_to_the_farthest_feasible_point_of_the_line() -> None:
+    space, home = Toy(1, lambda x: np.asarray(np.abs(x[:, 0]) < 0.5)), np.zeros(1)
+    mended = space.repair(np.array([[0.2], [0.9], [-3.0], [np.nan]]), home)
+    # of 32 points on the way from 0 to 0.9 the 17th is the last below 0.5; from 0 to -1 the 15th
+    np.testing.assert_allclose(mended[:, 0], [0.2, 0.9 * 17 / 32, -15 / 32, 0.0])
+
+
+@pytest.mark.parametrize("rule", [anywhere, ball, shell, corner])
+@pytest.mark.parametrize("wrapping", [0, 1])
+def test_a_repair_is_always_feasible(rule: box.Space, wrapping: int) -> None:
+    space = Toy(2, rule, wrapping=wrapping)  # type: ignore[arg-type]
+    home = {
+        anywhere: [0.0, 0.0],
+        ball: [0.1, 0.1],
+        shell: [0.3 + np.sqrt(0.1), 0.3 - np.sqrt(0.1)],
+        corner: [0.95, 0.95],
+    }[rule]  # type: ignore[index]
+    proposals = np.random.default_rng(0).normal(0.0, 3.0, (300, 2))
+    kept = proposals.copy()
+    assert space.feasible(space.repair(proposals, np.array(home))).all()
+    np.testing.assert_array_equal(proposals, kept)
+
+
+def test_a_draw_from_a_start_on_the_edge_of_many_dimensions_is_no_heap_of_copies() -> None:
+    start = Start(np.ones(50), np.full(50, 0.1), np.zeros(50))
+    drawn = Toy(50, start=start).draw(np.random.default_rng(0), 40)
+    assert len(np.unique(drawn, axis=0)) == 40
+    assert (np.abs(drawn) <= 1.0).all()
+
+
+def test_a_draw_where_nothing_is_feasible_says_so() -> None:
+    with pytest.raises(ValueError, match="some of its range feasible, got none"):
+        Toy(2, nowhere).draw(np.random.default_rng(0), 3)
+
+
+def test_moving_to_another_box_keeps_the_pose() -> None:
+    motion = library.built_in("walk-a")
+    prior = PCA().fit(motion.poses[:, 3:])
+    old = SearchSpace(prior, np.zeros(3), np.radians([180.0, 15.0, 15.0]), np.array([0.0, 1.0, 0.0]), "searched")
+    new = SearchSpace(
+        prior, np.array([0.3, 0.0, 0.0]), np.radians([45.0, 15.0, 15.0]), np.array([0.1, 1.0, 0.0]), "searched"
+    )
+    proposals = old.draw(np.random.default_rng(0), 200) * np.array([0.1] + [0.5] * 11)
+    poses, places = old.decode(proposals)
+    moved_poses, moved_places = new.decode(new.moved(proposals, old))
+    np.testing.assert_allclose(moved_poses, poses, atol=1e-12)
+    np.testing.assert_allclose(moved_places, places, atol=1e-12)

@@ -1,0 +1,158 @@
+"""A library that calls the objective itself is asked and told, and leaves nothing behind."""
+
+import copy
+import gc
+import os
+import pickle
+import threading
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit import minimise
+from posefit.fitting.bridge import Bridge, Bridged, GlobalRandom, bearable
+from posefit.geometry.rotation import Array
+from posefit.testing.toy import Toy, ball, sphere
+
+
+def climbs(space: Toy, rng: np.random.Generator, objective: Any) -> None:
+    """A library as they are: it calls the objective, and returns at the end."""
+    place, cost = np.zeros(space.dimensions), np.inf
+    for _ in range(20):
+        near = place + 0.3 * rng.standard_normal((5, space.dimensions))
+        costs = objective(near)
+        if costs.min() < cost:
+            place, cost = near[costs.argmin()], costs.min()
+
+
+def fails(space: Toy, rng: np.random.Generator, objective: Any) -> None:
+    objective(np.zeros((2, space.dimensions)))
+    raise OSError("out of paper")
+
+
+def bridges() -> int:
+    gc.collect()
+    return sum(thread.name == "posefit bridge" for thread in threading.enumerate())
+
+
+def test_a_library_is_asked_and_told_until_it_ends() -> None:
+    best = minimise(sphere, Bridged(Toy(3), np.random.default_rng(0), climbs), 10_000)
+    assert best.evaluations == 100
+    assert best.cost < 2.0
+
+
+def test_costs_reach_the_proposals_they_belong_to() -> None:
+    seen: list[tuple[Array, Array]] = []
+
+    def library(objective: Any) -> None:
+        for k in range(5):
+            asked = np.full((3, 2), 0.1 * k) + [[0.0], [0.01], [0.02]]
+            seen.append((asked, objective(asked)))
+
+    bridge = Bridge(library)
+    while (asked := bridge.ask()) is not None:
+        np.testing.assert_array_equal(bridge.ask(), asked)  # asking again changes nothing
+        bridge.tell(asked.sum(axis=1))
+    assert len(seen) == 5
+    for asked, costs in seen:
+        np.testing.assert_array_equal(costs, asked.sum(axis=1))
+
+
+@pytest.mark.parametrize("steps", [0, 1, 7, 20])
+def test_no_thread_outlives_its_search(steps: int) -> None:
+    before = bridges()
+    for seed in range(5):
+        optimiser = Bridged(Toy(3), np.random.default_rng(seed), climbs)
+        for _ in range(steps):
+            proposals = optimiser.ask()
+            optimiser.tell(proposals, sphere(proposals))
+    del optimiser
+    assert bridges() == before
+
+
+def test_no_thread_outlives_an_error_in_the_search() -> None:
+    before = bridges()
+
+    def breaks(proposals: Array) -> Array:
+        raise RuntimeError("the cost failed")
+
+    with pytest.raises(RuntimeError, match="the cost failed"):
+        minimise(breaks, Bridged(Toy(3), np.random.default_rng(0), climbs), 100)
+    assert bridges() == before
+
+
+def test_what_the_library_raises_is_raised_where_it_is_asked() -> None:
+    with pytest.raises(RuntimeError, match="the library failed: OSError: out of paper"):
+        minimise(sphere, Bridged(Toy(3), np.random.default_rng(0), fails), 100)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_a_copy_goes_on_as_the_original(copied: Any) -> None:
+    first = Bridged(Toy(3, ball), np.random.default_rng(0), climbs)
+    for _ in range(4):
+        proposals = first.ask()
+        first.tell(proposals, sphere(proposals))
+    second = copied(first)
+    for _ in range(5):
+        proposals = first.ask()
+        np.testing.assert_array_equal(second.ask(), proposals)
+        first.tell(proposals, sphere(proposals))
+        second.tell(proposals, sphere(proposals))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
+def test_a_forked_process_goes_on_by_itself() -> None:
+    optimiser = Bridged(Toy(3), np.random.default_rng(0), climbs)
+    optimiser.tell(optimiser.ask(), np.arange(5.0))
+    expected = optimiser.ask()
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if np.array_equal(optimiser.ask(), expected) else 1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def test_a_tell_that_does_not_fit_is_refused() -> None:
+    optimiser = Bridged(Toy(3), np.random.default_rng(0), climbs)
+    with pytest.raises(ValueError, match="tell must follow ask"):
+        optimiser.tell(np.zeros((5, 3)), np.zeros(5))
+    optimiser.ask()
+    with pytest.raises(ValueError, match="tell must get 5 costs, got 3"):
+        optimiser.tell(np.zeros((3, 3)), np.zeros(3))
+
+
+def test_proposals_are_feasible_though_the_library_knows_nothing_of_it() -> None:
+    space = Toy(3, ball)
+    optimiser = Bridged(space, np.random.default_rng(0), climbs)
+    for _ in range(20):
+        proposals = optimiser.ask()
+        assert space.feasible(proposals).all()
+        optimiser.tell(proposals, -sphere(proposals))
+
+
+def test_no_library_sees_a_cost_it_cannot_bear() -> None:
+    np.testing.assert_array_equal(
+        bearable(np.array([3.0, np.nan, np.inf, -np.inf, 1e300])), [3.0, 1e15, 1e15, -1e15, 1e15]
+    )
+
+
+def test_a_borrowed_global_generator_is_put_back() -> None:
+    def draws(generator: GlobalRandom) -> list[float]:
+        with generator:
+            return [float(np.random.rand()) for _ in range(2)]  # noqa: NPY002
+
+    before = np.random.get_state()[1].copy()  # type: ignore[index, union-attr]  # noqa: NPY002
+    one, other = GlobalRandom(5), GlobalRandom(5)
+    first = draws(one)
+    assert draws(other) == first
+    assert draws(one) != first  # it goes on
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # type: ignore[index]  # noqa: NPY002
+
+
+def test_partial_libraries_are_called_with_space_generator_and_objective() -> None:
+    def library(extra: int, space: Toy, rng: np.random.Generator, objective: Any) -> None:
+        objective(np.full((extra, space.dimensions), rng.uniform(0.0, 0.1)))
+
+    assert Bridged(Toy(2), np.random.default_rng(0), partial(library, 7)).ask().shape == (7, 2)

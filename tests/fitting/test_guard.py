@@ -1,0 +1,73 @@
+"""Whatever somebody's optimiser does wrong ends with one line that names it and the rule."""
+
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit import minimise
+from posefit.fitting.guard import BrokenRuleError, Guarded
+from posefit.testing.toy import Toy, sphere
+
+
+class Answers:
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def ask(self) -> Any:
+        return self.answer() if callable(self.answer) else self.answer
+
+    def tell(self, proposals: Any, costs: Any) -> None:
+        if isinstance(self.answer, np.ndarray) and self.answer[0, 0] == 0.25:
+            raise KeyError("lost")
+
+
+def forever() -> None:
+    while True:
+        time.sleep(0.01)
+
+
+def fails() -> None:
+    raise ZeroDivisionError("division by zero")
+
+
+@pytest.mark.parametrize(
+    ("answer", "rule"),
+    [
+        (np.zeros((40, 8)), r"ask must return an array of shape \(n, 9\), got shape \(40, 8\)"),
+        (np.zeros(9), r"ask must return an array of shape \(n, 9\), got shape \(9,\)"),
+        ([[0.0] * 9], r"ask must return an array of shape \(n, 9\), got list"),
+        (None, r"ask must return an array of shape \(n, 9\), got NoneType"),
+        (np.zeros((4, 9), dtype=int), "ask must return numbers of type float64, got int64"),
+        (np.full((4, 9), 1.5), r"ask must return proposals in \[-1, 1\], got 1.5"),
+        (np.full((4, 9), -np.inf), r"ask must return proposals in \[-1, 1\], got -inf"),
+        (np.full((4, 9), np.nan), "ask must return finite proposals, got nan"),
+        (np.full((4, 9), 0.25), "tell must not fail, got KeyError: 'lost'"),
+        (fails, "ask must not fail, got ZeroDivisionError: division by zero"),
+        (forever, "ask must return within 0.2 s, and did not"),
+    ],
+)
+def test_a_broken_rule_is_named(answer: Any, rule: str) -> None:
+    guarded = Guarded(Answers(answer), Toy(9), "optimiser 'bad' of posefit-bad 1.0", 0.2)
+    with pytest.raises(BrokenRuleError, match=rf"^optimiser 'bad' of posefit-bad 1.0: {rule}$"):
+        minimise(sphere, guarded, 40)
+
+
+def test_an_empty_population_is_no_mistake() -> None:
+    assert Guarded(Answers(np.empty((0, 9))), Toy(9), "it").ask().shape == (0, 9)
+
+
+def test_without_a_main_thread_there_is_no_limit_but_it_works() -> None:
+    found: list[Any] = []
+    guarded = Guarded(Answers(np.zeros((4, 9))), Toy(9), "it", 0.2)
+    thread = threading.Thread(target=lambda: found.append(guarded.ask()))
+    thread.start()
+    thread.join()
+    assert found[0].shape == (4, 9)
+
+
+def test_a_filter_without_advance_is_named() -> None:
+    with pytest.raises(BrokenRuleError, match="advance must not fail, got AttributeError"):
+        Guarded(Answers(np.zeros((4, 9))), Toy(9), "it").advance(Toy(9))

@@ -1,0 +1,159 @@
+"""Gordon et al. 1993 and Deutscher and Reid 2005: each step by hand, by law, or against a Kalman filter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefit import Start
+from posefit.geometry.rotation import Array
+from posefit.testing.toy import Toy, ball, sphere
+from posefit_filters.annealed import Annealed
+from posefit_filters.particle import Particle
+from posefit_filters.weights import sharpness, survival, systematic, weigh
+
+
+def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (likelihood)
+    # e^-0 : e^-ln2 : e^-ln4 = 4 : 2 : 1
+    np.testing.assert_allclose(weigh(np.log([1.0, 2.0, 4.0]), 1.0), [4 / 7, 2 / 7, 1 / 7])
+    np.testing.assert_allclose(weigh(np.log([1.0, 2.0, 4.0]) + 900.0, 2.0), [16 / 21, 4 / 21, 1 / 21])
+    np.testing.assert_allclose(weigh(np.array([0.0, np.nan, np.inf]), 1.0), [1.0, 0.0, 0.0])
+    np.testing.assert_allclose(weigh(np.array([np.nan, np.inf]), 1.0), [0.5, 0.5])
+
+
+def test_resampling_gives_each_particle_its_share() -> None:  # GORDON1993 (resampling)
+    weights = np.array([0.5, 0.3, 0.15, 0.05])
+    teeth = np.linspace(0.0, 1.0, 2000, endpoint=False)
+    counts = np.array([np.bincount(systematic(weights, u), minlength=4) for u in teeth])
+    np.testing.assert_allclose(counts.mean(axis=0), 4 * weights, atol=2e-3)
+    assert (np.abs(counts - 4 * weights) < 1.0 + 1e-12).all()  # never off by a whole particle
+    assert systematic(np.array([0.0, 1.0, 0.0]), 0.999).tolist() == [1, 1, 1]
+
+
+def test_particles_move_by_normal_noise() -> None:  # GORDON1993 (motion)
+    space = Toy(2, start=Start(np.zeros(2), np.full(2, 1e-6), np.array([0.3, -0.2])))
+    for drift, mean in ((0.0, [0.0, 0.0]), (1.0, [0.3, -0.2])):
+        particle = Particle(space, np.random.default_rng(0), evaluations=20_000, noise=0.05, drift=drift)
+        particle.tell(particle.ask(), np.zeros(20_000))
+        particle.advance(space)
+        moved = particle.ask()
+        np.testing.assert_allclose(moved.mean(axis=0), mean, atol=2e-3)
+        np.testing.assert_allclose(moved.std(axis=0), 0.05, rtol=0.02)
+
+
+def test_the_filter_agrees_with_a_kalman_filter() -> None:
+    # x_t = x_{t-1} + N(0, q^2), y_t = x_t + N(0, r^2), x_0 uniform on the box, all far from its sides
+    q, r, rng = 0.05, 0.1, np.random.default_rng(1)
+    truth = 0.2 + np.cumsum(q * rng.standard_normal(15))
+    seen = truth + r * rng.standard_normal(15)
+    space = Toy(1)
+    particle = Particle(space, np.random.default_rng(0), evaluations=40_000, sharpness=1.0, noise=q)
+    mean, variance = seen[0], r**2  # a flat first belief leaves the first observation
+    for t, y in enumerate(seen):
+        if t:
+            particle.advance(space)
+            variance += q**2
+            gain = variance / (variance + r**2)
+            mean, variance = mean + gain * (y - mean), (1.0 - gain) * variance
+        proposals = particle.ask()
+        particle.tell(proposals, (proposals[:, 0] - y) ** 2 / (2.0 * r**2))
+        assert particle._weights @ proposals[:, 0] == pytest.approx(mean, abs=5e-3)
+    spread = np.sqrt(particle._weights @ (proposals[:, 0] - mean) ** 2)
+    assert spread == pytest.approx(np.sqrt(variance), rel=0.05)
+
+
+def test_survival_is_the_effective_share_of_particles() -> None:  # DEUTSCHER2005 (survival)
+    assert survival(np.full(8, 1 / 8)) == pytest.approx(1.0)
+    assert survival(np.array([1.0, 0.0, 0.0, 0.0])) == pytest.approx(0.25)
+    assert survival(np.array([0.5, 0.5, 0.0, 0.0])) == pytest.approx(0.5)
+    # 1 / (0.36 + 0.09 + 0.01) / 3 = 0.724638
+    assert survival(np.array([0.6, 0.3, 0.1])) == pytest.approx(0.724638, abs=1e-6)
+
+
+@pytest.mark.parametrize("wanted", [0.1, 0.3, 0.5, 0.9])
+def test_beta_lets_the_wanted_share_survive(wanted: float) -> None:  # DEUTSCHER2005 (beta)
+    costs = np.random.default_rng(0).exponential(5.0, 300)
+    beta = sharpness(costs, wanted)
+    assert survival(weigh(costs, beta)) == pytest.approx(wanted, abs=1e-9)
+    assert sharpness(10.0 * costs, wanted) == pytest.approx(beta / 10.0)  # the cost's own scale does not matter
+
+
+def test_beta_has_an_answer_where_no_share_can_be_had() -> None:  # DEUTSCHER2005 (beta)
+    assert sharpness(np.array([1.0, np.inf, np.nan, np.inf]), 0.5) == 0.0  # a quarter survives at most
+    assert sharpness(np.zeros(10), 0.5) > 1e12  # all survive at any beta
+    assert sharpness(np.full(4, np.nan), 0.5) > 1e12
+
+
+def annealed(particles: Array, **settings: float) -> Annealed:
+    """Return a filter of one layer more than has been told, with these particles."""
+    layers = int(settings.pop("layers", 2))
+    made = Annealed(
+        Toy(particles.shape[1]),
+        np.random.default_rng(0),
+        evaluations=layers * len(particles),
+        layers=layers,
+        **settings,
+    )  # type: ignore[arg-type]
+    made._particles = particles
+    return made
+
+
+def test_noise_is_a_multiple_of_the_particles_own_spread() -> None:  # DEUTSCHER2005 (diffusion)
+    scale = np.array([0.01, 0.05])
+    particles = scale * np.random.default_rng(1).standard_normal((20_000, 2))
+    made = annealed(particles.copy(), diffusion=0.5)
+    made.tell(particles, np.zeros(len(particles)))  # equal costs: all survive, once each
+    step = made.ask() - particles
+    np.testing.assert_allclose(step.std(axis=0), 0.5 * particles.std(axis=0), rtol=0.02)
+
+
+def test_noise_shrinks_where_the_particles_agree() -> None:  # DEUTSCHER2005 (diffusion)
+    space = Toy(4)
+    made = Annealed(space, np.random.default_rng(0), evaluations=5000, layers=10)
+    spreads, betas = [], []
+    while len(proposals := made.ask()):
+        costs = sphere(proposals)
+        spreads.append(proposals.std(axis=0).mean())
+        betas.append(sharpness(costs, 0.5))
+        made.tell(proposals, costs)
+    assert len(spreads) == 10
+    assert (np.diff(spreads) < 0.0).all()
+    assert (np.diff(betas) > 0.0).all()  # so the likelihood sharpens from layer to layer
+
+
+def test_crossover_trades_a_run_of_coordinates() -> None:  # DEUTSCHER2005 (crossover)
+    particles = np.repeat(np.linspace(-0.9, 0.9, 50)[:, None], 6, axis=1)  # a row is one number, six times
+    children = annealed(particles)._traded(particles)
+    mixed = 0
+    for child, parent in zip(children, particles, strict=True):
+        foreign = child != parent
+        mixed += foreign.any()
+        assert len(np.unique(child[foreign])) <= 1  # one partner
+        assert (np.diff(foreign.astype(int)) == 1).sum() + foreign[0] <= 1  # one run
+    assert mixed > 25
+    made = annealed(particles)
+    made._space = Toy(6, ball)
+    allowed = particles[ball(particles)]
+    assert ball(made._traded(allowed)).all()
+
+
+def test_survivors_enter_the_next_frame_with_the_noise_of_a_motion() -> None:  # DEUTSCHER2005 (next frame)
+    particles = np.zeros((20_000, 2))
+    made = annealed(particles, noise=0.07, layers=1)
+    made.tell(particles, np.zeros(len(particles)))
+    assert not len(made.ask())
+    made.advance(Toy(2))
+    np.testing.assert_allclose(made.ask().std(axis=0), 0.07, rtol=0.02)
+
+
+def test_a_frames_particles_are_carried_into_a_box_that_has_moved() -> None:
+    class Moved(Toy):
+        def moved(self, proposals: Array, origin: object) -> Array:
+            return proposals - 0.25
+
+    space = Toy(2, start=Start(np.full(2, 0.5), np.full(2, 1e-9), np.zeros(2)))
+    particle = Particle(space, np.random.default_rng(0), evaluations=500, noise=1e-9)
+    particle.tell(particle.ask(), np.zeros(500))
+    particle.advance(Moved(2))
+    np.testing.assert_allclose(particle.ask(), 0.25, atol=1e-6)
+    assert replace(space, start=None).start is None

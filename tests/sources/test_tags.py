@@ -1,0 +1,42 @@
+"""Every equation and step that an optimiser takes from a publication has one home, and a test of its name."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TAGS = (
+    "KENNEDY1995 (pbest, gbest)",
+    "KENNEDY1995 (velocity)",
+    "CLERC2002 (constriction)",
+    "CLERC2002 (velocity)",
+    "GORDON1993 (likelihood)",
+    "GORDON1993 (resampling)",
+    "GORDON1993 (motion)",
+    "DEUTSCHER2005 (survival)",
+    "DEUTSCHER2005 (beta)",
+    "DEUTSCHER2005 (diffusion)",
+    "DEUTSCHER2005 (crossover)",
+    "DEUTSCHER2005 (next frame)",
+    "HANSEN2016 (population)",
+    "HANSEN2016 (sampling)",
+    "HANSEN2016 (update)",
+    "AUGER2005 (restart)",
+)
+
+
+def lines(folder: str) -> list[str]:
+    return [line for path in sorted((ROOT / folder).rglob("*.py")) for line in path.read_text("utf-8").splitlines()]
+
+
+@pytest.mark.parametrize("tag", TAGS)
+def test_a_tag_has_one_home_and_a_test(tag: str) -> None:
+    assert sum(line.endswith(f"# {tag}") for line in lines("plugins")) == 1
+    tests = [path for path in (ROOT / "tests" / "sources").glob("test_*.py") if path.name != Path(__file__).name]
+    assert any(re.search(rf"def test_.*\n?.*# {re.escape(tag)}", path.read_text("utf-8")) for path in tests), tag
+
+
+def test_no_tag_is_missing_from_this_list() -> None:
+    found = {match[1] for line in lines("plugins") if (match := re.search(r"# ([A-Z]+\d{4} \(.*\))$", line))}
+    assert found == set(TAGS)
