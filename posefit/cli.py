@@ -125,18 +125,19 @@ def fit(as_json: bool, **options: Any) -> None:
 @click.option("--threads", type=int, help="How many `all threads` are; by default every core.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def bench(threads: int | None, as_json: bool) -> None:
-    """Time the kernel, the OpenCV way and a SAPSO frame, all in one run."""
+    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run."""
     from posefit.study.bench import bench as run
 
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, got {threads}")
-    _say("timing; this takes about ten seconds ...")
+    _say("timing; this takes half a minute ...")
     figures = run(threads)
     if as_json:
         click.echo(json.dumps(figures))
         return
-    for name, value in figures.items():
-        click.echo(f"{name:34} {value:.4g}" if isinstance(value, float) else f"{name:34} {value}")
+    optimisers = figures.pop("optimisers")
+    for name, value in {**figures, **{f"{name}, us a proposal": us for name, us in optimisers.items()}}.items():
+        click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
 
 
 @main.group(invoke_without_command=True)

@@ -8,7 +8,6 @@ import math
 from typing import Any
 
 import numpy as np
-from cmaes import CMA
 
 from posefit.fitting.box import Space
 from posefit.fitting.bridge import bearable
@@ -17,6 +16,12 @@ from posefit.geometry.rotation import Array
 
 SPREAD = 0.5  # sigma_0 in an unknown place, in half-ranges of the box
 GROWTH = 2  # IPOP: each restart has a population so many times as large
+
+
+def _library(*arguments: Any, **settings: Any) -> Any:
+    from cmaes import CMA  # here, as it loads scipy.stats, which takes more than a second
+
+    return CMA(*arguments, **settings)
 
 
 class CMAES:
@@ -53,7 +58,7 @@ class CMAES:
             self._home = start.mean.copy()
         size = math.sqrt(float((spread**2).mean()))
         covariance = np.diag(np.maximum(spread / size, 1e-6) ** 2)
-        self._strategy = CMA(self._home.copy(), size, population_size=self._population, cov=covariance)
+        self._strategy = _library(self._home.copy(), size, population_size=self._population, cov=covariance)
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
@@ -83,5 +88,5 @@ class CMAES:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._strategy = CMA(np.zeros(2), 1.0)
+        self._strategy = _library(np.zeros(2), 1.0)
         self._strategy.__dict__.update(state["_strategy"])

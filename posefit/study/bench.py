@@ -17,7 +17,8 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import PARENTS
 from posefit.motion import library
-from posefit.registry import registry
+from posefit.registry import Offer, registry
+from posefit.settings import planned
 from posefit.silhouette.cost import mismatch, project
 from posefit.silhouette.mask import Silhouette
 
@@ -26,6 +27,8 @@ POSES = 1000
 PARTICLES, ITERATIONS = 40, 60
 SEEDS = 8  # a frame's time is the mean over so many
 ROUNDS = 12  # of all jobs in turn; of each, the fastest run counts
+POPULATIONS, SEARCHES = 30, 10  # of each optimiser
+PATIENCE = 3.0  # seconds for one optimiser; a slow one has fewer searches
 TURN = 0.05  # seconds; a job runs again until its turn is over
 
 
@@ -83,6 +86,46 @@ def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:
     return mismatch(areas)
 
 
+def optimiser_us(space: SearchSpace) -> dict[str, float]:
+    """Return what ask and tell take a proposal, in microseconds, of each optimiser that is installed.
+
+    Populations of 40 (for `scipy:dual_annealing` 1), as the cost a distance that takes no time to speak of; of a
+    filter, with the step to the next frame. The best of several searches, on one thread.
+    """
+    found = registry().offers["optimiser"]
+    names = [name for name, offer in found.items() if not offer.missing] + ["scipy:dual_annealing"]
+    return {name: 1e6 * _ask_and_tell(space, registry().offer("optimiser", name)) for name in names}
+
+
+def _ask_and_tell(space: SearchSpace, offer: Offer) -> float:
+    known = {setting.name for setting in offer.settings}
+    populations = POPULATIONS if "layers" not in known else POPULATIONS // 10
+    sizes: dict[str, Any] = {name: PARTICLES for name in ("particles", "population") if name in known}
+    budget = PARTICLES * (10 if "layers" in known else 1 if offer.next_frame == "carry" else POPULATIONS + 1)
+    fastest = np.inf
+    began = time.perf_counter()
+    for seed in range(SEARCHES):
+        optimiser = offer.factory(space, np.random.default_rng(seed), **planned(offer.factory, sizes, budget))
+        spent, count = 0.0, 0
+        for _ in range(populations):
+            spent -= time.perf_counter()
+            while len(proposals := optimiser.ask()):
+                spent += time.perf_counter()
+                costs = 50.0 * (proposals**2).mean(axis=1)
+                count += len(proposals)
+                spent -= time.perf_counter()
+                optimiser.tell(proposals, costs)
+                if offer.next_frame != "carry":
+                    break
+            if offer.next_frame == "carry":
+                optimiser.advance(space)
+            spent += time.perf_counter()
+        fastest = min(fastest, spent / max(count, 1))
+        if time.perf_counter() - began > PATIENCE:
+            break
+    return float(fastest)
+
+
 def bench(threads: int | None = None) -> dict[str, Any]:
     """Return the timings; `threads` is how many "all" are, by default every core this process may use.
 
@@ -137,6 +180,7 @@ def bench(threads: int | None = None) -> dict[str, Any]:
         "threads_speedup": seconds["one"] / seconds["all"],
         "poses_per_second_1_thread": 1.0 / one,
         "mean_cost_difference_to_opencv": float(difference.mean()),
+        "optimisers": {name: round(us, 3) for name, us in optimiser_us(alone.space).items()},
         "size": list(SIZE),
         "poses": POSES,
     }

@@ -71,7 +71,7 @@ class Evaluation:
         summary |= {
             "evaluations": used,
             "seconds_per_frame": seconds / len(frames),
-            "evaluations_per_second": used / seconds,
+            "evaluations_per_second": used / max(seconds, 1e-9),  # a tracker of somebody else may say 0
         }
         if len(frames) == 1:
             summary["history"] = frames[0].history.tolist()

@@ -1,6 +1,6 @@
 """Plugins come in by one door, and a broken one costs a warning."""
 
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -81,6 +81,93 @@ def test_an_unknown_name_lists_the_known_and_the_nearest() -> None:
         load(
             EntryPoint(f"p{k}", module, "posefit") for k, module in enumerate(["posefit_swarm", "posefit_priors"])
         ).optimiser("sapzo")
+
+
+def test_the_registry_says_what_becomes_of_an_optimiser_in_the_next_frame() -> None:
+    said = {name: offer.next_frame for name, offer in registry().offers["optimiser"].items()}
+    assert {said[name] for name in ("sapso", "pso", "cma", "scipy")} == {"start"}
+    assert {said[name] for name in ("particle", "annealed")} == {"carry"}
+    assert said["random"] == "forget"
+
+
+@pytest.mark.parametrize(
+    ("variables", "loaded"),
+    [
+        ({}, {"posefit-a", "posefit-b"}),
+        ({"POSEFIT_LOAD_PLUGINS": "a"}, {"posefit-a"}),
+        ({"POSEFIT_LOAD_PLUGINS": "posefit-b, x"}, {"posefit-b"}),
+        ({"POSEFIT_LOAD_PLUGINS": ""}, set()),
+        ({"POSEFIT_BLOCK_PLUGINS": "b"}, {"posefit-a"}),
+        ({"POSEFIT_BLOCK_PLUGINS": "Posefit-A,b"}, set()),
+        ({"POSEFIT_LOAD_PLUGINS": "a,b", "POSEFIT_BLOCK_PLUGINS": "a"}, {"posefit-b"}),
+    ],
+)
+def test_variables_choose_what_is_loaded(variables: dict[str, str], loaded: set[str]) -> None:
+    found = load([Point("a", offering("one")), Point("b", offering("two"))], variables)  # type: ignore[list-item]
+    assert {plugin.distribution for plugin in found.plugins if plugin.state == "loaded"} == loaded
+    assert {offer.distribution for offer in found.offers["optimiser"].values()} == loaded
+    assert all("names it" in one.cause or "not name it" in one.cause for one in found.plugins if one.state != "loaded")
+
+
+def test_built_ins_are_loaded_whatever_the_load_variable_says_but_may_be_blocked() -> None:
+    points = [point for point in entry_points(group="posefit") if point.name in ("swarm", "priors")]
+    assert "sapso" in load(points, {"POSEFIT_LOAD_PLUGINS": ""}).offers["optimiser"]
+    assert "sapso" not in load(points, {"POSEFIT_BLOCK_PLUGINS": "swarm"}).offers["optimiser"]
+
+
+@pytest.mark.parametrize("value", ["1", "yes"])
+def test_a_broken_plugin_is_an_error_where_plugins_are_strict(value: str) -> None:
+    points: Any = [Point("bad", ImportError("no module named 'lost'"))]
+    with pytest.raises(ValueError, match="plugin 'bad' of posefit-bad 1.0 is left out: ImportError: no module named"):
+        load(points, {"POSEFIT_STRICT_PLUGINS": value})
+    with pytest.warns(UserWarning, match="posefit-bad"):
+        assert load(points, {"POSEFIT_STRICT_PLUGINS": "0"}).plugins[0].state == "broken"
+
+
+def registering(*arguments: Any, **more: Any) -> ModuleType:
+    def posefit_register_optimisers(register: Any) -> None:
+        register(*arguments, **more)
+
+    return plugin(posefit_register_optimisers=posefit_register_optimisers)
+
+
+@pytest.mark.parametrize(
+    ("module", "cause"),
+    [
+        (registering("a.b", PCA), "a name must be letters, digits"),
+        (registering("a:b", PCA), "a name must be letters"),
+        (registering(3, PCA), "a name must be letters"),
+        (registering("a", "PCA"), "optimiser 'a' must be a factory that can be called, got 'PCA'"),
+        (registering("a", PCA, next_frame="stay"), "next_frame must be one of start, carry, forget, got 'stay'"),
+        (registering("a", PCA, colour="red"), "TypeError"),
+        (SystemExit(3), "SystemExit: 3"),
+    ],
+)
+def test_a_registration_that_makes_no_sense_is_left_out(module: Any, cause: str) -> None:
+    if isinstance(module, SystemExit):
+        point = Point("bad", None)
+        point.load = exits  # type: ignore[method-assign]
+    else:
+        point = Point("bad", module)
+    with pytest.warns(UserWarning, match=cause):
+        assert not load([point]).offers["optimiser"]  # type: ignore[list-item]
+
+
+def exits() -> Any:
+    raise SystemExit(3)
+
+
+def test_a_plugin_that_takes_one_name_that_is_taken_is_left_out_whole() -> None:
+    def posefit_register_optimisers(register: Any) -> None:
+        register("new", PCA)
+        register("one", PCA)
+
+    points: Any = [
+        Point("a", offering("one")),
+        Point("b", plugin(posefit_register_optimisers=posefit_register_optimisers)),
+    ]
+    with pytest.warns(UserWarning, match="'one' is already registered by posefit-a"):
+        assert list(load(points).offers["optimiser"]) == ["one"]
 
 
 def test_a_prior_survives_its_file(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -301,6 +302,136 @@ def test_plugins_are_listed() -> None:
         ("prior", "pca"),
     }
     assert "sapso" in run("plugins").stdout
+
+
+def test_plugins_say_where_they_come_from_and_what_can_be_set() -> None:
+    rows = {row["name"]: row for row in json.loads(run("plugins", "--json").stdout)}
+    sapso = rows["sapso"]
+    assert sapso["distribution"] == "posefit"
+    assert sapso["version"] == posefit.__version__
+    assert sapso["next_frame"] == "start"
+    assert {"name": "cooling", "type": "float", "default": 0.95} in sapso["settings"]
+    assert {"name": "cool", "type": "iteration | acceptance", "default": "iteration"} in sapso["settings"]
+    text = run("plugins").stdout
+    assert "optimiser sapso (posefit" in text
+    assert "cooling: float = 0.95" in " ".join(text.split())
+    assert all(len(line) <= 120 for line in text.splitlines())
+    assert all(row["summary"] for row in rows.values())
+
+
+def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = run("plugins", "doctor")
+    assert result.exit_code == 0
+    assert "offers optimiser sapso, optimiser pso, optimiser random" in result.stdout
+    from posefit import registry
+
+    broken = registry.Plugin("bad", "posefit-bad", "1.0", "broken", "ImportError: no module named 'lost'")
+    found = registry.Registry((*registry.registry().plugins, broken))
+    monkeypatch.setattr(registry, "registry", lambda: found)
+    result = run("plugins", "doctor")
+    assert result.exit_code == 1
+    assert "broken    bad (posefit-bad 1.0): ImportError: no module named 'lost'" in result.stdout
+
+
+def test_check_reports_every_rule_and_how_many_ran() -> None:
+    result = run("check", "optimiser", "random")
+    assert result.exit_code == 0, result.output
+    assert "29 checks ran, 0 failed, 5 skipped" in result.stdout
+    assert "it is the baseline itself" in result.stdout
+    report = json.loads(run("check", "prior", "pca", "--set", "components=4", "--json").stdout)
+    assert {"check": "ranges", "outcome": "passed", "detail": "4 latents"} in report["results"]
+    assert "optimiser must be one of" in fails("check", "optimiser", "nothing")
+    assert "a setting of pca must be one of" in fails("check", "prior", "pca", "--set", "colour=red")
+    assert "--set must be SETTING=VALUE" in fails("check", "prior", "pca", "--set", "colour")
+
+
+@pytest.mark.parametrize("kind", ["optimiser", "prior", "tracker"])
+def test_a_new_plugin_installs_offline_and_passes_its_own_test(kind: str, tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    result = run("plugins", "new", "my-own", "--kind", kind, "--out", folder)
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in folder.iterdir()} == {
+        "pyproject.toml",
+        "README.md",
+        "posefit_my_own.py",
+        "test_my_own.py",
+    }
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation"]
+    subprocess.run([*pip, "--target", str(tmp_path / "site"), str(folder)], check=True, capture_output=True)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
+    environment.pop("POSEFIT_LOAD_PLUGINS", None)
+    tests = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_my_own.py"],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert tests.returncode == 0, tests.stdout
+    assert "passed" in tests.stdout
+    used = subprocess.run(
+        [sys.executable, "-m", "posefit", "track", "walk", f"--{kind}", "my-own", "--frames", "0:3", "--json"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert used.returncode == 0, used.stderr
+    assert "my-own" in json.loads(used.stdout)["method"]
+
+
+def test_a_new_plugin_replaces_nothing(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    assert "expected a new folder, got one that exists" in fails("plugins", "new", "a", "--out", tmp_path / "mine")
+    assert list(tmp_path.iterdir()) == [tmp_path / "mine"]
+    assert "name must be small letters" in fails("plugins", "new", "9 lives", "--out", tmp_path / "x")
+    assert "kind must be one of optimiser, prior, tracker, got 'camera'" in fails(
+        "plugins", "new", "a", "--kind", "camera", "--out", tmp_path / "x"
+    )
+    assert not (tmp_path / "x").exists()
+
+
+def test_settings_are_given_by_plugin_and_name() -> None:
+    result = run(
+        "track", "walk", "--frames", "0:2", "--json", *QUICK, "--set", "sapso.cooling=0.5", "--set", "pca.components=4",
+        "--set", "tracker.floor=0.1", "--set", "tracker.root_range_degrees=30,10,10",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    settings = json.loads(result.stdout)["settings"]
+    assert settings["optimiser"]["cooling"] == 0.5
+    assert settings["prior"] == {"components": 4}
+    assert settings["tracker"] == {"floor": 0.1, "root_range_degrees": [30, 10, 10]}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sapso", "--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
+        ("sapso=3", "--set must be NAME.SETTING=VALUE"),
+        ("pso.phi=4.2", "--set must name one of tracker, sapso, pca, which are in use here, got 'pso.phi=4.2'"),
+        ("sapso.coling=1", "did you mean 'cooling'"),
+        ("sapso.cooling=cold", "sapso.cooling must be float, got 'cold'"),
+        ("sapso.cooling=2", "cooling must lie in 0 to 1, got 2"),
+        ("sapso.cool=never", "sapso.cool must be iteration | acceptance, got 'never'"),
+        ("tracker.floor=0", "floor must be above 0, got 0"),
+    ],
+)
+def test_a_setting_that_makes_no_sense_is_one_line(text: str, message: str) -> None:
+    assert message in fails("track", "walk", "--frames", "0:2", *QUICK, "--set", text)
+
+
+def test_evaluations_are_the_same_for_every_method() -> None:
+    used = {}
+    for name in ("sapso", "annealed", "cma"):
+        result = run(
+            "track", "walk", "--frames", "0:2", "--size", "120x90", "--evaluations", 400, "--optimiser", name, "--json"
+        )
+        summary = json.loads(result.stdout)
+        used[name] = summary["evaluations"]
+        assert summary["evaluations_per_frame"] == 400
+    assert used == {"sapso": 800, "annealed": 800, "cma": 800}
+    text = run("track", "walk", "--frames", "0:2", "--size", "120x90", "--evaluations", 415).stdout
+    assert "400 of 415 evaluations" in text
 
 
 def test_help_loads_nothing_heavy() -> None:

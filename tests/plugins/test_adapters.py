@@ -1,0 +1,71 @@
+"""Other people's optimisers: what is said where a library is absent, and that they work in a whole track."""
+
+import subprocess
+import sys
+import threading
+import warnings
+from dataclasses import replace
+from importlib.metadata import EntryPoint
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.registry import Registry, load, registry
+from posefit.testing.toy import Toy
+
+EXTRAS = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna"}
+
+
+@pytest.mark.parametrize("name", EXTRAS)
+def test_an_absent_library_is_named_with_the_extra_to_install(name: str) -> None:
+    found = load([EntryPoint(name, f"posefit_{name}", "posefit")])
+    plugin = found.plugins[0]
+    absent = tuple(replace(offer, needs=(f"no_such_{offer.name}", f"posefit[{offer.name}]")) for offer in plugin.offers)
+    with pytest.raises(ImportError, match=rf"optimiser {name} needs the library .* pip install 'posefit\[{name}\]'"):
+        Registry((replace(plugin, offers=absent),)).optimiser(name)
+    assert found.offers["optimiser"][name].needs == (EXTRAS[name], f"posefit[{name}]")
+
+
+def test_listing_the_adapters_imports_none_of_their_libraries() -> None:
+    script = (
+        "import sys; from posefit.registry import registry; registry();"
+        "print([m for m in ('cma', 'nevergrad', 'pymoo', 'optuna', 'scipy.optimize', 'sklearn') if m in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("name", ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna"])
+def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
+    threads = threading.active_count()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        summary = posefit.track("walk", optimiser=name, frames=(0, 2), size=(120, 90), evaluations=400).summary
+    assert summary["evaluations_per_frame"] == 400
+    assert 720 <= summary["evaluations"] <= 800
+    assert summary["iou"] > 0.5
+    assert threading.active_count() == threads
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("pymoo:NSGA9", "variant must be one of DE, PSO, GA, ES, SRES, ISRES, got 'NSGA9'"),
+        ("optuna:Best", "variant must be one of TPESampler"),
+        ("nevergrad:Best", "variant must be one of [0-9]+ names such as TwoPointsDE, CMA, PSO, got 'Best'"),
+        ("scipy:minimize", "variant must be one of differential_evolution, dual_annealing, got 'minimize'"),
+        ("sapso:fast", "optimiser must be sapso, which has no variants, got 'sapso:fast'"),
+    ],
+)
+def test_an_unknown_variant_is_named(name: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        posefit.track("walk", optimiser=name, frames=(0, 1), size=(60, 45), evaluations=100)
+
+
+def test_a_variant_is_a_setting_too() -> None:
+    offer = registry().offer("optimiser", "pymoo:GA")
+    assert offer.name == "pymoo:GA"
+    assert {setting.name: setting.default for setting in offer.settings}["variant"] == "GA"
+    assert offer.summary == registry().offer("optimiser", "pymoo").summary
+    assert np.isfinite(offer.factory(Toy(3), np.random.default_rng(0)).ask()).all()

@@ -1,0 +1,171 @@
+"""The other priors: all angles, several motions at once, and scikit-learn's transformers."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import Skeleton
+from posefit.motion import library
+from posefit_priors.full import Full
+from posefit_priors.pca import PCA
+from posefit_priors.sklearn import Transformed
+from posefit_priors.union import Union
+
+
+def angles(*names: str) -> Array:
+    return np.concatenate([library.built_in(name).poses[:, 3:] for name in names])
+
+
+def floor(prior: Any, poses: Array) -> float:
+    return float(np.degrees(np.abs(prior.inverse_transform(prior.transform(poses)) - poses)).mean())
+
+
+# full
+
+
+def test_the_full_space_has_the_limits_that_the_skeleton_states() -> None:
+    skeleton = library.average_skeleton()
+    prior = Full().fit(angles("walk-a"), skeleton)
+    assert skeleton.limits is not None
+    # .asf of CMU: the thigh's rx lies in -160 to 20 degrees, and lfemur is the third inner joint
+    assert (np.degrees(skeleton.limits[3, 0]), np.degrees(skeleton.limits[3, 1])) == pytest.approx((-160.0, 20.0))
+    assert np.degrees([prior.low[0], prior.high[0]]) == pytest.approx([-160.0, 20.0])
+    assert len(prior.low) == np.count_nonzero(skeleton.limits[:, 1] > skeleton.limits[:, 0])
+
+
+def test_limits_widen_where_a_training_pose_passes_them() -> None:
+    skeleton, poses = library.average_skeleton(), angles("run-a")
+    prior = Full().fit(poses, skeleton)
+    latents = prior.transform(poses)
+    assert ((latents >= prior.low) & (latents <= prior.high)).all()
+    np.testing.assert_allclose(prior.inverse_transform(latents), poses, atol=1e-12)
+
+
+def test_the_training_range_can_be_taken_instead_with_a_margin() -> None:
+    poses = angles("walk-a")
+    prior = Full(limits="training", margin=0.1).fit(poses)
+    low, high = poses.min(axis=0), poses.max(axis=0)
+    moving = high > low
+    np.testing.assert_allclose(prior.low, (low - 0.1 * (high - low))[moving])
+    np.testing.assert_allclose(prior.high, (high + 0.1 * (high - low))[moving])
+
+
+def test_a_skeleton_without_limits_is_named() -> None:
+    average = library.average_skeleton()
+    bare = Skeleton("bare", average.offsets, average.axes, average.channels)
+    with pytest.raises(
+        ValueError, match="limits must be training where the skeleton states no joint limits, got asf and bare"
+    ):
+        Full().fit(angles("walk-a"), bare)
+    with pytest.raises(ValueError, match="got asf and no skeleton"):
+        Full().fit(angles("walk-a"))
+    with pytest.raises(ValueError, match="angles must differ somewhere"):
+        Full(limits="training").fit(np.zeros((5, 63)))
+
+
+# union
+
+
+@pytest.fixture(scope="module")
+def union() -> Union:
+    return Union().fit(angles("walk-a", "walk-b", "run-a", "run-b"))
+
+
+def test_a_union_covers_each_motion_nearly_as_well_as_a_prior_of_its_own(union: Union) -> None:
+    for styles in (("walk-a", "walk-b"), ("run-a", "run-b")):
+        poses = angles(*styles)
+        own, other = PCA(components=len(union.low)).fit(poses), union
+        assert floor(other, poses) < floor(own, poses) + 0.5
+        assert other.feasible(other.transform(poses)).mean() > 0.95
+
+
+def test_a_prior_of_one_motion_does_not_cover_another() -> None:
+    walk = PCA().fit(angles("walk-a", "walk-b"))
+    assert walk.feasible(walk.transform(angles("run-a"))).mean() < 0.1
+
+
+def test_a_union_has_nothing_feasible_half_way_between_two_motions(union: Union) -> None:
+    rng = np.random.default_rng(0)
+    walk, run = union.transform(angles("walk-a")), union.transform(angles("run-a"))
+    between = 0.5 * (walk[rng.integers(0, len(walk), 400)] + run[rng.integers(0, len(run), 400)])
+    one = PCA(components=len(union.low)).fit(angles("walk-a", "walk-b", "run-a", "run-b"))
+    assert union.feasible(between).mean() < 0.05
+    assert one.feasible(between).mean() > 0.5  # where the paper's constraint lets nearly everything in
+
+
+def test_a_long_clip_does_not_push_a_short_one_out() -> None:
+    walk, run = angles("walk-a"), angles("run-a")
+    many = np.concatenate([np.tile(walk, (20, 1)) + 1e-3 * np.random.default_rng(0).standard_normal((1200, 63)), run])
+    union, one = Union(components=4).fit(many), PCA(components=4).fit(many)
+    assert floor(union, run) < 0.8 * floor(one, run)
+
+
+def test_one_union_tracks_walk_and_run() -> None:
+    for source, others in (
+        ("walk", ("walk-a", "walk-b", "run-a", "run-b")),
+        ("run", ("walk-a", "walk-b", "run-a", "run-b")),
+    ):
+        result = posefit.track(source, train=others, prior="union", frames=(0, 30), view_degrees=45)
+        assert result.summary["error_degrees"]["mean"] < 2.5
+        assert result.summary["lost_rate"] == 0.0
+
+
+# scikit-learn
+
+
+def test_a_linear_transformer_is_inverted_as_scikit_learn_does_it() -> None:
+    from sklearn import decomposition
+
+    poses = angles("walk-a", "walk-b")
+    prior = Transformed(variant="PCA", components=5).fit(poses)
+    theirs = decomposition.PCA(5, random_state=0).fit(poses)
+    latents = prior.transform(poses)
+    np.testing.assert_allclose(latents, theirs.transform(poses), atol=1e-12)
+    np.testing.assert_allclose(prior.inverse_transform(latents), theirs.inverse_transform(latents), atol=1e-12)
+
+
+def test_factor_analysis_is_inverted_though_scikit_learn_does_not() -> None:
+    poses = angles("walk-a", "walk-b")
+    assert floor(Transformed(variant="FactorAnalysis").fit(poses), poses) < 1.0
+
+
+def test_parameters_of_a_transformer_can_be_given() -> None:
+    poses = angles("walk-a", "walk-b")
+    loose, tight = (Transformed(options=f'{{"gamma": {gamma}}}').fit(poses) for gamma in (0.05, 5.0))
+    assert floor(loose, poses) != floor(tight, poses)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"variant": "TSNE"}, r"variant must be a transformer with an inverse, such as .*KernelPCA.*, got 'TSNE'"),
+        ({"variant": "KMeans"}, "got 'KMeans'"),
+        ({"options": "gamma=1"}, "options must be a JSON object, got 'gamma=1'"),
+        ({"options": "[1]"}, "options must be a JSON object"),
+        ({"options": '{"gama": 1}'}, "options of KernelPCA must be of alpha, .*, got gama"),
+        ({"components": 0}, "components must be at least 1, got 0"),
+    ],
+)
+def test_mistakes_are_named(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Transformed(**settings)
+
+
+@pytest.mark.parametrize("kind", [Full, Union, Transformed])
+def test_a_file_that_is_no_prior_is_refused(kind: Any, tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", mean=np.zeros(3))
+    (tmp_path / "b.npz").write_bytes(b"nothing of the kind")
+    for name in "ab":
+        with pytest.raises(ValueError, match=r"\.npz: expected an \.npz file with"):
+            kind.load(tmp_path / f"{name}.npz")
+    prior = kind().fit(angles("walk-a", "walk-b"), library.average_skeleton())
+    prior.save(tmp_path / "good.npz")
+    stored = dict(np.load(tmp_path / "good.npz"))
+    name = "words" if kind is Transformed else "low"
+    np.savez(tmp_path / "c.npz", **{**stored, name: np.zeros((2, 2))})
+    with pytest.raises(ValueError, match=r"c\.npz: "):
+        kind.load(tmp_path / "c.npz")

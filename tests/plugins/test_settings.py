@@ -1,0 +1,116 @@
+"""Settings are read from a plugin's signature, and a mistake is found before anything runs."""
+
+from typing import Any, Literal
+
+import pytest
+
+from posefit.settings import accepts, check, parse, planned, settings_of
+from posefit_filters.particle import Particle
+from posefit_swarm.sapso import SAPSO
+
+
+def factory(
+    space: object,
+    rng: object,
+    *,
+    count: int = 3,
+    rate: float = 0.5,
+    kind: Literal["a", "b"] = "a",
+    name: str = "x",
+    sharp: bool = False,
+    limit: float | None = None,
+    reach: tuple[float, float] = (1.0, 2.0),
+    anything=None,  # type: ignore[no-untyped-def]
+) -> None: ...
+
+
+def test_settings_have_a_name_a_type_and_a_default() -> None:
+    shown = {one.name: (one.type, one.default) for one in settings_of(factory)}
+    assert shown == {
+        "count": ("int", 3),
+        "rate": ("float", 0.5),
+        "kind": ("a | b", "a"),
+        "name": ("str", "x"),
+        "sharp": ("bool", False),
+        "limit": ("float | none", None),
+        "reach": ("tuple[float, float]", (1.0, 2.0)),
+        "anything": ("any", None),
+    }
+
+
+def test_texts_become_what_their_types_ask_for() -> None:
+    given = {"count": "7", "rate": "1", "kind": "b", "name": "7", "sharp": "True", "limit": "none", "reach": "3,4.5"}
+    parsed = parse("it", factory, given)
+    assert parsed == {
+        "count": 7,
+        "rate": 1,
+        "kind": "b",
+        "name": "7",
+        "sharp": True,
+        "limit": None,
+        "reach": (3, 4.5),
+    }
+    assert parse("it", factory, {"limit": "1e-3", "anything": "4"}) == {"limit": 1e-3, "anything": 4}
+
+
+@pytest.mark.parametrize(
+    ("setting", "text", "message"),
+    [
+        ("count", "2.5", "it.count must be int, got '2.5'"),
+        ("count", "many", "it.count must be int, got 'many'"),
+        ("rate", "fast", "it.rate must be float, got 'fast'"),
+        ("kind", "c", r"it.kind must be a \| b, got 'c'"),
+        ("sharp", "1", "it.sharp must be bool, got '1'"),
+        ("limit", "no", r"it.limit must be float \| none, got 'no'"),
+        ("reach", "3", r"it.reach must be tuple\[float, float\], got '3'"),
+        ("reach", "3,a", "it.reach must be"),
+        ("rat", "1", "a setting of it must be one of count, rate, .*, got 'rat'; did you mean 'rate'?"),
+    ],
+)
+def test_a_text_that_does_not_fit_is_named(setting: str, text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        parse("it", factory, {setting: text})
+
+
+def test_values_are_checked_as_texts_are() -> None:
+    check("it", factory, {"count": 4, "rate": 1, "kind": "a", "limit": None, "anything": object()})
+    for given, message in (
+        ({"count": True}, "it.count must be int, got True"),
+        ({"count": 4.0}, "it.count must be int, got 4.0"),
+        ({"rate": "0.5"}, "it.rate must be float, got '0.5'"),
+        ({"nothing": 1}, "a setting of it must be one of"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            check("it", factory, given)
+    with pytest.raises(ValueError, match="a setting of bare must be none, it takes none, got 'x'"):
+        check("bare", lambda space, rng: None, {"x": 1})
+
+
+def test_an_annotation_that_is_not_understood_accepts_everything() -> None:
+    assert accepts("SomeType", 3)
+    assert accepts(list[int], [1])
+
+    def stringly(space, rng, *, a: "Missing" = 1): ...  # type: ignore[no-untyped-def, name-defined]  # noqa: F821
+
+    assert [one.name for one in settings_of(stringly)] == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("given", "evaluations", "particles", "filled"),
+    [
+        ({}, 2440, None, {"iterations": 60}),
+        ({}, 2440, 20, {"particles": 20, "iterations": 121}),
+        ({"particles": 61}, 2440, None, {"particles": 61, "iterations": 39}),
+        ({"iterations": 5}, 2440, None, {"iterations": 5}),
+        ({}, 50, None, {"iterations": 1}),
+    ],
+)
+def test_a_budget_becomes_iterations(
+    given: dict[str, Any], evaluations: int, particles: int | None, filled: Any
+) -> None:
+    assert planned(SAPSO, given, evaluations, particles) == filled
+
+
+def test_a_budget_becomes_evaluations_where_an_optimiser_plans_with_them() -> None:
+    assert planned(Particle, {"noise": 0.2}, 500, 20) == {"noise": 0.2, "evaluations": 500}
+    assert planned(lambda space, rng: None, {}, 500, 20) == {}
