@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tqdm import tqdm
 
 from posefit.study.run import track
 
@@ -76,7 +77,8 @@ def main(root: Path, first_pose: str = "searched") -> None:
     """Print the table."""
     cells: list[Cell] = list(product(OPTIMISERS, PRIORS, CASES, VIEWS, SEEDS))
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
-        summaries = list(pool.map(follow, *zip(*[(root, first_pose, cell) for cell in cells], strict=True)))
+        jobs = zip(*[(root, first_pose, cell) for cell in cells], strict=True)
+        summaries = list(tqdm(pool.map(follow, *jobs), total=len(cells), unit="track"))
     found = dict(zip(cells, summaries, strict=True))
     heads = [
         f"{motion} {what}" for motion in CASES for what in ("error", "at 0, 45, 90", "skill", "swapped %", "lost %")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 import posefit
 from posefit.fitting.optimiser import OptimiserFactory
@@ -132,7 +133,9 @@ def track(
         _warm_up(method.warm_up, scene)
     say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
     found: list[Frame] = []
-    with folder or nullcontext() as files:
+
+    # the matrices of an optimiser are small: more than one thread of BLAS for them is slower than one
+    with folder or nullcontext() as files, threadpool_limits(1):
         seen = _Tee(scene.observations)
         results = method.tracker.track(seen, np.random.default_rng(seed))
         for frame in progress(results, scene.count) if progress else results:
