@@ -51,7 +51,10 @@ class PoseProblem:
 
     def cost(self, poses: Array, translations: Array) -> Array:
         """Return the cost (n,) of poses (n, 66) with their root at translations (n, 3)."""
-        counts = self.areas(poses, translations)
+        return self.combined(self.areas(poses, translations))
+
+    def combined(self, counts: Sequence[Areas]) -> Array:
+        """Return the cost (n,) of areas R, B, Y (n, 3), one array a view."""
         costs = mismatch(counts[0], self.beta)
         for more in counts[1:]:
             costs += mismatch(more, self.beta)

@@ -73,23 +73,17 @@ TrackerFactory = Callable[..., Tracker]
 
 
 @dataclass(frozen=True, eq=False)
-class SynthesisTracker:
-    """Follows a person by a search a frame, started around a prediction. SAPSO section 4.
+class Prediction:
+    """Where the next frame's pose is sought, and where the search starts. SAPSO (6), (7).
 
-    `make` builds an optimiser from a space and a generator; `next_frame` says what becomes of it in the next frame.
     Readings: `spread` and `floor` (S5), `prediction` from the "latest" step or the "literal" one before it (S12).
     """
 
-    task: Task
-    prior: Prior
-    make: Callable[[Space, np.random.Generator], Optimiser]
-    next_frame: NextFrame = "start"
     root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
     translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     spread: float = SPREAD
     floor: float = FLOOR
     prediction: Literal["latest", "literal"] = "latest"
-    beta: float = BETA
 
     def __post_init__(self) -> None:
         if not self.floor > 0.0:
@@ -99,20 +93,91 @@ class SynthesisTracker:
         if self.prediction not in ("latest", "literal"):
             raise ValueError(f"prediction must be one of latest, literal, got {self.prediction!r}")
 
+
+class Follower:
+    """Goes from frame to frame: gives the space of the next one, and takes the proposal that was found in it."""
+
+    def __init__(self, task: Task, prior: Prior, prediction: Prediction) -> None:
+        self._task, self._prior, self._how = task, prior, prediction
+        reach = np.radians(prediction.root_range_degrees)
+        if task.yaw is None:
+            reach[0] = np.pi
+        centre = np.array([task.yaw or 0.0, 0.0, 0.0])
+        limits = np.array(prediction.translation_range)
+        self._space = SearchSpace(prior, centre, reach, task.anchor, task.translation, limits)
+        self._found: list[Array] = []  # coordinates of the latest gbest, the newest last
+
+    def space(self, observation: Observation) -> SearchSpace:
+        """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
+        anchor, found, space = observation.translation, self._found, self._space
+        if not found:
+            if anchor is not None:
+                space = space.around(space.centre, anchor=anchor)
+            if self._task.first_pose is not None:
+                space = replace(space, start=self._given(space, self._task.first_pose))
+            self._space = space
+            return space
+        if self._task.yaw is None:  # only the first frame looks all around
+            space = self._narrowed(space)
+        space = space.around(found[-1], anchor=anchor)
+        # Reading S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
+        back = 1 if self._how.prediction == "latest" else 2
+        step = np.zeros(space.dimensions)
+        if len(found) > back:
+            step = space.towards(found[-back - 1] / space.half, found[-back] / space.half)
+        mean = space.proposals(found[-1])
+        spread = np.maximum(self._how.spread * np.abs(step), self._how.floor)  # Reading S5
+        self._space = space.around(found[-1], Start(mean, spread, step), anchor)
+        return self._space
+
+    def commit(self, proposal: Array) -> None:
+        """Take the best proposal (d,) of the space that was given last."""
+        self._found = [*self._found[-2:], self._space.coordinates(proposal)]
+
+    def _given(self, space: SearchSpace, angles: Array) -> Start:
+        """Return the start of a first frame whose joint angles are about known; its root need not be."""
+        away = np.zeros(space.dimensions)
+        latents = self._prior.transform(np.asarray(angles, dtype=np.float64)[None])[0]
+        first = space.dimensions - len(latents)
+        away[first:] = space.proposals(np.concatenate([space.centre[:first], latents]))[first:]
+        spread = np.full(space.dimensions, self._how.floor)
+        if self._task.yaw is None:
+            spread[0] = 1.0
+        return Start(away, spread, np.zeros(space.dimensions))
+
+    def _narrowed(self, space: SearchSpace) -> SearchSpace:
+        reach = np.radians(self._how.root_range_degrees)
+        limits = space.translation_range
+        return SearchSpace(self._prior, space.root_centre, reach, space.anchor, self._task.translation, limits)
+
+
+@dataclass(frozen=True, eq=False)
+class SynthesisTracker:
+    """Follows a person by a search a frame, started around a prediction. SAPSO section 4.
+
+    `make` builds an optimiser from a space and a generator; `next_frame` says what becomes of it in the next frame.
+    """
+
+    task: Task
+    prior: Prior
+    make: Callable[[Space, np.random.Generator], Optimiser]
+    next_frame: NextFrame = "start"
+    prediction: Prediction = field(default_factory=Prediction)
+    beta: float = BETA
+
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
-        task, space = self.task, self._first_space()
-        found: list[Array] = []  # coordinates of the latest gbest, the newest last
+        task, follower = self.task, Follower(self.task, self.prior, self.prediction)
         optimiser: Optimiser | None = None
         for observation in observations:
             began = time.perf_counter()
-            space = self._next_space(space, found, observation)
+            space = follower.space(observation)
             optimiser = self._ready(optimiser, space, rng)
             problem = PoseProblem(
                 task.body, task.cameras, observation.silhouettes, space, beta=self.beta, threads=task.threads
             )
             best = minimise(problem.evaluate, optimiser, task.evaluations)
-            found = [*found[-2:], space.coordinates(best.proposal)]
+            follower.commit(best.proposal)
             yield _frame(problem, best, time.perf_counter() - began)
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
@@ -121,48 +186,6 @@ class SynthesisTracker:
             cast(Filter, optimiser).advance(space)
             return optimiser
         return self.make(replace(space, start=None) if self.next_frame == "forget" else space, rng)
-
-    def _first_space(self) -> SearchSpace:
-        task, reach = self.task, np.radians(self.root_range_degrees)
-        if task.yaw is None:
-            reach[0] = np.pi
-        centre = np.array([task.yaw or 0.0, 0.0, 0.0])
-        return SearchSpace(self.prior, centre, reach, task.anchor, task.translation, np.array(self.translation_range))
-
-    def _next_space(self, space: SearchSpace, found: list[Array], observation: Observation) -> SearchSpace:
-        """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
-        anchor = observation.translation
-        if not found:
-            space = space if anchor is None else space.around(space.centre, anchor=anchor)
-            return space if self.task.first_pose is None else replace(space, start=self._given(space))
-        if self.task.yaw is None:  # only the first frame looks all around
-            space = self._narrowed(space)
-        space = space.around(found[-1], anchor=anchor)
-        # Reading S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
-        back = 1 if self.prediction == "latest" else 2
-        step = np.zeros(space.dimensions)
-        if len(found) > back:
-            step = space.towards(found[-back - 1] / space.half, found[-back] / space.half)
-        mean = space.proposals(found[-1])
-        spread = np.maximum(self.spread * np.abs(step), self.floor)  # Reading S5
-        return space.around(found[-1], Start(mean, spread, step), anchor)
-
-    def _given(self, space: SearchSpace) -> Start:
-        """Return the start of a first frame whose joint angles are about known; its root need not be."""
-        away = np.zeros(space.dimensions)
-        latents = self.prior.transform(np.asarray(self.task.first_pose, dtype=np.float64)[None])[0]
-        first = space.dimensions - len(latents)
-        away[first:] = space.proposals(np.concatenate([space.centre[:first], latents]))[first:]
-        spread = np.full(space.dimensions, self.floor)
-        if self.task.yaw is None:
-            spread[0] = 1.0
-        return Start(away, spread, np.zeros(space.dimensions))
-
-    def _narrowed(self, space: SearchSpace) -> SearchSpace:
-        reach = np.radians(self.root_range_degrees)
-        return SearchSpace(
-            self.prior, space.root_centre, reach, space.anchor, self.task.translation, space.translation_range
-        )
 
 
 def _frame(problem: PoseProblem, best: Minimum, seconds: float) -> Frame:

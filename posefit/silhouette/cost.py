@@ -67,6 +67,42 @@ def areas(
     return out
 
 
+def paint(
+    body: Body,
+    camera: Camera,
+    silhouette: Silhouette,
+    poses: Array,
+    translations: Array,
+    pixels: NDArray[np.uint16],
+    value: int,
+) -> Areas:
+    """Return R, B, Y (n, 3) as `areas` does, and add `value` to the pixels (n, height, width) of each pose's body.
+
+    Raises ValueError where a shape does not fit.
+    """
+    poses, translations = writeable(poses), writeable(translations)
+    n, shape = len(poses), (camera.height, camera.width)
+    if poses.shape != (n, ANGLES) or translations.shape != (n, 3):
+        raise ValueError(f"poses must have shape (n, {ANGLES}) with translations (n, 3), got {poses.shape}")
+    if silhouette.mask.shape != shape or pixels.shape != (n, *shape):
+        raise ValueError(f"mask and pixels must have shape {shape}, got {silhouette.mask.shape}, {pixels.shape[1:]}")
+    out = np.empty((n, 3), dtype=np.int64)
+    observed, valid = silhouette.bits
+    kernels.paint_areas(
+        body.skeleton.chain,
+        body.radii,
+        view_of(camera),
+        observed,
+        valid,
+        poses,
+        translations,
+        out,
+        np.uint16(value),
+        pixels,
+    )
+    return out
+
+
 @jit
 def add_mismatch(areas, scale, beta, costs):
     """Add the mismatch of areas (n, 3) to costs (n,). SAPSO (4)."""

@@ -272,6 +272,41 @@ def count_areas(chain, radii, view, observed, valid, poses, translations, areas)
 
 
 @jit
+def paint(image, box, height, value, pixels):
+    """Add `value` to the pixels (height, width, ...) of the body in a bit image."""
+    for y in range(box[0], min(box[1], height)):
+        for w in range(box[2], box[3] + 1):
+            word = image[w, y]
+            x = w << 6
+            while word != _NONE:
+                if word & np.uint64(1):
+                    pixels[y, x] |= value
+                word >>= np.uint64(1)
+                x += 1
+
+
+@jit
+def paint_areas(chain, radii, view, observed, valid, poses, translations, areas, value, pixels):
+    """As `count_areas`, and add `value` to each pixel of pose i's body in pixels[i] (n, height, width)."""
+    bones = chain.parents.size
+    (sines, cosines, frames, joints), (seen, ends, lines, bounds, items, box), image = scratch(
+        view, bones, poses.shape[1]
+    )
+    silhouette = _NONE
+    for w in range(observed.shape[0]):
+        for y in range(view.height):
+            silhouette += np.uint64(_popcount(observed[w, y]))
+    for i in range(poses.shape[0]):
+        place_joints(chain, poses[i], translations[i], sines, cosines, frames, joints)
+        draw(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
+        paint(image, box, view.height, value, pixels[i])
+        body, overlap = count(image, observed, valid, box)
+        areas[i, 0] = silhouette - overlap
+        areas[i, 1] = body - overlap
+        areas[i, 2] = overlap
+
+
+@jit
 def draw_bits(chain, radii, view, pose, translation):
     """Return the bit image of one body."""
     (sines, cosines, frames, joints), (seen, ends, lines, bounds, items, box), image = scratch(

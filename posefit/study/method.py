@@ -14,7 +14,17 @@ from posefit.fitting.guard import BrokenRuleError, Guarded
 from posefit.fitting.optimiser import NextFrame, Optimiser, OptimiserFactory
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE
-from posefit.fitting.tracker import FLOOR, SPREAD, Frame, Observation, SynthesisTracker, Task, Tracker, TrackerFactory
+from posefit.fitting.tracker import (
+    FLOOR,
+    SPREAD,
+    Frame,
+    Observation,
+    Prediction,
+    SynthesisTracker,
+    Task,
+    Tracker,
+    TrackerFactory,
+)
 from posefit.geometry.rotation import Array
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
@@ -82,16 +92,20 @@ def prepare(choice: Choice, task: Task) -> Method:
     settings.check("tracker", _driver, choice.tracker_settings)
     prior, learned = _prior(choice, task)
 
+    driven = dict(choice.tracker_settings)
+    beta = float(driven.pop("beta", BETA))
+    prediction = Prediction(**driven)
+
     def tracker(limit: float | None) -> SynthesisTracker:
         make = partial(_guarded, offer, mine, limit)
-        return SynthesisTracker(task, learned, make, offer.next_frame, **choice.tracker_settings)
+        return SynthesisTracker(task, learned, make, offer.next_frame, prediction, beta)
 
     patient = None if choice.ask_seconds is None else choice.ask_seconds + COMPILING
     return Method(
         f"{offer.name} + {prior}",
         tracker(choice.ask_seconds),
         learned,
-        float(choice.tracker_settings.get("beta", BETA)),
+        beta,
         {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)},
         tracker(patient),
     )

@@ -10,7 +10,7 @@ import pytest
 
 from posefit import PoseProblem, SearchSpace, Silhouette, Start, minimise
 from posefit.fitting import metrics
-from posefit.fitting.tracker import Observation, SynthesisTracker, Task
+from posefit.fitting.tracker import Observation, Prediction, SynthesisTracker, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array, rotation_from_root_angles
@@ -466,7 +466,8 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
     mask = project(body, camera, np.zeros(66), np.array([0.0, 0.9, 0.0]))
     observation = Observation([Silhouette.of(mask)], np.array([0.0, 0.9, 0.0]))
     task = Task(body, [camera], 1, 0.0, np.array([0.0, 0.9, 0.0]))
-    tracker = SynthesisTracker(task, Line(), make, prediction=prediction, spread=2.0, floor=0.05)
+    how = Prediction(prediction=prediction, spread=2.0, floor=0.05)
+    tracker = SynthesisTracker(task, Line(), make, prediction=how)
     list(tracker.track([observation] * 4, np.random.default_rng(0)))
     assert made[0].space.start is None  # frame 1 is an estimation
     starts = [optimiser.space.start for optimiser in made[1:]]

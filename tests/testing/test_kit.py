@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from posefit.fitting.tracker import SynthesisTracker, Task
+from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
 from posefit.testing import check_optimiser, check_prior, check_tracker, optimiser_checks, parametrize, report, results
 from posefit_priors.pca import PCA
@@ -36,7 +36,7 @@ def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
     from posefit.study.method import training_angles
 
     make = partial(SAPSO, particles=20, iterations=task.evaluations // 20 - 1)
-    return SynthesisTracker(task, PCA().fit(training_angles(task)), make, floor=floor)
+    return SynthesisTracker(task, PCA().fit(training_angles(task)), make, prediction=Prediction(floor=floor))
 
 
 def test_it_passes_the_papers_tracker() -> None:

@@ -1,0 +1,40 @@
+"""Gymnasium environments of posefit: `gym.make("posefit_envs:posefit/Fit-v0")`.
+
+`Fit-v0` is a search for the pose in one silhouette; `Track-v0` follows a sequence; `Configure-v0` steers a running
+swarm. Importing this package registers them; the environments themselves are imported when they are made. `drive` runs
+an optimiser against a vector environment, `to_sb3_vec_env` hands one to Stable-Baselines3, and `check_vector_env`
+compares any vector environment with single ones.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from gymnasium.envs.registration import register
+
+if TYPE_CHECKING:
+    from posefit_envs.checker import check_vector_env as check_vector_env
+    from posefit_envs.drive import drive as drive
+    from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
+
+_HOME = {"check_vector_env": "checker", "drive": "drive", "to_sb3_vec_env": "sb3"}
+__all__ = list(_HOME)
+
+register(
+    id="posefit/Fit-v0",
+    entry_point="posefit_envs.fit:Fit",
+    vector_entry_point="posefit_envs.fit_vector:FitVector",
+)
+register(
+    id="posefit/Track-v0",
+    entry_point="posefit_envs.track:Track",
+    vector_entry_point="posefit_envs.track_vector:TrackVector",
+)
+register(id="posefit/Configure-v0", entry_point="posefit_envs.configure:Configure")
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'posefit_envs' has no attribute {name!r}")
+    value = getattr(import_module(f"posefit_envs.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

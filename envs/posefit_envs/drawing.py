@@ -1,0 +1,88 @@
+"""What an environment looks like: the silhouettes on each other, the body from its side, and the cost in words."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from gymnasium import error
+from numpy.typing import NDArray
+
+from posefit.geometry.rotation import Array
+from posefit.silhouette.cost import project
+from posefit.study.picture import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, side_view
+from posefit_envs.search import Scenery
+
+MODES = ("rgb_array", "human")
+HEIGHT = 240  # pixels
+STRIP = 24  # pixels for the words below
+
+Picture = NDArray[np.uint8]  # (height, width, 3) red, green, blue
+
+
+def check_mode(mode: str | None) -> None:
+    """Return nothing. Raises gymnasium.error.UnsupportedMode where there is no such render mode."""
+    if mode is not None and mode not in MODES:
+        raise error.UnsupportedMode(f"render_mode must be one of {', '.join(MODES)}, got {mode!r}")
+
+
+def draw(scenery: Scenery, pose: Array | None, translation: Array | None, label: str) -> Picture:
+    """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side."""
+    panels = []
+    for camera, silhouette in zip(scenery.task.cameras, scenery.observation.silhouettes, strict=True):
+        mask = silhouette.mask
+        body = np.zeros_like(mask)
+        if pose is not None and translation is not None:
+            body = project(scenery.task.body, camera, pose, translation)
+        image = np.full((*mask.shape, 3), BACKGROUND, dtype=np.uint8)
+        image[mask & ~body], image[body & ~mask], image[mask & body] = MISSED, SPILLED, BOTH
+        width = 2 * round(mask.shape[1] * HEIGHT / mask.shape[0] / 2)
+        panels.append(cv2.resize(image, (width, HEIGHT), interpolation=cv2.INTER_NEAREST))
+    if pose is not None and translation is not None:
+        panels.append(side_view(scenery.task.body, scenery.task.cameras[0], pose, translation, HEIGHT))
+    else:
+        panels.append(np.full((HEIGHT, HEIGHT, 3), BACKGROUND, dtype=np.uint8))
+    image = np.hstack(panels)
+    words = np.full((STRIP, image.shape[1], 3), BACKGROUND, dtype=np.uint8)
+    cv2.putText(words, label, (8, 17), cv2.FONT_HERSHEY_SIMPLEX, 0.45, TEXT, 1, cv2.LINE_AA)
+    return np.ascontiguousarray(np.vstack([image, words])[..., ::-1])
+
+
+class Screen:
+    """A pygame window, opened when it is first needed."""
+
+    def __init__(self, fps: int) -> None:
+        self._fps = fps
+        self._window: Any = None
+        self._clock: Any = None
+
+    def show(self, picture: Picture) -> None:
+        """Show a picture. Raises gymnasium.error.DependencyNotInstalled without pygame or without a display."""
+        try:
+            import pygame
+        except ImportError:
+            raise error.DependencyNotInstalled(
+                "render_mode human needs pygame: install it with python -m pip install 'posefit[human]'"
+            ) from None
+        size = picture.shape[1], picture.shape[0]
+        try:
+            if self._window is None:
+                pygame.display.init()
+                self._window = pygame.display.set_mode(size)
+                self._clock = pygame.time.Clock()
+        except pygame.error as cause:
+            raise error.DependencyNotInstalled(
+                f"render_mode human needs a display, got none ({cause}); use render_mode rgb_array instead"
+            ) from None
+        self._window.blit(pygame.surfarray.make_surface(picture.swapaxes(0, 1)), (0, 0))
+        pygame.event.pump()
+        pygame.display.flip()
+        self._clock.tick(self._fps)
+
+    def close(self) -> None:
+        """Close the window; again does nothing."""
+        if self._window is not None:
+            import pygame
+
+            pygame.display.quit()
+            pygame.quit()
+            self._window = None

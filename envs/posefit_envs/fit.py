@@ -1,0 +1,218 @@
+"""Fit-v0: one silhouette, an episode of proposals."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import error, spaces
+
+from posefit import SearchSpace
+from posefit.geometry.rotation import Array
+from posefit_envs.drawing import MODES, Screen, check_mode, draw
+from posefit_envs.instance import Instance, Views, World, check_number, draw_number, instance, measured, world
+from posefit_envs.search import Doorkeeper, Image, Outcome, look
+
+MAX_EVALUATIONS = 200
+TARGET_COST = 2.0
+SIZE = (64, 48)
+
+
+class Fit(gym.Env[Image, Any]):
+    """
+    ## Description
+    A person was seen as a silhouette. Each step proposes a pose; its body is projected, and what does not overlap with
+    the silhouette is its cost. The episode is a search for the pose, the hard way: by proposals alone.
+
+    ## Action Space
+    `Box(-1, 1, (d,), float32)`: a proposal, with `prior="pca"` and a known translation d = 9.
+
+    | Num | Meaning | Min and max stand for |
+    |---|---|---|
+    | 0, 1, 2 | root yaw, pitch, roll | 45, 15, 15 degrees to either side of a guess |
+    | 3, 4, 5 | root translation, with `translation="searched"` only | 0.5 m to either side |
+    | the rest | latents of the prior | the range of its training poses |
+
+    Actions outside are clipped, with one warning. float64 is taken as it is, and not rounded.
+
+    ## Observation Space
+    `Box(0, 255, (height, width, 2 views), uint8)`, for each view:
+
+    | Channel | Meaning |
+    |---|---|
+    | 0 | the observed silhouette: 255 is the person |
+    | 1 | the silhouette of the last proposal; empty before the first |
+
+    ## Rewards
+    Minus the cost of the proposal, 0 to 100; SAPSO (4).
+
+    ## Starting State
+    An instance: a pose of the motion, its cadence, and the middle of the searched yaw, all from its number. Without
+    `instance` each reset draws a number of the `split`; `reset(options={"instance": 17})` chooses one.
+
+    ## Episode End
+    Terminates when the best cost is at or below `target_cost`; truncates after `max_evaluations` proposals.
+
+    ## Information
+    `cost`, `best_cost`, `evaluations`, `error_degrees` of the proposal against the truth, `areas` (views, 3) R, B, Y in
+    pixels, and `instance`; a reset gives `instance` alone.
+
+    ## Arguments
+    - `motion="walk"`: a built-in motion, or an .amc or .bvh file.
+    - `instance=None`: 0 to 19,999. `split="train"` draws of 0 to 9,999, `"test"` of the others, which are held out.
+    - `view_degrees=45.0`: where the camera stands, 0 in front of the person; several for several views.
+    - `prior="pca"`, `train=None`: the prior and the motions it learns from; by default other people's.
+    - `translation="known"`: or "searched" or "aligned".
+    - `size=(64, 48)`: width and height in pixels.
+    - `noise=None`: what is wrong with the silhouette, such as `{"holes": 0.3, "shadow": 0.5}`; see
+      `posefit_envs.corruption`.
+    - `mismatch_percent=0.0`: how far bones and radii of the fitted body are off at most.
+    - `target_cost=2.0`, `max_evaluations=200`.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
+
+    def __init__(
+        self,
+        motion: str = "walk",
+        instance: int | None = None,
+        split: str = "train",
+        view_degrees: Views = 45.0,
+        prior: str = "pca",
+        train: Sequence[str] | None = None,
+        translation: str = "known",
+        size: Sequence[int] = SIZE,
+        noise: Mapping[str, float] | None = None,
+        mismatch_percent: float = 0.0,
+        target_cost: float = TARGET_COST,
+        max_evaluations: int = MAX_EVALUATIONS,
+        render_mode: str | None = None,
+    ) -> None:
+        check_number(instance, split)
+        check_budget(target_cost, "max_evaluations", max_evaluations)
+        check_mode(render_mode)
+        self.render_mode = render_mode
+        self.world = world(motion, view_degrees, prior, train, translation, size, noise, mismatch_percent)
+        self._number, self._split = instance, split
+        self._target, self._most = float(target_cost), int(max_evaluations)
+        self.action_space, self.observation_space = spaces_of(self.world)  # type: ignore[assignment]
+        self._shape = action_shape(self.world)
+        self._door = Doorkeeper(self._shape[0])
+        self._episode: Episode | None = None
+        self._screen = Screen(self.metadata["render_fps"])
+
+    @property
+    def search_space(self) -> SearchSpace:
+        """The space of the current instance. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return self._current().space
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Image, dict[str, Any]]:
+        """Begin with an instance; `options={"instance": 17}` chooses it."""
+        super().reset(seed=seed)
+        number = chosen(self._number, options)
+        if number is None:
+            number = draw_number(self._split, self.np_random)  # type: ignore[arg-type]
+        self._episode = Episode(self.world, number, self._most)
+        if self.render_mode == "human":
+            self.render()
+        return self._episode.scenery.picture, {"instance": number}
+
+    def step(self, action: Any) -> tuple[Image, float, bool, bool, dict[str, Any]]:
+        """Propose a pose."""
+        episode = self._current()
+        if episode.ended:
+            raise error.ResetNeeded("the episode has ended: reset before the next step")
+        proposal = self._door.proposals(action, self._shape)
+        outcome = look(episode.scenery, episode.space, proposal[None])
+        info = episode.take(outcome, 0)
+        terminated = episode.best_cost <= self._target
+        truncated = not terminated and episode.evaluations >= self._most
+        episode.ended = terminated or truncated
+        if self.render_mode == "human":
+            self.render()
+        return outcome.pictures[0], -info["cost"], terminated, truncated, info
+
+    def render(self) -> Any:
+        """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
+        if self.render_mode is None:
+            return None
+        episode = self._current()
+        picture = draw(episode.scenery, episode.pose, episode.translation, episode.label)
+        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._screen.close()
+
+    def _current(self) -> "Episode":
+        if self._episode is None:
+            raise error.ResetNeeded("reset must come before anything else")
+        return self._episode
+
+
+class Episode:
+    """The state of one search."""
+
+    def __init__(self, world: World, number: int, evaluations: int) -> None:
+        self.instance: Instance = instance(world, number, 1, evaluations)
+        self.space = self.instance.space(world.learned)
+        self.scenery = self.instance.scenery(0)
+        self.best_cost, self.evaluations, self.ended = np.inf, 0, False
+        self.cost = np.inf
+        self.pose: Array | None = None
+        self.translation: Array | None = None
+
+    def take(self, outcome: Outcome, row: int) -> dict[str, Any]:
+        """Remember a proposal's outcome and return its information."""
+        self.cost = float(outcome.costs[row])
+        self.best_cost = min(self.best_cost, self.cost)
+        self.evaluations += 1
+        self.pose, self.translation = outcome.poses[row], outcome.translations[row]
+        return {
+            "cost": self.cost,
+            "best_cost": self.best_cost,
+            "evaluations": self.evaluations,
+            "error_degrees": float(measured(self.instance.truth, 0, self.pose[None])[0]),
+            "areas": outcome.areas[row].copy(),
+            "instance": self.instance.number,
+        }
+
+    @property
+    def label(self) -> str:
+        """What is written into the picture."""
+        if self.pose is None:
+            return f"instance {self.instance.number}"
+        return f"cost {self.cost:.1f}, best {self.best_cost:.1f}, {self.evaluations} evaluations"
+
+
+def action_shape(setting: World) -> tuple[int]:
+    """Return (d,) of a world's proposals."""
+    return (len(setting.learned.low) + (6 if setting.translation == "searched" else 3),)
+
+
+def spaces_of(setting: World) -> tuple[spaces.Box, spaces.Box]:
+    """Return the action space and the observation space of a world."""
+    width, height = setting.size
+    return (
+        spaces.Box(-1.0, 1.0, action_shape(setting), np.float32),
+        spaces.Box(0, 255, (height, width, 2 * len(setting.view_degrees)), np.uint8),
+    )
+
+
+def chosen(number: int | None, options: Mapping[str, Any] | None) -> int | None:
+    """Return the instance that the options choose, or the one that was fixed. Raises gymnasium.error.Error."""
+    if options and options.get("instance") is not None:
+        number = int(options["instance"])
+        check_number(number, "train")
+    return number
+
+
+def check_budget(target_cost: float, name: str, evaluations: int) -> None:
+    """Return nothing. Raises gymnasium.error.Error where a number makes no sense."""
+    if not np.isfinite(target_cost):
+        raise error.Error(f"target_cost must be finite, got {target_cost}")
+    if evaluations < 2:
+        raise error.Error(f"{name} must be at least 2, got {evaluations}")

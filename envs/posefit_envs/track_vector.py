@@ -1,0 +1,142 @@
+"""Track-v0 for many environments at once: all that are in the same frame of the same instance are one kernel call."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import error
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from posefit import SearchSpace
+from posefit.geometry.rotation import Array
+from posefit_envs.batch import mask_of, seeds_of
+from posefit_envs.drawing import MODES, check_mode, draw
+from posefit_envs.fit import SIZE, action_shape, check_budget, chosen, spaces_of
+from posefit_envs.instance import Views, check_number, draw_number, world
+from posefit_envs.search import Doorkeeper, Image, distinct, look_at
+from posefit_envs.track import EVALUATIONS, FRAMES, Course
+
+Infos = dict[str, Any]
+
+
+class TrackVector(VectorEnv[Image, Any, Array]):
+    """`num_envs` environments as `posefit_envs.track.Track`, with the same arguments.
+
+    Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an episode's last
+    one resets, as `AutoresetMode.NEXT_STEP` says.
+    """
+
+    metadata = {  # noqa: RUF012, as Gymnasium has it
+        "render_modes": list(MODES),
+        "render_fps": 30,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        motion: str = "walk",
+        instance: int | None = None,
+        split: str = "train",
+        view_degrees: Views = 45.0,
+        prior: str = "pca",
+        train: Sequence[str] | None = None,
+        translation: str = "known",
+        size: Sequence[int] = SIZE,
+        noise: Mapping[str, float] | None = None,
+        mismatch_percent: float = 0.0,
+        frames: int = FRAMES,
+        evaluations_per_frame: int = EVALUATIONS,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if num_envs < 1:
+            raise error.Error(f"num_envs must be at least 1, got {num_envs}")
+        check_number(instance, split)
+        check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
+        check_mode(render_mode)
+        if render_mode == "human":
+            raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
+        if frames < 1:
+            raise error.Error(f"frames must be at least 1, got {frames}")
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self.world = world(motion, view_degrees, prior, train, translation, size, noise, mismatch_percent)
+        self._number, self._split = instance, split
+        self._frames, self._most, self._longest = int(frames), int(evaluations_per_frame), max_episode_steps
+        self.single_action_space, self.single_observation_space = spaces_of(self.world)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._shape = (num_envs, *action_shape(self.world))
+        self._door = Doorkeeper(self._shape[1])
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._courses: list[Course] = []
+        self._steps, self._ended = np.zeros(num_envs, dtype=np.int64), np.zeros(num_envs, dtype=bool)
+
+    @property
+    def search_spaces(self) -> list[SearchSpace]:
+        """The space of each environment's frame. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return [course.space for course in self._current()]
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Image, Infos]:
+        """Begin with an instance each; `options={"instance": 17}` chooses one for all, "reset_mask" some to begin."""
+        seeds, mask = seeds_of(seed, self.num_envs), mask_of(options, self.num_envs, bool(self._courses))
+        if not self._courses:
+            self._courses = [None] * self.num_envs  # type: ignore[list-item]
+        infos: Infos = {}
+        for i in np.flatnonzero(mask).tolist():
+            if seeds[i] is not None:
+                self._generators[i] = seeding.np_random(seeds[i])[0]
+            infos = self._add_info(infos, self._begin(i, options), i)
+        return np.stack([course.scenery.picture for course in self._courses]), infos
+
+    def step(self, actions: Any) -> tuple[Image, Array, Any, Any, Infos]:
+        """Propose a pose in each environment; one whose episode has ended resets instead."""
+        courses, n = self._current(), self.num_envs
+        proposals = self._door.proposals(actions, self._shape)
+        pictures = np.empty(self.observation_space.shape or (), dtype=np.uint8)
+        rewards, terminated, truncated = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        given: list[dict[str, Any]] = [{} for _ in range(n)]
+        for i in np.flatnonzero(self._ended).tolist():
+            given[i] = self._begin(i, None)
+            pictures[i] = self._courses[i].scenery.picture
+        stepping = [i for i in range(n) if not given[i]]
+        for group in distinct([course.scenery for course in courses], stepping).values():
+            decoded = [courses[i].space.decode(proposals[i : i + 1]) for i in group]
+            poses, places = (np.concatenate(parts) for parts in zip(*decoded, strict=True))
+            first = courses[group[0]]
+            outcome = look_at(first.scenery, first.scenery.problem(first.space), poses, places)
+            for row, i in enumerate(group):
+                pictures[i], given[i] = courses[i].take(proposals[i], outcome, row)
+                self._steps[i] += 1
+                rewards[i], terminated[i] = -given[i]["cost"], courses[i].ended
+                truncated[i] = self._longest is not None and not terminated[i] and self._steps[i] >= self._longest
+        self._ended = terminated | truncated
+        infos: Infos = {}
+        for i, info in enumerate(given):
+            infos = self._add_info(infos, info, i)
+        return pictures, rewards, terminated, truncated, infos
+
+    def _begin(self, i: int, options: Mapping[str, Any] | None) -> dict[str, Any]:
+        number = chosen(self._number, options)
+        if number is None:
+            if self._generators[i] is None:
+                self._generators[i] = seeding.np_random(None)[0]
+            number = draw_number(self._split, self._generators[i])  # type: ignore[arg-type]
+        self._courses[i] = Course(self.world, number, self._frames, self._most)
+        self._steps[i], self._ended[i] = 0, False
+        return {"instance": number, "frame": 0}
+
+    def render(self) -> Any:
+        """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        return tuple(draw(one.scenery, one.pose, one.place, one.label) for one in self._current())
+
+    def _current(self) -> list[Course]:
+        if not self._courses:
+            raise error.ResetNeeded("reset must come before anything else")
+        return self._courses

@@ -1,0 +1,425 @@
+"""The environments keep Gymnasium's rules and Stable-Baselines3's, with every warning an error."""
+
+import copy
+import pickle
+import warnings
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium import error, wrappers
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import posefit_envs  # noqa: F401, registers them
+from posefit_envs.corruption import CORRUPTIONS
+from posefit_envs.instance import RESERVED
+
+IDS = ("posefit/Fit-v0", "posefit/Track-v0", "posefit/Configure-v0")
+SPREAD: list[dict[str, Any]] = [
+    {},
+    {"instance": 17},
+    {"motion": "run", "view_degrees": [0.0, 90.0], "prior": "full", "size": (80, 60)},
+    {"translation": "searched", "noise": {"holes": 0.5, "shadow": 0.5}},
+    {"translation": "aligned", "mismatch_percent": 10.0, "split": "test", "train": ["walk-a", "run-a"]},
+]
+SHORT: dict[str, dict[str, Any]] = {
+    "posefit/Fit-v0": {"max_evaluations": 7},
+    "posefit/Track-v0": {"frames": 3, "evaluations_per_frame": 3},
+    "posefit/Configure-v0": {"particles": 5, "iterations": 4},
+}
+
+
+@pytest.fixture(autouse=True)
+def no_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setenv("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+
+
+@pytest.mark.filterwarnings("ignore:.*pkg_resources.*:UserWarning", "ignore:.*pkg_resources.*:DeprecationWarning")
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("arguments", SPREAD)
+def test_the_checkers_pass_without_a_warning(name: str, arguments: dict[str, Any]) -> None:
+    from stable_baselines3.common.env_checker import check_env as check_env_sb3
+
+    env = gym.make(name, **arguments)
+    check_env(env.unwrapped)
+    check_env_sb3(gym.make(name, **arguments).unwrapped)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_it_is_made_by_module_and_name(name: str) -> None:
+    env = gym.make(f"posefit_envs:{name}")
+    assert env.spec is not None
+    assert env.spec.id == name
+
+
+def trace(env: gym.Env[Any, Any], steps: int = 12) -> list[Any]:
+    env.action_space.seed(3)
+    seen: list[Any] = [env.reset(seed=5)]
+    for _ in range(steps):
+        seen.append(env.step(env.action_space.sample()))
+        if seen[-1][2] or seen[-1][3]:
+            seen.append(env.reset())
+    env.close()
+    return seen
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("arguments", SPREAD)
+def test_its_description_as_json_makes_an_equal_one(name: str, arguments: dict[str, Any]) -> None:
+    env = gym.make(name, **{**arguments, **SHORT[name]})
+    assert env.spec is not None
+    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert data_equivalence(trace(env), trace(again))
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_it_can_be_pickled_and_copied_in_the_middle(name: str) -> None:
+    env = gym.make(name, instance=3).unwrapped
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    for twin in (pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
+        action = np.full(env.action_space.shape or (), 0.1, dtype=np.float32)
+        first = copy.deepcopy(env).step(action)
+        assert data_equivalence(first, twin.step(action))
+    env.close()
+    env.close()
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_the_usual_wrappers_wrap_it(name: str, tmp_path: Any) -> None:
+    env: Any = gym.make(name, render_mode="rgb_array", **SHORT[name])
+    env = wrappers.RecordEpisodeStatistics(env)
+    env = wrappers.RescaleAction(env, np.float32(-2.0), np.float32(2.0))
+    env = wrappers.FrameStackObservation(env, 2)
+    env = wrappers.FlattenObservation(env)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # moviepy's own
+        env = wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda k: k == 0, disable_logger=True)
+        env.reset(seed=0)
+        for _ in range(40):
+            _, _, terminated, truncated, info = env.step(env.action_space.sample())
+            if terminated or truncated:
+                break
+        assert terminated or truncated
+        assert info["episode"]["l"] >= 4
+        env.reset()
+        env.close()
+    assert [path.suffix for path in tmp_path.iterdir()] == [".mp4"]
+
+
+def make_fit() -> gym.Env[Any, Any]:
+    return gym.make("posefit_envs:posefit/Fit-v0", max_evaluations=5)
+
+
+@pytest.mark.parametrize("kind", [SyncVectorEnv, AsyncVectorEnv])
+def test_it_runs_in_gymnasiums_own_vector_environments(kind: Any) -> None:
+    vector = kind([make_fit] * 2)
+    first, _ = vector.reset(seed=3)
+    for _ in range(8):
+        observations, rewards, *_ = vector.step(vector.action_space.sample())
+        assert observations.shape == first.shape
+        assert (rewards <= 0.0).all()
+    vector.close()
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_pictures_are_rgb_and_a_window_opens(name: str) -> None:
+    env = gym.make(name, render_mode="rgb_array")
+    env.reset(seed=0)
+    before = np.asarray(env.render())
+    env.step(env.action_space.sample())
+    after = np.asarray(env.render())
+    assert before.shape == after.shape
+    assert before.dtype == after.dtype == np.uint8
+    assert before.shape[2] == 3
+    assert (before != after).any()
+    pytest.importorskip("pygame")
+    window = gym.make(name, render_mode="human")
+    window.reset(seed=0)
+    window.step(window.action_space.sample())
+    window.close()
+    window.close()
+
+
+def test_without_pygame_or_a_display_the_window_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+    with pytest.raises(error.DependencyNotInstalled, match="needs a display, got none .*; use render_mode rgb_array"):
+        gym.make("posefit/Fit-v0", render_mode="human").reset(seed=0)
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(error.DependencyNotInstalled, match=r"needs pygame: .* pip install 'posefit\[human\]'"):
+        gym.make("posefit/Fit-v0", render_mode="human").reset(seed=0)
+
+
+# instances
+
+
+def test_a_number_is_the_same_silhouette_everywhere() -> None:
+    first, again = gym.make("posefit/Fit-v0", instance=17), gym.make("posefit/Fit-v0")
+    one = first.reset(seed=0)[0]
+    np.testing.assert_array_equal(one, first.reset(seed=99)[0])
+    np.testing.assert_array_equal(one, again.reset(options={"instance": 17})[0])
+    track = gym.make("posefit/Track-v0", instance=17, frames=1)
+    np.testing.assert_array_equal(one.shape, track.reset(seed=0)[0].shape)
+    assert (one != gym.make("posefit/Fit-v0", instance=18).reset(seed=0)[0]).any()
+
+
+def test_the_test_split_is_held_out_by_number() -> None:
+    for split, (first, last) in RESERVED.items():
+        env = gym.make("posefit/Fit-v0", split=split)
+        numbers = {env.reset(seed=seed)[1]["instance"] for seed in range(20)}
+        assert len(numbers) > 15
+        assert all(first <= number < last for number in numbers)
+    assert RESERVED["train"][1] <= RESERVED["test"][0]
+
+
+@pytest.mark.parametrize("name", CORRUPTIONS)
+def test_each_corruption_changes_the_silhouette_more_the_stronger_it_is(name: str) -> None:
+    def silhouettes(noise: Any) -> np.ndarray[Any, Any]:
+        made = gym.make("posefit/Fit-v0", noise=noise, size=(160, 120))
+        return np.stack([made.reset(options={"instance": k})[0][..., 0] > 0 for k in range(12)])
+
+    clean = silhouettes(None)
+    changed = [(silhouettes({name: strength}) != clean).mean() for strength in (0.1, 0.4, 1.0)]
+    assert 0.0 <= changed[0] < changed[1] < changed[2] < 0.5
+    assert (silhouettes({name: 0.0}) == clean).all()
+
+
+def test_a_body_that_is_off_costs_even_the_true_pose_something() -> None:
+    from posefit_envs.instance import instance, world
+
+    lowest = []
+    for percent in (0.0, 10.0):
+        setting = world("walk", 45.0, "pca", None, "known", (160, 120), None, percent)
+        made = instance(setting, 3, 1, 10)
+        problem_task, truth = made.task, made.truth
+        from posefit.silhouette.cost import areas, mismatch
+
+        counts = areas(
+            problem_task.body,
+            problem_task.cameras[0],
+            made.observations[0].silhouettes[0],
+            truth.poses[:1],
+            truth.translations[:1],
+        )
+        lowest.append(float(mismatch(counts)[0]))
+    assert lowest[0] == 0.0
+    assert 1.0 < lowest[1] < 30.0
+
+
+# what the steps mean
+
+
+def test_fit_ends_at_the_target_or_with_the_budget() -> None:
+    env = gym.make("posefit/Fit-v0", instance=3, target_cost=99.0)
+    env.reset(seed=0)
+    assert env.step(np.zeros(9, np.float32))[2:4] == (True, False)
+    env = gym.make("posefit/Fit-v0", instance=3, target_cost=0.0, max_evaluations=3)
+    env.reset(seed=0)
+    ends = [env.step(np.full(9, 0.3 * k, np.float32)) for k in range(3)]
+    assert [end[2:4] for end in ends] == [(False, False), (False, False), (False, True)]
+    costs = [end[4]["cost"] for end in ends]
+    assert [end[1] for end in ends] == [-cost for cost in costs]
+    assert [end[4]["best_cost"] for end in ends] == [min(costs[: k + 1]) for k in range(3)]
+    assert [end[4]["evaluations"] for end in ends] == [1, 2, 3]
+
+
+def test_the_reward_is_the_mismatch_of_the_two_channels() -> None:
+    env = gym.make("posefit/Fit-v0", instance=5, size=(160, 120))
+    env.reset(seed=0)
+    picture, reward, _, _, info = env.step(np.full(9, 0.1, np.float32))
+    seen, body = picture[..., 0] > 0, picture[..., 1] > 0
+    r, b, y = (seen & ~body).sum(), (body & ~seen).sum(), (seen & body).sum()
+    assert info["areas"].tolist() == [[r, b, y]]
+    assert reward == pytest.approx(-100.0 * (0.5 * b / (b + y) + 0.5 * r / (r + y)))
+    assert set(np.unique(picture)) == {0, 255}
+
+
+def test_track_commits_the_best_and_moves_its_box_on() -> None:
+    env = gym.make("posefit/Track-v0", instance=5, frames=3, evaluations_per_frame=4)
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    centres, committed = [], []
+    for step in range(12):
+        centres.append(env.unwrapped.search_space.centre[0])  # type: ignore[attr-defined]
+        picture, _, terminated, truncated, info = env.step(rng.uniform(-1.0, 1.0, 9).astype(np.float32))
+        assert ("committed_pose" in info) == (step % 4 == 3)
+        if "committed_pose" in info:
+            committed.append(info)
+            if not terminated:
+                assert picture[..., 1].any()  # the committed pose, in the next frame
+        assert not truncated
+    assert terminated
+    assert [info["committed_frame"] for info in committed] == [0, 1, 2]
+    assert [info["frame"] for info in committed] == [1, 2, 2]
+    assert len(set(centres)) == 3
+    assert centres[4] == pytest.approx(committed[0]["committed_pose"][0])
+    assert all(info["committed_cost"] == info["best_cost"] for info in committed)
+
+
+def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
+    from posefit import SynthesisTracker
+    from posefit_envs.instance import instance
+
+    env: Any = gym.make("posefit/Track-v0", instance=5, frames=3, evaluations_per_frame=4).unwrapped
+    env.reset(seed=0)
+
+    class Fixed:
+        def __init__(self) -> None:
+            self.rng = np.random.default_rng(1)
+
+        def ask(self) -> Any:
+            return self.rng.uniform(-1.0, 1.0, (4, 9))
+
+        def tell(self, proposals: Any, costs: Any) -> None: ...
+
+    shared = Fixed()
+    made = instance(env.world, 5, 3, 4)
+    frames = list(
+        SynthesisTracker(made.task, env.world.learned, lambda space, rng: shared).track(
+            made.observations, np.random.default_rng(0)
+        )
+    )
+    steps = Fixed()
+    poses = []
+    for _ in range(3):
+        for proposal in steps.ask():
+            info = env.step(proposal)[4]
+        poses.append(info["committed_pose"])
+        steps.tell(None, None)
+        if len(poses) < 3:
+            continue
+    assert len(frames) == 3
+    np.testing.assert_array_equal(poses[0], frames[0].pose)
+
+
+def test_configure_with_sapsos_own_schedule_finds_what_sapso_finds() -> None:
+    from posefit_swarm.swarm import inertia
+
+    costs = []
+    for number in range(3):
+        env = gym.make("posefit/Configure-v0", instance=number)
+        env.reset(seed=number)
+        rewards = 0.0
+        for k in range(60):
+            action = [inertia(k, 60) / 0.6 - 1.0, (np.log10(0.95**k) + 3.0) / 2.25 - 1.0, -1.0]
+            state, reward, terminated, _, info = env.step(np.array(action, np.float32))
+            rewards += float(reward)
+        assert terminated
+        assert info["evaluations"] == 2440
+        costs.append(info["best_cost"])
+        assert state[0] == pytest.approx(info["best_cost"] / 100.0, abs=1e-6)
+        assert rewards >= 0.0
+    assert np.median(costs) < 6.0
+
+
+# mistakes
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"motion": "wakl"}, "did you mean 'walk'"),
+        ({"prior": "pcb"}, "prior must be one of .* did you mean 'pca'"),
+        ({"train": ["wakl"]}, "did you mean 'walk'"),
+        ({"instance": 20_000}, "instance must lie in 0 to 19999, got 20000"),
+        ({"instance": -1}, "instance must lie in 0 to 19999, got -1"),
+        ({"split": "dev"}, "split must be one of train, test, got 'dev'"),
+        ({"noise": {"rain": 0.5}}, "noise must be of occluder, .*, got 'rain'"),
+        ({"noise": {"holes": 2.0}}, "noise holes must have a strength of 0 to 1, got 2.0"),
+        ({"size": (20, 20)}, r"size must be \(width, height\) of 36 to 4096 pixels"),
+        ({"translation": "free"}, "translation must be one of known, searched, aligned"),
+        ({"view_degrees": float("nan")}, "view_degrees must be a finite number or several"),
+        ({"mismatch_percent": 80.0}, "mismatch_percent must lie in 0 to 50"),
+        ({"render_mode": "ansi"}, "render_mode must be one of rgb_array, human, got 'ansi'"),
+    ],
+)
+@pytest.mark.filterwarnings(
+    "ignore:.*render_mode:UserWarning", "ignore:.*The environment is being initialised with render_mode.*"
+)
+def test_arguments_that_make_no_sense_are_named(name: str, arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(error.Error, match=message):
+        gym.make(name, **arguments)
+    if name != "posefit/Configure-v0" and "render_mode" not in arguments:
+        with pytest.raises(error.Error, match=message):
+            gym.make_vec(name, num_envs=2, **arguments)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_actions_that_make_no_sense_are_named(name: str) -> None:
+    env = gym.make(name, disable_env_checker=True).unwrapped
+    size = (env.action_space.shape or ())[0]
+    with pytest.raises(error.ResetNeeded, match="reset must come before"):
+        env.step(np.zeros(size))
+    env.reset(seed=0)
+    for action, message in (
+        (np.zeros(size + 1), rf"actions must have shape \({size},\), got \({size + 1},\)"),
+        (np.full(size, np.nan), "actions must be finite, got nan or infinity"),
+        (np.full(size, np.inf), "actions must be finite"),
+        ("left", f"an action must be {size} numbers, got 'left'"),
+        (None, r"actions must"),
+    ):
+        with pytest.raises(error.InvalidAction, match=message):
+            env.step(action)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
+    env, other = (gym.make(name, instance=3, disable_env_checker=True).unwrapped for _ in range(2))
+    env.reset(seed=0)
+    other.reset(seed=0)
+    size = (env.action_space.shape or ())[0]
+    with pytest.warns(UserWarning, match=r"actions must lie in \[-1, 1\], got 3 from 0; it is clipped"):
+        clipped = env.step(np.full(size, 3.0))
+    assert data_equivalence(clipped, other.step(np.ones(size)))
+    env.step(np.full(size, -2.0))  # a second warning would be an error
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_a_step_after_the_end_asks_for_a_reset(name: str) -> None:
+    env = gym.make(name, **SHORT[name], **({"target_cost": 99.0} if "Fit" in name else {})).unwrapped
+    env.reset(seed=0)
+    for _ in range(20):
+        if env.step(env.action_space.sample())[2]:
+            break
+    with pytest.raises(error.ResetNeeded, match="the episode has ended"):
+        env.step(env.action_space.sample())
+
+
+worlds = st.fixed_dictionaries(
+    {
+        "motion": st.sampled_from(["walk", "run", "walk-a"]),
+        "view_degrees": st.sampled_from([0.0, 45.0, 90.0, 200.0, [10.0, 100.0]]),
+        "prior": st.sampled_from(["pca", "full", "union"]),
+        "translation": st.sampled_from(["known", "searched", "aligned"]),
+        "size": st.sampled_from([(36, 36), (64, 48), (50, 70)]),
+        "noise": st.dictionaries(st.sampled_from(sorted(CORRUPTIONS)), st.floats(0.0, 1.0), max_size=5),
+        "mismatch_percent": st.floats(0.0, 20.0),
+        "instance": st.none() | st.integers(0, 19_999),
+    }
+)
+
+
+@settings(max_examples=50, deadline=None)
+@given(worlds, st.integers(0, 1000), st.sampled_from(IDS))
+def test_ten_thousand_random_steps_stay_in_their_spaces(arguments: dict[str, Any], seed: int, name: str) -> None:
+    env = gym.make(name, disable_env_checker=True, **arguments)
+    observation, _ = env.reset(seed=seed)
+    env.action_space.seed(seed)
+    for _ in range(200):
+        assert observation in env.observation_space
+        observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+        assert np.isfinite(float(reward))
+        for value in info.values():
+            assert np.isfinite(value).all()
+        if terminated or truncated:
+            observation, _ = env.reset()
+    env.close()

@@ -1,0 +1,263 @@
+"""Vector environments do what single ones do; optimisers and agents run on them."""
+
+import tracemalloc
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium import error, wrappers
+from gymnasium.vector import AutoresetMode
+
+import posefit_envs
+from posefit import minimise
+from posefit.registry import registry
+from posefit.settings import planned
+from posefit_envs import check_vector_env, drive, to_sb3_vec_env
+from posefit_envs.fit_vector import FitVector
+
+FIT: list[dict[str, Any]] = [
+    {},
+    {"instance": 3},
+    {"max_evaluations": 4, "noise": {"holes": 0.4}},
+    {"target_cost": 30.0},
+    {"view_degrees": [0.0, 90.0], "translation": "aligned", "max_evaluations": 5},
+    {"translation": "searched", "prior": "union", "mismatch_percent": 5.0, "instance": 9, "max_evaluations": 6},
+]
+TRACK: list[dict[str, Any]] = [
+    {"frames": 3, "evaluations_per_frame": 4},
+    {"instance": 3, "frames": 4, "evaluations_per_frame": 3},
+    {"frames": 2, "evaluations_per_frame": 5, "translation": "aligned", "view_degrees": [0.0, 70.0]},
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"), [("posefit/Fit-v0", one) for one in FIT] + [("posefit/Track-v0", one) for one in TRACK]
+)
+def test_a_vector_environment_equals_single_ones(name: str, arguments: dict[str, Any]) -> None:
+    vector = gym.make_vec(name, num_envs=4, **arguments)
+    assert type(vector.unwrapped).__module__.startswith("posefit_envs")
+    assert vector.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    check_vector_env(vector, lambda: gym.make(name, **arguments), steps=40)
+
+
+def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
+    for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
+        vector = gym.make_vec("posefit/Fit-v0", 3, "sync", {"autoreset_mode": mode}, max_evaluations=4)
+        check_vector_env(vector, lambda: gym.make("posefit/Fit-v0", max_evaluations=4), steps=20)
+    check_vector_env(gym.make_vec("CartPole-v1", 3, "sync"), lambda: gym.make("CartPole-v1"), steps=60)
+
+    class Shifted(FitVector):
+        def step(self, actions: Any) -> Any:
+            observations, rewards, *rest = super().step(actions)
+            return observations, rewards - 1e-9, *rest
+
+    class Masked(FitVector):
+        def step(self, actions: Any) -> Any:
+            *rest, infos = super().step(actions)
+            infos["_cost"][0] = False
+            return *rest, infos
+
+    class SameSeed(FitVector):
+        def reset(self, *, seed: Any = None, options: Any = None) -> Any:
+            return super().reset(seed=None if seed is None else [seed] * self.num_envs, options=options)
+
+    for wrong, message in ((Shifted, "reward must be"), (Masked, "info must have"), (SameSeed, "environment 1, reset")):
+        with pytest.raises(AssertionError, match=message):
+            check_vector_env(wrong(3), lambda: gym.make("posefit/Fit-v0"), steps=10)
+
+
+def test_a_time_limit_truncates_a_vector_environment_too() -> None:
+    check_vector_env(
+        gym.make_vec("posefit/Fit-v0", num_envs=3, max_episode_steps=3),
+        lambda: gym.make("posefit/Fit-v0", max_episode_steps=3),
+        steps=12,
+    )
+
+
+def test_some_environments_can_be_reset_alone() -> None:
+    for name in ("posefit/Fit-v0", "posefit/Track-v0"):
+        vector = gym.make_vec(name, num_envs=3)
+        with pytest.raises(error.ResetNeeded, match="the first reset must be of all"):
+            vector.reset(options={"reset_mask": np.array([True, False, False])})
+        vector.reset(seed=0)
+        _, _, _, _, before = vector.step(vector.action_space.sample())
+        _, infos = vector.reset(options={"reset_mask": np.array([False, True, False])})
+        assert infos["_instance"].tolist() == [False, True, False]
+        _, _, _, _, after = vector.step(vector.action_space.sample())
+        assert after["evaluations"].tolist() == [2, 1, 2]
+        with pytest.raises(error.Error, match="reset_mask must be 3 booleans"):
+            vector.reset(options={"reset_mask": [1, 0]})
+        assert before["evaluations"].tolist() == [1, 1, 1]
+
+
+@pytest.mark.parametrize("name", ["posefit/Fit-v0", "posefit/Track-v0"])
+def test_mistakes_are_named(name: str) -> None:
+    vector = gym.make_vec(name, num_envs=3)
+    with pytest.raises(error.ResetNeeded, match="reset must come before"):
+        vector.step(np.zeros((3, 9)))
+    with pytest.raises(error.Error, match="seed must be one number or 3, got 2"):
+        vector.reset(seed=[1, 2])
+    vector.reset(seed=0)
+    with pytest.raises(error.InvalidAction, match=r"actions must have shape \(3, 9\), got \(2, 9\)"):
+        vector.step(np.zeros((2, 9)))
+    with pytest.raises(error.InvalidAction, match="actions must be finite"):
+        vector.step(np.full((3, 9), np.nan))
+    with pytest.raises(error.UnsupportedMode, match="rgb_array for a vector environment, got human"):
+        gym.make_vec(name, num_envs=3, render_mode="human")
+    with pytest.raises(error.Error, match="num_envs must be at least 1, got 0"):
+        gym.make_vec(name, num_envs=0)
+    with pytest.raises(TypeError, match="colour"):
+        gym.make_vec(name, num_envs=3, colour="red")
+
+
+@pytest.mark.parametrize("name", ["posefit/Fit-v0", "posefit/Track-v0"])
+def test_every_environment_has_its_picture(name: str) -> None:
+    vector = gym.make_vec(name, num_envs=2, render_mode="rgb_array")
+    vector.reset(seed=0)
+    before = vector.render()
+    vector.step(vector.action_space.sample())
+    after = vector.render()
+    assert before is not None
+    assert after is not None
+    assert len(before) == len(after) == 2
+    assert all((a != b).any() for a, b in zip(before, after, strict=True))
+
+
+# optimisers
+
+
+@pytest.mark.parametrize(("name", "width"), [("sapso", 40), ("pso", 40), ("cma", 10), ("annealed", 244)])
+def test_an_optimiser_through_the_environment_is_the_optimiser_through_the_library(name: str, width: int) -> None:
+    env = gym.make_vec("posefit/Fit-v0", num_envs=width, instance=3, max_evaluations=10**6, target_cost=-1.0)
+    driven = drive(env, name, seed=5)
+    unwrapped: Any = env.unwrapped
+    episode = unwrapped._episodes[0]
+    problem = episode.scenery.problem(episode.space)
+    factory = registry().optimiser(name)
+    alone = minimise(
+        problem.evaluate, factory(episode.space, np.random.default_rng(5), **planned(factory, {}, 2440)), 2440
+    )
+    assert driven.cost == alone.cost
+    assert driven.evaluations == alone.evaluations
+    np.testing.assert_array_equal(driven.history, alone.history)
+    np.testing.assert_array_equal(driven.proposal, alone.proposal)
+
+
+def test_a_rounded_action_is_off_by_no_more_than_a_few_pixels() -> None:
+    # float32 has 24 bits: a proposal moves by 6e-8 half-ranges at most, which moves an edge by 1e-5 pixels
+    env = gym.make_vec("posefit/Fit-v0", num_envs=400, instance=3, max_evaluations=10**6, target_cost=-1.0)
+    env.reset(seed=0)
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (400, 9))
+    exact, rounded = (env.step(one)[4] for one in (actions, actions.astype(np.float32)))
+    differing = (exact["areas"] != rounded["areas"]).any(axis=(1, 2)).mean()
+    assert differing < 0.02
+    assert np.abs(exact["cost"] - rounded["cost"]).max() < 0.5
+
+
+def test_drive_says_what_does_not_fit() -> None:
+    env = gym.make_vec("posefit/Fit-v0", num_envs=7, instance=3)
+    with pytest.raises(error.Error, match="a population must be a multiple of num_envs 7, got 40"):
+        drive(env, "sapso")
+    env = gym.make_vec("posefit/Fit-v0", num_envs=40, instance=3, max_evaluations=5)
+    with pytest.raises(error.Error, match="raise max_evaluations, lower target_cost"):
+        drive(env, "sapso")
+    with pytest.raises(error.Error, match="evaluations must hold one population of 40, got 20"):
+        drive(env, "pso", evaluations=20)
+
+
+def test_a_population_may_take_several_steps() -> None:
+    one, four = (
+        gym.make_vec("posefit/Fit-v0", num_envs=n, instance=3, max_evaluations=10**6, target_cost=-1.0)
+        for n in (40, 10)
+    )
+    assert drive(one, "sapso", evaluations=400).cost == drive(four, "sapso", evaluations=400).cost
+
+
+def test_memory_stays_flat() -> None:
+    env = gym.make_vec("posefit/Fit-v0", num_envs=8, max_evaluations=20)
+    env.reset(seed=0)
+    sizes = []
+    tracemalloc.start()
+    for step in range(1200):
+        env.step(env.action_space.sample())
+        if step in (599, 1199):
+            sizes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    assert sizes[1] - sizes[0] < 3_000_000
+
+
+# agents
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("policy", ["CnnPolicy", "MlpPolicy"])
+def test_an_agent_trains_on_the_vector_environment(policy: str) -> None:
+    sb3 = pytest.importorskip("stable_baselines3")
+    vector = to_sb3_vec_env(gym.make_vec("posefit/Fit-v0", num_envs=8, max_evaluations=30))
+    model = sb3.PPO(policy, vector, n_steps=64, batch_size=128, n_epochs=2, seed=0, device="cpu")
+    model.learn(2000)
+    assert model.num_timesteps >= 2000
+    vector.close()
+
+
+def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
+    pytest.importorskip("stable_baselines3")
+    for name, arguments in (
+        ("posefit/Fit-v0", {"max_evaluations": 3}),
+        ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
+    ):
+        adapted = to_sb3_vec_env(gym.make_vec(name, num_envs=2, **arguments))
+        adapted.seed(4)
+        first = adapted.reset()
+        assert first.shape[0] == 2
+        for step in range(3):
+            observations, rewards, done, infos = adapted.step(np.zeros((2, 9), dtype=np.float32))
+            assert done.tolist() == [step == 2] * 2
+        assert rewards.shape == (2,)
+        assert infos[0]["terminal_observation"][..., 1].any()
+        assert not observations[0][..., 1].any()  # a new episode: nothing proposed yet
+        assert infos[0]["TimeLimit.truncated"] is ("Fit" in name)
+        assert adapted.get_attr("num_envs") == [2, 2]
+        adapted.close()
+
+
+def test_another_kind_of_vector_environment_is_refused() -> None:
+    pytest.importorskip("stable_baselines3")
+    same = gym.make_vec("CartPole-v1", 2, "sync", {"autoreset_mode": AutoresetMode.SAME_STEP})
+    with pytest.raises(error.Error, match="autoreset_mode must be NEXT_STEP, got"):
+        to_sb3_vec_env(same)
+
+
+def test_the_wrapper_chain_of_cleanrl_accepts_it() -> None:
+    def make() -> Any:
+        env: Any = gym.make("posefit/Fit-v0", max_evaluations=6)
+        env = wrappers.FlattenObservation(env)
+        env = wrappers.RecordEpisodeStatistics(env)
+        env = wrappers.ClipAction(env)
+        env = wrappers.NormalizeObservation(env)
+        env = wrappers.TransformObservation(env, lambda x: np.clip(x, -10.0, 10.0), env.observation_space)
+        env = wrappers.NormalizeReward(env, gamma=0.99)
+        return wrappers.TransformReward(env, lambda reward: float(np.clip(reward, -10.0, 10.0)))
+
+    vector = gym.vector.SyncVectorEnv([make, make])
+    vector.reset(seed=0)
+    finished = 0
+    for _ in range(20):
+        _, rewards, _, _, infos = vector.step(vector.action_space.sample())
+        assert np.isfinite(rewards).all()
+        finished += int(np.sum(infos.get("_episode", False)))
+    assert finished >= 4
+    native = wrappers.vector.RecordEpisodeStatistics(gym.make_vec("posefit/Fit-v0", num_envs=2, max_evaluations=6))
+    native.reset(seed=0)
+    assert any("episode" in native.step(native.action_space.sample())[4] for _ in range(10))
+
+
+def test_the_package_is_light_to_import() -> None:
+    import subprocess
+    import sys
+
+    script = "import sys, posefit_envs; print([m for m in ('numba', 'cv2', 'scipy', 'pygame') if m in sys.modules])"
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
+    assert set(dir(posefit_envs)) >= {"__all__"}
