@@ -135,8 +135,9 @@ def bench(threads: int | None, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(figures))
         return
-    optimisers = figures.pop("optimisers")
-    for name, value in {**figures, **{f"{name}, us a proposal": us for name, us in optimisers.items()}}.items():
+    for group in ("vector_env", "optimisers"):
+        figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
+    for name, value in figures.items():
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
 
 

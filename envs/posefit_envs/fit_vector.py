@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from posefit import SearchSpace
+from posefit import PoseProblem, SearchSpace
 from posefit.geometry.rotation import Array
 from posefit_envs.batch import mask_of, seeds_of
 from posefit_envs.drawing import MODES, check_mode, draw
@@ -80,6 +80,11 @@ class FitVector(VectorEnv[Image, Any, Array]):
     def search_spaces(self) -> list[SearchSpace]:
         """The space of each environment's instance. Raises gymnasium.error.ResetNeeded before the first reset."""
         return [episode.space for episode in self._current()]
+
+    @property
+    def problems(self) -> list[PoseProblem]:
+        """The problem that each environment's proposals are evaluated on."""
+        return [episode.scenery.problem(episode.space) for episode in self._current()]
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
