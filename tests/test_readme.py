@@ -26,3 +26,8 @@ def test_the_optimiser_of_the_readme_keeps_every_rule() -> None:
 def test_the_pieces_of_the_readme_fit_together(capsys: Any) -> None:
     exec(code("best = minimise"), {"__name__": "pieces"})
     assert float(capsys.readouterr().out) < 15.0
+
+
+def test_the_environments_of_the_readme_run(capsys: Any) -> None:
+    exec(code("posefit_envs:posefit/Fit-v0"), {"__name__": "environments"})
+    assert 0.0 <= float(capsys.readouterr().out) < 30.0

@@ -193,7 +193,7 @@ def test_memory_stays_flat() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("policy", ["CnnPolicy", "MlpPolicy"])
 def test_an_agent_trains_on_the_vector_environment(policy: str) -> None:
-    sb3 = pytest.importorskip("stable_baselines3")
+    sb3 = pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
     vector = to_sb3_vec_env(gym.make_vec("posefit/Fit-v0", num_envs=8, max_evaluations=30))
     model = sb3.PPO(policy, vector, n_steps=64, batch_size=128, n_epochs=2, seed=0, device="cpu")
     model.learn(2000)
@@ -202,7 +202,7 @@ def test_an_agent_trains_on_the_vector_environment(policy: str) -> None:
 
 
 def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
-    pytest.importorskip("stable_baselines3")
+    pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
     for name, arguments in (
         ("posefit/Fit-v0", {"max_evaluations": 3}),
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
@@ -223,7 +223,7 @@ def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
 
 
 def test_another_kind_of_vector_environment_is_refused() -> None:
-    pytest.importorskip("stable_baselines3")
+    pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
     same = gym.make_vec("CartPole-v1", 2, "sync", {"autoreset_mode": AutoresetMode.SAME_STEP})
     with pytest.raises(error.Error, match="autoreset_mode must be NEXT_STEP, got"):
         to_sb3_vec_env(same)
