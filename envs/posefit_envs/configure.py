@@ -1,7 +1,6 @@
 """Configure-v0: dynamic algorithm configuration. The action steers a swarm that searches for the pose."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -10,8 +9,8 @@ from numpy.typing import NDArray
 
 from posefit.geometry.rotation import Array
 from posefit_envs.drawing import MODES, Screen, check_mode, draw
-from posefit_envs.fit import SIZE, Episode, chosen
-from posefit_envs.instance import Views, check_number, draw_number, measured, world
+from posefit_envs.fit import Episode
+from posefit_envs.instance import Arguments, measured, select
 from posefit_envs.search import Doorkeeper
 from posefit_swarm.flock import Flock, speed_limits
 
@@ -78,28 +77,19 @@ class Configure(gym.Env[State, Any]):
 
     def __init__(
         self,
-        motion: str = "walk",
-        instance: int | None = None,
-        split: str = "train",
-        view_degrees: Views = 45.0,
-        prior: str = "pca",
-        train: Sequence[str] | None = None,
-        translation: str = "known",
-        size: Sequence[int] = SIZE,
-        noise: Mapping[str, float] | None = None,
-        mismatch_percent: float = 0.0,
+        *,
         particles: int = PARTICLES,
         iterations: int = ITERATIONS,
         render_mode: str | None = None,
+        **arguments: Unpack[Arguments],
     ) -> None:
-        check_number(instance, split)
         check_mode(render_mode)
         for name, value in (("particles", particles), ("iterations", iterations)):
             if value < 2:
                 raise error.Error(f"{name} must be at least 2, got {value}")
         self.render_mode = render_mode
-        self.world = world(motion, view_degrees, prior, train, translation, size, noise, mismatch_percent)
-        self._number, self._split = instance, split
+        self._selection = select(**arguments)
+        self.world = self._selection.world
         self._particles, self._iterations = int(particles), int(iterations)
         self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.observation_space = spaces.Box(0.0, 1.0, (8,), np.float32)
@@ -110,9 +100,7 @@ class Configure(gym.Env[State, Any]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[State, dict[str, Any]]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
-        number = chosen(self._number, options)
-        if number is None:
-            number = draw_number(self._split, self.np_random)  # type: ignore[arg-type]
+        number = self._selection.number(options, lambda: self.np_random)
         episode = Episode(self.world, number, self._particles * (self._iterations + 1))
         rng = np.random.default_rng(int(self.np_random.integers(2**63)))
         self._search = _Search(episode, rng, self._particles, self._iterations)

@@ -1,7 +1,6 @@
 """Fit-v0: one silhouette, an episode of proposals."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -10,12 +9,11 @@ from gymnasium import error, spaces
 from posefit import SearchSpace
 from posefit.geometry.rotation import Array
 from posefit_envs.drawing import MODES, Screen, check_mode, draw
-from posefit_envs.instance import Instance, Views, World, check_number, draw_number, instance, measured, world
+from posefit_envs.instance import Arguments, Instance, World, instance, measured, select
 from posefit_envs.search import Doorkeeper, Image, Outcome, look
 
 MAX_EVALUATIONS = 200
 TARGET_COST = 2.0
-SIZE = (64, 48)
 
 
 class Fit(gym.Env[Image, Any]):
@@ -77,26 +75,17 @@ class Fit(gym.Env[Image, Any]):
 
     def __init__(
         self,
-        motion: str = "walk",
-        instance: int | None = None,
-        split: str = "train",
-        view_degrees: Views = 45.0,
-        prior: str = "pca",
-        train: Sequence[str] | None = None,
-        translation: str = "known",
-        size: Sequence[int] = SIZE,
-        noise: Mapping[str, float] | None = None,
-        mismatch_percent: float = 0.0,
+        *,
         target_cost: float = TARGET_COST,
         max_evaluations: int = MAX_EVALUATIONS,
         render_mode: str | None = None,
+        **arguments: Unpack[Arguments],
     ) -> None:
-        check_number(instance, split)
         check_budget(target_cost, "max_evaluations", max_evaluations)
         check_mode(render_mode)
         self.render_mode = render_mode
-        self.world = world(motion, view_degrees, prior, train, translation, size, noise, mismatch_percent)
-        self._number, self._split = instance, split
+        self._selection = select(**arguments)
+        self.world = self._selection.world
         self._target, self._most = float(target_cost), int(max_evaluations)
         self.action_space, self.observation_space = spaces_of(self.world)  # type: ignore[assignment]
         self._shape = action_shape(self.world)
@@ -112,9 +101,7 @@ class Fit(gym.Env[Image, Any]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Image, dict[str, Any]]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
-        number = chosen(self._number, options)
-        if number is None:
-            number = draw_number(self._split, self.np_random)  # type: ignore[arg-type]
+        number = self._selection.number(options, lambda: self.np_random)
         self._episode = Episode(self.world, number, self._most)
         if self.render_mode == "human":
             self.render()
@@ -200,14 +187,6 @@ def spaces_of(setting: World) -> tuple[spaces.Box, spaces.Box]:
         spaces.Box(-1.0, 1.0, action_shape(setting), np.float32),
         spaces.Box(0, 255, (height, width, 2 * len(setting.view_degrees)), np.uint8),
     )
-
-
-def chosen(number: int | None, options: Mapping[str, Any] | None) -> int | None:
-    """Return the instance that the options choose, or the one that was fixed. Raises gymnasium.error.Error."""
-    if options and options.get("instance") is not None:
-        number = int(options["instance"])
-        check_number(number, "train")
-    return number
 
 
 def check_budget(target_cost: float, name: str, evaluations: int) -> None:

@@ -1,7 +1,7 @@
 """Fit-v0 for many environments at once: a population of proposals is one call of the kernel."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium import error
@@ -14,8 +14,8 @@ from posefit import PoseProblem, SearchSpace
 from posefit.geometry.rotation import Array
 from posefit_envs.batch import mask_of, seeds_of
 from posefit_envs.drawing import MODES, check_mode, draw
-from posefit_envs.fit import MAX_EVALUATIONS, SIZE, TARGET_COST, Episode, action_shape, check_budget, chosen, spaces_of
-from posefit_envs.instance import Views, check_number, draw_number, measured, world
+from posefit_envs.fit import MAX_EVALUATIONS, TARGET_COST, Episode, action_shape, check_budget, spaces_of
+from posefit_envs.instance import Arguments, measured, select
 from posefit_envs.search import Doorkeeper, Image, Outcome, distinct, look
 
 Infos = dict[str, Any]
@@ -38,31 +38,22 @@ class FitVector(VectorEnv[Image, Any, Array]):
     def __init__(
         self,
         num_envs: int = 1,
-        motion: str = "walk",
-        instance: int | None = None,
-        split: str = "train",
-        view_degrees: Views = 45.0,
-        prior: str = "pca",
-        train: Sequence[str] | None = None,
-        translation: str = "known",
-        size: Sequence[int] = SIZE,
-        noise: Mapping[str, float] | None = None,
-        mismatch_percent: float = 0.0,
+        *,
         target_cost: float = TARGET_COST,
         max_evaluations: int = MAX_EVALUATIONS,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
+        **arguments: Unpack[Arguments],
     ) -> None:
         if num_envs < 1:
             raise error.Error(f"num_envs must be at least 1, got {num_envs}")
-        check_number(instance, split)
         check_budget(target_cost, "max_evaluations", max_evaluations)
         check_mode(render_mode)
         if render_mode == "human":
             raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
         self.num_envs, self.render_mode = num_envs, render_mode
-        self.world = world(motion, view_degrees, prior, train, translation, size, noise, mismatch_percent)
-        self._number, self._split = instance, split
+        self._selection = select(**arguments)
+        self.world = self._selection.world
         self._target, self._most = float(target_cost), int(max_evaluations)
         self._longest = max_episode_steps
         self.single_action_space, self.single_observation_space = spaces_of(self.world)
@@ -157,12 +148,14 @@ class FitVector(VectorEnv[Image, Any, Array]):
             [measured(one.instance.truth, 0, outcome.poses[i : i + 1])[0] for i, one in enumerate(self._episodes)]
         )
 
+    def _generator(self, i: int) -> np.random.Generator:
+        mine = self._generators[i]
+        if mine is None:
+            mine = self._generators[i] = seeding.np_random(None)[0]
+        return mine
+
     def _begin(self, i: int, options: Mapping[str, Any] | None) -> None:
-        number = chosen(self._number, options)
-        if number is None:
-            if self._generators[i] is None:
-                self._generators[i] = seeding.np_random(None)[0]
-            number = draw_number(self._split, self._generators[i])  # type: ignore[arg-type]
+        number = self._selection.number(options, lambda: self._generator(i))
         self._episodes[i] = Episode(self.world, number, self._most)
         self._best[i], self._used[i], self._ended[i] = np.inf, 0, False
 

@@ -1,9 +1,9 @@
 """Instances, numbered as in other benchmarks: a number and an environment's arguments are a person and what is seen."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Literal, get_args
+from typing import Any, TypedDict
 
 import numpy as np
 from gymnasium import error
@@ -19,10 +19,10 @@ from posefit.study.source import motion_of
 from posefit_envs.corruption import CORRUPTIONS, corrupted
 from posefit_envs.search import Scenery
 
-Split = Literal["train", "test"]
 RESERVED = {"train": (0, 10_000), "test": (10_000, 20_000)}  # instance numbers; those of the test split are held out
 SALT = 2012  # part of every instance's seed
 FPS = 30.0
+SIZE = (64, 48)  # pixels
 YAW_DEGREES = 20.0  # how far the middle of the searched yaw is from the truth at most
 SPEED = 0.15  # how far the cadence of a built-in motion is from its own at most
 DISTANCE, HEIGHT = 3.5, 0.9  # metres from camera to person; of the camera above the ground
@@ -54,17 +54,59 @@ class World:
         return _learned(self.prior, self.motion, self.train)
 
 
-def world(
-    motion: str,
-    view_degrees: Views,
-    prior: str,
-    train: Sequence[str] | None,
-    translation: str,
-    size: Sequence[int],
-    noise: Mapping[str, float] | None,
-    mismatch_percent: float,
-) -> World:
-    """Return the world that arguments describe. Raises gymnasium.error.Error where one of them makes no sense."""
+class Arguments(TypedDict, total=False):
+    """The arguments that all environments share; their docstrings say what each means."""
+
+    motion: str
+    instance: int | None
+    split: str
+    view_degrees: Views
+    prior: str
+    train: Sequence[str] | None
+    translation: str
+    size: Sequence[int]
+    noise: Mapping[str, float] | None
+    mismatch_percent: float
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A world, and which of its instances come."""
+
+    world: World
+    instance: int | None
+    split: str
+
+    def number(self, options: Mapping[str, Any] | None, generator: Callable[[], np.random.Generator]) -> int:
+        """Return the number of the next instance: of a reset's options, the one that is fixed, or one drawn.
+
+        Raises gymnasium.error.Error where the options name one that there is not.
+        """
+        if options and options.get("instance") is not None:
+            number = int(options["instance"])
+            _check_number(number)
+            return number
+        return self.instance if self.instance is not None else int(generator().integers(*RESERVED[self.split]))
+
+
+def select(
+    *,
+    motion: str = "walk",
+    instance: int | None = None,
+    split: str = "train",
+    view_degrees: Views = 45.0,
+    prior: str = "pca",
+    train: Sequence[str] | None = None,
+    translation: str = "known",
+    size: Sequence[int] = SIZE,
+    noise: Mapping[str, float] | None = None,
+    mismatch_percent: float = 0.0,
+) -> Selection:
+    """Return what the arguments describe. Raises gymnasium.error.Error where one of them makes no sense."""
+    if split not in RESERVED:
+        raise error.Error(f"split must be one of {', '.join(RESERVED)}, got {split!r}")
+    if instance is not None:
+        _check_number(instance)
     views = tuple(map(float, view_degrees)) if isinstance(view_degrees, Sequence) else (float(view_degrees),)
     if not views or not np.isfinite(views).all():
         raise error.Error(f"view_degrees must be a finite number or several, got {view_degrees!r}")
@@ -93,7 +135,13 @@ def world(
         assert made.learned is not None
     except (ValueError, ImportError) as mistake:  # unknown motions and priors are named there
         raise error.Error(str(mistake)) from None
-    return made
+    return Selection(made, instance, split)
+
+
+def _check_number(number: int) -> None:
+    last = RESERVED["test"][1] - 1
+    if not 0 <= number <= last:
+        raise error.Error(f"instance must lie in 0 to {last}, got {number}")
 
 
 @lru_cache(maxsize=32)
@@ -134,20 +182,6 @@ class Instance:
         assert task.yaw is not None
         centre = np.array([task.yaw, 0.0, 0.0])
         return SearchSpace(prior, centre, np.radians(ROOT_RANGE_DEGREES), task.anchor, task.translation)
-
-
-def draw_number(split: Split, rng: np.random.Generator) -> int:
-    """Return a number of the split."""
-    return int(rng.integers(*RESERVED[split]))
-
-
-def check_number(number: int | None, split: str) -> None:
-    """Return nothing. Raises gymnasium.error.Error where there is no such instance or split."""
-    if split not in get_args(Split):
-        raise error.Error(f"split must be one of {', '.join(get_args(Split))}, got {split!r}")
-    last = RESERVED["test"][1] - 1
-    if number is not None and not 0 <= number <= last:
-        raise error.Error(f"instance must lie in 0 to {last}, got {number}")
 
 
 @lru_cache(maxsize=64)

@@ -1,8 +1,7 @@
 """Track-v0: a sequence of silhouettes, some proposals for each."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -13,8 +12,8 @@ from posefit.fitting import metrics
 from posefit.fitting.tracker import Follower, Prediction
 from posefit.geometry.rotation import Array
 from posefit_envs.drawing import MODES, Screen, check_mode, draw
-from posefit_envs.fit import SIZE, action_shape, check_budget, chosen, spaces_of
-from posefit_envs.instance import Instance, Views, World, check_number, draw_number, instance, measured, world
+from posefit_envs.fit import action_shape, check_budget, spaces_of
+from posefit_envs.instance import Arguments, Instance, World, instance, measured, select
 from posefit_envs.search import Doorkeeper, Image, Outcome, Scenery, look, look_at
 
 FRAMES = 20
@@ -61,28 +60,19 @@ class Track(gym.Env[Image, Any]):
 
     def __init__(
         self,
-        motion: str = "walk",
-        instance: int | None = None,
-        split: str = "train",
-        view_degrees: Views = 45.0,
-        prior: str = "pca",
-        train: Sequence[str] | None = None,
-        translation: str = "known",
-        size: Sequence[int] = SIZE,
-        noise: Mapping[str, float] | None = None,
-        mismatch_percent: float = 0.0,
+        *,
         frames: int = FRAMES,
         evaluations_per_frame: int = EVALUATIONS,
         render_mode: str | None = None,
+        **arguments: Unpack[Arguments],
     ) -> None:
-        check_number(instance, split)
         check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
         check_mode(render_mode)
         if frames < 1:
             raise error.Error(f"frames must be at least 1, got {frames}")
         self.render_mode = render_mode
-        self.world = world(motion, view_degrees, prior, train, translation, size, noise, mismatch_percent)
-        self._number, self._split = instance, split
+        self._selection = select(**arguments)
+        self.world = self._selection.world
         self._frames, self._most = int(frames), int(evaluations_per_frame)
         self.action_space, self.observation_space = spaces_of(self.world)  # type: ignore[assignment]
         self._shape = action_shape(self.world)
@@ -98,9 +88,7 @@ class Track(gym.Env[Image, Any]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Image, dict[str, Any]]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
-        number = chosen(self._number, options)
-        if number is None:
-            number = draw_number(self._split, self.np_random)  # type: ignore[arg-type]
+        number = self._selection.number(options, lambda: self.np_random)
         self._course = Course(self.world, number, self._frames, self._most)
         if self.render_mode == "human":
             self.render()

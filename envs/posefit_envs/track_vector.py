@@ -1,7 +1,7 @@
 """Track-v0 for many environments at once: all that are in the same frame of the same instance are one kernel call."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium import error
@@ -13,8 +13,8 @@ from posefit import SearchSpace
 from posefit.geometry.rotation import Array
 from posefit_envs.batch import mask_of, seeds_of
 from posefit_envs.drawing import MODES, check_mode, draw
-from posefit_envs.fit import SIZE, action_shape, check_budget, chosen, spaces_of
-from posefit_envs.instance import Views, check_number, draw_number, world
+from posefit_envs.fit import action_shape, check_budget, spaces_of
+from posefit_envs.instance import Arguments, select
 from posefit_envs.search import Doorkeeper, Image, distinct, look_at
 from posefit_envs.track import EVALUATIONS, FRAMES, Course
 
@@ -37,24 +37,15 @@ class TrackVector(VectorEnv[Image, Any, Array]):
     def __init__(
         self,
         num_envs: int = 1,
-        motion: str = "walk",
-        instance: int | None = None,
-        split: str = "train",
-        view_degrees: Views = 45.0,
-        prior: str = "pca",
-        train: Sequence[str] | None = None,
-        translation: str = "known",
-        size: Sequence[int] = SIZE,
-        noise: Mapping[str, float] | None = None,
-        mismatch_percent: float = 0.0,
+        *,
         frames: int = FRAMES,
         evaluations_per_frame: int = EVALUATIONS,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
+        **arguments: Unpack[Arguments],
     ) -> None:
         if num_envs < 1:
             raise error.Error(f"num_envs must be at least 1, got {num_envs}")
-        check_number(instance, split)
         check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
         check_mode(render_mode)
         if render_mode == "human":
@@ -62,8 +53,8 @@ class TrackVector(VectorEnv[Image, Any, Array]):
         if frames < 1:
             raise error.Error(f"frames must be at least 1, got {frames}")
         self.num_envs, self.render_mode = num_envs, render_mode
-        self.world = world(motion, view_degrees, prior, train, translation, size, noise, mismatch_percent)
-        self._number, self._split = instance, split
+        self._selection = select(**arguments)
+        self.world = self._selection.world
         self._frames, self._most, self._longest = int(frames), int(evaluations_per_frame), max_episode_steps
         self.single_action_space, self.single_observation_space = spaces_of(self.world)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -120,12 +111,14 @@ class TrackVector(VectorEnv[Image, Any, Array]):
             infos = self._add_info(infos, info, i)
         return pictures, rewards, terminated, truncated, infos
 
+    def _generator(self, i: int) -> np.random.Generator:
+        mine = self._generators[i]
+        if mine is None:
+            mine = self._generators[i] = seeding.np_random(None)[0]
+        return mine
+
     def _begin(self, i: int, options: Mapping[str, Any] | None) -> dict[str, Any]:
-        number = chosen(self._number, options)
-        if number is None:
-            if self._generators[i] is None:
-                self._generators[i] = seeding.np_random(None)[0]
-            number = draw_number(self._split, self._generators[i])  # type: ignore[arg-type]
+        number = self._selection.number(options, lambda: self._generator(i))
         self._courses[i] = Course(self.world, number, self._frames, self._most)
         self._steps[i], self._ended[i] = 0, False
         return {"instance": number, "frame": 0}

@@ -198,11 +198,11 @@ def test_each_corruption_changes_the_silhouette_more_the_stronger_it_is(name: st
 
 
 def test_a_body_that_is_off_costs_even_the_true_pose_something() -> None:
-    from posefit_envs.instance import instance, world
+    from posefit_envs.instance import instance, select
 
     lowest = []
     for percent in (0.0, 10.0):
-        setting = world("walk", 45.0, "pca", None, "known", (160, 120), None, percent)
+        setting = select(size=(160, 120), mismatch_percent=percent).world
         made = instance(setting, 3, 1, 10)
         problem_task, truth = made.task, made.truth
         from posefit.silhouette.cost import areas, mismatch
