@@ -184,7 +184,7 @@ def new(name: str, kind: Any, out: str | None) -> None:
     from posefit.study.plugins import new as write
 
     folder = write(name, kind, out)
-    click.echo(f"written to {folder}; next: cd {folder} && python -m pip install --no-deps -e . && python -m pytest")
+    click.echo(f"written to {folder}; next: cd {folder} && python -m pip install -e '.[test]' && python -m pytest")
 
 
 @main.command()
