@@ -43,6 +43,15 @@ def _range(_: click.Context, __: click.Parameter, value: str | None) -> tuple[in
     raise click.BadParameter(f"expected A:B such as 0:50, :50 or 10:, got {value!r}")
 
 
+def _box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...] | None:
+    if value is None:
+        return None
+    parts = value.split(",")
+    if len(parts) != 4 or not all(part.strip().isdigit() for part in parts):
+        raise click.BadParameter(f"expected X,Y,WIDTH,HEIGHT in pixels such as 0,420,1400,570, got {value!r}")
+    return tuple(map(int, parts))
+
+
 _OPTIONS = (
     click.argument("source", default="walk"),
     click.option("--asf", metavar="FILE", help="Skeleton of SOURCE; by default the only .asf beside an .amc."),
@@ -119,6 +128,30 @@ def fit(as_json: bool, **options: Any) -> None:
     click.echo(table(result.summary))
     if options["out"]:
         click.echo(f"written to {options['out']}: look at summary.png")
+
+
+@main.command()
+@click.argument("video")
+@click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
+@click.option("--method", default="mixture", show_default=True, help="mixture, median or mean.")
+@click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image.")
+@click.option("--roi", callback=_box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels.")
+@click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front.")
+@click.option("--frames", callback=_range, metavar="A:B", help="Only these frames.")
+@click.option("--width", type=int, default=640, show_default=True, help="Scale larger videos down to this.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def extract(video: str, out: str, as_json: bool, **options: Any) -> None:
+    """Take the masks of one person out of a VIDEO before a still background."""
+    from posefit.study.extract import extract as run
+
+    result = run(video, out, progress=_progress, **options)
+    if as_json:
+        click.echo(json.dumps(result))
+        return
+    click.echo(
+        f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border, "
+        f"{result['in_pieces']} in pieces; written to {out}: watch preview.mp4"
+    )
 
 
 @main.command()

@@ -151,6 +151,7 @@ class LazyMasks:
     path: Path
     files: Sequence[Path]
     stack: NDArray[Any] | None = field(default=None, repr=False)
+    known: NDArray[Any] | None = field(default=None, repr=False)  # of the same shape; 0 where nothing is known
 
     @classmethod
     def of(cls, path: Path, frames: Range) -> "LazyMasks":
@@ -166,14 +167,18 @@ class LazyMasks:
         try:
             with np.load(path, allow_pickle=False) as stored:
                 stack = stored["masks"]
+                known = stored.get("valid")
         except (KeyError, ValueError, OSError, EOFError) as error:
             raise ValueError(f"{path}: expected an .npz file with the key masks, got {error}") from None
         if stack.ndim != 3 or not len(stack) or stack.dtype.kind not in "buif":
             raise ValueError(f"{path}: masks must have shape (frames, height, width), got {stack.shape} {stack.dtype}")
         if stack.dtype.kind == "f" and not np.isfinite(stack).all():
             raise ValueError(f"{path}: masks must be finite, got nan or infinity")
+        if known is not None and (known.shape != stack.shape or known.dtype.kind not in "bui"):
+            raise ValueError(f"{path}: valid must have the masks' shape {stack.shape}, got {known.shape} {known.dtype}")
         start, stop = _span(frames, len(stack))
-        return cls(path, [Path(f"{path}[{k}]") for k in range(start, stop)], stack[start:stop])
+        names = [Path(f"{path}[{k}]") for k in range(start, stop)]
+        return cls(path, names, stack[start:stop], None if known is None else known[start:stop])
 
     def __len__(self) -> int:
         return len(self.files)
@@ -194,7 +199,7 @@ class LazyMasks:
         if not person.any() or person.all():
             came = "an empty one" if not person.any() else "one without background"
             raise ValueError(f"{self.files[k]}: expected a mask with a person before a background, got {came}")
-        return Silhouette.of(person)
+        return Silhouette.of(person, None if self.known is None else self.known[k])
 
     @staticmethod
     def _image(path: Path) -> NDArray[Any]:

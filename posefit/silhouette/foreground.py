@@ -1,0 +1,160 @@
+"""From video frames to the mask of one person: a background model, clean edges, the largest piece, no holes.
+
+Frames and backgrounds are (height, width, 3) uint8. Nothing here keeps a frame, so a video may be as long as it likes.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.silhouette.mask import Mask
+
+Image = NDArray[np.uint8]  # (height, width, 3)
+
+SPREADS = 4.0  # a pixel is foreground this many standard deviations from the background
+LEAST = 18.0  # and at least so many grey levels
+SHADE = (0.45, 0.95)  # a shadow keeps this share of the background's brightness
+TINT = 14.0  # and its colour, to within so many grey levels after scaling
+SPECK = 0.004  # of the image's height: what an opening takes away
+GAP = 0.012  # of the image's height: what a closing joins
+NEAR = 0.04  # of the image's height: pieces as near as that belong to the person
+HOLE = 0.02  # of the person's area: a hole that is smaller is filled
+SAMPLES = 40  # frames that a median background looks at
+
+
+class Background(Protocol):
+    """Tells a person from what was there before."""
+
+    def classify(self, image: Image) -> tuple[Mask, Mask]:
+        """Return what is foreground, and what may be its shadow, of an image."""
+        ...
+
+
+@dataclass(frozen=True)
+class Still:
+    """One mean (or median) colour and one spread for each pixel. VSMM 1.1 and 1.2 are its mean form."""
+
+    middle: NDArray[np.float32] = field(repr=False)  # (height, width, 3)
+    spread: NDArray[np.float32] = field(repr=False)  # (height, width)
+
+    def classify(self, image: Image) -> tuple[Mask, Mask]:
+        """Return where an image differs from the background, and where it is only darker."""
+        away = cv2.absdiff(image, self.middle.round().astype(np.uint8))
+        difference = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2])
+        changed = np.asarray(difference > np.maximum(LEAST, SPREADS * self.spread))
+        before, now = self.middle[changed], image[changed].astype(np.float32)  # the rest need not be looked at
+        share = (now.mean(axis=1) + 1.0) / (before.mean(axis=1) + 1.0)
+        tint = np.abs(now - before * share[:, None]).max(axis=1)
+        shadow = np.zeros_like(changed)
+        shadow[changed] = (share > SHADE[0]) & (share < SHADE[1]) & (tint < TINT)
+        return changed & ~shadow, shadow
+
+
+def mean_background(images: Iterable[Image]) -> Still:
+    """Return the background that is the mean of images without a person. Raises ValueError where there is none."""
+    count, total, squares = 0, np.zeros(()), np.zeros(())
+    for image in images:
+        values = image.astype(np.float64)
+        count, total, squares = count + 1, total + values, squares + values**2
+    if not count:
+        raise ValueError("background must hold at least one frame, got none")
+    middle = total / count
+    variance = np.maximum(squares / count - middle**2, 0.0).max(axis=-1)
+    return Still(middle.astype(np.float32), np.sqrt(variance).astype(np.float32))
+
+
+def median_background(images: Iterable[Image]) -> Still:
+    """Return the background that is the median of some images, before which a person may walk; at most 40 are kept.
+
+    Raises ValueError where there is none.
+    """
+    kept = np.stack(list(images)) if not isinstance(images, np.ndarray) else images
+    if not len(kept):
+        raise ValueError("background must hold at least one frame, got none")
+    middle = np.median(kept, axis=0).astype(np.float32)
+    away = np.median(np.abs(kept.astype(np.float32) - middle), axis=0).max(axis=-1)
+    return Still(middle, (1.4826 * away).astype(np.float32))
+
+
+class Mixture:
+    """OpenCV's adaptive mixture of Gaussians, learned from all frames first: what the SAPSO paper starts from."""
+
+    def __init__(self, images: Iterable[Image]) -> None:
+        self._model: Any = cv2.createBackgroundSubtractorMOG2(500, 25.0, True)
+        count = 0
+        for image in images:
+            self._model.apply(image)
+            count += 1
+        if not count:
+            raise ValueError("background must hold at least one frame, got none")
+
+    def classify(self, image: Image) -> tuple[Mask, Mask]:
+        """Return what the mixture calls foreground, and what it calls shadow."""
+        label = self._model.apply(image, learningRate=0.0)
+        return np.asarray(label == 255), np.asarray(label == 127)
+
+
+@dataclass(frozen=True)
+class Person:
+    """One frame's mask, and how good it is."""
+
+    mask: Mask = field(repr=False)
+    valid: Mask = field(repr=False)  # False where nothing is known: shadow, and what is ignored
+    area: int  # pixels
+    pieces: int  # how many the foreground had that are large enough to be a part of a person
+    touches_border: bool
+
+
+def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> Person:
+    """Return the largest person (height, width) of a foreground, within `roi` x, y, width, height.
+
+    Specks go, gaps close, pieces near the largest one join it and small holes are filled.
+    """
+    height, width = foreground.shape
+    inside = np.ones(foreground.shape, dtype=bool)
+    if roi is not None:
+        x, y, wide, tall = roi
+        inside[:] = False
+        inside[y : y + tall, x : x + wide] = True
+    known = ~shadow if ignore is None else ~shadow & ~ignore
+    cleaned = _morphed(foreground & inside, cv2.MORPH_OPEN, SPECK * height)
+    cleaned = _morphed(cleaned, cv2.MORPH_CLOSE, GAP * height) & inside
+    if ignore is not None:
+        cleaned &= ~ignore
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(cleaned.astype(np.uint8), connectivity=8)
+    if count < 2:
+        return Person(np.zeros_like(foreground), known, 0, 0, False)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    largest = 1 + int(areas.argmax())
+    mask = labels == largest
+    reach = _morphed(mask, cv2.MORPH_DILATE, NEAR * height)
+    near = np.unique(labels[reach & cleaned])
+    mask = np.isin(labels, near[near > 0])
+    mask = _without_holes(mask)
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    touches = bool(rows[0] == 0 or columns[0] == 0 or rows[-1] == height - 1 or columns[-1] == width - 1)
+    pieces = int(np.count_nonzero(areas > 0.05 * areas.max()))
+    return Person(mask, known | mask, int(mask.sum()), pieces, touches)
+
+
+def _morphed(mask: Mask, operation: int, size: float) -> Mask:
+    side = 2 * max(1, round(0.5 * size)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    return np.asarray(cv2.morphologyEx(mask.astype(np.uint8), operation, kernel) > 0)
+
+
+def _without_holes(mask: Mask) -> Mask:
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
+    largest = HOLE * mask.sum()
+    height, width = mask.shape
+    filled = mask.copy()
+    for k in range(1, count):
+        left, top, wide, tall, area = stats[k]
+        enclosed = left > 0 and top > 0 and left + wide < width and top + tall < height
+        if enclosed and area <= largest:
+            filled |= labels == k
+    return filled

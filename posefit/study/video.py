@@ -1,0 +1,67 @@
+"""Reads video frame by frame, so that memory does not grow with its length."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from posefit.silhouette.foreground import Image
+
+
+@dataclass(frozen=True)
+class Video:
+    """A video file, opened anew each time its frames are asked for."""
+
+    path: Path
+    fps: float
+    size: tuple[int, int]  # width and height in pixels, as filmed
+
+    @classmethod
+    def of(cls, path: str | Path) -> "Video":
+        """Return a video. Raises ValueError where the file is missing, cannot be read or has no frame."""
+        path = Path(path)
+        if not path.is_file():
+            raise ValueError(f"{path}: expected a video file, got nothing of that name")
+        capture = cv2.VideoCapture(str(path))
+        try:
+            read, image = capture.read()
+            if not read:
+                raise ValueError(f"{path}: expected a video that OpenCV can read, got none or one without frames")
+            fps = float(capture.get(cv2.CAP_PROP_FPS))
+        finally:
+            capture.release()
+        return cls(path, fps if np.isfinite(fps) and 0.0 < fps <= 1000.0 else 30.0, (image.shape[1], image.shape[0]))
+
+    def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
+        """Yield every `step`th frame of start to stop, scaled to `size`.
+
+        Raises ValueError where a frame has another size than the first.
+        """
+        capture = cv2.VideoCapture(str(self.path))
+        try:
+            k = 0
+            while stop is None or k < stop:
+                if k < start or (k - start) % step:
+                    if not capture.grab():
+                        return
+                else:
+                    read, image = capture.read()
+                    if not read:
+                        return
+                    if (image.shape[1], image.shape[0]) != self.size:
+                        came = f"{image.shape[1]}x{image.shape[0]} in frame {k}"
+                        raise ValueError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
+                    yield np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+                k += 1
+        finally:
+            capture.release()
+
+    def count(self) -> int:
+        """Return how many frames there are, by going through them: what a file says of itself is often wrong."""
+        capture, count = cv2.VideoCapture(str(self.path)), 0
+        while capture.grab():
+            count += 1
+        capture.release()
+        return count

@@ -1,0 +1,240 @@
+"""Masks from video: synthetic ones with a known person, and a real one where it is at hand."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import posefit
+from posefit.cli import main
+from posefit.motion import library
+from posefit.silhouette.cost import project
+from posefit.silhouette.foreground import Still, mean_background, median_background, person
+from posefit.study.extract import extract
+from posefit.study.source import LazyMasks
+
+SIZE = (160, 120)
+EMPTY, FRAMES = 12, 48  # frames without anybody, then frames of a walk across
+
+
+def truth() -> list[Any]:
+    motion = library.built_in("walk", frames=FRAMES)
+    body = posefit.Body.of(motion.skeleton)
+    places = motion.translations.copy()
+    places[:, 2] = np.linspace(-1.1, 1.1, FRAMES)
+    camera = posefit.Camera.around(np.array([0.0, 0.9, 0.0]), np.pi / 2, 4.0, SIZE)
+    return [project(body, camera, pose, place) for pose, place in zip(motion.poses, places, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
+    path = tmp_path_factory.mktemp("video") / "walk.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    rng = np.random.default_rng(0)
+    background = cv2.GaussianBlur(rng.uniform(90.0, 250.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0)
+    background = (background - background.mean()) * 4.0 + 150.0
+    masks = [np.zeros((SIZE[1], SIZE[0]), dtype=bool)] * EMPTY + truth()
+    for mask in masks:
+        image = background + rng.normal(0.0, 2.0, background.shape)
+        image[mask] = (40.0, 30.0, 120.0)
+        writer.write(np.clip(image, 0, 255).astype(np.uint8))
+    writer.release()
+    return path, masks
+
+
+def iou(first: Any, second: Any) -> float:
+    return float((first & second).sum() / max((first | second).sum(), 1))
+
+
+@pytest.mark.parametrize(("method", "background"), [("mixture", None), ("median", None), ("mean", f"0:{EMPTY}")])
+def test_each_method_finds_the_person(
+    filmed: tuple[Path, list[Any]], tmp_path: Path, method: Any, background: Any
+) -> None:
+    path, masks = filmed
+    result = extract(path, tmp_path / "out", method=method, background=background, frames=(EMPTY, None))
+    assert result["frames"] == FRAMES
+    assert result["usable"] > 0.8 * FRAMES
+    stored = np.load(tmp_path / "out" / "masks.npz")
+    assert stored["masks"].shape == stored["valid"].shape == (FRAMES, SIZE[1], SIZE[0])
+    assert stored["fps"] == 25.0
+    overlaps = [iou(a > 0, b) for a, b, ok in zip(stored["masks"], masks[EMPTY:], stored["usable"], strict=True) if ok]
+    assert np.mean(overlaps) > 0.8  # a person of 900 pixels: half a pixel all along the edge costs 0.15
+    assert {one.name for one in (tmp_path / "out").iterdir()} == {"masks.npz", "preview.mp4", "quality.csv"}
+    with (tmp_path / "out" / "quality.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["frame"]) for row in rows] == list(range(EMPTY, EMPTY + FRAMES))
+    assert sum(int(row["usable"]) for row in rows) == result["usable"]
+
+
+def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
+    filmed: tuple[Path, list[Any]], tmp_path: Path
+) -> None:
+    path, _ = filmed
+    hidden = np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)
+    hidden[:, 70:80] = 255
+    cv2.imwrite(str(tmp_path / "tree.png"), hidden)
+    extract(path, tmp_path / "out", ignore=tmp_path / "tree.png", frames=(EMPTY + 5, EMPTY + 40))
+    masks = LazyMasks.of(tmp_path / "out" / "masks.npz", (None, None))
+    silhouette = masks.silhouette(15)
+    assert not silhouette.valid[:, 70:80].any()
+    assert not silhouette.mask[:, 70:80].any()
+    result = posefit.track(tmp_path / "out" / "masks.npz", frames=(5, 9), view_degrees=90, evaluations=400)
+    assert result.summary["iou"] > 0.4
+
+
+def test_frames_without_a_whole_person_are_not_usable(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    path, _ = filmed
+    extract(path, tmp_path / "out", method="mean", background=f"0:{EMPTY}", frames=(0, EMPTY + 20))
+    usable = np.load(tmp_path / "out" / "masks.npz")["usable"]
+    assert not usable[: EMPTY - 1].any()
+    assert usable[EMPTY + 8 :].mean() > 0.8
+
+
+def test_the_person_is_looked_for_where_roi_says(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    path, masks = filmed
+    extract(path, tmp_path / "out", roi=(0, 0, 80, 120), frames=(EMPTY, None))
+    found = np.load(tmp_path / "out" / "masks.npz")["masks"]
+    assert found[:, :, 81:].sum() == 0
+    assert found[:, :, :80].any()
+    assert any(mask[:, 81:].any() for mask in masks)
+
+
+# the pieces
+
+
+def test_a_mean_background_is_the_mean_and_its_spread() -> None:
+    images = [np.full((2, 3, 3), value, dtype=np.uint8) for value in (10, 20, 30)]
+    still = mean_background(iter(images))
+    np.testing.assert_allclose(still.middle, 20.0)
+    np.testing.assert_allclose(still.spread, np.sqrt(200.0 / 3.0), rtol=1e-6)
+    with pytest.raises(ValueError, match="at least one frame"):
+        mean_background([])
+
+
+def test_a_median_background_does_not_see_who_walks_by() -> None:
+    images = [np.full((4, 4, 3), 100, dtype=np.uint8) for _ in range(9)]
+    images[2][:] = 0
+    images[5][:] = 255
+    np.testing.assert_allclose(median_background(images).middle, 100.0)
+    with pytest.raises(ValueError, match="at least one frame"):
+        median_background(np.zeros((0, 2, 2, 3), dtype=np.uint8))
+
+
+def test_a_shadow_is_darker_but_has_the_grounds_colour() -> None:
+    still = Still(np.full((1, 4, 3), (80.0, 120.0, 160.0), dtype=np.float32), np.zeros((1, 4), dtype=np.float32))
+    # the ground; its shadow at 60 %; another colour; far darker than any shadow
+    image = np.array([[[80, 120, 160], [48, 72, 96], [160, 60, 40], [8, 12, 16]]], dtype=np.uint8)
+    foreground, shadow = still.classify(image)
+    assert foreground.tolist() == [[False, False, True, True]]
+    assert shadow.tolist() == [[False, True, False, False]]
+
+
+def test_the_largest_person_is_taken_with_the_pieces_near_it_and_small_holes_filled() -> None:
+    seen = np.zeros((250, 250), dtype=bool)
+    seen[50:200, 100:140] = True  # the person
+    seen[100:106, 115:121] = False  # a small hole in it
+    seen[204:225, 100:140] = True  # feet, 4 rows apart
+    seen[50:120, 220:240] = True  # somebody smaller, far off
+    seen[5, 5] = True  # a speck
+    found = person(seen, np.zeros_like(seen), None, None)
+    assert found.mask[103, 118]
+    assert found.mask[210, 120]
+    assert not found.mask[:, 215:].any()
+    assert not found.mask[5, 5]
+    assert found.pieces >= 2
+    assert not found.touches_border
+    assert person(seen, np.zeros_like(seen), (210, 0, 40, 250), None).mask[60, 230]
+    nobody = person(np.zeros_like(seen), np.zeros_like(seen), None, None)
+    assert (nobody.area, nobody.pieces, nobody.touches_border) == (0, 0, False)
+    seen[50:200, 0:100] = True
+    assert person(seen, np.zeros_like(seen), None, None).touches_border
+
+
+# the command and its mistakes
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def test_the_command_prints_what_it_found(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    result = run("extract", filmed[0], "--out", tmp_path / "out", "--frames", "20:40", "--json")
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert summary["frames"] == 20
+    assert summary["size"] == [160, 120]
+    again = run(
+        "extract", filmed[0], "--out", tmp_path / "two", "--frames", "20:40", "--width", "80", "--roi", "0,0,160,120"
+    )
+    assert "20 frames" in again.stdout
+    assert np.load(tmp_path / "two" / "masks.npz")["masks"].shape == (20, 60, 80)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--method", "magic"], "method must be one of mixture, mean, median, got 'magic'"),
+        (["--method", "mean"], "background must be frames A:B or an image for the method mean, got none"),
+        (["--background", "0:5"], "background must not be given for the method mixture"),
+        (
+            ["--method", "mean", "--background", "nothing.png"],
+            "background must be frames A:B or an image, got 'nothing.png'",
+        ),
+        (["--method", "mean", "--background", "90:99"], "frames must choose some of the 60 frames, got 90:99"),
+        (["--frames", "90:"], "frames must choose some of the 60 frames, got 90:"),
+        (["--roi", "1,2,3"], "expected X,Y,WIDTH,HEIGHT in pixels"),
+        (["--roi", "100,0,100,100"], "roi must lie within the video's 160x120 pixels"),
+        (["--ignore", "nothing.png"], "nothing.png: expected an image of what to ignore"),
+        (["--width", "3"], "width must lie in 36 to 8192 pixels, got 3"),
+        (
+            ["--frames", "0:8", "--method", "mean", "--background", "0:12"],
+            "expected a person who moves before a still background",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(
+    filmed: tuple[Path, list[Any]], tmp_path: Path, words: list[str], message: str
+) -> None:
+    result = run("extract", filmed[0], "--out", tmp_path / "out", *words)
+    assert result.exit_code == 2, result.output
+    lines = [line for line in result.stderr.splitlines() if line.startswith("posefit:")]
+    assert len(lines) == 1
+    assert message in lines[0]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
+    (tmp_path / "text.mp4").write_text("no video")
+    (tmp_path / "empty.mp4").write_bytes(b"")
+    for name, message in (
+        ("missing.mp4", "expected a video file, got nothing of that name"),
+        ("text.mp4", "expected a video that OpenCV can read"),
+        ("empty.mp4", "expected a video that OpenCV can read"),
+    ):
+        result = run("extract", tmp_path / name, "--out", tmp_path / "out")
+        assert result.exit_code == 2
+        assert message in result.stderr
+    (tmp_path / "out").mkdir()
+    result = run("extract", tmp_path / "text.mp4", "--out", tmp_path / "out")
+    assert "expected a new folder, got one that exists" in result.stderr
+
+
+def test_a_real_walk_is_seen_from_its_first_step_to_its_last(tmp_path: Path) -> None:
+    video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
+    if not video.is_file():
+        pytest.skip(f"no video at {video}")
+    result = extract(video, tmp_path / "out", roi=(0, 420, 1400, 570), frames=(65, 165))
+    assert result["usable"] > 80
+    stored = np.load(tmp_path / "out" / "masks.npz")
+    middles = [
+        np.flatnonzero(mask.any(axis=0)).mean()
+        for mask, ok in zip(stored["masks"], stored["usable"], strict=True)
+        if ok
+    ]
+    assert middles[-1] < middles[0] - 200  # she walks from right to left
+    assert np.corrcoef(middles, np.arange(len(middles)))[0, 1] < -0.98
