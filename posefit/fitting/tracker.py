@@ -29,6 +29,7 @@ class Observation:
 
     silhouettes: Sequence[Silhouette] = field(repr=False)
     translation: Array | None = None  # (3,) metres
+    usable: bool = True  # False: too little is seen to learn from it, and a tracker holds its pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,16 +170,34 @@ class SynthesisTracker:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
         task, follower = self.task, Follower(self.task, self.prior, self.prediction)
         optimiser: Optimiser | None = None
+        latest: Frame | None = None
         for observation in observations:
             began = time.perf_counter()
             space = follower.space(observation)
+            if not observation.usable:
+                latest = self._held(latest, space, observation)
+                yield latest
+                continue
             optimiser = self._ready(optimiser, space, rng)
             problem = PoseProblem(
                 task.body, task.cameras, observation.silhouettes, space, beta=self.beta, threads=task.threads
             )
             best = minimise(problem.evaluate, optimiser, task.evaluations)
             follower.commit(best.proposal)
-            yield _frame(problem, best, time.perf_counter() - began)
+            latest = _frame(problem, best, time.perf_counter() - began)
+            yield latest
+
+    def _held(self, latest: Frame | None, space: SearchSpace, observation: Observation) -> Frame:
+        """Return the latest frame once more, at no evaluation; before the first one, the middle of the box."""
+        poses, places = space.decode(np.zeros((1, space.dimensions)))
+        if latest is not None:
+            poses, places = latest.pose[None], latest.translation[None]
+        if observation.translation is not None:
+            places = np.array(observation.translation, dtype=np.float64)[None]
+        problem = PoseProblem(self.task.body, self.task.cameras, observation.silhouettes, space, beta=self.beta)
+        counts = problem.areas(poses, places)
+        areas = np.stack([one[0] for one in counts])
+        return Frame(poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0))
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
         """Return the optimiser of the next frame, as `next_frame` asks."""

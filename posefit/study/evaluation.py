@@ -22,12 +22,14 @@ class Evaluation:
     def __init__(self, scene: Scene, prior: Prior | None, training: Array, beta: float) -> None:
         self._scene, self._prior, self._training, self._beta = scene, prior, training, beta
         self._frames: list[Frame] = []
+        self._usable: list[bool] = []
         self._nearest: list[Array] = []
 
     def add(self, frame: Frame, observation: Observation) -> dict[str, float]:
         """Return cost, IoU and, where there is a truth, the error of a frame."""
         k = len(self._frames)
         self._frames.append(frame)
+        self._usable.append(observation.usable)
         row = {"cost": frame.cost, "iou": float(metrics.iou(frame.areas).mean())}
         if self._scene.truth is not None:
             truth = self._scene.truth.poses[k]
@@ -64,7 +66,10 @@ class Evaluation:
                 "prior_floor_degrees",
             )
         )
-        summary["iou"], summary["cost"] = float(columns["iou"].mean()), float(columns["cost"].mean())
+        usable = np.array(self._usable) if any(self._usable) else np.ones(len(frames), dtype=bool)
+        summary["iou"], summary["cost"] = (float(columns[name][usable].mean()) for name in ("iou", "cost"))
+        summary["held_frames"] = int(np.count_nonzero(~np.array(self._usable)))
+        columns["usable"] = np.array(self._usable, dtype=np.float64)
         if self._scene.truth is not None:
             columns |= self._errors(summary)
         used, seconds = sum(frame.evaluations for frame in frames), sum(frame.seconds for frame in frames)

@@ -127,7 +127,7 @@ def observed(
     Without a camera one is guessed: level, 40 degrees across, the person as far away as its size asks.
     """
     masks = LazyMasks.of(Path(source), frames)
-    first = masks.silhouette(0)
+    first = masks.silhouette(masks.first)
     joints = body.skeleton.joints(np.zeros(66))
     tall = float(np.ptp(joints[:, 1]) + 2.0 * body.radii.max() * 0.5)
     if camera is None:
@@ -152,6 +152,7 @@ class LazyMasks:
     files: Sequence[Path]
     stack: NDArray[Any] | None = field(default=None, repr=False)
     known: NDArray[Any] | None = field(default=None, repr=False)  # of the same shape; 0 where nothing is known
+    usable: NDArray[np.bool_] | None = field(default=None, repr=False)  # (T,)
 
     @classmethod
     def of(cls, path: Path, frames: Range) -> "LazyMasks":
@@ -167,7 +168,7 @@ class LazyMasks:
         try:
             with np.load(path, allow_pickle=False) as stored:
                 stack = stored["masks"]
-                known = stored.get("valid")
+                known, usable = stored.get("valid"), stored.get("usable")
         except (KeyError, ValueError, OSError, EOFError) as error:
             raise ValueError(f"{path}: expected an .npz file with the key masks, got {error}") from None
         if stack.ndim != 3 or not len(stack) or stack.dtype.kind not in "buif":
@@ -177,26 +178,40 @@ class LazyMasks:
         if known is not None and (known.shape != stack.shape or known.dtype.kind not in "bui"):
             raise ValueError(f"{path}: valid must have the masks' shape {stack.shape}, got {known.shape} {known.dtype}")
         start, stop = _span(frames, len(stack))
-        names = [Path(f"{path}[{k}]") for k in range(start, stop)]
-        return cls(path, names, stack[start:stop], None if known is None else known[start:stop])
+        if usable is not None and (usable.shape != stack.shape[:1] or usable.dtype != np.bool_):
+            raise ValueError(f"{path}: usable must be {len(stack)} booleans, got {usable.shape} {usable.dtype}")
+        names, part = [Path(f"{path}[{k}]") for k in range(start, stop)], slice(start, stop)
+        known, usable = (None if value is None else value[part] for value in (known, usable))
+        if usable is not None and not usable.any():
+            raise ValueError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
+        return cls(path, names, stack[part], known, usable)
 
     def __len__(self) -> int:
         return len(self.files)
 
     def __iter__(self) -> Iterator[Observation]:
-        size = self.silhouette(0).size
+        size = self.silhouette(self.first).size
         for k in range(len(self)):
             silhouette = self.silhouette(k)
             if silhouette.size != size:
                 expected, came = ((s[1], s[0]) for s in (size, silhouette.size))
                 raise ValueError(f"{self.files[k]}: mask must have shape {expected}, got {came}")
-            yield Observation([silhouette])
+            yield Observation([silhouette], usable=self.is_usable(k))
+
+    def is_usable(self, k: int) -> bool:
+        """Return whether mask k shows enough of the person to be searched; masks that do not say so do."""
+        return self.usable is None or bool(self.usable[k])
+
+    @property
+    def first(self) -> int:
+        """Which mask is the first one that is usable."""
+        return 0 if self.usable is None else int(self.usable.argmax())
 
     def silhouette(self, k: int) -> Silhouette:
         """Return mask k. Raises ValueError naming the file where it is no mask, or empty, or full."""
         mask = self.stack[k] if self.stack is not None else self._image(self.files[k])
         person = np.greater(mask, 127 if mask.max() > 1 else 0)
-        if not person.any() or person.all():
+        if self.is_usable(k) and (not person.any() or person.all()):
             came = "an empty one" if not person.any() else "one without background"
             raise ValueError(f"{self.files[k]}: expected a mask with a person before a background, got {came}")
         return Silhouette.of(person, None if self.known is None else self.known[k])

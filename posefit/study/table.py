@@ -29,6 +29,8 @@ def table(summary: Mapping[str, Any]) -> str:
             f"MPJPE {summary['mpjpe_mm']:.0f} mm, PA-MPJPE {summary['pa_mpjpe_mm']:.0f} mm, left/right swapped "
             f"{100 * summary['swap_rate']:.0f} %, lost {100 * summary['lost_rate']:.0f} % of frames"
         )
+    if summary["held_frames"]:
+        lines.append(f"{summary['held_frames']} frames show too little of the person: their pose is held, not searched")
     used = summary["evaluations"] / summary["frames"]
     lines.append(
         f"IoU {summary['iou']:.3f}, {used:,.0f} of {summary['evaluations_per_frame']:,} evaluations and "

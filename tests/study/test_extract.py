@@ -238,3 +238,58 @@ def test_a_real_walk_is_seen_from_its_first_step_to_its_last(tmp_path: Path) -> 
     ]
     assert middles[-1] < middles[0] - 200  # she walks from right to left
     assert np.corrcoef(middles, np.arange(len(middles)))[0, 1] < -0.98
+
+
+# tracking what is only partly usable
+
+
+def stored_masks(path: Path, **more: Any) -> Path:
+    masks = np.stack(truth()[10:22]).astype(np.uint8)
+    np.savez(path, **{"masks": masks, **more})
+    return path
+
+
+def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
+    usable = np.ones(12, dtype=bool)
+    usable[[0, 5, 6]] = False
+    masks = np.stack(truth()[10:22]).astype(np.uint8)
+    masks[6] = 0  # nobody at all
+    path = stored_masks(tmp_path / "a.npz", masks=masks, usable=usable)
+    result = posefit.track(path, view_degrees=90, evaluations=400, out=tmp_path / "out")
+    assert result.summary["frames"] == 12
+    assert result.summary["held_frames"] == 3
+    assert result.summary["evaluations"] == 9 * 400
+    assert [row["usable"] for row in result.frames] == usable.astype(float).tolist()
+    poses = result.motion.poses
+    np.testing.assert_array_equal(poses[5], poses[4])
+    np.testing.assert_array_equal(poses[6], poses[4])
+    assert (poses[7] != poses[6]).any()
+    assert result.summary["iou"] == pytest.approx(
+        np.mean([row["iou"] for row, ok in zip(result.frames, usable, strict=True) if ok])
+    )
+    text = run("track", path, "--view-degrees", "90", "--evaluations", "400").stdout
+    assert "3 frames show too little of the person: their pose is held, not searched" in text
+
+
+def test_a_filter_goes_on_after_a_frame_that_was_held(tmp_path: Path) -> None:
+    usable = np.arange(12) != 4
+    path = stored_masks(tmp_path / "a.npz", usable=usable)
+    summary = posefit.track(path, optimiser="annealed", view_degrees=90, evaluations=400).summary
+    assert summary["evaluations"] == 11 * 400
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (
+            {"valid": np.ones((12, 5, 5), dtype=np.uint8)},
+            r"valid must have the masks' shape \(12, 120, 160\), got \(12, 5, 5\)",
+        ),
+        ({"usable": np.ones(5, dtype=bool)}, r"usable must be 12 booleans, got \(5,\) bool"),
+        ({"usable": np.ones(12)}, r"usable must be 12 booleans, got \(12,\) float64"),
+        ({"usable": np.zeros(12, dtype=bool)}, "expected a frame that is usable, got none from 0 to 12"),
+    ],
+)
+def test_masks_that_contradict_themselves_are_named(tmp_path: Path, more: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        posefit.track(stored_masks(tmp_path / "a.npz", **more))
