@@ -104,6 +104,10 @@ def track(
         ask_seconds,
     )
     budget = choice.budget()
+    if view_degrees is not None and not np.isfinite(view_degrees):
+        raise ValueError(f"view_degrees must be a finite number, got {view_degrees}")
+    if not (np.isfinite(fps) and fps > 0.0):
+        raise ValueError(f"fps must be a positive number, got {fps}")
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
     folder = OutputFolder(out, force) if out is not None else None

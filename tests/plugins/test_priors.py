@@ -14,6 +14,7 @@ from posefit_priors.full import Full
 from posefit_priors.pca import PCA
 from posefit_priors.sklearn import Transformed
 from posefit_priors.union import Union
+from tests.files import arrays
 
 
 def angles(*names: str) -> Array:
@@ -158,7 +159,7 @@ def test_a_file_that_is_no_prior_is_refused(kind: Any, tmp_path: Path) -> None:
             kind.load(tmp_path / f"{name}.npz")
     prior = kind().fit(angles("walk-a", "walk-b"), library.average_skeleton())
     prior.save(tmp_path / "good.npz")
-    stored = dict(np.load(tmp_path / "good.npz"))
+    stored = arrays(tmp_path / "good.npz")
     name = "words" if kind is Transformed else "low"
     np.savez(tmp_path / "c.npz", **{**stored, name: np.zeros((2, 2))})
     with pytest.raises(ValueError, match=r"c\.npz: "):

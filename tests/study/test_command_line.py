@@ -17,6 +17,7 @@ from posefit.cli import main
 from posefit.motion import library
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
+from tests.files import arrays
 
 QUICK = ["--particles", "10", "--iterations", "4", "--size", "120x90"]
 FILES = {
@@ -104,7 +105,7 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
     assert [path.name for path in out.parent.iterdir()] == ["out"]
     assert "error deg" in result.stdout
     assert "mean training pose" in result.stdout
-    stored = np.load(out / "poses.npz")
+    stored = arrays(out / "poses.npz")
     assert stored["poses"].shape == (5, 66)
     again = read_clip(out / "skeleton.asf", out / "track.amc", fps=30.0)
     difference = (again.poses - stored["poses"] + np.pi) % (2 * np.pi) - np.pi
@@ -227,7 +228,7 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
         (["walk", "--size", "0x9"], "size must be from 1x1"),
         (["walk", "--frames", "3"], "expected A:B"),
         (["walk", "--frames", "70:80"], "frames must choose some of the 60 frames, got 70:80"),
-        (["walk", "--fps", "0"], "fps and speed must be positive"),
+        (["walk", "--fps", "0"], "fps must be a positive number, got"),
         (["walk", "--threads", "0"], "threads must be at least 1, got 0"),
         (["walk", "--translation", "free"], "translation must be one of known, searched, aligned, got 'free'"),
         (["walk", "--camera", "no.json"], "no.json"),

@@ -17,6 +17,7 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
 from posefit.study.extract import extract
 from posefit.study.source import LazyMasks
+from tests.files import arrays
 
 SIZE = (160, 120)
 EMPTY, FRAMES = 12, 48  # frames without anybody, then frames of a walk across
@@ -59,7 +60,7 @@ def test_each_method_finds_the_person(
     result = extract(path, tmp_path / "out", method=method, background=background, frames=(EMPTY, None))
     assert result["frames"] == FRAMES
     assert result["usable"] > 0.8 * FRAMES
-    stored = np.load(tmp_path / "out" / "masks.npz")
+    stored = arrays(tmp_path / "out" / "masks.npz")
     assert stored["masks"].shape == stored["valid"].shape == (FRAMES, SIZE[1], SIZE[0])
     assert stored["fps"] == 25.0
     overlaps = [iou(a > 0, b) for a, b, ok in zip(stored["masks"], masks[EMPTY:], stored["usable"], strict=True) if ok]
@@ -90,7 +91,7 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
 def test_frames_without_a_whole_person_are_not_usable(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
     path, _ = filmed
     extract(path, tmp_path / "out", method="mean", background=f"0:{EMPTY}", frames=(0, EMPTY + 20))
-    usable = np.load(tmp_path / "out" / "masks.npz")["usable"]
+    usable = arrays(tmp_path / "out" / "masks.npz")["usable"]
     assert not usable[: EMPTY - 1].any()
     assert usable[EMPTY + 8 :].mean() > 0.8
 
@@ -98,7 +99,7 @@ def test_frames_without_a_whole_person_are_not_usable(filmed: tuple[Path, list[A
 def test_the_person_is_looked_for_where_roi_says(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
     path, masks = filmed
     extract(path, tmp_path / "out", roi=(0, 0, 80, 120), frames=(EMPTY, None))
-    found = np.load(tmp_path / "out" / "masks.npz")["masks"]
+    found = arrays(tmp_path / "out" / "masks.npz")["masks"]
     assert found[:, :, 81:].sum() == 0
     assert found[:, :, :80].any()
     assert any(mask[:, 81:].any() for mask in masks)
@@ -172,7 +173,7 @@ def test_the_command_prints_what_it_found(filmed: tuple[Path, list[Any]], tmp_pa
         "extract", filmed[0], "--out", tmp_path / "two", "--frames", "20:40", "--width", "80", "--roi", "0,0,160,120"
     )
     assert "20 frames" in again.stdout
-    assert np.load(tmp_path / "two" / "masks.npz")["masks"].shape == (20, 60, 80)
+    assert arrays(tmp_path / "two" / "masks.npz")["masks"].shape == (20, 60, 80)
 
 
 @pytest.mark.parametrize(
@@ -230,7 +231,7 @@ def test_a_real_walk_is_seen_from_its_first_step_to_its_last(tmp_path: Path) -> 
         pytest.skip(f"no video at {video}")
     result = extract(video, tmp_path / "out", roi=(0, 420, 1400, 570), frames=(65, 165))
     assert result["usable"] > 80
-    stored = np.load(tmp_path / "out" / "masks.npz")
+    stored = arrays(tmp_path / "out" / "masks.npz")
     middles = [
         np.flatnonzero(mask.any(axis=0)).mean()
         for mask, ok in zip(stored["masks"], stored["usable"], strict=True)
