@@ -272,12 +272,16 @@ def count_areas(chain, radii, view, observed, valid, poses, translations, areas)
 
 
 @jit
-def paint(image, box, height, value, pixels):
-    """Add `value` to the pixels (height, width, ...) of the body in a bit image."""
+def paint(image, box, value, pixels):
+    """Add `value` to the pixels (height, width) of the body in a bit image.
+
+    Bits past the image's right border may be set and count for nothing: no pixel stands for them.
+    """
+    height, width = pixels.shape
     for y in range(box[0], min(box[1], height)):
         for w in range(box[2], box[3] + 1):
-            word = image[w, y]
             x = w << 6
+            word = image[w, y] & _below(width - x)
             while word != _NONE:
                 if word & np.uint64(1):
                     pixels[y, x] |= value
@@ -299,7 +303,7 @@ def paint_areas(chain, radii, view, observed, valid, poses, translations, areas,
     for i in range(poses.shape[0]):
         place_joints(chain, poses[i], translations[i], sines, cosines, frames, joints)
         draw(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
-        paint(image, box, view.height, value, pixels[i])
+        paint(image, box, value, pixels[i])
         body, overlap = count(image, observed, valid, box)
         areas[i, 0] = silhouette - overlap
         areas[i, 1] = body - overlap

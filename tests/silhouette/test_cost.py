@@ -13,7 +13,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion.library import average_skeleton
-from posefit.silhouette.cost import LEAST_SHARE, add_mismatch, areas, mismatch, project
+from posefit.silhouette.cost import LEAST_SHARE, add_mismatch, areas, mismatch, paint, project
 from posefit.silhouette.mask import Silhouette
 
 counts = st.tuples(*[st.integers(0, 10**9)] * 3)
@@ -164,3 +164,33 @@ def test_shapes_that_do_not_fit_are_refused_before_the_kernel_sees_them(body: Bo
             areas(body, camera, seen, poses, translations)
     with pytest.raises(ValueError, match=r"pose and translation must have shapes"):
         project(body, camera, np.zeros(40), np.zeros(3))
+
+
+@pytest.mark.parametrize("size", [(36, 36), (50, 70), (64, 48), (65, 40), (130, 90)])
+@pytest.mark.parametrize("aside", [-1.5, -0.6, 0.0, 0.6, 1.5])
+def test_painting_fills_the_bodys_pixels_and_none_beyond_the_image(
+    body: Body, size: tuple[int, int], aside: float
+) -> None:
+    width, height = size
+    view = Camera.around(np.zeros(3), 0.0, 2.5, size)
+    poses, places = np.zeros((3, ANGLES)), np.tile([aside, 0.1, 0.0], (3, 1))
+    seen = Silhouette.of(project(body, view, poses[0], np.zeros(3)))
+    room = np.full((3, height + 40, width + 100), 7, dtype=np.uint16)
+    pixels = room[:, :height, :width]
+    pixels[:] = 1
+    counts = paint(body, view, seen, poses, places, pixels, 0xFF00)
+    drawn = project(body, view, poses[0], places[0])
+    for image in pixels:
+        np.testing.assert_array_equal(image, np.where(drawn, 0xFF01, 1))
+    assert (room[:, height:] == 7).all()
+    assert (room[:, :, width:] == 7).all()
+    np.testing.assert_array_equal(counts, areas(body, view, seen, poses, places))
+
+
+def test_painting_names_what_does_not_fit(body: Body, camera: Camera) -> None:
+    seen = Silhouette.of(np.ones((72, 96)))
+    poses, places = np.zeros((2, ANGLES)), np.zeros((2, 3))
+    with pytest.raises(ValueError, match=r"poses must have shape \(n, 66\) with translations \(n, 3\), got \(2, 66\)"):
+        paint(body, camera, seen, poses, places[:1], np.zeros((2, 72, 96), dtype=np.uint16), 1)
+    with pytest.raises(ValueError, match=r"mask and pixels must have shape \(72, 96\), got \(72, 96\), \(70, 96\)"):
+        paint(body, camera, seen, poses, places, np.zeros((2, 70, 96), dtype=np.uint16), 1)
