@@ -53,17 +53,23 @@ def _box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int,
 
 
 _OPTIONS = (
-    click.argument("source", default="walk"),
+    click.argument("source", nargs=-1),
     click.option("--asf", metavar="FILE", help="Skeleton of SOURCE; by default the only .asf beside an .amc."),
-    click.option("--camera", metavar="FILE", help="Camera as JSON; guessed where absent."),
+    click.option("--camera", multiple=True, metavar="FILE", help="Calibration, one a view; guessed where absent."),
+    click.option("--up", type=click.Choice(["x", "y", "z"]), help="Axis that points up in the calibration's world."),
     click.option("--optimiser", default="sapso", show_default=True, help="See `posefit plugins`."),
-    click.option("--prior", default="pca", show_default=True, help="See `posefit plugins`."),
+    click.option("--prior", help="By default pca, or loose where the truth is not known; see `posefit plugins`."),
     click.option("--tracker", help="A tracker instead of optimiser and prior; see `posefit plugins`."),
     click.option(
         "--set", "settings", multiple=True, metavar="NAME.SETTING=VALUE", help="Such as sapso.cooling=0.9; repeatable."
     ),
     click.option("--train", multiple=True, metavar="SOURCE", help="Motion the prior learns from; may be repeated."),
-    click.option("--view-degrees", type=float, help="Where the camera stands: 0 in front, 90 to the side."),
+    click.option(
+        "--view-degrees",
+        type=float,
+        multiple=True,
+        help="Where a camera stands: 0 in front, 90 to the side; repeatable.",
+    ),
     click.option("--size", default="320x240", show_default=True, callback=_size, help="Image of a rendered motion."),
     click.option("--fps", type=float, default=30.0, show_default=True, help="Rate to resample a motion to."),
     click.option("--evaluations", type=int, help="Budget of a frame; by default N (C + 1) = 2440."),
@@ -72,10 +78,20 @@ _OPTIONS = (
     click.option("--first-pose", default="searched", show_default=True, help="searched, or given (the true one)."),
     click.option("--ask-seconds", type=float, help="How long a plugin may take to propose a population."),
     click.option("--translation", help="Root translation: known, searched or aligned."),
+    click.option("--height", type=float, metavar="METRES", help="How tall the person in the footage stands."),
+    click.option("--restarts", type=int, help="Searches of a first pose nobody knows; by default 8."),
+    click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
+    click.option("--extraction", default="mixture", show_default=True, help="Of video: mixture, median or mean."),
+    click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
+    click.option("--roi", callback=_box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
+    click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
+    click.option("--width", type=int, default=640, show_default=True, help="Larger videos are scaled down to this."),
     click.option("--seed", type=int, default=0, show_default=True),
     click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),
     click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),
     click.option("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
+    click.option("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),
+    click.option("--rerun", metavar="FILE", help="Write a recording (.rrd) for the Rerun viewer."),
     click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout."),
 )
 
@@ -96,11 +112,13 @@ def main() -> None:
 @_common
 @click.option("--frames", callback=_range, metavar="A:B", help="Only these frames, counted after resampling.")
 def track(as_json: bool, **options: Any) -> None:
-    """Follow a person through SOURCE: a built-in motion, an .amc or .bvh file, a folder or .npz of masks."""
+    """Follow a person through SOURCE.
+
+    A built-in motion, an .amc or .bvh file, a folder or .npz of masks, a video; or what several cameras saw.
+    """
     from posefit.study.run import track as run
 
-    options |= _settings(options)
-    result = run(options.pop("source"), progress=_progress, say=_say, **options)
+    result = run(progress=_progress, say=_say, **_arguments(options))
     if as_json:
         click.echo(json.dumps(result.summary))
         return
@@ -118,8 +136,7 @@ def fit(as_json: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE."""
     from posefit.study.run import fit as run
 
-    options |= _settings(options)
-    result = run(options.pop("source"), say=_say, **options)
+    result = run(say=_say, **_arguments(options))
     if as_json:
         click.echo(json.dumps({**result.summary, "pose_degrees": _degrees(result.pose)}))
         return
@@ -140,11 +157,14 @@ def fit(as_json: bool, **options: Any) -> None:
 @click.option("--frames", callback=_range, metavar="A:B", help="Only these frames.")
 @click.option("--width", type=int, default=640, show_default=True, help="Scale larger videos down to this.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def extract(video: str, out: str, as_json: bool, **options: Any) -> None:
+def extract(video: str, out: str, as_json: bool, frames: Any, **options: Any) -> None:
     """Take the masks of one person out of a VIDEO before a still background."""
     from posefit.study.extract import extract as run
+    from posefit.study.segment import Extraction
 
-    result = run(video, out, progress=_progress, **options)
+    result = run(video, out, Extraction(**options), frames=frames, progress=_progress)
+    for warning in result["warnings"]:
+        _say(f"warning: {warning}")
     if as_json:
         click.echo(json.dumps(result))
         return
@@ -239,14 +259,22 @@ def check(context: click.Context, kind: Any, name: str, settings: tuple[str, ...
     context.exit(0 if report else 1)
 
 
-def _settings(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Take `--set` out of the options and return the settings of optimiser, prior and tracker, as their types ask.
+def _arguments(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the keywords of `posefit.track` that options stand for.
 
-    `tracker.` also sets the tracker that an optimiser and a prior are driven by.
+    `--set` gives the settings of optimiser, prior and tracker, as their types ask; `tracker.` also sets the tracker that
+    an optimiser and a prior are driven by.
     """
     from posefit.study.method import parse_settings
+    from posefit.study.run import prior_of
+    from posefit.study.segment import Extraction
 
-    return parse_settings(options.pop("settings"), options["optimiser"], options["prior"], options["tracker"])
+    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
+    options["extraction"] = Extraction(method=options["extraction"], **how)
+    options["source"] = options["source"] or ("walk",)
+    options["view_degrees"] = options["view_degrees"] or None
+    prior = options["prior"] or prior_of(options["source"][0])
+    return options | parse_settings(options.pop("settings"), options["optimiser"], prior, options["tracker"])
 
 
 def _say(message: str) -> None:

@@ -1,7 +1,7 @@
 """The compact pose space: principal components, a range, and clusters that mark where poses are. SAPSO section 2."""
 
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,14 +83,22 @@ class PCA:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
         return np.asarray(near(self.centres, writeable(latents), self.reach))
 
+    def arrays(self) -> dict[str, Any]:
+        """Return what was learned, by name."""
+        return {name: getattr(self, name) for name in _SHAPES}
+
     def save(self, path: str | Path) -> None:
         """Write the learned space to an .npz file."""
-        np.savez(path, **{name: getattr(self, name) for name in _SHAPES})
+        np.savez(path, **self.arrays())
 
     @classmethod
-    def load(cls, path: str | Path) -> "PCA":
-        """Return the space that `save` wrote. Raises ValueError where the file is not one."""
-        arrays = load_arrays(path, _SHAPES)
+    def load(cls, path: str | Path, prefix: str = "") -> "PCA":
+        """Return the space that `save` wrote. Raises ValueError where the file is not one.
+
+        `prefix` is what stands before the names, where the file holds more than this space.
+        """
+        found = load_arrays(path, {prefix + name: shape for name, shape in _SHAPES.items()})
+        arrays = {name: found[prefix + name] for name in _SHAPES}
         m = len(arrays["components"])
         prior = cls(components=m, clusters=len(arrays["centres"]))
         for name, value in arrays.items():

@@ -20,6 +20,7 @@ from posefit.silhouette.cost import BETA, Areas
 from posefit.silhouette.mask import Silhouette
 
 SPREAD = 1.0  # k of Reading S5: Sigma's standard deviations, as multiples of the predicted step
+KEPT = 3  # frames: how far back a prediction looks
 FLOOR = 0.05  # Reading S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
 
 
@@ -43,6 +44,7 @@ class Frame:
     evaluations: int
     seconds: float
     history: Array = field(repr=False)  # (populations,) best cost after each
+    coordinates: Array | None = field(default=None, repr=False)  # (d,) where it was found in a search space
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,7 @@ class Task:
     fps: float = 30.0
     training: Sequence[Motion] = field(default=(), repr=False)  # what may be learned from
     first_pose: Array | None = None  # (63,) joint angles in the first frame, where somebody knows them
+    before: Sequence[Frame] = field(default=(), repr=False)  # found earlier, where a track goes on that was interrupted
     threads: int = 1
 
 
@@ -106,7 +109,8 @@ class Follower:
         centre = np.array([task.yaw or 0.0, 0.0, 0.0])
         limits = np.array(prediction.translation_range)
         self._space = SearchSpace(prior, centre, reach, task.anchor, task.translation, limits)
-        self._found: list[Array] = []  # coordinates of the latest gbest, the newest last
+        earlier = [frame.coordinates for frame in task.before if frame.coordinates is not None]
+        self._found: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
 
     def space(self, observation: Observation) -> SearchSpace:
         """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
@@ -133,7 +137,7 @@ class Follower:
 
     def commit(self, proposal: Array) -> None:
         """Take the best proposal (d,) of the space that was given last."""
-        self._found = [*self._found[-2:], self._space.coordinates(proposal)]
+        self._found = [*self._found, self._space.coordinates(proposal)][-KEPT:]
 
     def _given(self, space: SearchSpace, angles: Array) -> Start:
         """Return the start of a first frame whose joint angles are about known; its root need not be."""
@@ -170,7 +174,7 @@ class SynthesisTracker:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
         task, follower = self.task, Follower(self.task, self.prior, self.prediction)
         optimiser: Optimiser | None = None
-        latest: Frame | None = None
+        latest: Frame | None = task.before[-1] if task.before else None
         for observation in observations:
             began = time.perf_counter()
             space = follower.space(observation)
@@ -210,4 +214,5 @@ class SynthesisTracker:
 def _frame(problem: PoseProblem, best: Minimum, seconds: float) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
     counts = np.stack([areas[0] for areas in problem.areas(poses, translations)])
-    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, seconds, best.history)
+    found = problem.space.coordinates(best.proposal)
+    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, seconds, best.history, found)

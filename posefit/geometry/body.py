@@ -1,11 +1,11 @@
 """The person's flesh: a tapered cone on every bone."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from posefit.geometry.rotation import Array
-from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, Skeleton
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS, Skeleton
 
 # Radii as shares of the bone's length: (where the bone starts, where it ends). Ours: read off an adult's build.
 PROPORTIONS = {
@@ -56,3 +56,19 @@ class Body:
         np.maximum.at(radii, np.array(PARENTS[1:]), self.radii[:, 0])
         np.maximum.at(radii, np.arange(1, len(JOINTS)), self.radii[:, 1])
         return radii
+
+    @property
+    def stature(self) -> float:
+        """How tall the body stands, in metres: its legs straight and upright, the rest as in its rest pose."""
+        skeleton, at = self.skeleton, BONES.index
+        joints = skeleton.joints(np.zeros(ANGLES))
+        crown = joints[JOINTS.index("head"), 1] + self.radii[at("head"), 1]
+        leg = skeleton.lengths[[at("lfemur"), at("ltibia")]].sum()
+        sole = max(0.0, -float(skeleton.offsets[at("lfoot"), 1])) + self.radii[at("lfoot"), 1]
+        return float(crown - joints[JOINTS.index("lhipjoint"), 1] + leg + sole)
+
+    def scaled(self, lengths: Array | float, girths: Array | float) -> "Body":
+        """Return the body with its bones' lengths and radii multiplied by factors, one for all or one a bone (26,)."""
+        lengths, girths = np.broadcast_to(lengths, len(BONES)), np.broadcast_to(girths, len(BONES))
+        skeleton = replace(self.skeleton, offsets=self.skeleton.offsets * lengths[:, None])
+        return Body(skeleton, self.radii * girths[:, None])

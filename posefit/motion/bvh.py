@@ -1,4 +1,4 @@
-"""BVH motions, read through the optional library pybvh.
+"""BVH motions: read through the optional library pybvh, and written.
 
 In a BVH file a joint's rotation turns everything that starts at it. In a `Skeleton` the angles named after a bone
 turn that bone about the joint it starts from. So the BVH joint that stands for a bone is the one at the bone's start:
@@ -14,7 +14,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from posefit.geometry.rotation import Array, joint_angles_from_rotation, root_angles_from_rotation
+from posefit.geometry.rotation import (
+    Array,
+    joint_angles_from_rotation,
+    root_angles_from_rotation,
+    rotation_from_joint_angles,
+    rotation_from_root_angles,
+)
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Channels, Skeleton, angle_index
 from posefit.motion.amc import SIZE_LIMIT
 from posefit.motion.asf import LARGEST, check_size, positive
@@ -45,6 +51,7 @@ NAMES = {
     "rhipjoint": "RHipJoint",
 }
 CHANNELS: Channels = tuple((BONES[j - 1], ("rx", "ry", "rz")) for j in range(1, len(JOINTS)) if j not in ENDS)
+ROTATIONS = "Zrotation Xrotation Yrotation"
 SAME_PLACE = 1e-4  # share of the longest bone within which two joints are at one point
 
 
@@ -124,3 +131,47 @@ def _offsets(path: Path, nodes: list[Any]) -> Array:
                 got = " ".join(f"{value:g}" for value in child.offset)
                 raise ValueError(f"{path}: expected joint {child.name!r} at OFFSET {where}, got {got}")
     return offsets[1:]
+
+
+def write_bvh(path: str | Path, motion: Motion) -> None:
+    """Write a .bvh file, in metres and y up, that reads back as the same motion of a skeleton with the same bones.
+
+    Joint names are those of the CMU conversions, as `read_bvh` takes them. Angles are counted in other axes there, so
+    the poses that come back differ, and the joints do not.
+    """
+    axes = motion.skeleton.axes
+    rotations = np.tile(np.eye(3), (len(JOINTS), len(motion), 1, 1))
+    rotations[0] = rotation_from_root_angles(motion.poses[:, :3])
+    for joint in range(1, len(JOINTS)):
+        if joint not in ENDS:
+            turned = rotation_from_joint_angles(motion.poses[:, angle_index(joint) : angle_index(joint) + 3])
+            rotations[joint] = axes[joint - 1] @ turned @ axes[joint - 1].T
+    lines, order = ["HIERARCHY"], []
+
+    def visit(joint: int, depth: int) -> None:
+        tab = "\t" * depth
+        where = np.zeros(3) if PARENTS[joint] <= 0 else motion.skeleton.offsets[PARENTS[joint] - 1]
+        order.append(joint)
+        lines.append(f"{tab}{'JOINT' if joint else 'ROOT'} {NAMES[JOINTS[joint]]}")
+        channels = "6 Xposition Yposition Zposition" if joint == 0 else "3"
+        lines.extend([f"{tab}{{", f"{tab}\tOFFSET {_plain(where)}", f"{tab}\tCHANNELS {channels} {ROTATIONS}"])
+        for child, parent in enumerate(PARENTS):
+            if parent == joint:
+                visit(child, depth + 1)
+        if joint in ENDS:
+            end = _plain(motion.skeleton.offsets[joint - 1])
+            lines.extend([f"{tab}\tEnd Site", f"{tab}\t{{", f"{tab}\t\tOFFSET {end}", f"{tab}\t}}"])
+        lines.append(f"{tab}}}")
+
+    visit(0, 0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # at a gimbal lock any of the solutions will do
+        angles = Rotation.from_matrix(rotations[order].reshape(-1, 3, 3)).as_euler("ZXY", degrees=True)
+    angles = np.swapaxes(angles.reshape(len(order), len(motion), 3), 0, 1).reshape(len(motion), -1)
+    lines += ["MOTION", f"Frames: {len(motion)}", f"Frame Time: {1.0 / motion.fps!r}"]
+    lines += [_plain(row) for row in np.hstack([motion.translations, angles])]
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _plain(values: Array) -> str:
+    return " ".join(f"{value:.9f}" for value in values)

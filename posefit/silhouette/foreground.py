@@ -21,7 +21,9 @@ SHADE = (0.45, 0.95)  # a shadow keeps this share of the background's brightness
 TINT = 14.0  # and its colour, to within so many grey levels after scaling
 SPECK = 0.004  # of the image's height: what an opening takes away
 GAP = 0.012  # of the image's height: what a closing joins
-NEAR = 0.04  # of the image's height: pieces as near as that belong to the person
+NEAR = 0.06  # of the largest piece's height: pieces as near as that belong to the person
+PIECE = 0.05  # of the largest piece's area: a piece that is smaller is not counted
+BRIDGE = 0.15  # of the person's height: shadow between parts of the person that are no farther apart is clothing
 HOLE = 0.02  # of the person's area: a hole that is smaller is filled
 SAMPLES = 40  # frames that a median background looks at
 
@@ -106,39 +108,55 @@ class Person:
     valid: Mask = field(repr=False)  # False where nothing is known: shadow, and what is ignored
     area: int  # pixels
     pieces: int  # how many the foreground had that are large enough to be a part of a person
+    rival: float  # the area of the largest piece that is not this person's, as a share of the person's
     touches_border: bool
 
 
 def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> Person:
     """Return the largest person (height, width) of a foreground, within `roi` x, y, width, height.
 
-    Specks go, gaps close, pieces near the largest one join it and small holes are filled.
+    Gaps close, specks go, pieces near the largest one join it and small holes are filled. What looks like a shadow but
+    lies between parts of the person is dark clothing and belongs to it; any other shadow is unknown.
     """
-    height, width = foreground.shape
+    height = foreground.shape[0]
     inside = np.ones(foreground.shape, dtype=bool)
     if roi is not None:
         x, y, wide, tall = roi
         inside[:] = False
         inside[y : y + tall, x : x + wide] = True
-    known = ~shadow if ignore is None else ~shadow & ~ignore
-    cleaned = _morphed(foreground & inside, cv2.MORPH_OPEN, SPECK * height)
-    cleaned = _morphed(cleaned, cv2.MORPH_CLOSE, GAP * height) & inside
     if ignore is not None:
-        cleaned &= ~ignore
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(cleaned.astype(np.uint8), connectivity=8)
+        inside &= ~ignore
+    known = ~shadow if ignore is None else ~shadow & ~ignore
+    seen = foreground & inside
+    mask, pieces, _ = _largest(_cleaned(seen, height) & inside)
+    if not pieces:
+        return Person(mask, known, 0, 0, 0.0, False)
+    size = int(np.ptp(np.flatnonzero(mask.any(axis=1)))) + 1
+    dark = _morphed(seen, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
+    mask, pieces, rival = _largest(_cleaned(seen | dark, height) & inside)
+    mask = _without_holes(mask)
+    touches = bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
+    return Person(mask, known | mask, int(mask.sum()), pieces, rival, touches)
+
+
+def _cleaned(mask: Mask, height: int) -> Mask:
+    return _morphed(_morphed(mask, cv2.MORPH_CLOSE, GAP * height), cv2.MORPH_OPEN, SPECK * height)
+
+
+def _largest(mask: Mask) -> tuple[Mask, int, float]:
+    """Return the largest piece with the pieces near it, how many pieces count, and the share of the largest other."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     if count < 2:
-        return Person(np.zeros_like(foreground), known, 0, 0, False)
+        return np.zeros_like(mask), 0, 0.0
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest = 1 + int(areas.argmax())
-    mask = labels == largest
-    reach = _morphed(mask, cv2.MORPH_DILATE, NEAR * height)
-    near = np.unique(labels[reach & cleaned])
-    mask = np.isin(labels, near[near > 0])
-    mask = _without_holes(mask)
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    touches = bool(rows[0] == 0 or columns[0] == 0 or rows[-1] == height - 1 or columns[-1] == width - 1)
-    pieces = int(np.count_nonzero(areas > 0.05 * areas.max()))
-    return Person(mask, known | mask, int(mask.sum()), pieces, touches)
+    reach = _morphed(labels == largest, cv2.MORPH_DILATE, 2.0 * NEAR * stats[largest, cv2.CC_STAT_HEIGHT])
+    near = np.unique(labels[reach & mask])
+    near = near[near > 0]
+    mine = np.zeros(count, dtype=bool)
+    mine[near] = True
+    rival = float(areas[~mine[1:]].max(initial=0) / areas[mine[1:]].sum())
+    return np.isin(labels, near), int(np.count_nonzero(areas > PIECE * areas.max())), rival
 
 
 def _morphed(mask: Mask, operation: int, size: float) -> Mask:

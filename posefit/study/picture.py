@@ -6,7 +6,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
@@ -14,9 +13,10 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES, PARENTS
 from posefit.silhouette.cost import project
+from posefit.silhouette.foreground import Image
+from posefit.silhouette.kernels import NEAR
+from posefit.silhouette.mask import Mask
 from posefit.study.source import Scene
-
-Image = NDArray[np.uint8]  # (height, width, 3) blue, green, red
 
 BACKGROUND = (28, 24, 22)
 BOTH, MISSED, SPILLED = (186, 214, 168), (90, 90, 235), (235, 160, 70)  # Y, R, B
@@ -24,6 +24,8 @@ LEFT, RIGHT, MIDDLE = (80, 150, 245), (225, 165, 85), (205, 205, 205)
 TEXT = (240, 240, 240)
 PANEL = 480  # pixels high
 STILLS = 6  # frames on the summary
+SOLID = 0.65  # how much of what was filmed the body hides
+DISTANCE = 6.0  # metres from the view from the side
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
@@ -31,31 +33,38 @@ class Painter:
     """Paints frame after frame; keeps small stills of a few of them for the summary."""
 
     def __init__(self, scene: Scene) -> None:
-        self._scene, self.camera = scene, scene.cameras[0]
+        self._scene = scene
         self._wanted = np.unique(np.linspace(0, scene.count - 1, STILLS).round().astype(int)).tolist()
         self._stills: list[Image] = []
         self._count = 0
 
-    def add(self, frame: Frame, observation: Observation, row: Mapping[str, float]) -> Image:
-        """Return the picture (height, width, 3) of a frame."""
-        body, camera = self._scene.body, self.camera
-        mask = observation.silhouettes[0].mask
-        fitted = project(body, camera, frame.pose, frame.translation)
-        overlay = np.full((*mask.shape, 3), BACKGROUND, dtype=np.uint8)
-        overlay[mask & ~fitted], overlay[fitted & ~mask], overlay[mask & fitted] = MISSED, SPILLED, BOTH
-        height = PANEL
-        width = 2 * round(mask.shape[1] * height / mask.shape[0] / 2)
-        left = np.asarray(cv2.resize(overlay, (width, height), interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
-        side = side_view(body, camera, frame.pose, frame.translation, PANEL)
-        image = np.hstack([left, side])
+    def add(
+        self, frame: Frame, observation: Observation, row: Mapping[str, float], filmed: Image | None = None
+    ) -> Image:
+        """Return the picture (height, width, 3) of a frame: on what was `filmed`, or on the masks."""
+        body, cameras = self._scene.body, self._scene.cameras
+        if filmed is None:
+            seen = [
+                _overlay(silhouette.mask, project(body, camera, frame.pose, frame.translation))
+                for camera, silhouette in zip(cameras, observation.silhouettes, strict=True)
+            ]
+            left = _grid(seen)
+        else:
+            drawn = filmed.copy()
+            draw_body(drawn, body, cameras[0], frame.pose, frame.translation)
+            left = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), PANEL)
+        width = left.shape[1]
+        image = np.hstack([left, side_view(body, cameras[0], frame.pose, frame.translation, PANEL)])
         label = "   ".join(
             [f"frame {self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
             + ([f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else [])
+            + ([] if observation.usable else ["pose held"])
         )
         _write(image, label, (12, 26))
         _write(image, "from the side", (width + 12, 26))
-        for k, (name, colour) in enumerate((("both", BOTH), ("observed only", MISSED), ("body only", SPILLED))):
-            _write(image, name, (12 + 130 * k, PANEL - 14), colour)
+        if filmed is None:
+            for k, (name, colour) in enumerate((("both", BOTH), ("observed only", MISSED), ("body only", SPILLED))):
+                _write(image, name, (12 + 130 * k, PANEL - 14), colour)
         if self._count in self._wanted:
             self._stills.append(
                 np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
@@ -71,6 +80,29 @@ class Painter:
         return np.vstack([grid, curve([row[name] for row in rows], name.replace("_", " "), grid.shape[1], 160)])
 
 
+def _overlay(mask: Mask, fitted: Mask) -> Image:
+    overlay = np.full((*mask.shape, 3), BACKGROUND, dtype=np.uint8)
+    overlay[mask & ~fitted], overlay[fitted & ~mask], overlay[mask & fitted] = MISSED, SPILLED, BOTH
+    return overlay
+
+
+def _panel(image: Image, height: int, sharp: bool = False) -> Image:
+    width = 2 * round(image.shape[1] * height / image.shape[0] / 2)
+    how = cv2.INTER_NEAREST if sharp else cv2.INTER_AREA if height < image.shape[0] else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(image, (width, height), interpolation=how), dtype=np.uint8)
+
+
+def _grid(views: Sequence[Image]) -> Image:
+    """Return the views of all cameras in one panel, two beside each other."""
+    columns = min(2, len(views))
+    height = PANEL // -(-len(views) // columns)
+    panels = [_panel(view, height, sharp=True) for view in views]
+    wide = max(panel.shape[1] for panel in panels)
+    panels = [np.pad(panel, ((0, 0), (0, wide - panel.shape[1]), (0, 0))) for panel in panels]
+    panels += [np.zeros_like(panels[0])] * (-len(panels) % columns)
+    return np.vstack([np.hstack(panels[k : k + columns]) for k in range(0, len(panels), columns)])
+
+
 def side_view(body: Body, camera: Camera, pose: Array, translation: Array, side: int) -> Image:
     """Return the body (side, side, 3) seen from the camera's right: left limbs orange, right ones blue."""
     joints = body.skeleton.joints(pose, translation)
@@ -78,21 +110,27 @@ def side_view(body: Body, camera: Camera, pose: Array, translation: Array, side:
     back = -camera.rotation[2]
     azimuth = math.atan2(back[0], back[2]) + 0.5 * math.pi
     tall = 1.25 * (float(np.ptp(joints[:, 1])) + 2.0 * float(body.radii.max()))
-    distance = 6.0
-    view = Camera.around(middle, azimuth, distance, (side, side), 2.0 * math.atan(0.5 * tall / distance))
-    pixels, depths = view.project(joints)
-    scale = view.focal[0] / depths
+    view = Camera.around(middle, azimuth, DISTANCE, (side, side), 2.0 * math.atan(0.5 * tall / DISTANCE))
     image = np.full((side, side, 3), BACKGROUND, dtype=np.uint8)
+    draw_body(image, body, view, pose, translation)
+    return image
+
+
+def draw_body(image: Image, body: Body, camera: Camera, pose: Array, translation: Array) -> None:
+    """Draw the body into an image of a camera's size, far bones first: left limbs orange, right ones blue."""
+    joints = body.skeleton.joints(pose, translation)
+    pixels, depths = camera.project(joints)
+    scale = camera.focal[0] / depths
     parents = np.array(PARENTS[1:])
     for bone in np.argsort(-(depths[parents] + depths[1:])):
-        ends = (int(parents[bone]), int(bone) + 1)
-        radii = body.radii[bone] * scale[list(ends)]
-        shade = 1.0 - 0.25 * float(np.clip(depths[list(ends)].mean() - distance, -0.4, 0.4)) / 0.4
+        ends = [int(parents[bone]), int(bone) + 1]
+        if depths[ends].min() <= NEAR:
+            continue
+        shade = 1.0 - 0.25 * float(np.clip(depths[ends].mean() - depths[0], -0.4, 0.4)) / 0.4
         colour = (
             MIDDLE if BONES[bone] in ("lowerback", "lowerneck") else {"l": LEFT, "r": RIGHT}.get(BONES[bone][0], MIDDLE)
         )
-        _cone(image, pixels[list(ends)], radii, tuple(min(255.0, shade * c) for c in colour))
-    return image
+        _cone(image, pixels[ends], body.radii[bone] * scale[ends], tuple(min(255.0, shade * c) for c in colour))
 
 
 def _cone(image: Image, centres: Array, radii: Array, colour: Any) -> None:

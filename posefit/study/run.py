@@ -2,9 +2,9 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,18 +15,24 @@ import posefit
 from posefit.fitting.optimiser import OptimiserFactory
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import Translation
+from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker, TrackerFactory
-from posefit.geometry.body import Body
+from posefit.geometry.calibration import Up
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
 from posefit.motion import library
 from posefit.motion.motion import Motion
 from posefit.study.evaluation import Evaluation
+from posefit.study.masks import Range
 from posefit.study.method import Choice, prepare, training_angles
-from posefit.study.source import Range, Scene, is_masks, motion_of, observed, synthetic
-from posefit.study.writing import OutputFolder
+from posefit.study.opening import begun, built
+from posefit.study.scenes import Source, Viewing, scene
+from posefit.study.segment import Extraction
+from posefit.study.source import Scene, kind_of, motion_of
+from posefit.study.writing import Nowhere, Output, OutputFolder
 
-Source = str | Path | Motion
+RESTARTS = 8  # of the first frame, where nobody knows the truth
+BODY_FRAMES = 30  # from which a build is found
 PATIENCE = 1.5  # seconds of compiling before it is announced
 
 
@@ -52,15 +58,15 @@ class Fit:
 
 
 def track(
-    source: Source = "walk",
+    source: Source | Sequence[Source] = "walk",
     *,
     asf: str | Path | None = None,
-    camera: Camera | str | Path | None = None,
+    camera: Camera | str | Path | Sequence[Camera | str | Path] | None = None,
     optimiser: str | OptimiserFactory = "sapso",
-    prior: str | Prior = "pca",
+    prior: str | Prior | None = None,
     tracker: str | TrackerFactory | None = None,
     train: Sequence[Source] = (),
-    view_degrees: float | None = None,
+    view_degrees: float | Sequence[float] | None = None,
     size: tuple[int, int] = (320, 240),
     fps: float = 30.0,
     frames: Range = (None, None),
@@ -69,6 +75,11 @@ def track(
     evaluations: int | None = None,
     translation: Translation | None = None,
     first_pose: Literal["searched", "given"] = "searched",
+    restarts: int | None = None,
+    body_frames: int | None = None,
+    height: float | None = None,
+    extraction: Extraction | None = None,
+    up: Up | None = None,
     seed: int = 0,
     threads: int = 1,
     ask_seconds: float | None = None,
@@ -77,23 +88,46 @@ def track(
     tracker_settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     force: bool = False,
-    progress: Callable[[Iterator[Frame], int], Iterator[Frame]] | None = None,
+    resume: bool = False,
+    rerun: str | Path | None = None,
+    progress: Callable[[Iterator[Any], int], Iterator[Any]] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Track:
     """Return the motion followed through a source's silhouettes, with its errors where the truth is known.
 
-    `source` is a built-in motion's name, a `Motion`, an .amc or .bvh file, a folder of mask images or an .npz of masks.
-    `train` names the motions a prior learns from; by default the other styles of a built-in motion, else the built-in
-    walks. The method is `optimiser` with `prior`, or `tracker`. The budget of a frame is `evaluations`, by default
-    particles x (iterations + 1) = 40 x 61, the same for every method. `translation` is "known" where the truth is, else
-    "aligned". A `first_pose` that is "given" starts the first frame around the true one. `ask_seconds` is how long a
-    plugin may take to propose a population. With `out`, a new folder gets the poses, an .amc, a table, a video and a
-    picture; it appears whole or not at all. Raises ValueError for every mistake in the arguments or files.
+    `source` is a built-in motion's name, a `Motion`, an .amc or .bvh file, a folder of mask images, an .npz of masks, a
+    video, or several masks or videos that cameras took at the same time. `train` names the motions a prior learns from;
+    by default the other styles of a built-in motion, else the built-in walks. The method is `optimiser` with `prior`, or
+    `tracker`. The budget of a frame is `evaluations`, by default particles x (iterations + 1) = 40 x 61, the same for
+    every method. `translation` is "known" where the truth is, else "aligned". A `first_pose` that is "given" starts the
+    first frame around the true one. `ask_seconds` is how long a plugin may take to propose a population.
+
+    Where the truth is known the prior is `pca`. Where it is not it is `loose`, the first frame is searched `restarts`
+    times (8), and the person's build is fitted to `body_frames` (30; none where an .asf is given), as tall as `height`
+    says. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or the
+    calibration of one a view, in whose world `up` points up; `extraction` is how masks are taken from video.
+
+    With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at all.
+    What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a recording
+    for the Rerun viewer goes. Raises ValueError for every mistake in the arguments or files.
     """
+    arguments = {name: repr(value) for name, value in sorted(locals().items()) if name not in _MAY_DIFFER}
     say = say or _nothing
+    sources = source if isinstance(source, Sequence) and not isinstance(source, str) else [source]
+    viewing = Viewing(
+        asf,
+        () if camera is None else (camera,) if isinstance(camera, Camera | str | Path) else tuple(camera),
+        () if view_degrees is None else np.atleast_1d(view_degrees).astype(float).tolist(),
+        size,
+        fps,
+        frames,
+        extraction or Extraction(),
+        height,
+        up,
+    )
     choice = Choice(
         optimiser,
-        prior,
+        prior or prior_of(sources[0]),
         tracker,
         optimiser_settings or {},
         prior_settings or {},
@@ -103,80 +137,174 @@ def track(
         evaluations,
         ask_seconds,
     )
-    budget = choice.budget()
-    if view_degrees is not None and not np.isfinite(view_degrees):
-        raise ValueError(f"view_degrees must be a finite number, got {view_degrees}")
-    if not (np.isfinite(fps) and fps > 0.0):
-        raise ValueError(f"fps must be a positive number, got {fps}")
+    choice.budget()
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
-    folder = OutputFolder(out, force) if out is not None else None
-    scene = _scene(source, asf, camera, view_degrees, size, fps, frames)
-    trained = _training(source, train, asf, fps)
-    mode: Translation = translation or ("known" if scene.truth is not None else "aligned")
-    if mode == "known" and scene.truth is None:
-        raise ValueError("translation must be searched or aligned where only masks are given, got known")
     if first_pose not in ("searched", "given"):
         raise ValueError(f"first_pose must be one of searched, given, got {first_pose!r}")
-    task = Task(
-        scene.body,
-        scene.cameras,
-        budget,
-        scene.yaw,
-        scene.anchor,
-        translation=mode,
-        fps=scene.fps,
-        training=trained,
-        first_pose=_first_pose(scene) if first_pose == "given" else None,
-        threads=threads,
-    )
-    method = prepare(choice, task)
-    evaluation = Evaluation(scene, method.prior, training_angles(task), method.beta)
-    began = time.perf_counter()
-    with _announced(say):
-        _warm_up(method.warm_up, scene)
-    say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
-    found: list[Frame] = []
+    for name, value in (("restarts", restarts), ("body_frames", body_frames)):
+        if value is not None and value < 0:
+            raise ValueError(f"{name} must be 0 or more, got {value}")
+    if resume and out is None:
+        raise ValueError("resume must be given with out, the folder of the track that goes on, got none")
+    if rerun is not None:
+        from posefit.study.recording import check_recording
 
-    # the matrices of an optimiser are small: more than one thread of BLAS for them is slower than one
-    with folder or nullcontext() as files, threadpool_limits(1):
-        seen = _Tee(scene.observations)
-        results = method.tracker.track(seen, np.random.default_rng(seed))
-        for frame in progress(results, scene.count) if progress else results:
-            row = evaluation.add(frame, seen.latest)
-            if files is not None:
-                files.picture(scene, frame, seen.latest, row)
-            found.append(frame)
+        check_recording(rerun)
+    folder = Nowhere() if out is None else OutputFolder(out, force, resume, _spec(arguments), say)
+    with folder as output, threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
+        seen, warnings = scene(sources, viewing, output.work, progress, say)
+        for warning in warnings:
+            say(f"warning: {warning}")
+        task, shape = _opened(
+            seen, choice, _training(sources, train, asf, fps), translation, first_pose, restarts, body_frames,
+            viewing, seed, threads, say,
+        )  # fmt: skip
+        seen = replace(seen, body=task.body)
+        method = prepare(choice, task)
+        found = _followed(seen, choice, task, output, seed, progress, say)
+        evaluation = Evaluation(seen, method.prior, training_angles(task), method.beta)
+        for frame, observation in zip(found, seen.observations, strict=True):
+            evaluation.add(frame, observation)
+        rows, measured = evaluation.close()
         estimate = Motion(
-            scene.name,
-            scene.body.skeleton,
+            seen.name,
+            seen.body.skeleton,
             np.array([frame.pose for frame in found]),
             np.array([frame.translation for frame in found]),
-            scene.fps,
+            seen.fps,
         )
-        rows, measured = evaluation.close()
         summary = {
-            "motion": scene.name,
+            "motion": seen.name,
             "method": method.name,
             "seed": seed,
             "frames": len(found),
             **measured,
-            "evaluations_per_frame": budget,
+            "evaluations_per_frame": task.evaluations,
             "version": posefit.__version__,
-            "train": [motion.name for motion in trained],
+            "train": [motion.name for motion in task.training],
             "view_degrees": view_degrees,
-            "translation": mode,
+            "translation": task.translation,
             "first_pose": first_pose,
-            "size": [scene.cameras[0].width, scene.cameras[0].height],
-            "fps": scene.fps,
+            "views": len(seen.cameras),
+            "size": [seen.cameras[0].width, seen.cameras[0].height],
+            "fps": seen.fps,
             "settings": method.settings,
+            "body": None if shape is None else _described(shape),
+            "warnings": warnings,
         }
-        if files is not None:
-            files.finish(estimate, found, rows, summary)
-    return Track(estimate, scene.truth, rows, summary)
+        output.finish(seen, estimate, found, rows, summary)
+        if rerun is not None:
+            from posefit.study.recording import record
+
+            record(rerun, seen, estimate)
+    return Track(estimate, seen.truth, rows, summary)
 
 
-def fit(source: Source = "walk", *, frame: int = 0, **settings: Any) -> Fit:
+def prior_of(source: Source) -> str:
+    """Return the prior that a source is followed with by default."""
+    return "pca" if kind_of(source) == "motion" else "loose"
+
+
+_MAY_DIFFER = ("out", "force", "resume", "rerun", "progress", "say", "threads")
+
+
+def _spec(arguments: Mapping[str, str]) -> dict[str, str]:
+    return {**arguments, "version": posefit.__version__}
+
+
+def _opened(
+    seen: Scene,
+    choice: Choice,
+    trained: list[Motion],
+    translation: Translation | None,
+    first_pose: str,
+    restarts: int | None,
+    body_frames: int | None,
+    viewing: Viewing,
+    seed: int,
+    threads: int,
+    say: Callable[[str], None],
+) -> tuple[Task, Shape | None]:
+    """Return the task and the person's build, after what has to be found out before the first frame."""
+    blind = seen.truth is None
+    mode: Translation = translation or ("aligned" if blind else "known")
+    if mode == "known" and blind:
+        raise ValueError("translation must be searched or aligned where only masks are given, got known")
+    task = Task(
+        seen.body,
+        seen.cameras,
+        choice.budget(),
+        seen.yaw,
+        seen.anchor,
+        translation=mode,
+        fps=seen.fps,
+        training=trained,
+        first_pose=_first_pose(seen) if first_pose == "given" else None,
+        threads=threads,
+    )
+    began = time.perf_counter()
+    with _announced(say):
+        _warm_up(prepare(choice, task).warm_up, seen)
+    say(f"ready in {time.perf_counter() - began:.1f} s; {seen.count} frames of {seen.name}")
+
+    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        return prepare(choice, task).tracker.track(observations, rng)
+
+    if restarts is None:
+        restarts = RESTARTS if blind else 0
+    if body_frames is None:
+        body_frames = BODY_FRAMES if blind and viewing.asf is None else 0
+    if restarts:
+        say(f"looking for the first pose, {restarts} times")
+        task = begun(task, seen.observations, follow, restarts, seed)
+    shape = None
+    if body_frames:
+        say(f"fitting the person's build to {body_frames} frames")
+        alone = len(seen.cameras) == 1 and mode == "aligned"
+        height = viewing.height or (task.body.stature if alone else None)
+        shape = built(task, seen.observations, follow, body_frames, height, seed)
+        if shape is not None:
+            task = replace(task, body=shape.body)
+    return task, shape
+
+
+def _followed(
+    seen: Scene,
+    choice: Choice,
+    task: Task,
+    output: Output,
+    seed: int,
+    progress: Callable[[Iterator[Any], int], Iterator[Any]] | None,
+    say: Callable[[str], None],
+) -> list[Frame]:
+    """Return what is found in all frames, each recorded as it comes; those that were found before stay as they are."""
+    found, state = output.earlier()
+    rng = np.random.default_rng(seed)
+    if state is not None:
+        rng.bit_generator.state = state
+        say(f"going on from frame {len(found)} of {seen.count}")
+        last = found[-1]
+        task = replace(task, yaw=float(last.pose[0]), anchor=task.anchor, first_pose=last.pose[3:], before=tuple(found))
+    rest = (seen.observations[k] for k in range(len(found), seen.count))
+    results = prepare(choice, task).tracker.track(rest, rng) if len(found) < seen.count else iter(())
+    for frame in progress(results, seen.count - len(found)) if progress else results:
+        output.record(frame, dict(rng.bit_generator.state))
+        found.append(frame)
+    return found
+
+
+def _described(shape: Shape) -> dict[str, Any]:
+    """Return a build as the summary gives it."""
+    return {
+        "stature": shape.body.stature,
+        "cost": shape.cost,
+        "factors": dict(zip(NAMES, shape.factors.tolist(), strict=True)),
+        "spread": dict(zip(NAMES, shape.spread.tolist(), strict=True)),
+    }
+
+
+def fit(source: Source | Sequence[Source] = "walk", *, frame: int = 0, **settings: Any) -> Fit:
     """Return the pose found in one frame of a source; settings as for `track`, but for `frames`."""
     if frame < 0:
         raise ValueError(f"frame must be 0 or more, got {frame}")
@@ -186,29 +314,8 @@ def fit(source: Source = "walk", *, frame: int = 0, **settings: Any) -> Fit:
     return Fit(result.motion.poses[0], result.motion.translations[0], row["cost"], history, result.summary)
 
 
-def _scene(
-    source: Source,
-    asf: str | Path | None,
-    camera: Camera | str | Path | None,
-    view_degrees: float | None,
-    size: tuple[int, int],
-    fps: float,
-    frames: Range,
-) -> Scene:
-    if min(size) < 1 or max(size) > 16_384:
-        raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {size[0]}x{size[1]}")
-    if isinstance(camera, str | Path):
-        camera = Camera.from_json(camera)
-    if is_masks(source):
-        from posefit.motion.asf import read_asf
-
-        skeleton = library.average_skeleton() if asf is None else read_asf(asf)
-        return observed(str(source), Body.of(skeleton), view_degrees, camera, fps, frames)
-    return synthetic(motion_of(source, asf, fps), view_degrees, size, camera, frames)
-
-
-def _training(source: Source, train: Sequence[Source], asf: str | Path | None, fps: float) -> list[Motion]:
-    chosen: Sequence[Source] = train
+def _training(sources: Sequence[Source], train: Sequence[Source], asf: str | Path | None, fps: float) -> list[Motion]:
+    source, chosen = sources[0], train
     if not chosen:
         known = isinstance(source, str) and source in library.names()
         chosen = library.other_styles(str(source) if known else "walk")
@@ -248,17 +355,3 @@ def _announced(say: Callable[[str], None]) -> Iterator[None]:
     finally:
         timer.cancel()
         timer.join()  # it may be in the middle of saying it
-
-
-class _Tee:
-    """Passes observations on and remembers the latest."""
-
-    latest: Observation
-
-    def __init__(self, observations: Any) -> None:
-        self._observations = observations
-
-    def __iter__(self) -> Iterator[Observation]:
-        for observation in self._observations:
-            self.latest = observation
-            yield observation

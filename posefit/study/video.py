@@ -1,5 +1,6 @@
 """Reads video frame by frame, so that memory does not grow with its length."""
 
+import errno
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,8 @@ import cv2
 import numpy as np
 
 from posefit.silhouette.foreground import Image
+
+CODE = "mp4v"
 
 
 @dataclass(frozen=True)
@@ -65,3 +68,36 @@ class Video:
             count += 1
         capture.release()
         return count
+
+
+class VideoWriter:
+    """Writes an .mp4 whose number of frames is checked at the end: OpenCV says nothing when the disk is full."""
+
+    def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
+        self._path, self._count = path, 0
+        self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*CODE), fps, size)
+        if not self._writer.isOpened():
+            raise ValueError(f"{path}: expected OpenCV to write {CODE} video, got a build or a disk that cannot")
+
+    def write(self, image: Image) -> None:
+        """Add a frame."""
+        self._writer.write(image)
+        self._count += 1
+
+    def close(self) -> None:
+        """Finish the file. Raises OSError where it does not hold all frames."""
+        self._writer.release()
+        capture = cv2.VideoCapture(str(self._path))
+        written = round(capture.get(cv2.CAP_PROP_FRAME_COUNT)) if capture.isOpened() else 0
+        capture.release()
+        if written != self._count:
+            raise OSError(errno.ENOSPC, f"room for {written} of {self._count} frames of video")
+
+    def __enter__(self) -> "VideoWriter":
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self._writer.release()

@@ -1,0 +1,104 @@
+"""Principal components with freedom around them at the limbs: people swing their arms as nobody in training did."""
+
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.fitting.check import at_least
+from posefit.geometry.arrays import writeable
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
+from posefit_priors.arrays import load_arrays
+from posefit_priors.pca import CLUSTERS, PCA, QUANTILE
+
+COMPONENTS = 12
+ARMS_DEGREES = 45.0
+LEGS_DEGREES = 15.0
+ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
+_SHAPES = {"loose": ("k",), "angles_low": ("k",), "angles_high": ("k",), "low": ("d",), "high": ("d",)}
+
+
+class Loose:
+    """The space of `pca`, and one latent more for each angle of shoulders, elbows, hips and knees that moves in training.
+
+    Such a latent, in radians, is added to the angle that the components give: up to `arms_degrees` or `legs_degrees` to
+    either side, within the skeleton's joint limits where it states some. The other settings are those of `pca`.
+    """
+
+    low: Array  # (d,)
+    high: Array  # (d,)
+
+    def __init__(
+        self,
+        *,
+        components: float = COMPONENTS,
+        arms_degrees: float = ARMS_DEGREES,
+        legs_degrees: float = LEGS_DEGREES,
+        clusters: int = CLUSTERS,
+        quantile: float = QUANTILE,
+        seed: int = 0,
+    ) -> None:
+        at_least("arms_degrees", arms_degrees, 0.0)
+        at_least("legs_degrees", legs_degrees, 0.0)
+        self._reach = np.radians([arms_degrees, legs_degrees])
+        self._pca = PCA(components=components, clusters=clusters, quantile=quantile, seed=seed)
+
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
+        """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
+        self._pca.fit(angles, skeleton)
+        angles = np.asarray(angles, dtype=np.float64)
+        least, most = angles.min(axis=0), angles.max(axis=0)
+        chosen, reach = [], []
+        for bones, reached in zip((ARMS, LEGS), self._reach, strict=True):
+            for name in (side + bone for bone in bones for side in "lr"):
+                first = angle_index(JOINTS.index(name)) - 3
+                moving = [i for i in range(first, first + 3) if most[i] > least[i]]
+                chosen += moving
+                reach += [reached] * len(moving)
+        self.loose = np.array(chosen, dtype=np.intp)
+        self.angles_low, self.angles_high = np.full(len(chosen), -np.pi), np.full(len(chosen), np.pi)
+        if skeleton is not None and skeleton.limits is not None:
+            self.angles_low, self.angles_high = skeleton.limits[self.loose].T.copy()
+        self.angles_low = np.minimum(self.angles_low, least[self.loose])
+        self.angles_high = np.maximum(self.angles_high, most[self.loose])
+        left = self.transform(angles)[:, len(self._pca.low) :]
+        self.low = np.concatenate([self._pca.low, np.minimum(-np.array(reach), left.min(axis=0, initial=0.0))])
+        self.high = np.concatenate([self._pca.high, np.maximum(np.array(reach), left.max(axis=0, initial=0.0))])
+        return self
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, d) of joint angles (n, 63): components, then what they leave of the loose angles."""
+        latents = self._pca.transform(angles)
+        left = (np.asarray(angles) - self._pca.inverse_transform(latents))[:, self.loose]
+        return np.hstack([latents, left])
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, d)."""
+        m = len(self._pca.low)
+        angles = self._pca.inverse_transform(writeable(latents[:, :m]))
+        angles[:, self.loose] += latents[:, m:]
+        return angles
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return which latents (n, d) the components allow and the joint limits too (n,)."""
+        angles = self.inverse_transform(latents)[:, self.loose]
+        bent = ((angles >= self.angles_low - 1e-9) & (angles <= self.angles_high + 1e-9)).all(axis=1)
+        return np.asarray(bent & self._pca.feasible(writeable(latents[:, : len(self._pca.low)])))
+
+    def save(self, path: str | Path) -> None:
+        """Write the learned space to an .npz file."""
+        own: dict[str, Any] = {name: getattr(self, name) for name in _SHAPES}
+        np.savez(path, **own, **{f"pca_{name}": value for name, value in self._pca.arrays().items()})
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Loose":
+        """Return the space that `save` wrote. Raises ValueError where the file is not one."""
+        arrays = load_arrays(path, _SHAPES)
+        prior = cls()
+        prior._pca = PCA.load(path, "pca_")
+        prior.loose = arrays["loose"].astype(np.intp)
+        for name in ("angles_low", "angles_high", "low", "high"):
+            setattr(prior, name, arrays[name])
+        return prior

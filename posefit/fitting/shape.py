@@ -1,0 +1,149 @@
+"""The build of one person: factors on the bone lengths and radii of a body, found from a few frames with the poses."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.fitting.alignment import align
+from posefit.fitting.tracker import Frame, Observation
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import BONES
+from posefit.silhouette.cost import areas, mismatch
+
+LENGTHS = {
+    "hips": ("hipjoint",),
+    "thighs": ("femur",),
+    "shanks": ("tibia",),
+    "feet": ("foot", "toes"),
+    "torso": ("lowerback", "upperback", "thorax"),
+    "neck": ("lowerneck", "upperneck", "head"),
+    "shoulders": ("clavicle",),
+    "upper arms": ("humerus",),
+    "forearms": ("radius", "wrist", "hand"),
+}
+GIRTHS = {
+    "hips": ("hipjoint",),
+    "thighs": ("femur",),
+    "shanks": ("tibia",),
+    "feet": ("foot", "toes"),
+    "torso": ("lowerback", "upperback", "thorax", "clavicle"),
+    "head": ("lowerneck", "upperneck", "head"),
+    "arms": ("humerus", "radius", "wrist", "hand"),
+}
+NAMES = ("scale", *(f"{name} length" for name in LENGTHS), *(f"{name} girth" for name in GIRTHS))
+
+# How far people differ: the standard deviation of the logarithm of each factor. Ours; lengths are read off the nine
+# skeletons of the built-in motions' subjects, girths are wider, as clothes count.
+SPREAD = np.array([0.10] + [0.06] * len(LENGTHS) + [0.20] * len(GIRTHS))
+REACH = 3.0  # spreads to either side that are searched
+PULL = 0.05  # cost of a factor that is one spread away from 1
+ROUNDS = 4  # poses with the body, then the body with the poses
+GENERATIONS = 60  # of CMA-ES, a round
+
+
+def _members(groups: dict[str, tuple[str, ...]]) -> Array:
+    """Return which bones (26, groups) belong to which group, as 0 and 1."""
+    plain = [bone if bone in _MIDDLE else bone[1:] for bone in BONES]
+    return np.array([[float(bone in group) for group in groups.values()] for bone in plain])
+
+
+_MIDDLE = ("lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
+_LENGTHS, _GIRTHS = _members(LENGTHS), _members(GIRTHS)
+
+
+def shaped(body: Body, factors: Array, height: float | None = None) -> Body:
+    """Return a body with its lengths and radii multiplied by factors (17,), in the order of `NAMES`.
+
+    With a `height` in metres the result is scaled to stand so tall.
+    """
+    lengths = factors[0] * np.exp(_LENGTHS @ np.log(factors[1 : 1 + len(LENGTHS)]))
+    girths = factors[0] * np.exp(_GIRTHS @ np.log(factors[1 + len(LENGTHS) :]))
+    made = body.scaled(lengths, girths)
+    return made if height is None else made.scaled(height / made.stature, height / made.stature)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A fitted body, and how sure its factors are."""
+
+    body: Body
+    factors: Array = field(repr=False)  # (17,) in the order of `NAMES`
+    spread: Array = field(repr=False)  # (17,) standard deviation of the factors over resampled frames
+    cost: float  # mean over the frames
+
+
+def fit_shape(
+    body: Body,
+    cameras: Sequence[Camera],
+    observations: Sequence[Observation],
+    follow: Callable[[Body], Sequence[Frame]],
+    rng: np.random.Generator,
+    *,
+    height: float | None = None,
+    aligned: bool = True,
+    resamples: int = 4,
+) -> Shape:
+    """Return the shape that fits all observations best, found in turns with their poses.
+
+    `follow` tracks the observations with a body. With a `height` in metres the person stands so tall; one camera alone
+    does not see how large somebody is. Where poses are `aligned`, so are those of every body that is tried. `spread`
+    comes from `resamples` fits to frames drawn with replacement.
+    """
+    factors = np.ones(len(NAMES))
+    base = body
+    for _ in range(ROUNDS):
+        frames = follow(shaped(base, factors, height))
+        fitted = _Frames(base, cameras, observations, frames, height, aligned)
+        factors = fitted.search(factors, np.arange(len(observations)), rng)
+    drawn = [
+        fitted.search(factors, rng.integers(len(observations), size=len(observations)), rng) for _ in range(resamples)
+    ]
+    cost = fitted.cost(factors, np.arange(len(observations)))
+    return Shape(shaped(base, factors, height), factors, np.std(drawn, axis=0), cost)
+
+
+@dataclass(frozen=True, eq=False)
+class _Frames:
+    """Frames whose poses are held while the body is sought."""
+
+    base: Body
+    cameras: Sequence[Camera]
+    observations: Sequence[Observation]
+    found: Sequence[Frame]
+    height: float | None
+    aligned: bool
+
+    def cost(self, factors: Array, chosen: NDArray[np.int64]) -> float:
+        """Return the mean mismatch over the chosen frames."""
+        body, total = shaped(self.base, factors, self.height), 0.0
+        for k in chosen.tolist():
+            pose, translation = self.found[k].pose[None], self.found[k].translation[None]
+            silhouettes = self.observations[k].silhouettes
+            if self.aligned:
+                translation = align(body, self.cameras, silhouettes, pose, translation)
+            for camera, silhouette in zip(self.cameras, silhouettes, strict=True):
+                total += float(mismatch(areas(body, camera, silhouette, pose, translation))[0])
+        return total / (len(chosen) * len(self.cameras))
+
+    def search(self, start: Array, chosen: NDArray[np.int64], rng: np.random.Generator) -> Array:
+        """Return the factors (17,) that fit the chosen frames best, by CMA-ES in spreads of their logarithms."""
+        from cmaes import CMA  # here, as it loads scipy.stats, which takes more than a second
+
+        bounds = np.tile([-REACH, REACH], (len(NAMES), 1))
+        mean = np.clip(np.log(start) / SPREAD, -REACH, REACH)
+        search = CMA(mean, 0.5, bounds=bounds, seed=int(rng.integers(2**31)))
+        best, least = mean, np.inf
+        for _ in range(GENERATIONS):
+            told = []
+            for _ in range(search.population_size):
+                asked = search.ask()
+                cost = self.cost(np.exp(SPREAD * asked), chosen) + PULL * float(asked @ asked)
+                told.append((asked, cost))
+                if cost < least:
+                    best, least = asked, cost
+            search.tell(told)
+        return np.asarray(np.exp(SPREAD * best))

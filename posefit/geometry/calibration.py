@@ -1,0 +1,251 @@
+"""Calibration files of other programs, read into cameras: OpenCV's YAML and JSON, Qualisys' XML, and TOML.
+
+A file holds one camera or several. All give camera_from_world in OpenCV's frame; which way is up in their world differs,
+and is turned to +y here: the axis that the images of all cameras together see pointing up, unless `up` names one.
+"""
+
+import json
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array
+
+Up = Literal["x", "y", "z"]
+LARGEST_FILE = 4_000_000  # bytes
+SUBPIXELS = 64.0  # Qualisys counts lengths on the sensor in 64ths of a pixel
+HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
+# The rotation of the world that turns an axis to +y.
+TURNS = {"x": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], "y": np.eye(3), "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a file says of one camera. Lengths are metres and pixels."""
+
+    name: str
+    size: tuple[int, int]  # width, height
+    matrix: Array = field(repr=False)  # (3, 3) of the pinhole, skew ignored; pixel centres at 0, as OpenCV counts them
+    distortion: Array = field(repr=False)  # (4,) to (14,): OpenCV's k1, k2, p1, p2, k3, ...; none is all 0
+    rotation: Array | None = field(repr=False)  # (3, 3) camera_from_world; None where the file does not place it
+    translation: Array | None = field(repr=False)  # (3,)
+    fisheye: bool = False
+
+    @property
+    def distorted(self) -> bool:
+        """Whether the lens bends straight lines."""
+        return bool(np.any(self.distortion))
+
+    def camera(self, size: tuple[int, int], world: Array) -> Camera:
+        """Return the camera of pictures scaled to `size` without their distortion; `world` (3, 3) turns its up to +y.
+
+        A camera that the file does not place stands at the origin and looks level along -z.
+        """
+        scale = np.array(size) / self.size
+        rotation = np.diag([1.0, -1.0, -1.0]) if self.rotation is None else self.rotation @ world.T
+        translation = np.zeros(3) if self.translation is None else self.translation
+        focal = np.diag(self.matrix)[:2] * scale
+        centre = (self.matrix[:2, 2] + HALF) * scale
+        return Camera(*size, focal, centre, _orthonormal(rotation), translation)
+
+    def maps(self, size: tuple[int, int]) -> tuple[Any, Any]:
+        """Return the two maps with which cv2.remap undoes the distortion of pictures scaled to `size`."""
+        camera = self.camera(size, np.eye(3))
+        matrix = _pinhole(camera.focal, camera.centre - HALF)
+        if self.fisheye:
+            return cv2.fisheye.initUndistortRectifyMap(
+                matrix, self.distortion[:4], np.eye(3), matrix, size, cv2.CV_32FC1
+            )
+        return cv2.initUndistortRectifyMap(matrix, self.distortion, np.eye(3), matrix, size, cv2.CV_32FC1)
+
+
+def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
+    """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
+
+    Without `up` it is the axis, either way, that the images see pointing up most. Raises ValueError where `up` names none.
+    """
+    if up is not None and up not in TURNS:
+        raise ValueError(f"up must be one of x, y, z, got {up!r}")
+    placed = [one.rotation for one in calibrations if one.rotation is not None]
+    if not placed:
+        return np.eye(3)
+    seen = -np.sum([rotation[1] for rotation in placed], axis=0)  # images' up, in the world
+    axis: Up = up or ("x", "y", "z")[int(np.abs(seen).argmax())]
+    turn = np.array(TURNS[axis], dtype=np.float64)
+    return turn if up is not None or (turn @ seen)[1] > 0.0 else np.diag([1.0, -1.0, -1.0]) @ turn
+
+
+def read_calibrations(path: str | Path) -> list[Calibration]:
+    """Return the cameras of a calibration file, in its order. Raises ValueError naming the file and what is wrong."""
+    path = Path(path)
+    if not path.is_file():
+        raise ValueError(f"{path}: expected a calibration file, got nothing of that name")
+    if path.stat().st_size > LARGEST_FILE:
+        raise ValueError(f"{path}: expected a calibration of at most 4 MB, got {path.stat().st_size} bytes")
+    try:
+        text = path.read_text(encoding="utf-8")
+        found = _reader(path, text)(path, text)
+        for one in found:
+            one.camera(one.size, np.eye(3))
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, cv2.error) as error:
+        said = f"no {error}" if isinstance(error, KeyError) else str(error).strip() or type(error).__name__
+        raise ValueError(f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {said}") from None
+    if not found:
+        raise ValueError(f"{path}: expected a calibration with a camera, got none")
+    return found
+
+
+def _reader(path: Path, text: str) -> Callable[[Path, str], list[Calibration]]:
+    start = text.lstrip()[:100]
+    if start.startswith("<") and "opencv_storage" not in start:
+        return _qualisys
+    if start.startswith("{") and "camera_from_world" in text:
+        return _own
+    if start.startswith(("{", "%YAML", "<")):
+        return _opencv
+    if path.suffix.lower() == ".toml":
+        return _toml
+    raise ValueError(
+        f"a file that is none of them, {path.suffix or 'without a suffix'}; OpenCV's YAML begins with %YAML"
+    )
+
+
+def _own(path: Path, _: str) -> list[Calibration]:
+    camera = Camera.from_json(path)
+    matrix, size = _pinhole(camera.focal, camera.centre - HALF), (camera.width, camera.height)
+    return [Calibration(path.stem, size, matrix, np.zeros(4), camera.rotation, camera.translation)]
+
+
+def _toml(_: Path, text: str) -> list[Calibration]:
+    found: list[Calibration] = []
+    for name, camera in tomllib.loads(text).items():
+        if name == "metadata" or not isinstance(camera, dict):
+            continue
+        rotation = cv2.Rodrigues(_numbers(camera["rotation"], (3,)))[0] if "rotation" in camera else None
+        translation = _numbers(camera["translation"], (3,)) if "translation" in camera else None
+        found.append(
+            Calibration(
+                str(camera.get("name", name)),
+                _size(*camera["size"]),
+                _numbers(camera["matrix"], (3, 3)),
+                np.asarray(camera.get("distortions", np.zeros(4)), dtype=np.float64).reshape(-1),
+                None if rotation is None else np.asarray(rotation, dtype=np.float64),
+                translation,
+                bool(camera.get("fisheye", False)),
+            )
+        )
+    return found
+
+
+def _qualisys(_: Path, text: str) -> list[Calibration]:
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ValueError("an XML file with a document type, which is not read")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"XML that is broken: {error}") from None
+    found: list[Calibration] = []
+    for camera in root.iter("camera"):
+        view, lens, place = (_tag(camera, name) for name in ("fov_video", "intrinsic", "transform"))
+        left, top, right, bottom = (float(view.get(side, "")) for side in ("left", "top", "right", "bottom"))
+        focal, centre = (
+            np.array([float(lens.get(f"{name}{axis}", "")) / SUBPIXELS for axis in "UV"])
+            for name in ("focalLength", "centerPoint")
+        )
+        matrix = _pinhole(focal, centre - (left, top))
+        names = ("radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2")
+        distortion = np.array([float(lens.get(name, "0")) for name in (*names, "radialDistortion3")])
+        turned = np.array([[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"])
+        rotation = np.diag([1.0, -1.0, -1.0]) @ turned  # its camera looks along -z with y up
+        position = np.array([float(place.get(axis, "")) for axis in "xyz"]) / 1000.0
+        size = _size(right - left + 1, bottom - top + 1)
+        name = camera.get("serial", f"camera {len(found)}")
+        found.append(Calibration(name, size, matrix, distortion, rotation, -rotation @ position))
+    return found
+
+
+def _tag(camera: ElementTree.Element, name: str) -> ElementTree.Element:
+    tag = camera.find(name)
+    if tag is None:
+        raise ValueError(f"a camera without {name}")
+    return tag
+
+
+def _opencv(path: Path, text: str) -> list[Calibration]:
+    storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+    try:
+        if not storage.isOpened():
+            raise ValueError("a file that OpenCV cannot read")
+        matrix = _matrix(storage, "camera_matrix", "cameraMatrix", "K", "M")
+        width, height = (_number(storage, f"image_{name.lower()}", f"image{name}") for name in ("Width", "Height"))
+        if matrix is None or width is None or height is None:
+            raise ValueError("one without camera_matrix, image_width and image_height")
+        distortion = _matrix(storage, "distortion_coefficients", "dist_coeffs", "distCoeffs", "distortion", "D")
+        rotation = _matrix(storage, "R", "rotation", "rvec")
+        translation = _matrix(storage, "T", "translation", "tvec")
+        if rotation is not None and rotation.size == 3:
+            rotation = np.asarray(cv2.Rodrigues(rotation.reshape(3))[0], dtype=np.float64)
+        if (rotation is None) != (translation is None):
+            raise ValueError("one with a rotation or a translation, but not both")
+        return [
+            Calibration(
+                path.stem,
+                _size(width, height),
+                _numbers(matrix, (3, 3)),
+                np.zeros(4) if distortion is None else distortion.reshape(-1),
+                None if rotation is None else _numbers(rotation, (3, 3)),
+                None if translation is None else _numbers(translation.reshape(-1), (3,)),
+            )
+        ]
+    finally:
+        storage.release()
+
+
+def _matrix(storage: cv2.FileStorage, *names: str) -> Array | None:
+    for name in names:
+        node = storage.getNode(name)
+        if not node.empty():
+            value = node.mat() if node.isMap() else [node.at(k).real() for k in range(node.size())]
+            return np.asarray(value, dtype=np.float64)
+    return None
+
+
+def _number(storage: cv2.FileStorage, *names: str) -> float | None:
+    for name in names:
+        node = storage.getNode(name)
+        if not node.empty():
+            return float(node.real())
+    return None
+
+
+def _pinhole(focal: Array, centre: Array) -> Array:
+    return np.array([[focal[0], 0.0, centre[0]], [0.0, focal[1], centre[1]], [0.0, 0.0, 1.0]])
+
+
+def _size(width: Any, height: Any) -> tuple[int, int]:
+    if not (float(width).is_integer() and float(height).is_integer() and width >= 1 and height >= 1):
+        raise ValueError(f"an image size of {width} x {height}")
+    return int(width), int(height)
+
+
+def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
+    numbers = np.asarray(values, dtype=np.float64)
+    if numbers.shape != shape or not np.isfinite(numbers).all():
+        raise ValueError(f"{json.dumps(numbers.tolist())} where finite numbers of shape {shape} should be")
+    return numbers
+
+
+def _orthonormal(rotation: Array) -> Array:
+    """Return the rotation nearest to a matrix that was rounded when it was written."""
+    left, _, right = np.linalg.svd(rotation)
+    nearest = left @ right
+    if np.linalg.det(nearest) < 0.0 or np.abs(nearest - rotation).max() > 1e-2:
+        raise ValueError(f"a rotation that is none: {rotation.tolist()}")
+    return np.asarray(nearest)

@@ -1,0 +1,25 @@
+"""Joint positions as a .trc file, which OpenSim and other programs of biomechanics open."""
+
+from pathlib import Path
+
+from posefit.geometry.skeleton import JOINTS
+from posefit.motion.motion import Motion
+
+
+def write_trc(path: str | Path, motion: Motion) -> None:
+    """Write the 27 joints of every frame as markers, in metres and y up."""
+    path, joints = Path(path), motion.skeleton.joints(motion.poses, motion.translations)
+    count, fps = len(motion), f"{motion.fps:g}"
+    head = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame")
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "\t".join([*head, "OrigNumFrames"]),
+        "\t".join([fps, fps, str(count), str(len(JOINTS)), "m", fps, "1", str(count)]),
+        "Frame#\tTime\t" + "\t".join(f"{joint}\t\t" for joint in JOINTS),
+        "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(JOINTS) + 1) for axis in "XYZ"),
+        "",
+    ]
+    for k, points in enumerate(joints):
+        values = "\t".join(f"{value:.6f}" for value in points.reshape(-1))
+        lines.append(f"{k + 1}\t{k / motion.fps:.6f}\t{values}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -1,0 +1,238 @@
+"""Masks that are read when their turn comes, so that memory does not grow with their number."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.fitting.tracker import Observation
+from posefit.silhouette.mask import Mask, Silhouette
+
+IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
+BITE = 2_000_000_000  # bytes; the largest .npz of masks that is read
+Range = tuple[int | None, int | None]
+
+
+class Masks(Protocol):
+    """What one camera saw of a person, frame by frame."""
+
+    def __len__(self) -> int:
+        """How many frames there are."""
+        ...
+
+    def is_usable(self, k: int) -> bool:
+        """Return whether frame k shows enough of the person to be searched."""
+        ...
+
+    def silhouette(self, k: int) -> Silhouette:
+        """Return the silhouette of frame k. Raises ValueError naming the frame where there is none."""
+        ...
+
+    def label(self, k: int) -> str:
+        """Return what to call frame k in a message."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class LazyMasks:
+    """The masks of a folder of images, or of an .npz file."""
+
+    files: Sequence[Path]
+    stack: NDArray[Any] | None = field(default=None, repr=False)
+    known: NDArray[Any] | None = field(default=None, repr=False)  # of the same shape; 0 where nothing is known
+    usable: NDArray[np.bool_] | None = field(default=None, repr=False)  # (T,)
+
+    @classmethod
+    def of(cls, path: Path, frames: Range) -> "LazyMasks":
+        """Return the masks of a folder or an .npz file, cut to `frames`."""
+        if path.is_dir():
+            files = sorted(file for file in path.iterdir() if file.suffix.lower() in IMAGES)
+            if not files:
+                raise ValueError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
+            return cls(files[slice(*span(frames, len(files)))])
+        existing(path)
+        if path.stat().st_size > BITE:
+            raise ValueError(f"{path}: expected at most {BITE // 10**9} GB, got {path.stat().st_size / 1e9:.1f} GB")
+        try:
+            with np.load(path, allow_pickle=False) as stored:
+                stack = stored["masks"]
+                known, usable = stored.get("valid"), stored.get("usable")
+        except (KeyError, ValueError, OSError, EOFError) as error:
+            raise ValueError(f"{path}: expected an .npz file with the key masks, got {error}") from None
+        if stack.ndim != 3 or not len(stack) or stack.dtype.kind not in "buif":
+            raise ValueError(f"{path}: masks must have shape (frames, height, width), got {stack.shape} {stack.dtype}")
+        if stack.dtype.kind == "f" and not np.isfinite(stack).all():
+            raise ValueError(f"{path}: masks must be finite, got nan or infinity")
+        if known is not None and (known.shape != stack.shape or known.dtype.kind not in "bui"):
+            raise ValueError(f"{path}: valid must have the masks' shape {stack.shape}, got {known.shape} {known.dtype}")
+        start, stop = span(frames, len(stack))
+        if usable is not None and (usable.shape != stack.shape[:1] or usable.dtype != np.bool_):
+            raise ValueError(f"{path}: usable must be {len(stack)} booleans, got {usable.shape} {usable.dtype}")
+        names, part = [Path(f"{path}[{k}]") for k in range(start, stop)], slice(start, stop)
+        known, usable = (None if value is None else value[part] for value in (known, usable))
+        if usable is not None and not usable.any():
+            raise ValueError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
+        return cls(names, stack[part], known, usable)
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def is_usable(self, k: int) -> bool:
+        """Return whether mask k shows enough of the person to be searched; masks that do not say so do."""
+        return self.usable is None or bool(self.usable[k])
+
+    def label(self, k: int) -> str:
+        """Return the file of mask k, or its place in the .npz file."""
+        return str(self.files[k])
+
+    def silhouette(self, k: int) -> Silhouette:
+        """Return mask k. Raises ValueError naming the file where it is no mask, or empty, or full."""
+        mask = self.stack[k] if self.stack is not None else self._image(self.files[k])
+        person = np.greater(mask, 127 if mask.max() > 1 else 0)
+        if self.is_usable(k) and (not person.any() or person.all()):
+            came = "an empty one" if not person.any() else "one without background"
+            raise ValueError(f"{self.files[k]}: expected a mask with a person before a background, got {came}")
+        return Silhouette.of(person, None if self.known is None else self.known[k])
+
+    @staticmethod
+    def _image(path: Path) -> NDArray[Any]:
+        import cv2
+
+        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise ValueError(f"{path}: expected an image, got a file that is none")
+        return image
+
+
+class PackedMasks:
+    """Masks and what is known of them in two files of bits, eight pixels a byte, which stay on the disk."""
+
+    def __init__(self, folder: Path, size: tuple[int, int], usable: NDArray[np.bool_], name: str, start: int) -> None:
+        self._size, self._usable, self._name, self._start = size, usable, name, start
+        self._stride = (size[0] * size[1] + 7) // 8
+        self._files = [folder / f"{kind}.bits" for kind in KINDS]
+
+    def __len__(self) -> int:
+        return len(self._usable)
+
+    def is_usable(self, k: int) -> bool:
+        """Return whether frame k shows enough of the person to be searched."""
+        return bool(self._usable[k])
+
+    def label(self, k: int) -> str:
+        """Return the video and its frame."""
+        return f"{self._name}, frame {self._start + k}"
+
+    def silhouette(self, k: int) -> Silhouette:
+        """Return the silhouette of frame k."""
+        width, height = self._size
+        planes = []
+        for file in self._files:
+            packed = np.fromfile(file, np.uint8, self._stride, offset=k * self._stride)
+            planes.append(np.unpackbits(packed, count=width * height).reshape(height, width))
+        return Silhouette.of(*planes)
+
+
+KINDS = ("masks", "valid")
+
+
+def packed(mask: Mask) -> bytes:
+    """Return a mask as `PackedMasks` reads it."""
+    return np.packbits(mask).tobytes()
+
+
+@dataclass(frozen=True, eq=False)
+class Straight:
+    """Masks whose lens distortion is undone; what the lens did not see is unknown."""
+
+    masks: Masks
+    maps: tuple[Any, Any] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.masks)
+
+    def is_usable(self, k: int) -> bool:
+        """Return whether frame k shows enough of the person to be searched."""
+        return self.masks.is_usable(k)
+
+    def label(self, k: int) -> str:
+        """Return what to call frame k."""
+        return self.masks.label(k)
+
+    def silhouette(self, k: int) -> Silhouette:
+        """Return the silhouette of frame k as a pinhole camera would have seen it."""
+        import cv2
+
+        bent = self.masks.silhouette(k)
+        mask, valid = (
+            cv2.remap(plane.astype(np.uint8), *self.maps, cv2.INTER_NEAREST) for plane in (bent.mask, bent.valid)
+        )
+        return Silhouette.of(mask, valid)
+
+
+@dataclass(frozen=True, eq=False)
+class Views(Sequence[Observation]):
+    """What several cameras saw at the same times. A camera that saw too little in a frame counts for nothing there."""
+
+    masks: Sequence[Masks]
+
+    def __len__(self) -> int:
+        return min(map(len, self.masks))
+
+    def __getitem__(self, k):  # type: ignore[no-untyped-def]
+        if not 0 <= k < len(self):
+            raise IndexError(k)
+        return Observation([self._silhouette(v, k) for v in range(len(self.masks))], usable=self.is_usable(k))
+
+    def __iter__(self) -> Iterator[Observation]:
+        return (self[k] for k in range(len(self)))
+
+    def is_usable(self, k: int) -> bool:
+        """Return whether a camera saw enough in frame k."""
+        return any(masks.is_usable(k) for masks in self.masks)
+
+    @cached_property
+    def first(self) -> int:
+        """The first frame that all cameras, or else some, find usable. Raises ValueError where there is none."""
+        for enough in (all, any):
+            for k in range(len(self)):
+                if enough(masks.is_usable(k) for masks in self.masks):
+                    return k
+        raise ValueError(f"{self.masks[0].label(0)}: expected a frame that is usable, got none from there on")
+
+    @cached_property
+    def sizes(self) -> list[tuple[int, int]]:
+        """Width and height of each camera's masks."""
+        return [masks.silhouette(self.first).size for masks in self.masks]
+
+    def _silhouette(self, view: int, k: int) -> Silhouette:
+        masks = self.masks[view]
+        silhouette = masks.silhouette(k)
+        if silhouette.size != self.sizes[view]:
+            expected, came = ((s[1], s[0]) for s in (self.sizes[view], silhouette.size))
+            raise ValueError(f"{masks.label(k)}: mask must have shape {expected}, got {came}")
+        if len(self.masks) > 1 and not masks.is_usable(k):
+            return Silhouette.of(silhouette.mask, np.zeros_like(silhouette.mask))
+        return silhouette
+
+
+def span(frames: Range, count: int) -> tuple[int, int]:
+    """Return start and stop of some of `count` frames. Raises ValueError where that is none."""
+    start, stop, _ = slice(*frames).indices(count)
+    if start >= stop:
+        low, high = ("" if value is None else value for value in frames)
+        raise ValueError(f"frames must choose some of the {count} frames, got {low}:{high}")
+    return start, stop
+
+
+def existing(path: Path) -> Path:
+    """Return a path. Raises ValueError where there is nothing, or an empty file."""
+    if not path.exists():
+        raise ValueError(f"{path}: expected a file, got nothing of that name")
+    if path.is_file() and not path.stat().st_size:
+        raise ValueError(f"{path}: expected a file with content, got an empty one")
+    return path
