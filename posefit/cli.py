@@ -262,8 +262,8 @@ def check(context: click.Context, kind: Any, name: str, settings: tuple[str, ...
 def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Return the keywords of `posefit.track` that options stand for.
 
-    `--set` gives the settings of optimiser, prior and tracker, as their types ask; `tracker.` also sets the tracker that
-    an optimiser and a prior are driven by.
+    `--set` gives the settings of optimiser, prior and tracker, as their types ask; `tracker.` also sets the tracker
+    that an optimiser and a prior are driven by.
     """
     from posefit.study.method import parse_settings
     from posefit.study.run import prior_of

@@ -8,20 +8,51 @@ from numpy.typing import NDArray
 
 from posefit.fitting.check import at_least
 from posefit.geometry.arrays import writeable
+from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
 from posefit_priors.arrays import load_arrays
-from posefit_priors.pca import CLUSTERS, PCA, QUANTILE
+from posefit_priors.pca import CLUSTERS, PCA, QUANTILE, distance
 
 COMPONENTS = 12
 ARMS_DEGREES = 45.0
 LEGS_DEGREES = 15.0
 ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
+ROUNDING = 1e-9  # radians by which a joint may pass its limit
 _SHAPES = {"loose": ("k",), "angles_low": ("k",), "angles_high": ("k",), "low": ("d",), "high": ("d",)}
 
 
+@jit
+def recover_loose(latents, components, mean, loose, angles):
+    """Write the joint angles (n, 63) of latents (n, m + k): m components, k loose angles."""
+    m = components.shape[0]
+    for i in range(latents.shape[0]):
+        for j in range(mean.size):
+            angles[i, j] = mean[j]
+        for k in range(m):
+            for j in range(mean.size):
+                angles[i, j] += latents[i, k] * components[k, j]
+        for k in range(loose.size):
+            angles[i, loose[k]] += latents[i, m + k]
+
+
+@jit
+def _bearable(latents, components, mean, loose, low, high, centres, reach):
+    """Return which latents (n, m + k) are near a cluster and bend no loose joint too far."""
+    m = components.shape[0]
+    allowed = np.empty(latents.shape[0], np.bool_)
+    for i in range(latents.shape[0]):
+        allowed[i] = distance(centres, latents[i, :m]) < reach[()]
+        for k in range(loose.size):
+            angle = mean[loose[k]] + latents[i, m + k]
+            for c in range(m):
+                angle += latents[i, c] * components[c, loose[k]]
+            allowed[i] &= (angle >= low[k]) & (angle <= high[k])
+    return allowed
+
+
 class Loose:
-    """The space of `pca`, and one latent more for each angle of shoulders, elbows, hips and knees that moves in training.
+    """The space of `pca`, and a latent more for each angle of shoulders, elbows, hips and knees that moves in training.
 
     Such a latent, in radians, is added to the angle that the components give: up to `arms_degrees` or `legs_degrees` to
     either side, within the skeleton's joint limits where it states some. The other settings are those of `pca`.
@@ -76,16 +107,25 @@ class Loose:
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, d)."""
-        m = len(self._pca.low)
-        angles = self._pca.inverse_transform(writeable(latents[:, :m]))
-        angles[:, self.loose] += latents[:, m:]
+        angles = np.empty((len(latents), len(self._pca.mean)))
+        recover_loose(writeable(latents), self._pca.components, self._pca.mean, self.loose, angles)
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, d) the components allow and the joint limits too (n,)."""
-        angles = self.inverse_transform(latents)[:, self.loose]
-        bent = ((angles >= self.angles_low - 1e-9) & (angles <= self.angles_high + 1e-9)).all(axis=1)
-        return np.asarray(bent & self._pca.feasible(writeable(latents[:, : len(self._pca.low)])))
+        pca = self._pca
+        return np.asarray(
+            _bearable(
+                writeable(latents),
+                pca.components,
+                pca.mean,
+                self.loose,
+                self.angles_low - ROUNDING,
+                self.angles_high + ROUNDING,
+                pca.centres,
+                pca.reach,
+            )
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the learned space to an .npz file."""

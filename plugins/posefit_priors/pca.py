@@ -137,7 +137,7 @@ def recover(latents, components, mean, angles):
 
 
 @jit
-def _distance(centres, latent):
+def distance(centres, latent):
     """Return D: the mean absolute difference of a latent pose (m,) from the nearest centre."""
     nearest = np.inf
     for c in range(centres.shape[0]):
@@ -152,13 +152,13 @@ def _distance(centres, latent):
 def near(centres, latents, reach):
     within = np.empty(latents.shape[0], np.bool_)
     for i in range(latents.shape[0]):
-        within[i] = _distance(centres, latents[i]) < reach[()]  # SAPSO 2.2 constraint 2
+        within[i] = distance(centres, latents[i]) < reach[()]  # SAPSO 2.2 constraint 2
     return within
 
 
 def reach_of(centres: Array, latents: Array, quantile: float) -> Array:
     """Return chi (): this quantile of the distances D of training latents (n, m) from their nearest centres (K, m)."""
-    return np.array(np.quantile([_distance(centres, latent) for latent in latents], quantile))  # Reading S5
+    return np.array(np.quantile([distance(centres, latent) for latent in latents], quantile))  # Reading S5
 
 
 def clustered(latents: Array, clusters: int, seed: int) -> tuple[Array, NDArray[np.int64]]:

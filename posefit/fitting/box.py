@@ -83,31 +83,41 @@ def draw(space: Space, rng: np.random.Generator, count: int) -> Array:
     """Return a first population (count, d) of feasible proposals, from the start or uniform. SAPSO (6).
 
     Each is redrawn at most 100 times (Reading S7); one still out of the box is then folded back into it. What is
-    infeasible even so becomes the start's mean, or the copy of one that is feasible. Raises ValueError where none is.
+    infeasible even so becomes the start's mean, or the copy of one that is feasible. Where nothing around the start is
+    feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is.
     """
+    drawn = _drawn(space, space.start, rng, count)
+    if drawn is None and space.start is not None:
+        drawn = _drawn(space, None, rng, count)
+    if drawn is None:
+        raise ValueError(f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws")
+    return drawn
+
+
+def _drawn(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array | None:
     drawn = np.empty((count, space.dimensions))
     wanted = np.arange(count)
     for _ in range(REDRAWS):
-        drawn[wanted] = _sample(space, rng, len(wanted))
+        drawn[wanted] = _sample(space, start, rng, len(wanted))
         wanted = wanted[~space.feasible(drawn[wanted])]
         if not len(wanted):
             return drawn
     drawn[wanted] = fold(space, drawn[wanted])
     wanted = wanted[~space.feasible(drawn[wanted])]
-    if space.start is not None and space.feasible(space.start.mean[None])[0]:
-        drawn[wanted] = space.start.mean
+    if start is not None and space.feasible(start.mean[None])[0]:
+        drawn[wanted] = start.mean
         return drawn
     found = np.setdiff1d(np.arange(count), wanted)
     if not len(found):
-        raise ValueError(f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws")
+        return None
     drawn[wanted] = drawn[rng.choice(found, len(wanted))]
     return drawn
 
 
-def _sample(space: Space, rng: np.random.Generator, count: int) -> Array:
-    if space.start is None:
+def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array:
+    if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
-    return space.wrap(rng.normal(space.start.mean, space.start.spread, (count, space.dimensions)))  # SAPSO (6)
+    return space.wrap(rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
 
 
 def scatter(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:

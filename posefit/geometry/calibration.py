@@ -1,7 +1,7 @@
 """Calibration files of other programs, read into cameras: OpenCV's YAML and JSON, Qualisys' XML, and TOML.
 
-A file holds one camera or several. All give camera_from_world in OpenCV's frame; which way is up in their world differs,
-and is turned to +y here: the axis that the images of all cameras together see pointing up, unless `up` names one.
+A file holds one camera or several. All give camera_from_world in OpenCV's frame; which way is up in their world
+differs, and is turned to +y here: the axis that the images of all cameras see pointing up, unless `up` names one.
 """
 
 import json
@@ -69,7 +69,8 @@ class Calibration:
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
 
-    Without `up` it is the axis, either way, that the images see pointing up most. Raises ValueError where `up` names none.
+    Without `up` it is the axis, either way, that the images see pointing up most. Raises ValueError where `up` is
+    none.
     """
     if up is not None and up not in TURNS:
         raise ValueError(f"up must be one of x, y, z, got {up!r}")

@@ -19,6 +19,7 @@ SPREADS = 4.0  # a pixel is foreground this many standard deviations from the ba
 LEAST = 18.0  # and at least so many grey levels
 SHADE = (0.45, 0.95)  # a shadow keeps this share of the background's brightness
 TINT = 14.0  # and its colour, to within so many grey levels after scaling
+NOISE = 3  # pixels to a side, of which the majority decides
 SPECK = 0.004  # of the image's height: what an opening takes away
 GAP = 0.012  # of the image's height: what a closing joins
 NEAR = 0.06  # of the largest piece's height: pieces as near as that belong to the person
@@ -115,7 +116,7 @@ class Person:
 def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> Person:
     """Return the largest person (height, width) of a foreground, within `roi` x, y, width, height.
 
-    Gaps close, specks go, pieces near the largest one join it and small holes are filled. What looks like a shadow but
+    Noise and specks go, gaps close, pieces near the largest one join it and small holes are filled. What looks like a shadow but
     lies between parts of the person is dark clothing and belongs to it; any other shadow is unknown.
     """
     height = foreground.shape[0]
@@ -127,12 +128,12 @@ def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None
     if ignore is not None:
         inside &= ~ignore
     known = ~shadow if ignore is None else ~shadow & ~ignore
-    seen = foreground & inside
+    seen = np.asarray(cv2.medianBlur(foreground.astype(np.uint8), NOISE) > 0) & inside
     mask, pieces, _ = _largest(_cleaned(seen, height) & inside)
     if not pieces:
         return Person(mask, known, 0, 0, 0.0, False)
     size = int(np.ptp(np.flatnonzero(mask.any(axis=1)))) + 1
-    dark = _morphed(seen, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
+    dark = _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
     mask, pieces, rival = _largest(_cleaned(seen | dark, height) & inside)
     mask = _without_holes(mask)
     touches = bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from posefit.silhouette.foreground import Image, Person
@@ -31,7 +30,7 @@ def extract(
     """Return what was found in a video, and write its masks, a preview and a report to a new folder.
 
     masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,) and `fps`. The folder appears whole or not at
-    all. Raises ValueError for every mistake in the arguments or files, where nobody is seen, and where the disk is full.
+    all. Raises ValueError for every mistake in the arguments or files, where nobody is seen, and on a full disk.
     """
     target = Path(out)
     if target.exists():
@@ -63,7 +62,10 @@ def store(
     progress: Progress | None = None,
     look: Callable[[Image, Person, bool], None] | None = None,
 ) -> PackedMasks:
-    """Return the masks of a video, written to a folder while it goes by; `look` gets each frame and whether it is usable."""
+    """Return the masks of a video, written to a folder while it goes by.
+
+    `look` gets each frame, the person in it, and whether it is usable.
+    """
     files = [(folder / f"{kind}.bits").open("wb") for kind in KINDS]
     try:
         frames = iter(found)

@@ -29,7 +29,7 @@ def usable(observations: Sequence[Observation], count: int, stride: int = 1) -> 
 
 
 def begun(task: Task, observations: Sequence[Observation], follow: Follow, restarts: int, seed: int) -> Task:
-    """Return the task with yaw, place and joint angles of the best of several starts.
+    """Return the task with the best of several starts as the frame before the first.
 
     Each start searches the first usable frame anew, all around where no yaw is known, and follows the person through a
     few more frames. The least mean cost wins; a start that would have somebody walk backwards pays for it.
@@ -43,7 +43,9 @@ def begun(task: Task, observations: Sequence[Observation], follow: Follow, resta
             best, least = frames[0], cost
     if best is None:
         return task
-    return replace(task, yaw=float(best.pose[0]), anchor=best.translation, first_pose=best.pose[3:])
+    return replace(
+        task, yaw=float(best.pose[0]), anchor=best.translation, first_pose=best.pose[3:], before=(best,)
+    )
 
 
 def _backwards(frames: Sequence[Frame]) -> bool:

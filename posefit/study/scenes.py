@@ -1,7 +1,7 @@
 """Turns what a user names, a motion or what one camera or several saw, into a scene."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -36,13 +36,14 @@ class Viewing:
     size: tuple[int, int] = (320, 240)
     fps: float = 30.0
     frames: Range = (None, None)
-    extraction: Extraction = Extraction()
+    extraction: Extraction = field(default_factory=Extraction)
     height: float | None = None
     up: Up | None = None
 
     def __post_init__(self) -> None:
-        if not all(np.isfinite(one) for one in self.view_degrees):
-            raise ValueError(f"view_degrees must be a finite number, got {list(self.view_degrees)}")
+        for degrees in self.view_degrees:
+            if not np.isfinite(degrees):
+                raise ValueError(f"view_degrees must be a finite number, got {degrees}")
         if not (np.isfinite(self.fps) and self.fps > 0.0):
             raise ValueError(f"fps must be a positive number, got {self.fps}")
         if min(self.size) < 1 or max(self.size) > 16_384:

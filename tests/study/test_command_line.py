@@ -194,7 +194,7 @@ def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> 
 
 
 def test_memory_of_masks_in_a_folder_is_that_of_one(tmp_path: Path) -> None:
-    from posefit.study.source import LazyMasks
+    from posefit.study.masks import LazyMasks
 
     source = LazyMasks.of(masks(tmp_path / "masks"), (None, None))
     assert source.stack is None
@@ -289,7 +289,7 @@ def test_bad_masks_are_refused(tmp_path: Path) -> None:
         assert message in fails("track", tmp_path / f"{name}.npz")
     (tmp_path / "wide.json").write_text(posefit.Camera.around(np.zeros(3), 0.0, 4.0, (99, 90)).to_json())
     (folder / "0002.png").unlink()
-    assert "mask must have shape (90, 99), the camera's, got (90, 120)" in fails(
+    assert "camera 'wide' must be calibrated for 120x90, got 99x90" in fails(
         "track", folder, "--camera", tmp_path / "wide.json"
     )
     assert "translation must be searched or aligned" in fails("track", folder, "--translation", "known")

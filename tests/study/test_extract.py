@@ -16,7 +16,8 @@ from posefit.motion import library
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
 from posefit.study.extract import extract
-from posefit.study.source import LazyMasks
+from posefit.study.masks import LazyMasks
+from posefit.study.segment import Extraction
 from tests.files import arrays
 
 SIZE = (160, 120)
@@ -57,7 +58,7 @@ def test_each_method_finds_the_person(
     filmed: tuple[Path, list[Any]], tmp_path: Path, method: Any, background: Any
 ) -> None:
     path, masks = filmed
-    result = extract(path, tmp_path / "out", method=method, background=background, frames=(EMPTY, None))
+    result = extract(path, tmp_path / "out", Extraction(method, background), frames=(EMPTY, None))
     assert result["frames"] == FRAMES
     assert result["usable"] > 0.8 * FRAMES
     stored = arrays(tmp_path / "out" / "masks.npz")
@@ -79,7 +80,7 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
     hidden = np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)
     hidden[:, 70:80] = 255
     cv2.imwrite(str(tmp_path / "tree.png"), hidden)
-    extract(path, tmp_path / "out", ignore=tmp_path / "tree.png", frames=(EMPTY + 5, EMPTY + 40))
+    extract(path, tmp_path / "out", Extraction(ignore=tmp_path / "tree.png"), frames=(EMPTY + 5, EMPTY + 40))
     masks = LazyMasks.of(tmp_path / "out" / "masks.npz", (None, None))
     silhouette = masks.silhouette(15)
     assert not silhouette.valid[:, 70:80].any()
@@ -90,7 +91,7 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
 
 def test_frames_without_a_whole_person_are_not_usable(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
     path, _ = filmed
-    extract(path, tmp_path / "out", method="mean", background=f"0:{EMPTY}", frames=(0, EMPTY + 20))
+    extract(path, tmp_path / "out", Extraction("mean", f"0:{EMPTY}"), frames=(0, EMPTY + 20))
     usable = arrays(tmp_path / "out" / "masks.npz")["usable"]
     assert not usable[: EMPTY - 1].any()
     assert usable[EMPTY + 8 :].mean() > 0.8
@@ -98,7 +99,7 @@ def test_frames_without_a_whole_person_are_not_usable(filmed: tuple[Path, list[A
 
 def test_the_person_is_looked_for_where_roi_says(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
     path, masks = filmed
-    extract(path, tmp_path / "out", roi=(0, 0, 80, 120), frames=(EMPTY, None))
+    extract(path, tmp_path / "out", Extraction(roi=(0, 0, 80, 120)), frames=(EMPTY, None))
     found = arrays(tmp_path / "out" / "masks.npz")["masks"]
     assert found[:, :, 81:].sum() == 0
     assert found[:, :, :80].any()
@@ -229,7 +230,7 @@ def test_a_real_walk_is_seen_from_its_first_step_to_its_last(tmp_path: Path) -> 
     video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
     if not video.is_file():
         pytest.skip(f"no video at {video}")
-    result = extract(video, tmp_path / "out", roi=(0, 420, 1400, 570), frames=(65, 165))
+    result = extract(video, tmp_path / "out", Extraction(roi=(0, 420, 1520, 532)), frames=(65, 165))
     assert result["usable"] > 80
     stored = arrays(tmp_path / "out" / "masks.npz")
     middles = [

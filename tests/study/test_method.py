@@ -43,7 +43,7 @@ def test_a_budget_is_particles_times_iterations_and_one_where_nothing_else_is_sa
         ({"fps": 0.0}, "fps must be a positive number, got 0.0"),
         ({"fps": float("inf")}, "fps must be a positive number, got inf"),
         ({"optimiser": "sapzo"}, "did you mean 'sapso'"),
-        ({"prior": "pcb"}, "prior must be one of full, pca, sklearn, union, got 'pcb'; did you mean 'pca'"),
+        ({"prior": "pcb"}, "prior must be one of full, loose, pca, sklearn, union, got 'pcb'; did you mean 'pca'"),
         ({"tracker": "vsmn"}, "tracker must be one of none, got 'vsmn'"),
         ({"first_pose": "mine"}, "first_pose must be one of searched, given, got 'mine'"),
         ({"optimiser_settings": {"coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),
