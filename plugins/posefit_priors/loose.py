@@ -6,7 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.fitting.check import at_least
+from posefit.fitting.check import at_least, positive
 from posefit.geometry.arrays import writeable
 from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
@@ -17,6 +17,7 @@ from posefit_priors.pca import CLUSTERS, PCA, QUANTILE, distance
 COMPONENTS = 12
 ARMS_DEGREES = 45.0
 LEGS_DEGREES = 15.0
+SLACK = 1.5  # how many times as far as chi a pose may be from the nearest cluster
 ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
 ROUNDING = 1e-9  # radians by which a joint may pass its limit
 _SHAPES = {"loose": ("k",), "angles_low": ("k",), "angles_high": ("k",), "low": ("d",), "high": ("d",)}
@@ -55,7 +56,8 @@ class Loose:
     """The space of `pca`, and a latent more for each angle of shoulders, elbows, hips and knees that moves in training.
 
     Such a latent, in radians, is added to the angle that the components give: up to `arms_degrees` or `legs_degrees` to
-    either side, within the skeleton's joint limits where it states some. The other settings are those of `pca`.
+    either side, within the skeleton's joint limits where it states some. A pose may be `slack` times as far from the
+    clusters as in `pca`, whose settings the others are.
     """
 
     low: Array  # (d,)
@@ -67,18 +69,22 @@ class Loose:
         components: float = COMPONENTS,
         arms_degrees: float = ARMS_DEGREES,
         legs_degrees: float = LEGS_DEGREES,
+        slack: float = SLACK,
         clusters: int = CLUSTERS,
         quantile: float = QUANTILE,
         seed: int = 0,
     ) -> None:
+        positive("slack", slack)
         at_least("arms_degrees", arms_degrees, 0.0)
         at_least("legs_degrees", legs_degrees, 0.0)
         self._reach = np.radians([arms_degrees, legs_degrees])
+        self._slack = slack
         self._pca = PCA(components=components, clusters=clusters, quantile=quantile, seed=seed)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
         self._pca.fit(angles, skeleton)
+        self._pca.reach = np.array(self._slack * self._pca.reach)
         angles = np.asarray(angles, dtype=np.float64)
         least, most = angles.min(axis=0), angles.max(axis=0)
         chosen, reach = [], []
@@ -94,9 +100,12 @@ class Loose:
             self.angles_low, self.angles_high = skeleton.limits[self.loose].T.copy()
         self.angles_low = np.minimum(self.angles_low, least[self.loose])
         self.angles_high = np.maximum(self.angles_high, most[self.loose])
+        # as far as a training pose may still go, so that little of the box is past a joint limit
+        down = np.minimum(reach, least[self.loose] - self.angles_low)
+        up = np.minimum(reach, self.angles_high - most[self.loose])
         left = self.transform(angles)[:, len(self._pca.low) :]
-        self.low = np.concatenate([self._pca.low, np.minimum(-np.array(reach), left.min(axis=0, initial=0.0))])
-        self.high = np.concatenate([self._pca.high, np.maximum(np.array(reach), left.max(axis=0, initial=0.0))])
+        self.low = np.concatenate([self._pca.low, np.minimum(-down, left.min(axis=0, initial=0.0))])
+        self.high = np.concatenate([self._pca.high, np.maximum(up, left.max(axis=0, initial=0.0))])
         return self
 
     def transform(self, angles: Array) -> Array:
