@@ -63,7 +63,7 @@ class Fit(gym.Env[Image, Any]):
     - `translation="known"`: or "searched" or "aligned".
     - `size=(64, 48)`: width and height in pixels.
     - `noise=None`: what is wrong with the silhouette, such as `{"holes": 0.3, "shadow": 0.5}`; see
-      `posefit_envs.corruption`.
+      `posefit.silhouette.corruption`.
     - `mismatch_percent=0.0`: how far bones and radii of the fitted body are off at most.
     - `target_cost=2.0`, `max_evaluations=200`.
 

@@ -8,15 +8,15 @@ from typing import Any, TypedDict
 import numpy as np
 from gymnasium import error
 
-from posefit import Body, Camera, Motion, Observation, SearchSpace, Silhouette, Skeleton, Task
+from posefit import Body, Camera, Motion, Observation, SearchSpace, Silhouette, Task
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
+from posefit.geometry.body import varied
 from posefit.geometry.rotation import Array
-from posefit.geometry.skeleton import JOINTS, MIRROR
 from posefit.registry import registry
+from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
 from posefit.study.source import motion_of
-from posefit_envs.corruption import CORRUPTIONS, corrupted
 from posefit_envs.search import Scenery
 
 RESERVED = {"train": (0, 10_000), "test": (10_000, 20_000)}  # instance numbers; those of the test split are held out
@@ -201,7 +201,7 @@ def instance(setting: World, number: int, frames: int, evaluations: int) -> Inst
         masks = [corrupted(project(body, camera, pose, where), noise, rng) for camera in cameras]
         seen.append(Observation([Silhouette.of(mask) for mask in masks], where.copy()))
     yaw = facing + float(np.radians(rng.uniform(-YAW_DEGREES, YAW_DEGREES)))
-    fitted = _mismatched(body, setting.mismatch_percent, rng)
+    fitted = varied(body, setting.mismatch_percent, rng)
     task = Task(fitted, cameras, evaluations, yaw, truth.translations[0].copy(), setting.translation, FPS)
     return Instance(number, task, truth, seen)
 
@@ -217,23 +217,6 @@ def _truth(name: str, frames: int, rng: np.random.Generator) -> Motion:
         raise error.Error(f"frames must be at most {len(motion)}, the length of {name}, got {frames}")
     start = int(rng.integers(len(motion) - frames + 1))
     return motion.frames(start, start + frames)
-
-
-def _mismatched(body: Body, percent: float, rng: np.random.Generator) -> Body:
-    """Return a body whose bones and radii are off by at most so many percent, left and right alike."""
-    if percent == 0.0:
-        return body
-    shares = [_alike(1.0 + rng.uniform(-percent, percent, len(JOINTS)) / 100.0)[1:] for _ in range(2)]
-    bones, radii = shares
-    skeleton: Skeleton = body.skeleton
-    scaled = Skeleton(
-        skeleton.name, skeleton.offsets * bones[:, None], skeleton.axes, skeleton.channels, skeleton.limits
-    )
-    return Body(scaled, body.radii * radii[:, None])
-
-
-def _alike(shares: Array) -> Array:
-    return np.asarray(0.5 * (shares + shares[np.array(MIRROR)]))
 
 
 def measured(truth: Motion, frame: int, poses: Array) -> Array:

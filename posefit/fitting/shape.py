@@ -38,9 +38,9 @@ NAMES = ("scale", *(f"{name} length" for name in LENGTHS), *(f"{name} girth" for
 
 # How far people differ: the standard deviation of the logarithm of each factor. Ours; lengths are read off the nine
 # skeletons of the built-in motions' subjects, girths are wider, as clothes count.
-SPREAD = np.array([0.10] + [0.06] * len(LENGTHS) + [0.20] * len(GIRTHS))
+SPREAD = np.array([0.10] + [0.06] * len(LENGTHS) + [0.30] * len(GIRTHS))
 REACH = 3.0  # spreads to either side that are searched
-PULL = 0.05  # cost of a factor that is one spread away from 1
+PULL = 0.15  # cost of a factor that is one spread away from 1
 ROUNDS = 4  # poses with the body, then the body with the poses
 GENERATIONS = 60  # of CMA-ES, a round
 

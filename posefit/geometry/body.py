@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from posefit.geometry.rotation import Array
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS, Skeleton
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton
 
 # Radii as shares of the bone's length: (where the bone starts, where it ends). Ours: read off an adult's build.
 PROPORTIONS = {
@@ -72,3 +72,13 @@ class Body:
         lengths, girths = np.broadcast_to(lengths, len(BONES)), np.broadcast_to(girths, len(BONES))
         skeleton = replace(self.skeleton, offsets=self.skeleton.offsets * lengths[:, None])
         return Body(skeleton, self.radii * girths[:, None])
+
+
+def varied(body: Body, percent: float, rng: np.random.Generator) -> Body:
+    """Return a body whose bones and radii are off by at most so many percent each, left and right alike."""
+    if percent == 0.0:
+        return body
+    mirror = np.array(MIRROR)
+    shares = [1.0 + rng.uniform(-percent, percent, len(JOINTS)) / 100.0 for _ in range(2)]
+    lengths, girths = (0.5 * (share + share[mirror])[1:] for share in shares)
+    return body.scaled(lengths, girths)

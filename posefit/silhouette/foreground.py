@@ -116,8 +116,8 @@ class Person:
 def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> Person:
     """Return the largest person (height, width) of a foreground, within `roi` x, y, width, height.
 
-    Noise and specks go, gaps close, pieces near the largest one join it and small holes are filled. What looks like a shadow but
-    lies between parts of the person is dark clothing and belongs to it; any other shadow is unknown.
+    Noise and specks go, gaps close, pieces near the largest one join it and small holes are filled. What looks like a
+    shadow but lies between parts of the person is dark clothing and belongs to it; any other shadow is unknown.
     """
     height = foreground.shape[0]
     inside = np.ones(foreground.shape, dtype=bool)
@@ -145,7 +145,7 @@ def _cleaned(mask: Mask, height: int) -> Mask:
 
 
 def _largest(mask: Mask) -> tuple[Mask, int, float]:
-    """Return the largest piece with the pieces near it, how many pieces count, and the share of the largest other."""
+    """Return the largest piece with those near it, how many pieces count, and the share of the largest other."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     if count < 2:
         return np.zeros_like(mask), 0, 0.0

@@ -43,9 +43,7 @@ def begun(task: Task, observations: Sequence[Observation], follow: Follow, resta
             best, least = frames[0], cost
     if best is None:
         return task
-    return replace(
-        task, yaw=float(best.pose[0]), anchor=best.translation, first_pose=best.pose[3:], before=(best,)
-    )
+    return replace(task, yaw=float(best.pose[0]), anchor=best.translation, first_pose=best.pose[3:], before=(best,))
 
 
 def _backwards(frames: Sequence[Frame]) -> bool:

@@ -98,18 +98,18 @@ def track(
     `source` is a built-in motion's name, a `Motion`, an .amc or .bvh file, a folder of mask images, an .npz of masks, a
     video, or several masks or videos that cameras took at the same time. `train` names the motions a prior learns
     from; by default the other styles of a built-in motion, else the built-in walks. The method is `optimiser` with
-    `prior`, or `tracker`. The budget of a frame is `evaluations`, by default particles x (iterations + 1) = 40 x 61, the
-    same for every method. `translation` is "known" where the truth is, else "aligned". A `first_pose` that is "given"
-    starts the first frame around the true one. `ask_seconds` is how long a plugin may take to propose a population.
+    `prior`, or `tracker`. The budget of a frame is `evaluations`, by default particles x (iterations + 1) = 40 x 61,
+    the same for every method. `translation` is "known" where the truth is, else "aligned". A `first_pose` that is
+    "given" starts the first frame around the true one. `ask_seconds` is how long a plugin may take to propose a population.
 
     Where the truth is known the prior is `pca`. Where it is not it is `loose`, the first frame is searched `restarts`
     times (8), and the person's build is fitted to `body_frames` (30; none where an .asf is given), as tall as `height`
     says. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
     calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video.
 
-    With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at all.
-    What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a recording
-    for the Rerun viewer goes. Raises ValueError for every mistake in the arguments or files.
+    With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at
+    all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
+    recording for the Rerun viewer goes. Raises ValueError for every mistake in the arguments or files.
     """
     arguments = {name: repr(value) for name, value in sorted(locals().items()) if name not in _MAY_DIFFER}
     say = say or _nothing

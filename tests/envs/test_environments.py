@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import posefit_envs  # noqa: F401, registers them
-from posefit_envs.corruption import CORRUPTIONS
+from posefit.silhouette.corruption import CORRUPTIONS
 from posefit_envs.instance import RESERVED
 
 IDS = ("posefit/Fit-v0", "posefit/Track-v0", "posefit/Configure-v0")
