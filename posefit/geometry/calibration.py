@@ -23,7 +23,7 @@ LARGEST_FILE = 4_000_000  # bytes
 SUBPIXELS = 64.0  # Qualisys counts lengths on the sensor in 64ths of a pixel
 HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
 # The rotation of the world that turns an axis to +y.
-TURNS = {"x": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], "y": np.eye(3), "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}
+TURNS = {"x": [[0, -1, 0], [1, 0, 0], [0, 0, 1]], "y": np.eye(3), "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,8 @@ RIVAL = 0.4  # something else that is so large, as a share of the person, may be
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 PERIOD = 5  # every so many frames it is looked whether the camera moved
 SMALL = 160  # pixels: the width of the pictures that are compared for it
-MOVED = 0.015  # of the width: a camera that moved by more since the first frame is said to move
+TILES = 3  # to a side
+MOVED = 0.008  # of the width: a camera that moved by more since the first frame is said to move
 
 
 @dataclass(frozen=True)
@@ -130,18 +131,30 @@ class _Still:
     """Compares pictures with the first one: how far did the camera move?"""
 
     def __init__(self, size: tuple[int, int]) -> None:
-        self._size = SMALL, max(16, round(SMALL * size[1] / size[0]))
-        self._window = cv2.createHanningWindow(self._size, cv2.CV_32F)
+        self._size = SMALL, max(16 * TILES, round(SMALL * size[1] / size[0]))
+        self._tile = self._size[0] // TILES, self._size[1] // TILES
+        self._window = cv2.createHanningWindow(self._tile, cv2.CV_32F)
         self._first: Any = None
 
     def shift(self, image: Image) -> float:
-        """Return by how many pixels of a picture `SMALL` wide an image is shifted against the first."""
+        """Return by how many pixels of a picture `SMALL` wide an image is shifted against the first.
+
+        It is the median over tiles, of which a person who walks by covers only a few.
+        """
         small = cv2.cvtColor(cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
         grey = small.astype(np.float32)
         if self._first is None:
             self._first = grey
-        (x, y), _ = cv2.phaseCorrelate(self._first, grey, self._window)
-        return float(np.hypot(x, y))
+        found = [
+            cv2.phaseCorrelate(before, now, self._window)[0]
+            for before, now in zip(self._tiles(self._first), self._tiles(grey), strict=True)
+        ]
+        return float(np.hypot(*np.median(found, axis=0)))
+
+    def _tiles(self, image: Any) -> list[Any]:
+        wide, tall = self._tile
+        corners = [(y * tall, x * wide) for y in range(TILES) for x in range(TILES)]
+        return [np.ascontiguousarray(image[y : y + tall, x : x + wide]) for y, x in corners]
 
 
 def _background(video: Video, how: Extraction, size: tuple[int, int]) -> Background:

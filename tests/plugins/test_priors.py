@@ -11,6 +11,7 @@ from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import library
 from posefit_priors.full import Full
+from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
 from posefit_priors.sklearn import Transformed
 from posefit_priors.union import Union
@@ -164,3 +165,43 @@ def test_a_file_that_is_no_prior_is_refused(kind: Any, tmp_path: Path) -> None:
     np.savez(tmp_path / "c.npz", **{**stored, name: np.zeros((2, 2))})
     with pytest.raises(ValueError, match=r"c\.npz: "):
         kind.load(tmp_path / "c.npz")
+
+
+# loose
+
+
+def test_a_loose_prior_reaches_what_its_components_do_not() -> None:
+    prior, pca = Loose().fit(angles("walk-a", "walk-b", "walk-c"), library.average_skeleton()), PCA(components=12)
+    pca.fit(angles("walk-a", "walk-b", "walk-c"))
+    run = angles("run-a")
+    arms = [i for i in prior.loose if i >= 30]
+    left = np.abs(pca.inverse_transform(pca.transform(run)) - run)[:, arms].mean()
+    assert np.abs(prior.inverse_transform(prior.transform(run)) - run)[:, arms].mean() < 1e-9 < left
+
+
+def test_loose_angles_are_those_of_limbs_that_move_in_training() -> None:
+    poses = angles("walk-a", "walk-b")
+    prior = Loose().fit(poses, library.average_skeleton())
+    # both shoulders and hips turn about three axes in CMU's skeletons, elbows and knees about one
+    assert len(prior.loose) == 2 * (3 + 1 + 3 + 1)
+    assert len(prior.low) == 12 + 16
+    assert (np.ptp(poses[:, prior.loose], axis=0) > 0.0).all()
+
+
+def test_what_bends_past_a_joint_limit_is_not_feasible() -> None:
+    prior = Loose().fit(angles("walk-a", "walk-b"), library.average_skeleton())
+    latents = prior.transform(angles("walk-a")[:1])
+    assert prior.feasible(latents).all()
+    latents[0, 12:] -= 3.0
+    assert not prior.feasible(latents).any()
+
+
+def test_no_freedom_at_all_is_the_space_of_pca() -> None:
+    poses = angles("walk-a", "walk-b", "walk-c")
+    prior = Loose(arms_degrees=0.0, legs_degrees=0.0, slack=1.0).fit(poses, library.average_skeleton())
+    latents = prior.transform(poses)
+    latents[:, 12:] = 0.0
+    pca = PCA(components=12).fit(poses)
+    np.testing.assert_allclose(
+        prior.inverse_transform(latents), pca.inverse_transform(pca.transform(poses)), atol=1e-12
+    )

@@ -23,6 +23,8 @@ QUICK = ["--particles", "10", "--iterations", "4", "--size", "120x90"]
 FILES = {
     "poses.npz",
     "track.amc",
+    "track.bvh",
+    "track.trc",
     "skeleton.asf",
     "camera.json",
     "frames.csv",

@@ -12,41 +12,12 @@ from click.testing import CliRunner, Result
 
 import posefit
 from posefit.cli import main
-from posefit.motion import library
-from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
 from posefit.study.extract import extract
 from posefit.study.masks import LazyMasks
 from posefit.study.segment import Extraction
 from tests.files import arrays
-
-SIZE = (160, 120)
-EMPTY, FRAMES = 12, 48  # frames without anybody, then frames of a walk across
-
-
-def truth() -> list[Any]:
-    motion = library.built_in("walk", frames=FRAMES)
-    body = posefit.Body.of(motion.skeleton)
-    places = motion.translations.copy()
-    places[:, 2] = np.linspace(-1.1, 1.1, FRAMES)
-    camera = posefit.Camera.around(np.array([0.0, 0.9, 0.0]), np.pi / 2, 4.0, SIZE)
-    return [project(body, camera, pose, place) for pose, place in zip(motion.poses, places, strict=True)]
-
-
-@pytest.fixture(scope="module")
-def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
-    path = tmp_path_factory.mktemp("video") / "walk.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
-    rng = np.random.default_rng(0)
-    background = cv2.GaussianBlur(rng.uniform(90.0, 250.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0)
-    background = (background - background.mean()) * 4.0 + 150.0
-    masks = [np.zeros((SIZE[1], SIZE[0]), dtype=bool)] * EMPTY + truth()
-    for mask in masks:
-        image = background + rng.normal(0.0, 2.0, background.shape)
-        image[mask] = (40.0, 30.0, 120.0)
-        writer.write(np.clip(image, 0, 255).astype(np.uint8))
-    writer.release()
-    return path, masks
+from tests.study.conftest import EMPTY, FRAMES, SIZE, truth
 
 
 def iou(first: Any, second: Any) -> float:

@@ -26,7 +26,9 @@ def test_it_passes_every_shipped_optimiser(name: str) -> None:
     assert f"{ran} checks ran, 0 failed" in str(result)
 
 
-@pytest.mark.parametrize("name", ["pca", "full", "union", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA"])
+@pytest.mark.parametrize(
+    "name", ["pca", "loose", "full", "union", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA"]
+)
 def test_it_passes_every_shipped_prior(name: str) -> None:
     result = check_prior(registry().offer("prior", name).factory)
     assert result, str(result)

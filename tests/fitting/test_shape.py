@@ -1,0 +1,97 @@
+"""The build of a person: factors on lengths and radii, and how well they are found."""
+
+import numpy as np
+import pytest
+
+from posefit.fitting.alignment import align
+from posefit.fitting.shape import GIRTHS, LENGTHS, NAMES, fit_shape, shaped
+from posefit.fitting.tracker import Frame, Observation
+from posefit.geometry.body import Body, varied
+from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import BONES
+from posefit.motion import library
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
+
+AVERAGE = Body.of(library.average_skeleton())
+WALK = library.built_in("walk", frames=40).frames(0, 40)
+
+
+def frame(pose: np.ndarray, translation: np.ndarray) -> Frame:
+    return Frame(pose, translation, 0.0, np.zeros((1, 3), np.int64), 0, 0.0, np.empty(0))
+
+
+def seen(body: Body, cameras: list[Camera]) -> list[Observation]:
+    return [
+        Observation([Silhouette.of(project(body, camera, pose, where)) for camera in cameras])
+        for pose, where in zip(WALK.poses[::4], WALK.translations[::4], strict=True)
+    ]
+
+
+def test_every_bone_belongs_to_one_group_of_lengths_and_one_of_girths() -> None:
+    for groups in (LENGTHS, GIRTHS):
+        plain = [bone for group in groups.values() for bone in group]
+        assert len(plain) == len(set(plain))
+        found = {bone for bone in BONES for one in plain if bone in (one, f"l{one}", f"r{one}")}
+        assert found == set(BONES)
+
+
+def test_factors_multiply_what_they_name() -> None:
+    factors = np.ones(len(NAMES))
+    factors[NAMES.index("scale")] = 1.1
+    factors[NAMES.index("thighs length")] = 0.9
+    factors[NAMES.index("arms girth")] = 1.2
+    made = shaped(AVERAGE, factors)
+    ratio = made.skeleton.lengths / AVERAGE.skeleton.lengths
+    assert ratio[BONES.index("lfemur")] == pytest.approx(0.99)
+    assert ratio[BONES.index("rfemur")] == pytest.approx(0.99)
+    assert ratio[BONES.index("ltibia")] == pytest.approx(1.1)
+    wide = made.radii / AVERAGE.radii
+    np.testing.assert_allclose(wide[BONES.index("lradius")], 1.32)
+    np.testing.assert_allclose(wide[BONES.index("thorax")], 1.1)
+
+
+def test_stature_scales_and_is_that_of_an_adult() -> None:
+    assert 1.6 < AVERAGE.stature < 1.9
+    assert AVERAGE.scaled(1.1, 1.1).stature == pytest.approx(1.1 * AVERAGE.stature)
+    assert shaped(AVERAGE, np.full(len(NAMES), 1.07), height=1.62).stature == pytest.approx(1.62)
+
+
+def test_varied_people_are_alike_on_both_sides_and_within_their_percentage() -> None:
+    made = varied(AVERAGE, 10.0, np.random.default_rng(3))
+    ratio = made.skeleton.lengths / AVERAGE.skeleton.lengths
+    assert np.abs(ratio - 1.0).max() <= 0.1
+    assert ratio.std() > 0.01
+    assert ratio[BONES.index("lfemur")] == pytest.approx(ratio[BONES.index("rfemur")])
+    assert varied(AVERAGE, 0.0, np.random.default_rng(3)) is AVERAGE
+
+
+def test_a_build_is_found_where_the_poses_are_known() -> None:
+    rng = np.random.default_rng(5)
+    true = varied(AVERAGE, 10.0, rng).scaled(1.06, 1.06)
+    middle = WALK.translations.mean(axis=0)
+    cameras = [Camera.around(middle, azimuth, 3.5, (320, 240)) for azimuth in (0.0, np.pi / 2)]
+    frames = [frame(p, t) for p, t in zip(WALK.poses[::4], WALK.translations[::4], strict=True)]
+    shape = fit_shape(
+        AVERAGE, cameras, seen(true, cameras), lambda _: frames, np.random.default_rng(0), aligned=False, resamples=2
+    )
+    assert shape.body.stature == pytest.approx(true.stature, rel=0.03)
+    for bone in ("lfemur", "ltibia", "lhumerus"):
+        k = BONES.index(bone)
+        assert shape.body.skeleton.lengths[k] == pytest.approx(true.skeleton.lengths[k], rel=0.06)
+    assert (shape.spread >= 0.0).all()
+    assert shape.spread.max() > 0.0
+
+
+def test_one_camera_that_aligns_takes_the_height_it_is_given() -> None:
+    camera = Camera.around(WALK.translations.mean(axis=0), np.pi / 2, 3.5, (160, 120))
+    observations = seen(AVERAGE, [camera])
+    places = [
+        align(AVERAGE, [camera], one.silhouettes, pose[None], where[None])[0]
+        for one, pose, where in zip(observations, WALK.poses[::4], WALK.translations[::4], strict=True)
+    ]
+    frames = [frame(p, t) for p, t in zip(WALK.poses[::4], places, strict=True)]
+    shape = fit_shape(
+        AVERAGE, [camera], observations, lambda _: frames, np.random.default_rng(0), height=1.55, resamples=1
+    )
+    assert shape.body.stature == pytest.approx(1.55)

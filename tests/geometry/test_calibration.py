@@ -1,0 +1,156 @@
+"""Calibration files: what each format says, which way is up, and lenses that bend."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from posefit.geometry.calibration import read_calibrations, upright
+from posefit.geometry.camera import Camera
+
+TOML = """
+[left]
+name = "left"
+size = [ 640, 480]
+matrix = [ [ 500.0, 0.0, 319.5], [ 0.0, 510.0, 239.5], [ 0.0, 0.0, 1.0]]
+distortions = [ 0.1, 0.0, 0.0, 0.0]
+rotation = [ 1.5707963267948966, 0.0, 0.0]
+translation = [ 0.0, 1.0, 4.0]
+fisheye = false
+
+[metadata]
+adjusted = false
+"""
+
+# Written as Qualisys writes it: lengths in 64ths of a pixel and millimetres, a camera that looks along its own -z.
+# This one stands 4 m down the y axis of a z-up world, 1 m up, and looks level at the origin: its x is the world's x,
+# its y the world's z, its z the world's -y.
+QUALISYS = """<?xml version='1.0'?><calibration><cameras><camera serial="7">
+<fov_video left="10" top="20" right="649" bottom="499"/>
+<transform x="0" y="-4000" z="1000" r11="1" r12="0" r13="0" r21="0" r22="0" r23="1" r31="0" r32="-1" r33="0"/>
+<intrinsic focalLengthU="32000" focalLengthV="32640" centerPointU="21088" centerPointV="16608"
+ radialDistortion1="-0.05" radialDistortion2="0.1" radialDistortion3="0" tangentalDistortion1="0.001"
+ tangentalDistortion2="0.002"/></camera></cameras></calibration>"""
+
+
+def opencv(path: Path, placed: bool = True) -> Path:
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("image_width", 640)
+    storage.write("image_height", 480)
+    storage.write("camera_matrix", np.array([[500.0, 0, 319.5], [0, 510.0, 239.5], [0, 0, 1]]))
+    storage.write("distortion_coefficients", np.array([[0.1, 0.0, 0.0, 0.0, 0.0]]))
+    if placed:
+        storage.write("rvec", np.array([np.pi / 2, 0.0, 0.0]))
+        storage.write("tvec", np.array([[0.0], [1.0], [4.0]]))
+    storage.release()
+    return path
+
+
+def written(tmp_path: Path, name: str) -> Path:
+    path = tmp_path / name
+    if name.endswith(".toml"):
+        path.write_text(TOML)
+    elif name.endswith(".xml"):
+        path.write_text(QUALISYS)
+    else:
+        opencv(path)
+    return path
+
+
+@pytest.mark.parametrize("name", ["a.toml", "a.yml", "a.json", "a.xml"])
+def test_every_format_gives_the_same_camera(tmp_path: Path, name: str) -> None:
+    (one,) = read_calibrations(written(tmp_path, name))
+    assert one.size == (640, 480)
+    assert one.distorted
+    camera = one.camera((320, 240), upright([one]))
+    np.testing.assert_allclose(camera.focal, [250.0, 255.0])
+    np.testing.assert_allclose(camera.centre, [160.0, 120.0])  # OpenCV's 319.5 is the middle of 640 pixels
+    # z was up: the camera stands 4 m before the origin, 1 m up, and sees up as up
+    np.testing.assert_allclose(camera.position, [0.0, 1.0, 4.0], atol=1e-9)
+    pixels, depths = camera.project(np.array([[0.0, 1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, 0.0]]))
+    np.testing.assert_allclose(depths, 4.0)
+    np.testing.assert_allclose(pixels, [[160.0, 120.0], [160.0, 120.0 - 255.0 / 4.0], [160.0 + 62.5, 120.0]])
+
+
+def test_our_own_cameras_come_back(tmp_path: Path) -> None:
+    camera = Camera.around(np.array([0.1, 0.9, 0.3]), 0.7, 3.0, (320, 240))
+    (tmp_path / "camera.json").write_text(camera.to_json())
+    (one,) = read_calibrations(tmp_path / "camera.json")
+    assert not one.distorted
+    again = one.camera((320, 240), upright([one]))
+    for name in ("focal", "centre", "rotation", "translation"):
+        np.testing.assert_allclose(getattr(again, name), getattr(camera, name), atol=1e-12)
+
+
+def test_a_camera_that_is_not_placed_looks_level_from_the_origin(tmp_path: Path) -> None:
+    (one,) = read_calibrations(opencv(tmp_path / "a.yml", placed=False))
+    camera = one.camera((640, 480), upright([one]))
+    np.testing.assert_allclose(camera.position, 0.0, atol=1e-12)
+    np.testing.assert_allclose(camera.project(np.array([[0.0, 0.0, -2.0]]))[0], [[320.0, 240.0]])
+
+
+def test_up_can_be_named(tmp_path: Path) -> None:
+    (one,) = read_calibrations(written(tmp_path, "a.toml"))
+    np.testing.assert_allclose(upright([one], "z") @ [0.0, 0.0, 1.0], [0.0, 1.0, 0.0])
+    np.testing.assert_allclose(upright([one], "x") @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    np.testing.assert_allclose(upright([one], "y"), np.eye(3))
+    with pytest.raises(ValueError, match="up must be one of x, y, z, got 'w'"):
+        upright([one], "w")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["a.toml", "a.yml"])
+def test_the_maps_undo_the_lens(tmp_path: Path, name: str) -> None:
+    (one,) = read_calibrations(written(tmp_path, name))
+    across, down = one.maps((640, 480))
+    # the pixel 200 right of the centre was bent outwards by k1 r^2, r = 200 / 500
+    y, x = 240, 520
+    r2 = ((x - 319.5) / 500.0) ** 2 + ((y - 239.5) / 510.0) ** 2
+    assert across[y, x] == pytest.approx(319.5 + (x - 319.5) * (1.0 + 0.1 * r2), abs=1e-3)
+    assert down[y, x] == pytest.approx(239.5 + (y - 239.5) * (1.0 + 0.1 * r2), abs=1e-3)
+
+
+def test_several_cameras_stand_in_one_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(TOML + TOML.replace("[left]", "[right]").replace('"left"', '"right"').partition("[metadata]")[0])
+    assert [one.name for one in read_calibrations(path)] == ["left", "right"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.toml", "[left", "expected a calibration"),
+        ("a.toml", "[metadata]\nadjusted = false\n", "expected a calibration with a camera, got none"),
+        ("a.toml", TOML.replace("matrix", "matrx"), "no 'matrix'"),
+        ("a.toml", TOML.replace("[ 640, 480]", "[ 640.5, 480]"), "an image size of 640.5 x 480"),
+        ("a.toml", TOML.replace("500.0", "nan"), "finite numbers"),
+        ("a.xml", "<calibration>", "XML that is broken"),
+        ("a.xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><calibration/>", "document type"),
+        ("a.xml", QUALISYS.replace("intrinsic", "lens"), "a camera without intrinsic"),
+        ("a.xml", QUALISYS.replace('r11="1"', 'r11="3"'), "a rotation that is none"),
+        ("a.yml", "%YAML:1.0\n---\nimage_width: 3\n", "without camera_matrix, image_width and image_height"),
+        ("a.csv", "1,2,3", "a file that is none of them"),
+        ("a.json", '{"camera_from_world": 3}', "expected"),
+    ],
+)
+def test_a_file_that_is_no_calibration_is_named(tmp_path: Path, name: str, text: str, message: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=message) as caught:
+        read_calibrations(tmp_path / name)
+    assert str(tmp_path / name) in str(caught.value)
+    assert "\n" not in str(caught.value).strip()
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="expected a calibration file, got nothing of that name"):
+        read_calibrations(tmp_path / "none.toml")
+
+
+def test_the_real_calibration_places_its_camera_ten_metres_off() -> None:
+    path = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "Calib_demo.toml"
+    if not path.is_file():
+        pytest.skip(f"no calibration at {path}")
+    (one,) = read_calibrations(path)
+    camera = one.camera(one.size, upright([one]))
+    assert np.abs(camera.position).max() == pytest.approx(10.0, abs=0.1)
+    assert camera.rotation[1] @ [0.0, 1.0, 0.0] == pytest.approx(-1.0, abs=1e-3)  # level and upright

@@ -1,0 +1,58 @@
+"""A synthetic video of a walk, whose masks are known."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import posefit
+from posefit.motion import library
+from posefit.silhouette.cost import project
+
+SIZE = (160, 120)
+NOBODY = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
+EMPTY, FRAMES = 12, 48  # frames without anybody, then frames of a walk across
+
+
+def walk() -> posefit.Motion:
+    """Return a walk of 2.2 m along +z."""
+    motion = library.built_in("walk", frames=FRAMES)
+    places = motion.translations.copy()
+    places[:, 2] = np.linspace(-1.1, 1.1, FRAMES)
+    return replace(motion, translations=places)
+
+
+def camera(azimuth: float) -> posefit.Camera:
+    """Return the camera of a video."""
+    return posefit.Camera.around(np.array([0.0, 0.9, 0.0]), azimuth, 4.0, SIZE)
+
+
+def truth(azimuth: float = np.pi / 2) -> list[Any]:
+    """Return the masks of a walk across, as a camera at an azimuth sees it."""
+    motion = walk()
+    body = posefit.Body.of(motion.skeleton)
+    seen = zip(motion.poses, motion.translations, strict=True)
+    return [project(body, camera(azimuth), pose, place) for pose, place in seen]
+
+
+def film(path: Path, masks: list[Any]) -> Path:
+    """Write a video of a person before a still, noisy background."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    rng = np.random.default_rng(0)
+    background = cv2.GaussianBlur(rng.uniform(90.0, 250.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0)
+    background = (background - background.mean()) * 4.0 + 150.0
+    for mask in masks:
+        image = background + rng.normal(0.0, 2.0, background.shape)
+        image[mask] = (40.0, 30.0, 120.0)
+        writer.write(np.clip(image, 0, 255).astype(np.uint8))
+    writer.release()
+    return path
+
+
+@pytest.fixture(scope="session")
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
+    masks = [NOBODY] * EMPTY + truth()
+    return film(tmp_path_factory.mktemp("video") / "walk.avi", masks), masks
