@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from posefit.study.run import Track as Track
     from posefit.study.run import fit as fit
     from posefit.study.run import track as track
+    from posefit.study.segment import Extraction as Extraction
 
 __version__ = "0.1.0"
 hookimpl = HookimplMarker("posefit")
@@ -55,6 +56,7 @@ _HOMES = {
     "fitting.space": ("SearchSpace",),
     "fitting.tracker": ("Frame", "Observation", "SynthesisTracker", "Task", "Tracker"),
     "study.run": ("Fit", "Track", "fit", "track"),
+    "study.segment": ("Extraction",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = ["__version__", "hookimpl", *_HOME]

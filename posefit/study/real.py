@@ -4,34 +4,45 @@ Prints the overlap with the masks that were tracked and with a reference that wa
 differs from the median of the video by more than 18 grey levels in a channel, gaps of 11 pixels closed, the largest
 piece, all its holes filled, at 640 pixels across. Cast shadows are part of it. Then the direction of travel, whether
 the person faces it, and the steps a second, seen and fitted: the strongest period of how wide the lower half of the
-reference is, and of how far apart the fitted feet are in the image.
+reference is, and of how far apart the fitted feet are in the image. The first line tells how fast it is, on one thread.
 """
 
 import json
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+from threadpoolctl import threadpool_limits
 
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace
+from posefit.fitting.tracker import Task
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import JOINTS
+from posefit.motion import library
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, median_background
 from posefit.silhouette.mask import Mask
 from posefit.study.masks import Range
+from posefit.study.method import Choice, prepare
 from posefit.study.run import track
-from posefit.study.segment import WIDTH, Box, Extraction
+from posefit.study.scenes import Viewing, scene
+from posefit.study.segment import WIDTH, Box, Extraction, Segmentation
+from posefit.study.source import Scene
 from posefit.study.video import Video
 
 GREY, GAP = 18, 11  # levels, pixels
 STEPS = (1.0, 3.5)  # a second: between which a step frequency is sought
-SEEDS = range(3)
+SEEDS = range(5)
+POPULATION = 40
+METHODS = (("sapso", "loose"), ("sapso", "pca"), ("pso", "loose"), ("annealed", "loose"))
 
 
 def references(video: Video, size: tuple[int, int], roi: Box, frames: Range) -> Iterator[Mask]:
@@ -120,8 +131,57 @@ def _gait(motion: Motion, camera: Camera, seen: list[Mask]) -> dict[str, Any]:
     }
 
 
+def speed(source: str | Path, roi: Box, frames: Range) -> dict[str, float]:
+    """Return how fast frames are extracted, and how long tracking takes beside its evaluations, on one thread."""
+    cv2.setNumThreads(1)
+    video, how = Video.of(source), Extraction(roi=roi)
+    began = time.perf_counter()
+    found = Segmentation(video, how, (None, None))
+    learned = time.perf_counter()
+    count = sum(1 for _ in found)
+    ended = time.perf_counter()
+    speeds = {
+        "learning_frames_a_second": count / (learned - began),
+        "extraction_frames_a_second": count / (ended - learned),
+        "video_frames_a_second": video.fps,
+    }
+    with tempfile.TemporaryDirectory() as folder, threadpool_limits(1):
+        seen, _ = scene([source], Viewing(frames=frames, extraction=how), Path(folder), None, lambda _: None)
+        for optimiser, prior in METHODS:
+            whole, alone = _times(seen, Choice(optimiser, prior))
+            speeds[f"{optimiser}_{prior}_track_ms"] = whole
+            speeds[f"{optimiser}_{prior}_evaluations_ms"] = alone
+            speeds[f"{optimiser}_{prior}_overhead"] = whole / alone
+    return speeds
+
+
+def _times(seen: Scene, choice: Choice) -> tuple[float, float]:
+    """Return the median milliseconds of a frame, and of the same number of evaluations alone."""
+    training = [library.built_in(style) for style in library.other_styles("walk")]
+    task = Task(seen.body, seen.cameras, choice.budget(), None, seen.anchor, "aligned", training=training)
+    method = prepare(choice, task)
+    assert method.prior is not None
+    whole, alone = [], []
+    for frame, observation in zip(
+        method.tracker.track(seen.observations, np.random.default_rng(0)), seen.observations, strict=True
+    ):
+        if frame.coordinates is None:
+            continue
+        centre = np.array([frame.pose[0], 0.0, 0.0])
+        space = SearchSpace(method.prior, centre, np.radians(ROOT_RANGE_DEGREES), seen.anchor, "aligned")
+        problem = PoseProblem(seen.body, seen.cameras, observation.silhouettes, space)
+        near = np.tile(space.proposals(frame.coordinates.copy()), (POPULATION, 1))
+        began = time.perf_counter()
+        for _ in range(frame.evaluations // POPULATION):
+            problem.evaluate(near)
+        alone.append(time.perf_counter() - began)
+        whole.append(frame.seconds)
+    return 1e3 * float(np.median(whole)), 1e3 * float(np.median(alone))
+
+
 if __name__ == "__main__":
     box = tuple(map(int, sys.argv[2].split(",")))
     first, last = map(int, sys.argv[3].split(":"))
+    print(json.dumps(speed(sys.argv[1], box, (first, last))), flush=True)  # type: ignore[arg-type]
     for seed in SEEDS:
         print(json.dumps(measure(sys.argv[1], box, (first, last), seed)), flush=True)  # type: ignore[arg-type]
