@@ -11,10 +11,9 @@ from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import library
 from posefit.study.method import Choice
-from posefit.study.opening import built
-from posefit.study.run import BODY_FRAMES
+from posefit.study.opening import BODY_FRAMES, built, following
 from posefit.study.source import synthetic
-from posefit.study.synthetic import SIZE, followed, task_of
+from posefit.study.synthetic import SIZE, task_of
 
 PERCENT = 10.0
 SUBJECTS = range(8)
@@ -54,7 +53,7 @@ def study(motion: str = "walk-b") -> None:
             shape = built(
                 task,
                 scene.observations,
-                lambda task, seen, rng: iter(followed(task, choice, list(seen), int(rng.integers(2**31)))),
+                following(choice),
                 BODY_FRAMES,
                 height,
                 seed,

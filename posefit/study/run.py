@@ -1,9 +1,6 @@
 """Fit one frame or follow a sequence, by names: what the command line does, as typed calls."""
 
-import threading
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -16,7 +13,7 @@ from posefit.fitting.optimiser import OptimiserFactory
 from posefit.fitting.prior import Prior
 from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.space import Translation
-from posefit.fitting.tracker import Frame, Observation, Task, Tracker, TrackerFactory
+from posefit.fitting.tracker import Frame, Task, TrackerFactory
 from posefit.geometry.calibration import Up
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
@@ -25,15 +22,11 @@ from posefit.motion.motion import Motion
 from posefit.study.evaluation import Evaluation
 from posefit.study.masks import Range
 from posefit.study.method import Choice, prepare, training_angles
-from posefit.study.opening import begun, built
+from posefit.study.opening import Opening, opened
 from posefit.study.scenes import Source, Viewing, scene
 from posefit.study.segment import Extraction
 from posefit.study.source import Scene, kind_of, motion_of
 from posefit.study.writing import Nowhere, Output, OutputFolder
-
-RESTARTS = 8  # of the first frame, where nobody knows the truth
-BODY_FRAMES = 30  # from which a build is found
-PATIENCE = 1.5  # seconds of compiling before it is announced
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,13 +132,9 @@ def track(
         ask_seconds,
     )
     choice.budget()
+    opening = Opening(translation, first_pose, restarts, 0 if body_frames is None and asf else body_frames, height)
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
-    if first_pose not in ("searched", "given"):
-        raise ValueError(f"first_pose must be one of searched, given, got {first_pose!r}")
-    for name, value in (("restarts", restarts), ("body_frames", body_frames)):
-        if value is not None and value < 0:
-            raise ValueError(f"{name} must be 0 or more, got {value}")
     if resume and out is None:
         raise ValueError("resume must be given with out, the folder of the track that goes on, got none")
     if rerun is not None:
@@ -157,10 +146,8 @@ def track(
         seen, warnings = scene(sources, viewing, output.work, progress, say)
         for warning in warnings:
             say(f"warning: {warning}")
-        task, shape = _opened(
-            seen, choice, _training(sources, train, asf, seen.fps), translation, first_pose, restarts, body_frames,
-            viewing, seed, threads, say,
-        )  # fmt: skip
+        trained = _training(sources, train, asf, seen.fps)
+        task, shape = opened(seen, choice, opening, trained, seed, threads, say)
         seen = replace(seen, body=task.body)
         method = prepare(choice, task)
         found = _followed(seen, choice, task, output, seed, progress, say)
@@ -212,62 +199,6 @@ _MAY_DIFFER = ("out", "force", "resume", "rerun", "progress", "say", "threads")
 
 def _spec(arguments: Mapping[str, str]) -> dict[str, str]:
     return {**arguments, "version": posefit.__version__}
-
-
-def _opened(
-    seen: Scene,
-    choice: Choice,
-    trained: list[Motion],
-    translation: Translation | None,
-    first_pose: str,
-    restarts: int | None,
-    body_frames: int | None,
-    viewing: Viewing,
-    seed: int,
-    threads: int,
-    say: Callable[[str], None],
-) -> tuple[Task, Shape | None]:
-    """Return the task and the person's build, after what has to be found out before the first frame."""
-    blind = seen.truth is None
-    mode: Translation = translation or ("aligned" if blind else "known")
-    if mode == "known" and blind:
-        raise ValueError("translation must be searched or aligned where only masks are given, got known")
-    task = Task(
-        seen.body,
-        seen.cameras,
-        choice.budget(),
-        seen.yaw,
-        seen.anchor,
-        translation=mode,
-        fps=seen.fps,
-        training=trained,
-        first_pose=_first_pose(seen) if first_pose == "given" else None,
-        threads=threads,
-    )
-    began = time.perf_counter()
-    with _announced(say):
-        _warm_up(prepare(choice, task).warm_up, seen)
-    say(f"ready in {time.perf_counter() - began:.1f} s; {seen.count} frames of {seen.name}")
-
-    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        return prepare(choice, task).tracker.track(observations, rng)
-
-    if restarts is None:
-        restarts = RESTARTS if blind else 0
-    if body_frames is None:
-        body_frames = BODY_FRAMES if blind and viewing.asf is None else 0
-    if restarts:
-        say(f"looking for the first pose, {restarts} times")
-        task = begun(task, seen.observations, follow, restarts, seed)
-    shape = None
-    if body_frames:
-        say(f"fitting the person's build to {body_frames} frames")
-        alone = len(seen.cameras) == 1 and mode == "aligned"
-        height = viewing.height or (task.body.stature if alone else None)
-        shape = built(task, seen.observations, follow, body_frames, height, seed)
-        if shape is not None:
-            task = replace(task, body=shape.body)
-    return task, shape
 
 
 def _followed(
@@ -328,31 +259,5 @@ def _training(sources: Sequence[Source], train: Sequence[Source], asf: str | Pat
     return [motion_of(one, asf, fps) for one in chosen]
 
 
-def _first_pose(scene: Scene) -> Array:
-    if scene.truth is None:
-        raise ValueError("first_pose must be searched where only masks are given, got given")
-    return scene.truth.poses[0, 3:]
-
-
-def _warm_up(tracker: Tracker, scene: Scene) -> None:
-    """Compile what is not compiled yet, on the first frame."""
-    first = next(iter(scene.observations))
-    next(tracker.track([first], np.random.default_rng(0)))
-
-
 def _nothing(_: str) -> None:
     """Say nothing."""
-
-
-@contextmanager
-def _announced(say: Callable[[str], None]) -> Iterator[None]:
-    """Say that compiling takes its time, if it does."""
-    message = "compiling the kernels, once on this machine; this can take half a minute ..."
-    timer = threading.Timer(PATIENCE, say, (message,))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-        timer.join()  # it may be in the middle of saying it

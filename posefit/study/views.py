@@ -3,14 +3,11 @@
 The first pose is searched several times, as it is for footage.
 """
 
-from collections.abc import Iterable, Iterator
-
 import numpy as np
 
-from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.study.method import Choice, prepare
-from posefit.study.opening import begun
-from posefit.study.run import RESTARTS
+from posefit.fitting.tracker import Frame, Task
+from posefit.study.method import Choice
+from posefit.study.opening import RESTARTS, begun, following
 from posefit.study.source import Scene
 from posefit.study.synthetic import followed, mean_error, measured, scene_of, task_of
 
@@ -39,10 +36,7 @@ def compare() -> None:
 
 
 def _track(task: Task, choice: Choice, scene: Scene, seed: int) -> list[Frame]:
-    def follow(task: Task, seen: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        return prepare(choice, task).tracker.track(seen, rng)
-
-    begin = begun(task, scene.observations, follow, RESTARTS, seed)
+    begin = begun(task, scene.observations, following(choice), RESTARTS, seed)
     return followed(begin, choice, scene.observations, seed)
 
 
