@@ -46,6 +46,24 @@ CLIPS = {
     "walk-c": Clip("05/05_01", 0, 380, 0.9, 1.35),
     "run-a": Clip("16/16_35", 0, None, 0.6, 0.95),
     "run-b": Clip("09/09_01", 0, None, 0.6, 0.95),
+    "march-a": Clip("13/13_29", 2700, 3780, 1.8, 3.2),
+    "march-b": Clip("14/14_06", 1580, 2330, 1.8, 3.2),
+    "jacks-a": Clip("13/13_29", 20, 440, 0.8, 1.5),
+    "jacks-b": Clip("14/14_06", 20, 410, 0.8, 1.5),
+    "squat-a": Clip("13/13_29", 3800, 4580, 1.2, 3.3),
+    "squat-b": Clip("14/14_06", 1015, 1565, 1.2, 3.3),
+    "jump-a": Clip("49/49_02", 130, 400, 0.6, 1.2),
+    "jump-b": Clip("16/16_01", 60, 262, 1.6, 1.69),
+}
+STANDING = 0.2  # m/s; who is slower does not go anywhere, and faces where he looks on average
+# What is at its highest at phase 0 in each kind of motion: an angle rx, less another one, or less the root's height.
+BEATS = {
+    "walk": ("rfemur", "lfemur"),  # rx is negative when the thigh is in front
+    "run": ("rfemur", "lfemur"),
+    "march": ("rfemur", "lfemur"),
+    "jacks": ("lhumerus", None),
+    "squat": (None, "root"),
+    "jump": (None, "root"),
 }
 
 
@@ -55,17 +73,19 @@ def basis(phases: Array, harmonics: int) -> Array:
     return np.column_stack([np.ones(len(phases)), np.cos(turns), np.sin(turns)])
 
 
-def fitted(root: Path, clip: Clip) -> dict[str, Any]:
-    """Return the model of one style."""
+def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
+    """Return the model of one style of a kind of motion."""
     folder, name = clip.path.split("/")
     motion = read_clip(root / folder / f"{folder}.asf", root / folder / f"{name}.amc")
     motion = motion.frames(clip.start, clip.stop or len(motion))
     times = np.arange(len(motion)) / motion.fps
     velocity = np.polyfit(times, motion.translations, 1)[0]
+    speed = float(np.hypot(velocity[0], velocity[2]))
     heading = np.arctan2(velocity[0], velocity[2])
+    if speed < STANDING:
+        speed, heading = 0.0, float(np.angle(np.exp(1j * motion.poses[:, 0]).mean()))
     turn = Rotation.from_euler("y", -heading).as_matrix()
     path = motion.translations @ turn.T
-    speed = float(np.hypot(velocity[0], velocity[2]))
     path[:, 2] -= speed * times
     path[:, [0, 2]] -= path[:, [0, 2]].mean(axis=0)
     series = np.column_stack([path, motion.poses])
@@ -83,7 +103,7 @@ def fitted(root: Path, clip: Clip) -> dict[str, Any]:
     periods = np.arange(clip.shortest, clip.longest, 0.0025)
     period = float(periods[np.argmin([residual(p)[0] for p in periods])])
     error, coefficients = residual(period)
-    coefficients = in_step(coefficients, free)
+    coefficients = in_step(coefficients, free, kind)
     return {
         "source": name,
         "period": round(period, 4),
@@ -94,10 +114,18 @@ def fitted(root: Path, clip: Clip) -> dict[str, Any]:
     }
 
 
-def in_step(coefficients: Array, free: NDArray[np.int64]) -> Array:
-    """Return coefficients (1 + 2 H, series) shifted: at phase 0 the left thigh is furthest ahead of the right."""
-    left, right = (3 + int(np.searchsorted(free, angle_index(JOINTS.index(bone)))) for bone in ("lfemur", "rfemur"))
-    swing = coefficients[:, right] - coefficients[:, left]  # rx is negative when the thigh is in front
+def in_step(coefficients: Array, free: NDArray[np.int64], kind: str) -> Array:
+    """Return coefficients (1 + 2 H, series) shifted so that phase 0 is the beat of a kind of motion."""
+
+    def series(name: str | None) -> Array:
+        if name is None:
+            return np.zeros(len(coefficients))
+        # the root's height is the second series; the first three are its path
+        first = 1 if name == "root" else 3 + int(np.searchsorted(free, angle_index(JOINTS.index(name))))
+        return np.asarray(coefficients[:, first])
+
+    high, low = BEATS[kind]
+    swing = series(high) - series(low)
     shift = np.arctan2(swing[1 + HARMONICS], swing[1])
     turns = shift * np.arange(1, HARMONICS + 1)[:, None]
     cosines, sines = coefficients[1 : 1 + HARMONICS], coefficients[1 + HARMONICS :]
@@ -153,7 +181,7 @@ def main(root: Path) -> None:
         tuple((bone, tuple(free)) for bone, free in bones["channels"]),
         np.radians(bones["limits_degrees"]),
     )
-    motions = {name: fitted(root, clip) for name, clip in CLIPS.items()}
+    motions = {name: fitted(root, clip, name.split("-")[0]) for name, clip in CLIPS.items()}
     for name, model in motions.items():
         grounded(model, skeleton)
         print(f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees")

@@ -1,8 +1,9 @@
 """The built-in motions: small periodic models, so that everything runs without any data.
 
-Every kind has styles, each from another person: `walk-a`, `walk-b`, `walk-c`, `run-a`, `run-b`. `walk` and `run`,
-without a letter, are somebody in between: the mean of the styles, in step. So `walk` is none of the motions that its
-prior is trained on, but within their reach; a prior trained on other people only, as for `walk-a`, is the harder case.
+Every kind, `walk`, `run`, `march` (raising the knees on the spot), `jacks` (jumping jacks), `squat` and `jump`, has
+styles, each from another person: `walk-a`, `walk-b`, ... Without a letter it is somebody in between: the mean of the
+styles, in step. So `walk` is none of the motions that its prior is trained on, but within their reach; a prior trained
+on other people only, as for `walk-a`, is the harder case.
 They were fitted to CMU clips by `fit_library.py`. The data used in this project was obtained from mocap.cs.cmu.edu.
 The database was created with funding from NSF EIA-0196217.
 """
@@ -56,7 +57,7 @@ def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1
     """Return a built-in motion of so many frames. It goes along +z, and half its way is behind the origin.
 
     `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
-    lowest joint of the cycle is about 3 cm above the ground y = 0, as thick as a toe. Raises ValueError for an unknown
+    lowest joint of the cycle is about 3 cm above the ground y = 0, as thick as a toe; a mean of styles may be 2 cm off. Raises ValueError for an unknown
     name, and where a number is not what it should be.
     """
     angles, series, period, pace = _model(name)

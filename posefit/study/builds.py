@@ -23,7 +23,13 @@ SETUPS = {
     "2 views": ([0.0, 90.0], False),
     "4 views": ([0.0, 45.0, 90.0, 135.0], False),
 }
-LIMBS = {"thigh": "lfemur", "shank": "ltibia", "upper arm": "lhumerus", "forearm": "lradius"}
+LIMBS = {
+    "thigh": ("lfemur",),
+    "shank": ("ltibia",),
+    "upper arm": ("lhumerus",),
+    "forearm": ("lradius",),
+    "forearm and hand": ("lradius", "lwrist", "lhand"),
+}
 
 
 def subject(seed: int) -> Body:
@@ -72,8 +78,8 @@ def study(motion: str = "walk-b") -> None:
 
 def _off(body: Body, true: Body) -> list[float]:
     """Return by how many percent stature and limbs are off."""
-    limbs = [BONES.index(bone) for bone in LIMBS.values()]
-    lengths, others = ((one.stature, *one.skeleton.lengths[limbs]) for one in (body, true))
+    limbs = [[BONES.index(bone) for bone in bones] for bones in LIMBS.values()]
+    lengths, others = ([one.stature, *(one.skeleton.lengths[limb].sum() for limb in limbs)] for one in (body, true))
     return [100.0 * abs(length / other - 1.0) for length, other in zip(lengths, others, strict=True)]
 
 

@@ -1,4 +1,4 @@
-"""The built-in motions walk and run like people, repeat themselves, and differ where a test needs them to."""
+"""The built-in motions look like people, repeat themselves, and differ where a test needs them to."""
 
 import json
 from importlib.resources import files
@@ -22,11 +22,24 @@ CLIPS = {
     "walk-c": ("05/05_01", 0, 380),
     "run-a": ("16/16_35", 0, None),
     "run-b": ("09/09_01", 0, None),
+    "march-a": ("13/13_29", 2700, 3780),
+    "march-b": ("14/14_06", 1580, 2330),
+    "jacks-a": ("13/13_29", 20, 440),
+    "jacks-b": ("14/14_06", 20, 410),
+    "squat-a": ("13/13_29", 3800, 4580),
+    "squat-b": ("14/14_06", 1015, 1565),
+    "jump-a": ("49/49_02", 130, 400),
+    "jump-b": ("16/16_01", 60, 262),
 }
-RESIDUAL_DEGREES = 1.0  # the largest mean error over all 66 angles that a style may have
+# The largest mean error over all 66 angles that a style may have: nobody does an exercise twice in the same way.
+RESIDUAL_DEGREES = {"walk": 1.0, "run": 1.0, "jacks": 1.6, "squat": 1.6, "jump": 1.6, "march": 3.2}
+KINDS = ("walk", "run", "march", "jacks", "squat", "jump")
+GAITS = ("walk", "run")
 CYCLE = 240  # frames
 
 each = pytest.mark.parametrize("name", library.names())
+each_gait = pytest.mark.parametrize("name", [name for name in library.names() if name.startswith(GAITS)])
+each_exercise = pytest.mark.parametrize("name", [name for name in library.names() if not name.startswith(GAITS)])
 
 
 def stored() -> dict[str, Any]:
@@ -51,7 +64,7 @@ def joints(motion: Motion) -> Array:
 
 
 def test_names_are_the_kinds_and_their_styles() -> None:
-    assert library.names() == ("walk", "run", "walk-a", "walk-b", "walk-c", "run-a", "run-b")
+    assert library.names() == KINDS + tuple(CLIPS)
 
 
 def test_the_other_styles_of_a_motion_never_contain_it() -> None:
@@ -80,7 +93,7 @@ def test_no_joint_jumps_anywhere_in_the_cycle(name: str) -> None:
     assert steps.max() < 12.0  # m/s; a runner's foot swings forward at two to three times the pace
 
 
-@each
+@each_gait
 def test_a_motion_goes_along_z_and_has_its_middle_over_the_origin(name: str) -> None:
     motion = cycle(name, 4)
     root = motion.translations
@@ -97,14 +110,14 @@ def test_a_motion_goes_along_z_and_has_its_middle_over_the_origin(name: str) -> 
         assert (toe[standing, 2] > ankle[standing, 2]).all()
 
 
-@each
+@each_gait
 def test_the_feet_stay_above_the_ground_and_reach_it(name: str) -> None:
     lowest = joints(cycle(name))[..., 1].min(axis=1)
     assert 0.025 < lowest.min() < 0.035
     assert lowest.max() < (0.08 if name.startswith("walk") else 0.15)  # only a runner flies
 
 
-@each
+@each_gait
 def test_a_foot_on_the_ground_hardly_slides(name: str) -> None:
     motion = cycle(name)
     for foot in ("lfoot", "rfoot"):
@@ -114,7 +127,7 @@ def test_a_foot_on_the_ground_hardly_slides(name: str) -> None:
         assert slides.mean() < 0.2 * means(name, "speed")
 
 
-@each
+@each_gait
 def test_an_arm_swings_with_the_leg_of_the_other_side(name: str) -> None:
     motion = cycle(name)
     ahead = joints(motion)[..., 2] - motion.translations[:, None, 2]
@@ -122,7 +135,7 @@ def test_an_arm_swings_with_the_leg_of_the_other_side(name: str) -> None:
         assert np.corrcoef(ahead[:, JOINTS.index(arm)], ahead[:, JOINTS.index(leg)])[0, 1] > 0.5
 
 
-@each
+@each_gait
 def test_at_phase_0_the_left_thigh_is_ahead(name: str) -> None:
     left, right = (angle_index(JOINTS.index(bone)) for bone in ("lfemur", "rfemur"))
     poses = cycle(name).poses
@@ -132,14 +145,53 @@ def test_at_phase_0_the_left_thigh_is_ahead(name: str) -> None:
     assert abs(swing @ np.sin(turns)) < 1e-3 * (swing @ np.cos(turns))
 
 
-@pytest.mark.parametrize("kind", ["walk", "run"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_styles_of_a_kind_differ_by_some_degrees(kind: str) -> None:
     poses = {name: cycle(name).poses for name in (kind, *library.other_styles(kind))}
     for first, second in combinations(poses, 2):
-        assert 1.0 < np.degrees(np.abs(poses[first] - poses[second]).mean()) < 15.0, (first, second)
+        assert 1.0 < np.degrees(np.abs(poses[first] - poses[second]).mean()) < 25.0, (first, second)
 
 
-@pytest.mark.parametrize("kind", ["walk", "run"])
+@each_exercise
+def test_an_exercise_is_done_on_the_spot_facing_z(name: str) -> None:
+    motion = cycle(name, 2)
+    assert np.abs(motion.translations[:, [0, 2]]).max() < 0.25
+    yaws = motion.poses[:, 0]
+    assert abs(np.degrees(np.angle(np.exp(1j * yaws).mean()))) < 2.0  # of the series; the clip's own mean is 0
+    lowest = joints(motion)[..., 1].min(axis=1)
+    away = 0.005 if "-" in name else 0.025  # the mean of two people who stand firmly does not quite
+    assert abs(lowest.min() - 0.03) < away
+
+
+def test_each_exercise_is_what_it_is_called() -> None:
+    head, foot, root = JOINTS.index("head"), JOINTS.index("lfoot"), JOINTS.index("root")
+    hands = [JOINTS.index("lhand"), JOINTS.index("rhand")]
+    for name in ("jacks", "jacks-a", "jacks-b"):
+        placed = joints(cycle(name))
+        apart = np.abs(placed[:, foot] - placed[:, JOINTS.index("rfoot")])[:, 0]
+        raised = placed[:, hands, 1].min(axis=1) > placed[:, root, 1]
+        assert placed[:, hands, 1].max() > placed[:, head, 1].max()
+        assert apart[raised].mean() > apart[~raised].mean() + 0.15
+    for name in ("squat", "squat-a", "squat-b"):
+        assert np.ptp(joints(cycle(name))[:, root, 1]) > 0.4
+    for name in ("jump", "jump-a", "jump-b"):
+        assert joints(cycle(name))[..., 1].min(axis=1).max() > 0.1  # both feet leave the ground
+    for name in ("march", "march-a", "march-b"):
+        placed = joints(cycle(name))
+        knees = [np.ptp(placed[:, JOINTS.index(side + "femur"), 1]) for side in "lr"]
+        assert min(knees) > 0.25
+
+
+@pytest.mark.parametrize("kind", ["squat", "jump"])
+def test_at_phase_0_somebody_who_squats_or_jumps_is_down(kind: str) -> None:
+    for name in (kind, *library.other_styles(kind)):
+        height = cycle(name).translations[:, 1]
+        turns = 2.0 * np.pi * np.arange(CYCLE) / CYCLE
+        assert height @ np.cos(turns) < 0.0
+        assert abs(height @ np.sin(turns)) < 1e-3 * abs(height @ np.cos(turns))
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_kind_without_a_letter_is_the_mean_of_its_styles(kind: str) -> None:
     styles = [cycle(style).poses for style in library.other_styles(kind)]
     np.testing.assert_allclose(cycle(kind).poses, np.mean(styles, axis=0), atol=1e-9)
@@ -202,9 +254,13 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
     recorded = recorded.frames(start, stop or len(recorded))
     times = np.arange(len(recorded)) / recorded.fps
     direction = np.polyfit(times, recorded.translations, 1)[0]
-    assert np.hypot(direction[0], direction[2]) == pytest.approx(model["speed"], abs=1e-3)
     poses = recorded.poses.copy()
-    poses[:, 0] -= np.arctan2(direction[0], direction[2])
+    if model["speed"]:
+        assert np.hypot(direction[0], direction[2]) == pytest.approx(model["speed"], abs=1e-3)
+        poses[:, 0] -= np.arctan2(direction[0], direction[2])
+    else:
+        assert np.hypot(direction[0], direction[2]) < 0.2
+        poses[:, 0] -= np.angle(np.exp(1j * poses[:, 0]).mean())
 
     def error(phase: float) -> float:
         made = library.built_in(name, frames=len(recorded), fps=recorded.fps, phase=phase)
@@ -212,13 +268,13 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
         return float(np.degrees(np.abs((made.poses - poses + np.pi) % (2.0 * np.pi) - np.pi).mean()))
 
     least = min(error(phase) for phase in np.arange(400) / 400)
-    assert least < RESIDUAL_DEGREES
+    assert least < RESIDUAL_DEGREES[name.split("-")[0]]
     assert least == pytest.approx(model["residual_degrees"], abs=0.05)
 
 
 def test_the_library_is_small_and_states_its_origin() -> None:
     text = (files("posefit.motion") / "library.json").read_text(encoding="utf-8")
-    assert len(text.encode()) < 60_000
+    assert len(text.encode()) < 70_000
     origin = json.loads(text)["origin"]
     assert "The data used in this project was obtained from mocap.cs.cmu.edu." in origin
     assert "The database was created with funding from NSF EIA-0196217." in origin
@@ -226,7 +282,7 @@ def test_the_library_is_small_and_states_its_origin() -> None:
 
 @pytest.mark.parametrize("ask", [library.built_in, library.other_styles])
 def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
-    with pytest.raises(ValueError, match=r"one of walk, run, walk-a, .* got 'wlak'; did you mean 'walk'\?"):
+    with pytest.raises(ValueError, match=r"one of walk, run, march, .* got 'wlak'; did you mean 'walk'\?"):
         ask("wlak")
     with pytest.raises(ValueError, match="got 'zzz'$"):
         ask("zzz")
