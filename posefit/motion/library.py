@@ -57,8 +57,8 @@ def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1
     """Return a built-in motion of so many frames. It goes along +z, and half its way is behind the origin.
 
     `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
-    lowest joint of the cycle is about 3 cm above the ground y = 0, as thick as a toe; a mean of styles may be 2 cm off. Raises ValueError for an unknown
-    name, and where a number is not what it should be.
+    lowest joint of the cycle is about 3 cm above the ground y = 0, as thick as a toe; a mean of styles may be 2 cm
+    off. Raises ValueError for an unknown name, and where a number is not what it should be.
     """
     angles, series, period, pace = _model(name)
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 1:
