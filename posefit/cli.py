@@ -81,7 +81,9 @@ _OPTIONS = (
     click.option("--height", type=float, metavar="METRES", help="How tall the person in the footage stands."),
     click.option("--restarts", type=int, help="Searches of a first pose nobody knows; by default 8."),
     click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
-    click.option("--extraction", default="mixture", show_default=True, help="Of video: mixture, median or mean."),
+    click.option(
+        "--extraction", default="mixture", show_default=True, help="Of video: mixture, median, mean, or masks."
+    ),
     click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
     click.option("--roi", callback=_box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
     click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
@@ -150,7 +152,9 @@ def fit(as_json: bool, **options: Any) -> None:
 @main.command()
 @click.argument("video")
 @click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
-@click.option("--method", default="mixture", show_default=True, help="mixture, median or mean.")
+@click.option(
+    "--method", default="mixture", show_default=True, help="mixture, median, mean, or masks: the frames are masks."
+)
 @click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image.")
 @click.option("--roi", callback=_box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels.")
 @click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front.")

@@ -175,6 +175,7 @@ def track(
             "translation": task.translation,
             "first_pose": first_pose,
             "views": len(seen.cameras),
+            "camera": "given" if viewing.cameras else "guessed" if seen.truth is None else "placed",
             "size": [seen.cameras[0].width, seen.cameras[0].height],
             "fps": seen.fps,
             "settings": method.settings,

@@ -12,6 +12,7 @@ import numpy as np
 from posefit.silhouette.foreground import (
     SAMPLES,
     Background,
+    Drawn,
     Image,
     Mixture,
     Person,
@@ -23,7 +24,7 @@ from posefit.silhouette.mask import Mask
 from posefit.study.masks import Range, span
 from posefit.study.video import Video
 
-Method = Literal["mixture", "mean", "median"]
+Method = Literal["mixture", "mean", "median", "masks"]
 Box = tuple[int, int, int, int]  # x, y, width, height
 WIDTH = 640  # pixels; larger videos are scaled down to it
 LATEST = 15  # frames that a frame's area is compared with
@@ -41,9 +42,9 @@ class Extraction:
     """How the person is told from the background.
 
     `method` is a "mixture" of Gaussians or the "median", both learned from the whole video, or the "mean" of
-    `background`: frames without a person, as A:B, or an image. `roi` x, y, width, height in the video's own pixels is
-    where the person is looked for; `ignore` is an image whose bright pixels are never known, such as a tree in front.
-    Videos wider than `width` are scaled down to it.
+    `background`: frames without a person, as A:B, or an image; the frames may also be "masks" already. `roi` x, y,
+    width, height in the video's own pixels is where the person is looked for; `ignore` is an image whose bright pixels
+    are never known, such as a tree in front. Videos wider than `width` are scaled down to it.
     """
 
     method: Method = "mixture"
@@ -61,7 +62,7 @@ class Extraction:
             raise ValueError("background must be frames A:B or an image for the method mean, got none")
         if self.method != "mean" and self.background is not None:
             raise ValueError(
-                f"background must not be given for the method {self.method}, which learns it, got {self.background!r}"
+                f"background must be given for the method mean only, got {self.background!r} with {self.method}"
             )
 
 
@@ -161,6 +162,8 @@ def _background(video: Video, how: Extraction, size: tuple[int, int]) -> Backgro
     if how.method == "mean":
         assert how.background is not None
         return mean_background(_given_background(video, how.background, size))
+    if how.method == "masks":
+        return Drawn()
     if how.method == "median":
         step = max(1, video.count() // SAMPLES)
         return median_background(list(video.frames(0, None, size, step))[:SAMPLES])

@@ -8,6 +8,7 @@ _NAMES = {
     "persistence": "first true pose, held",
     "nearest": "best training pose",
 }
+NOTABLE = 0.05  # a part of the build that is off the average by less is not worth a word
 
 
 def table(summary: Mapping[str, Any]) -> str:
@@ -31,6 +32,20 @@ def table(summary: Mapping[str, Any]) -> str:
         )
     if summary["held_frames"]:
         lines.append(f"{summary['held_frames']} frames show too little of the person: their pose is held, not searched")
+    if summary["body"] is not None:
+        body = summary["body"]
+        parts = [
+            f"{name} {factor:.2f} +- {body['spread'][name]:.2f}"
+            for name, factor in body["factors"].items()
+            if abs(factor - 1.0) >= NOTABLE
+        ]
+        lines.append(
+            f"build: {body['stature']:.2f} m tall; against the average {', '.join(parts) or 'nothing notable'}"
+        )
+    if summary["camera"] == "guessed":
+        lines.append(
+            "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
+        )
     used = summary["evaluations"] / summary["frames"]
     lines.append(
         f"IoU {summary['iou']:.3f}, {used:,.0f} of {summary['evaluations_per_frame']:,} evaluations and "

@@ -44,6 +44,19 @@ def test_each_method_finds_the_person(
     assert sum(int(row["usable"]) for row in rows) == result["usable"]
 
 
+def test_a_video_of_masks_is_taken_as_it_is(tmp_path: Path) -> None:
+    masks = truth()[8:20]
+    writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"FFV1"), 25.0, SIZE)
+    for mask in masks:
+        writer.write(255 * mask.astype(np.uint8)[..., None].repeat(3, axis=2))
+    writer.release()
+    result = extract(tmp_path / "a.avi", tmp_path / "out", Extraction("masks"))
+    assert result["usable"] == 12
+    stored = arrays(tmp_path / "out" / "masks.npz")
+    assert np.mean([iou(a > 0, b) for a, b in zip(stored["masks"], masks, strict=True)]) > 0.95
+    assert stored["valid"].all()
+
+
 def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
     filmed: tuple[Path, list[Any]], tmp_path: Path
 ) -> None:
@@ -151,9 +164,9 @@ def test_the_command_prints_what_it_found(filmed: tuple[Path, list[Any]], tmp_pa
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--method", "magic"], "method must be one of mixture, mean, median, got 'magic'"),
+        (["--method", "magic"], "method must be one of mixture, mean, median, masks, got 'magic'"),
         (["--method", "mean"], "background must be frames A:B or an image for the method mean, got none"),
-        (["--background", "0:5"], "background must not be given for the method mixture"),
+        (["--background", "0:5"], "background must be given for the method mean only, got '0:5' with mixture"),
         (
             ["--method", "mean", "--background", "nothing.png"],
             "background must be frames A:B or an image, got 'nothing.png'",
