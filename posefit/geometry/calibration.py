@@ -91,7 +91,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     if path.stat().st_size > LARGEST_FILE:
         raise ValueError(f"{path}: expected a calibration of at most 4 MB, got {path.stat().st_size} bytes")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_bytes().decode("utf-8", errors="replace")
         found = _reader(path, text)(path, text)
         for one in found:
             one.camera(one.size, np.eye(3))

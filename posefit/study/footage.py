@@ -15,7 +15,7 @@ from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image
 from posefit.study.extract import store
 from posefit.study.masks import LazyMasks, Masks, Range, Straight, Views
-from posefit.study.segment import Extraction, Segmentation
+from posefit.study.segment import Segmentation
 from posefit.study.source import Scene, observed
 from posefit.study.video import Video
 
@@ -40,12 +40,8 @@ def masks_of(source: str | Path, fps: float, frames: Range) -> Seen:
     return Seen(masks, Views([masks]).sizes[0], None, fps)
 
 
-def video_of(
-    source: str | Path, how: Extraction, frames: Range, folder: Path, progress: Callable[..., Any] | None
-) -> Seen:
+def video_of(video: Video, found: Segmentation, folder: Path, progress: Callable[..., Any] | None) -> Seen:
     """Return what a video shows; its masks are written to a new folder, so that none has to stay in memory."""
-    video = Video.of(source)
-    found = Segmentation(video, how, frames)
     folder.mkdir()
     masks = store(folder, found, progress)
     pictures = partial(video.frames, found.start, found.stop, found.size)
@@ -65,14 +61,7 @@ def scene_of(
     A file with several cameras serves for several views, in its order. One view without a camera gets a guess: level,
     40 degrees across. Raises ValueError where cameras and views do not fit each other.
     """
-    rates = {round(one.fps, 3) for one in seen}
-    if len(rates) > 1:
-        raise ValueError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
-    known = _calibrations(cameras, len(seen))
-    if not known:
-        if len(seen) > 1:
-            raise ValueError(f"camera must be given for each of several views, {len(seen)}, got none")
-        known = [Camera.around(np.zeros(3), 0.0, 0.0, seen[0].size)]
+    known = calibrated(cameras, [one.filmed for one in seen]) or [Camera.around(np.zeros(3), 0.0, 0.0, seen[0].size)]
     world = upright([one for one in known if isinstance(one, Calibration)], up)
     masks: list[Masks] = []
     placed: list[Camera] = []
@@ -83,7 +72,8 @@ def scene_of(
             placed.append(calibration)
             maps.append(None)
             continue
-        _check_size(calibration, one)
+        if one.filmed is None:
+            _check_shape(calibration, one.size)
         placed.append(calibration.camera(one.size, world))
         bent = calibration.maps(one.size) if calibration.distorted else None
         maps.append(bent)
@@ -99,27 +89,39 @@ def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]
         yield np.asarray(cv2.remap(image, *maps, cv2.INTER_LINEAR), dtype=np.uint8)
 
 
-def _calibrations(cameras: Sequence[Camera | str | Path], views: int) -> list[Camera | Calibration]:
+def calibrated(
+    cameras: Sequence[Camera | str | Path], filmed: Sequence[tuple[int, int] | None]
+) -> list[Camera | Calibration]:
+    """Return the cameras of as many views, none for a single view without one; `filmed` are the sizes of videos.
+
+    Raises ValueError where cameras and views do not fit each other.
+    """
     known: list[Camera | Calibration] = []
     for camera in cameras:
         if isinstance(camera, Camera):
             known.append(camera)
         else:
             known += read_calibrations(camera)
+    views = len(filmed)
+    if not known and views > 1:
+        raise ValueError(f"camera must be given for each of several views, {views}, got none")
     if known and len(known) != views:
         raise ValueError(f"camera must be given for each view, {views}, got {len(known)}")
     if views > 1 and any(isinstance(one, Calibration) and one.rotation is None for one in known):
         raise ValueError("camera must say where each of several cameras stands, got a file without rotation")
+    for one, size in zip(known, filmed, strict=False):
+        if isinstance(one, Calibration) and size is not None and one.size != size:
+            raise _other_size(one, size)
     return known
 
 
-def _check_size(calibration: Calibration, seen: Seen) -> None:
-    """Check that a calibration is for a video's size; masks may be scaled, and must have its shape."""
-    (width, height), size = calibration.size, seen.filmed or seen.size
-    fits = calibration.size == size
-    if seen.filmed is None:
-        fits = abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE
-    if not fits:
-        raise ValueError(
-            f"camera {calibration.name!r} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}"
-        )
+def _check_shape(calibration: Calibration, size: tuple[int, int]) -> None:
+    """Check that masks, which may be scaled, have the shape that a calibration is for."""
+    width, height = calibration.size
+    if abs(size[0] * height / (size[1] * width) - 1.0) > SAME_SHAPE:
+        raise _other_size(calibration, size)
+
+
+def _other_size(calibration: Calibration, size: tuple[int, int]) -> ValueError:
+    width, height = calibration.size
+    return ValueError(f"camera {calibration.name!r} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}")

@@ -24,6 +24,7 @@ LEFT, RIGHT, MIDDLE = (80, 150, 245), (225, 165, 85), (205, 205, 205)
 TEXT = (240, 240, 240)
 PANEL = 480  # pixels high
 STILLS = 6  # frames on the summary
+BAND = 38  # pixels that the label stands on
 SOLID = 0.65  # how much of what was filmed the body hides
 DISTANCE = 6.0  # metres from the view from the side
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
@@ -60,8 +61,9 @@ class Painter:
             + ([f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else [])
             + ([] if observation.usable else ["pose held"])
         )
+        image[:BAND] //= 4  # so that the label is seen before a bright sky
         _write(image, label, (12, 26))
-        _write(image, "from the side", (width + 12, 26))
+        _write(image, "from the camera's right", (width + 12, 26))
         if filmed is None:
             for k, (name, colour) in enumerate((("both", BOTH), ("observed only", MISSED), ("body only", SPILLED))):
                 _write(image, name, (12 + 130 * k, PANEL - 14), colour)

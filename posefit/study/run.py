@@ -164,6 +164,8 @@ def track(
         )
         summary = {
             "motion": seen.name,
+            "source": [one.name if isinstance(one, Motion) else str(one) for one in sources],
+            "frames_chosen": list(frames),
             "method": method.name,
             "seed": seed,
             "frames": len(found),

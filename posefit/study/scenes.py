@@ -12,10 +12,11 @@ from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.motion import library
 from posefit.motion.motion import Motion
-from posefit.study.footage import masks_of, scene_of, video_of
+from posefit.study.footage import Seen, calibrated, masks_of, scene_of, video_of
 from posefit.study.masks import Range
-from posefit.study.segment import Extraction
+from posefit.study.segment import Extraction, Segmentation
 from posefit.study.source import Scene, kind_of, motion_of, synthetic
+from posefit.study.video import Video
 
 Source = str | Path | Motion
 HEIGHTS = (0.3, 2.8)  # metres that a person may stand
@@ -76,19 +77,38 @@ def scene(
         raise ValueError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     if len(viewing.view_degrees) > 1:
         raise ValueError(f"view_degrees must be one for footage, of its first camera, got {len(viewing.view_degrees)}")
-    seen = []
-    for k, source in enumerate(sources):
-        assert not isinstance(source, Motion)
-        if kinds == {"video"}:
-            say(f"taking the person out of {source}")
-            seen.append(video_of(source, viewing.extraction, viewing.frames, work / f"view-{k}", progress))
-        else:
-            seen.append(masks_of(source, viewing.fps, viewing.frames))
+    paths = [Path(source) for source in sources if not isinstance(source, Motion)]
+    if kinds == {"video"}:
+        seen = _filmed(paths, viewing, work, progress, say)
+    else:
+        calibrated(viewing.cameras, [None] * len(paths))
+        seen = [masks_of(path, viewing.fps, viewing.frames) for path in paths]
     body = _body(viewing)
     views = viewing.view_degrees[0] if viewing.view_degrees else None
     name = Path(str(sources[0])).stem
     made = scene_of(seen, name, body, viewing.cameras, views, viewing.up)
     return made, [warning for one in seen for warning in one.warnings]
+
+
+def _filmed(
+    paths: Sequence[Path],
+    viewing: Viewing,
+    work: Path,
+    progress: Callable[..., Any] | None,
+    say: Callable[[str], None],
+) -> list[Seen]:
+    """Return what videos show, after everything that a user may have got wrong was checked."""
+    videos = [Video.of(path) for path in paths]
+    rates = {round(video.fps, 3) for video in videos}
+    if len(rates) > 1:
+        raise ValueError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
+    calibrated(viewing.cameras, [video.size for video in videos])
+    found = [Segmentation(video, viewing.extraction, viewing.frames) for video in videos]
+    seen = []
+    for k, (video, one) in enumerate(zip(videos, found, strict=True)):
+        say(f"taking the person out of {video.path}")
+        seen.append(video_of(video, one, work / f"view-{k}", progress))
+    return seen
 
 
 def _cameras(one: Camera | str | Path, viewing: Viewing) -> list[Camera]:

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -31,6 +32,7 @@ LATEST = 15  # frames that a frame's area is compared with
 CHANGE = 0.5  # a frame whose area is off by more than this share is not usable
 RIVAL = 0.4  # something else that is so large, as a share of the person, may be another person
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
+LOST = 0.02  # the share of a file's frames that may be missing without a word
 PERIOD = 5  # every so many frames it is looked whether the camera moved
 SMALL = 160  # pixels: the width of the pictures that are compared for it
 TILES = 3  # to a side
@@ -55,7 +57,7 @@ class Extraction:
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):
-            raise ValueError(f"method must be one of {', '.join(get_args(Method))}, got {self.method!r}")
+            raise ValueError(f"extraction method must be one of {', '.join(get_args(Method))}, got {self.method!r}")
         if not 36 <= self.width <= 8192:
             raise ValueError(f"width must lie in 36 to 8192 pixels, got {self.width}")
         if self.method == "mean" and self.background is None:
@@ -70,38 +72,49 @@ class Segmentation:
     """One pass through a video; what it found is known when it has ended."""
 
     def __init__(self, video: Video, how: Extraction, frames: Range) -> None:
-        """Learn the background. Raises ValueError where the extraction does not fit the video."""
-        self.start, self.stop = span(frames, video.count())
+        """Check that the extraction fits the video. Raises ValueError where it does not."""
+        count = video.count()
+        self.start, self.stop = span(frames, count)
+        self._missing = max(0, video.claimed - count)
         scale = min(1.0, how.width / video.size[0])
         self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
         self.rows: list[dict[str, Any]] = []
         self.name, self._video = video.path, video
         self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
-        self._model = _background(video, how, self.size)
+        self._learn = partial(_background, video, how, self.size)
+        self._model = self._learn() if how.method == "mean" else None  # what is given is checked now
         self._shifts: list[float] = []
 
     def __len__(self) -> int:
         return self.stop - self.start
 
     def __iter__(self) -> Iterator[tuple[Image, Person]]:
-        """Yield each frame, scaled to `size`, with the person in it; `rows` gets what it is worth."""
+        """Learn the background and yield each frame, scaled, with the person in it; `rows` tells what it is worth."""
+        model = self._model or self._learn()
         latest: deque[int] = deque(maxlen=LATEST)
         still = _Still(self.size)
         for k, image in enumerate(self._video.frames(self.start, self.stop, self.size)):
             if k % PERIOD == 0:
                 self._shifts.append(still.shift(image))
-            found = person(*self._model.classify(image), self._roi, self._ignored)
+            found = person(*model.classify(image), self._roi, self._ignored)
             self.rows.append(_judged(found, self.start + k, latest))
             yield image, found
         if not any(row["usable"] for row in self.rows):
+            damage = f"; {self._damage}" if self._missing else ""
             raise ValueError(
-                f"{self.name}: expected a person who moves before a still background, got none in any frame"
+                f"{self.name}: expected a person who moves before a still background, got none in any frame{damage}"
             )
+
+    @property
+    def _damage(self) -> str:
+        return f"the file says that it has {self._missing} frames more than can be read: it seems to be damaged"
 
     @property
     def warnings(self) -> list[str]:
         """What a user should look at before he trusts the masks."""
         said, name = [], self.name
+        if self._missing > LOST * len(self.rows):
+            said.append(f"{name}: {self._damage}")
         seen = [row for row in self.rows if row["area"]]
         rivals = sum(row["rival"] > RIVAL for row in seen)
         if rivals > OFTEN * len(seen):

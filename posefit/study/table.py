@@ -31,7 +31,12 @@ def table(summary: Mapping[str, Any]) -> str:
             f"{100 * summary['swap_rate']:.0f} %, lost {100 * summary['lost_rate']:.0f} % of frames"
         )
     if summary["held_frames"]:
-        lines.append(f"{summary['held_frames']} frames show too little of the person: their pose is held, not searched")
+        held = summary["held_frames"]
+        show = "frame shows" if held == 1 else "frames show"
+        lines.append(
+            f"{held} {show} too little of the person: their pose is held, not searched, and may be off the person; "
+            "IoU is that of the others"
+        )
     if summary["body"] is not None:
         body = summary["body"]
         parts = [

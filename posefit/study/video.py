@@ -1,6 +1,7 @@
 """Reads video frame by frame, so that memory does not grow with its length."""
 
 import errno
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,8 @@ import numpy as np
 from posefit.silhouette.foreground import Image
 
 CODE = "mp4v"
+# what is wrong with a file is said once, by us; a user who wants to hear FFmpeg may set it himself
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,7 @@ class Video:
     path: Path
     fps: float
     size: tuple[int, int]  # width and height in pixels, as filmed
+    claimed: int = 0  # frames, by what the file says of itself; 0 where it says nothing
 
     @classmethod
     def of(cls, path: str | Path) -> "Video":
@@ -33,9 +37,11 @@ class Video:
             if not read:
                 raise ValueError(f"{path}: expected a video that OpenCV can read, got none or one without frames")
             fps = float(capture.get(cv2.CAP_PROP_FPS))
+            claimed = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
         finally:
             capture.release()
-        return cls(path, fps if np.isfinite(fps) and 0.0 < fps <= 1000.0 else 30.0, (image.shape[1], image.shape[0]))
+        rate = fps if np.isfinite(fps) and 0.0 < fps <= 1000.0 else 30.0
+        return cls(path, rate, (image.shape[1], image.shape[0]), int(claimed) if 0.0 < claimed < 1e9 else 0)
 
     def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop, scaled to `size`.

@@ -23,6 +23,14 @@ TAGS = (
     "HANSEN2016 (sampling)",
     "HANSEN2016 (update)",
     "AUGER2005 (restart)",
+    "VSMM 6.2a",
+    "VSMM 6.2b",
+    "VSMM 6.3a",
+    "VSMM 6.3b",
+    "VSMM 6.3c",
+    "VSMM 6.3d",
+    "VSMM 6.4",
+    "VSMM 6.5",
 )
 
 
@@ -38,5 +46,5 @@ def test_a_tag_has_one_home_and_a_test(tag: str) -> None:
 
 
 def test_no_tag_is_missing_from_this_list() -> None:
-    found = {match[1] for line in lines("plugins") if (match := re.search(r"# ([A-Z]+\d{4} \(.*\))$", line))}
+    found = {match[1] for line in lines("plugins") if (match := re.search(r"# ([A-Z]+\d{4} \(.*\)|VSMM .*)$", line))}
     assert found == set(TAGS)

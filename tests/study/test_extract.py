@@ -164,7 +164,7 @@ def test_the_command_prints_what_it_found(filmed: tuple[Path, list[Any]], tmp_pa
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--method", "magic"], "method must be one of mixture, mean, median, masks, got 'magic'"),
+        (["--method", "magic"], "extraction method must be one of mixture, mean, median, masks, got 'magic'"),
         (["--method", "mean"], "background must be frames A:B or an image for the method mean, got none"),
         (["--background", "0:5"], "background must be given for the method mean only, got '0:5' with mixture"),
         (

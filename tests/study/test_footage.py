@@ -295,7 +295,10 @@ def test_a_video_that_changes_its_size_is_named(tmp_path: Path, monkeypatch: pyt
         (["VIDEO", "--restarts", "-1"], "restarts must be 0 or more, got -1"),
         (["VIDEO", "--body-frames", "-1"], "body_frames must be 0 or more, got -1"),
         (["VIDEO", "--view-degrees", "0", "--view-degrees", "90"], "view_degrees must be one for footage"),
-        (["VIDEO", "--extraction", "magic"], "method must be one of mixture, mean, median, masks, got 'magic'"),
+        (
+            ["VIDEO", "--extraction", "magic"],
+            "extraction method must be one of mixture, mean, median, masks, got 'magic'",
+        ),
         (["VIDEO", "--translation", "known"], "translation must be searched or aligned where only masks are given"),
         (["VIDEO", "--first-pose", "given"], "first_pose must be searched where only masks are given"),
         (["VIDEO", "--frames", "0:5"], "expected a person who moves before a still background, got none in any frame"),

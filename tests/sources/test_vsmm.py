@@ -1,0 +1,245 @@
+"""The variable-structure multiple-model tracker, CN101894278, step by step; so far step 6, the filter.
+
+The textbook case is a target that flies straight and then turns: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation
+with Applications to Tracking and Navigation, Wiley 2001, chapter 11.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from posefit.geometry.rotation import Array
+from posefit_vsmm.imm import IMM, Belief, Manifold, Measurement, positive, start, update
+
+STEP, SIGMA = 1.0, 20.0  # seconds between measurements, metres of noise in each
+TRANSITION = np.array([[0.95, 0.05], [0.10, 0.90]])
+H = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A model whose state (x, vx, y, vy) is multiplied by a matrix."""
+
+    matrix: Array
+    noise: Array
+
+    def predict(self, state: Array, covariance: Array) -> tuple[Array, Array]:
+        return self.matrix @ state, self.matrix @ covariance @ self.matrix.T + self.noise
+
+
+def flight(rate: float, acceleration: float) -> Linear:
+    """Return constant velocity, or a coordinated turn at a known rate, with white accelerations."""
+    t = STEP
+    s, c = (t, 0.0) if rate == 0.0 else (np.sin(rate * t) / rate, (1.0 - np.cos(rate * t)) / rate)
+    cosine, sine = np.cos(rate * t), np.sin(rate * t)
+    matrix = np.array([[1, s, 0, -c], [0, cosine, 0, -sine], [0, c, 1, s], [0, sine, 0, cosine]])
+    gain = np.array([[0.5 * t**2, 0.0], [t, 0.0], [0.0, 0.5 * t**2], [0.0, t]])
+    return Linear(matrix, acceleration**2 * gain @ gain.T)
+
+
+MODELS = [flight(0.0, 0.2), flight(np.radians(6.0), 0.2)]
+
+
+def path(rng: np.random.Generator, straight: int = 25, turning: int = 20) -> tuple[Array, Array]:
+    """Return the states (T, 4) of a flight that goes straight, turns and goes straight, and its measurements (T, 2)."""
+    state, states = np.array([0.0, 120.0, 0.0, 30.0]), []
+    for model in [MODELS[0]] * straight + [MODELS[1]] * turning + [MODELS[0]] * straight:
+        state = model.matrix @ state
+        states.append(state)
+    truth = np.array(states)
+    return truth, truth @ H.T + rng.normal(0.0, SIGMA, (len(truth), 2))
+
+
+def measuring(seen: Array) -> Any:
+    return lambda state: Measurement(seen - H @ state, H, SIGMA**2 * np.eye(2))
+
+
+def begin(truth: Array) -> Belief:
+    return start(truth[0], np.diag([400.0, 100.0, 400.0, 100.0]), 2)
+
+
+def reference(belief: Belief, seen: Array) -> Belief:
+    """Return one cycle as the book writes it: probabilities as they are, S inverted, P - K S K'."""
+    mu = np.exp(belief.log_probabilities)
+    c = TRANSITION.T @ mu
+    states, covariances, likelihoods = [], [], []
+    for j in range(2):
+        weights = TRANSITION[:, j] * mu / c[j]
+        mean = sum(w * x for w, x in zip(weights, belief.states, strict=True))
+        spread = sum(
+            w * (P + np.outer(x - mean, x - mean))
+            for w, x, P in zip(weights, belief.states, belief.covariances, strict=True)
+        )
+        x, P = MODELS[j].matrix @ mean, MODELS[j].matrix @ spread @ MODELS[j].matrix.T + MODELS[j].noise
+        S = H @ P @ H.T + SIGMA**2 * np.eye(2)
+        K = P @ H.T @ np.linalg.inv(S)
+        v = seen - H @ x
+        states.append(x + K @ v)
+        covariances.append(P - K @ S @ K.T)
+        likelihoods.append(np.exp(-0.5 * v @ np.linalg.inv(S) @ v) / np.sqrt(np.linalg.det(2.0 * np.pi * S)))
+    mu = np.array(likelihoods) * c
+    return Belief(np.array(states), np.array(covariances), np.log(mu / mu.sum()), np.log(likelihoods))
+
+
+def test_a_flight_is_filtered_as_the_book_writes_it() -> None:  # VSMM 6.2a
+    truth, seen = path(np.random.default_rng(0))
+    imm = IMM(MODELS, TRANSITION)
+    belief = twin = begin(truth)
+    for one in seen:
+        belief, twin = imm.cycle(belief, measuring(one)), reference(twin, one)
+        np.testing.assert_allclose(belief.states, twin.states, rtol=1e-8, atol=1e-6)
+        np.testing.assert_allclose(belief.covariances, twin.covariances, rtol=1e-7, atol=1e-6)
+        np.testing.assert_allclose(belief.log_probabilities, twin.log_probabilities, atol=1e-7)
+        np.testing.assert_allclose(belief.log_likelihoods, twin.log_likelihoods, atol=1e-7)
+    assert belief.repairs == 0
+
+
+def test_mixing_has_the_spread_of_the_means() -> None:  # VSMM 6.2b
+    # by hand: means 0 and 2 of variance 1, both probable alike and changing freely, make a mean of 1 and a variance of 2
+    still = Linear(np.eye(1), np.zeros((1, 1)))
+    imm = IMM([still, still], np.full((2, 2), 0.5))
+    belief = Belief(np.array([[0.0], [2.0]]), np.ones((2, 1, 1)), np.log([0.5, 0.5]), np.zeros(2))
+    mixed = imm.mixed(belief)
+    np.testing.assert_allclose(mixed.states, 1.0)
+    np.testing.assert_allclose(mixed.covariances, 2.0)
+
+
+def test_a_model_predicts_by_its_own_motion() -> None:  # VSMM 6.3a
+    imm = IMM(MODELS, np.eye(2))
+    belief = begin(np.array([[0.0, 100.0, 0.0, 0.0]]))
+    after = imm.cycle(belief, lambda state: Measurement(np.empty(0), np.empty((0, 4)), np.empty((0, 0))))
+    np.testing.assert_allclose(after.states[0], [100.0, 100.0, 0.0, 0.0])
+    assert after.states[1][3] == pytest.approx(100.0 * np.sin(np.radians(6.0)))
+    np.testing.assert_allclose(after.probabilities, 0.5)  # nothing was measured
+
+
+def test_the_innovation_has_the_noise_of_state_and_measurement() -> None:  # VSMM 6.3b
+    # by hand: variance 3 of the state and 1 of the measurement: a gain of 3/4, and 3/4 left
+    seen = Measurement(np.array([4.0]), np.eye(1), np.eye(1))
+    state, left, _ = update(np.zeros(1), 3.0 * np.eye(1), seen, Manifold())
+    np.testing.assert_allclose(state, 3.0)
+    np.testing.assert_allclose(left, 0.75)
+
+
+def test_the_likelihood_is_the_gaussian_of_the_residual() -> None:  # VSMM 6.3c
+    # S = 4, residual 4: -1/2 (16 / 4 + ln 4 + ln 2 pi)
+    seen = Measurement(np.array([4.0]), np.eye(1), np.eye(1))
+    likelihood = update(np.zeros(1), 3.0 * np.eye(1), seen, Manifold())[2]
+    assert likelihood == pytest.approx(-0.5 * (4.0 + np.log(4.0) + np.log(2.0 * np.pi)))
+
+
+def test_the_gain_is_that_of_least_variance() -> None:  # VSMM 6.3d
+    rng = np.random.default_rng(1)
+    root, jacobian = rng.normal(size=(4, 4)), rng.normal(size=(2, 4))
+    covariance, noise = root @ root.T, np.diag([0.5, 2.0])
+    left = update(np.zeros(4), covariance, Measurement(np.zeros(2), jacobian, noise), Manifold())[1]
+    information = np.linalg.inv(covariance) + jacobian.T @ np.linalg.inv(noise) @ jacobian
+    np.testing.assert_allclose(left, np.linalg.inv(information), rtol=1e-9, atol=1e-12)
+
+
+def test_the_model_that_flies_as_the_target_does_is_the_probable_one() -> None:  # VSMM 6.4
+    errors: dict[str, list[float]] = {"imm": [], "straight": [], "turn": []}
+    right = []
+    for seed in range(20):
+        truth, seen = path(np.random.default_rng(seed))
+        imm, belief = IMM(MODELS, TRANSITION), begin(truth)
+        singles = {"straight": IMM(MODELS[:1], np.eye(1)), "turn": IMM(MODELS[1:], np.eye(1))}
+        alone = {name: start(truth[0], belief.covariances[0], 1) for name in singles}
+        for k, one in enumerate(seen):
+            belief = imm.cycle(belief, measuring(one))
+            turning = 25 <= k < 45
+            right.append(belief.probabilities[int(turning)] > 0.5)
+            fused = imm.fused(belief)[0]
+            errors["imm"].append(float(np.hypot(*(H @ (fused - truth[k])))))
+            for name, single in singles.items():
+                alone[name] = single.cycle(alone[name], measuring(one))
+                errors[name].append(float(np.hypot(*(H @ (alone[name].states[0] - truth[k])))))
+    assert np.mean(right) > 0.8  # a change is noticed some steps late
+    root = {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in errors.items()}
+    assert root["imm"] < 0.5 * root["straight"]
+    assert root["imm"] < 0.5 * root["turn"]
+    assert root["imm"] < SIGMA * np.sqrt(2.0)  # better than the measurements themselves
+
+
+def test_fusing_is_the_mean_over_the_models() -> None:  # VSMM 6.5
+    imm = IMM(MODELS, TRANSITION)
+    states = np.array([[0.0, 0.0, 0.0, 0.0], [4.0, 0.0, 0.0, 0.0]])
+    belief = Belief(states, np.tile(np.eye(4), (2, 1, 1)), np.log([0.75, 0.25]), np.zeros(2))
+    state, covariance = imm.fused(belief)
+    np.testing.assert_allclose(state, [1.0, 0.0, 0.0, 0.0])
+    assert covariance[0, 0] == pytest.approx(1.0 + 0.75 * 1.0 + 0.25 * 9.0)
+
+
+def test_a_34_dimensional_residual_of_60_pixels_leaves_probabilities() -> None:  # Reading V13
+    still = Linear(np.eye(34), np.eye(34))
+    imm = IMM([still, still, still], np.full((3, 3), 1.0 / 3.0))
+    offsets = np.array([60.0, 55.0, 70.0])
+    belief = Belief(
+        np.tile(offsets[:, None], (1, 34)),
+        np.tile(0.01 * np.eye(34), (3, 1, 1)),
+        np.log(np.full(3, 1 / 3)),
+        np.zeros(3),
+    )
+    keep = IMM([still, still, still], np.eye(3))  # no mixing: each model stays as far off as it is
+    after = keep.cycle(belief, lambda state: Measurement(-state, np.eye(34), np.eye(34)))
+    assert (after.log_likelihoods < -745.0).all()  # exp() of it is 0
+    assert np.isfinite(after.probabilities).all()
+    assert after.probabilities.sum() == pytest.approx(1.0)
+    assert after.probabilities.argmax() == 1
+    assert np.isfinite(imm.cycle(belief, lambda state: Measurement(-state, np.eye(34), np.eye(34))).states).all()
+
+
+def test_quaternions_are_mixed_on_their_manifold() -> None:  # Reading V4
+    def plus(state: Array, error: Array) -> Array:
+        return np.asarray((Rotation.from_quat(state) * Rotation.from_rotvec(error)).as_quat())
+
+    def minus(first: Array, second: Array) -> Array:
+        return np.asarray((Rotation.from_quat(second).inv() * Rotation.from_quat(first)).as_rotvec())
+
+    sphere = Manifold(plus, minus)
+    turns = Rotation.from_euler("y", [[170.0], [-170.0]], degrees=True).as_quat()
+    turns[1] *= -1.0  # the same rotation
+    mean = sphere.mean(turns, np.array([0.5, 0.5]))
+    assert np.degrees(Rotation.from_quat(mean).magnitude()) == pytest.approx(180.0)
+    assert np.linalg.norm(mean) == pytest.approx(1.0)
+    spread = sphere.spread(turns, np.zeros((2, 3, 3)), np.array([0.5, 0.5]), mean)
+    assert np.degrees(np.sqrt(spread[1, 1])) == pytest.approx(10.0)
+
+
+def test_a_covariance_that_is_none_is_repaired_and_counted() -> None:
+    broken = np.diag([1.0, -0.5])
+    mended, repaired = positive(broken)
+    assert repaired == 1
+    assert np.linalg.eigvalsh(mended).min() > 0.0
+    np.testing.assert_allclose(positive(np.diag([1.0, 2.0]))[0], np.diag([1.0, 2.0]))
+    imm = IMM(MODELS, TRANSITION)
+    belief = start(np.zeros(4), np.diag([1.0, 1.0, -1e-3, 1.0]), 2)
+    after = imm.cycle(belief, measuring(np.zeros(2)))
+    assert after.repairs >= 2
+    assert np.isfinite(after.covariances).all()
+
+
+def test_a_single_model_is_a_kalman_filter_and_a_model_that_nothing_leads_to_stays_itself() -> None:
+    truth, seen = path(np.random.default_rng(0))
+    imm, belief = IMM(MODELS[:1], np.eye(1)), start(truth[0], np.eye(4), 1)
+    assert imm.cycle(belief, measuring(seen[0])).probabilities == pytest.approx([1.0])
+    one_way = IMM(MODELS, np.array([[1.0, 0.0], [1.0, 0.0]]))
+    after = one_way.cycle(begin(truth), measuring(seen[0]))
+    np.testing.assert_allclose(after.probabilities, [1.0, 0.0])
+    assert np.isfinite(after.states).all()
+
+
+@pytest.mark.parametrize(
+    ("transition", "message"),
+    [
+        (np.eye(3), r"transition must have shape \(2, 2\), a row a model, got \(3, 3\)"),
+        (np.full((2, 2), 0.4), "transition must hold probabilities whose rows sum to 1"),
+        (np.array([[1.5, -0.5], [0.0, 1.0]]), "transition must hold probabilities"),
+    ],
+)
+def test_a_transition_that_is_none_is_named(transition: Array, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        IMM(MODELS, transition)
