@@ -112,7 +112,12 @@ def main() -> None:
 
 @main.command()
 @_common
-@click.option("--frames", callback=_range, metavar="A:B", help="Only these frames, counted after resampling.")
+@click.option(
+    "--frames",
+    callback=_range,
+    metavar="A:B",
+    help="Only these frames: of footage as filmed, of a motion after resampling.",
+)
 def track(as_json: bool, **options: Any) -> None:
     """Follow a person through SOURCE.
 
