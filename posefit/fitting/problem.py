@@ -54,7 +54,9 @@ class PoseProblem:
         return self.combined(self.areas(poses, translations))
 
     def combined(self, counts: Sequence[Areas]) -> Array:
-        """Return the cost (n,) of areas R, B, Y (n, 3), one array a view."""
+        """Return the cost (n,) of areas R, B, Y (n, 3), one array a view; one of which nothing is known has no say."""
+        known = [view for view, silhouette in zip(counts, self.silhouettes, strict=True) if silhouette.known]
+        counts = known or counts
         costs = mismatch(counts[0], self.beta)
         for more in counts[1:]:
             costs += mismatch(more, self.beta)

@@ -59,6 +59,11 @@ class Silhouette:
         return pack(self.mask), pack(self.valid)
 
     @cached_property
+    def known(self) -> bool:
+        """Whether anything is known at all."""
+        return bool(self.valid.any())
+
+    @cached_property
     def extent(self) -> tuple[float, float, float, float]:
         """Left, top, right and bottom border of the person in pixels; nan where nothing or the image's edge is seen."""
         rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))

@@ -23,6 +23,7 @@ class Evaluation:
         self._scene, self._prior, self._training, self._beta = scene, prior, training, beta
         self._frames: list[Frame] = []
         self._usable: list[bool] = []
+        self._ious: list[float] = []
         self._nearest: list[Array] = []
 
     def add(self, frame: Frame, observation: Observation) -> dict[str, float]:
@@ -30,7 +31,9 @@ class Evaluation:
         k = len(self._frames)
         self._frames.append(frame)
         self._usable.append(observation.usable)
-        row = {"cost": frame.cost, "iou": float(metrics.iou(frame.areas).mean())}
+        known = [silhouette.known for silhouette in observation.silhouettes]  # by a camera that saw something
+        self._ious.append(float(metrics.iou(frame.areas)[known if any(known) else slice(None)].mean()))
+        row = {"cost": frame.cost, "iou": self._ious[-1]}
         if self._scene.truth is not None:
             truth = self._scene.truth.poses[k]
             row["error_degrees"] = float(metrics.pose_error_degrees(truth[None], frame.pose[None])[0])
@@ -50,7 +53,7 @@ class Evaluation:
         frames = self._frames
         columns: dict[str, Array] = {
             "cost": np.array([frame.cost for frame in frames]),
-            "iou": np.array([metrics.iou(frame.areas).mean() for frame in frames]),
+            "iou": np.array(self._ious),
         }
         summary: dict[str, Any] = dict.fromkeys(
             (

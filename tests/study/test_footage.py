@@ -16,9 +16,13 @@ from click.testing import CliRunner, Result
 import posefit
 from posefit.cli import main
 from posefit.fitting import metrics
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
 from posefit.geometry.rotation import wrapped
+from posefit.motion import library
 from posefit.motion.amc import read_clip
 from posefit.motion.bvh import read_bvh
+from posefit.registry import registry
 from posefit.study.extract import extract
 from posefit.study.masks import LazyMasks, Straight, Views
 from posefit.study.segment import Extraction
@@ -109,6 +113,14 @@ def test_two_calibrated_cameras_find_the_person_where_he_is(filmed: tuple[Path, 
     assert filmed_twice.summary["iou"] > 0.4
 
 
+AVERAGE = posefit.Body.of(library.average_skeleton())
+
+
+def line(body: posefit.Body) -> SearchSpace:
+    prior = registry().prior("pca")().fit(walk().poses[:, 3:], body.skeleton)
+    return SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
+
+
 def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path: Path) -> None:
     side, front = (np.stack(truth(azimuth)[8:14]).astype(np.uint8) for azimuth in (np.pi / 2, 0.6))
     usable = np.array([True, True, False, True, True, True])
@@ -123,6 +135,10 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path
     sources = [tmp_path / "a.npz", tmp_path / "b.npz"]
     result = posefit.track(sources, camera=calibration, up="y", evaluations=200, restarts=1, body_frames=0)
     assert result.summary["held_frames"] == 0
+    blind = PoseProblem(AVERAGE, [camera(np.pi / 2), camera(0.6)], views[2].silhouettes, line(AVERAGE))
+    alone = PoseProblem(AVERAGE, [camera(0.6)], views[2].silhouettes[1:], line(AVERAGE))
+    pose, place = walk().poses[10:11], walk().translations[10:11]
+    np.testing.assert_array_equal(blind.cost(pose, place), alone.cost(pose, place))
 
 
 def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path: Path) -> None:
