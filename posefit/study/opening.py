@@ -12,7 +12,6 @@ import numpy as np
 from posefit.fitting.shape import Shape, fit_shape
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
-from posefit.geometry.rotation import Array
 from posefit.motion.motion import Motion
 from posefit.study.method import Choice, prepare
 from posefit.study.source import Scene
@@ -31,8 +30,9 @@ Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[F
 
 @dataclass(frozen=True)
 class Opening:
-    """What is to be found out before the first frame; None leaves it to whether the truth is known."""
+    """What is to be found out before the first frame; None leaves it to whether nobody knows the truth, `blind`."""
 
+    blind: bool
     translation: Translation | None = None
     first_pose: Literal["searched", "given"] = "searched"
     restarts: int | None = None
@@ -42,6 +42,10 @@ class Opening:
     def __post_init__(self) -> None:
         if self.first_pose not in ("searched", "given"):
             raise ValueError(f"first_pose must be one of searched, given, got {self.first_pose!r}")
+        if self.blind and self.translation == "known":
+            raise ValueError("translation must be searched or aligned where only masks are given, got known")
+        if self.blind and self.first_pose == "given":
+            raise ValueError("first_pose must be searched where only masks are given, got given")
         for name in ("restarts", "body_frames"):
             value = getattr(self, name)
             if value is not None and value < 0:
@@ -58,10 +62,8 @@ def opened(
     say: Callable[[str], None],
 ) -> tuple[Task, Shape | None]:
     """Return the task of following a scene, and the person's build where it was fitted."""
-    blind = seen.truth is None
-    mode: Translation = how.translation or ("aligned" if blind else "known")
-    if mode == "known" and blind:
-        raise ValueError("translation must be searched or aligned where only masks are given, got known")
+    mode: Translation = how.translation or ("aligned" if how.blind else "known")
+    known = None if seen.truth is None or how.first_pose == "searched" else seen.truth.poses[0, 3:]
     task = Task(
         seen.body,
         seen.cameras,
@@ -71,7 +73,7 @@ def opened(
         translation=mode,
         fps=seen.fps,
         training=trained,
-        first_pose=_first_pose(seen) if how.first_pose == "given" else None,
+        first_pose=known,
         threads=threads,
     )
     began = time.perf_counter()
@@ -80,8 +82,8 @@ def opened(
     say(f"ready in {time.perf_counter() - began:.1f} s; {seen.count} frames of {seen.name}")
 
     follow = following(choice)
-    restarts = (RESTARTS if blind else 0) if how.restarts is None else how.restarts
-    body_frames = (BODY_FRAMES if blind else 0) if how.body_frames is None else how.body_frames
+    restarts = (RESTARTS if how.blind else 0) if how.restarts is None else how.restarts
+    body_frames = (BODY_FRAMES if how.blind else 0) if how.body_frames is None else how.body_frames
     if restarts:
         say(f"looking for the first pose, {restarts} times")
         task = begun(task, seen.observations, follow, restarts, seed)
@@ -163,12 +165,6 @@ def built(
         height=height,
         aligned=task.translation == "aligned",
     )
-
-
-def _first_pose(scene: Scene) -> Array:
-    if scene.truth is None:
-        raise ValueError("first_pose must be searched where only masks are given, got given")
-    return scene.truth.poses[0, 3:]
 
 
 def _warm_up(tracker: Tracker, scene: Scene) -> None:

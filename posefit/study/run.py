@@ -132,7 +132,10 @@ def track(
         ask_seconds,
     )
     choice.budget()
-    opening = Opening(translation, first_pose, restarts, 0 if body_frames is None and asf else body_frames, height)
+    if body_frames is None and asf is not None:
+        body_frames = 0
+    opening = Opening(kind_of(sources[0]) != "motion", translation, first_pose, restarts, body_frames, height)
+    trained = _training(sources, train, asf, fps)
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
     if resume and out is None:
@@ -146,7 +149,8 @@ def track(
         seen, warnings = scene(sources, viewing, output.work, progress, say)
         for warning in warnings:
             say(f"warning: {warning}")
-        trained = _training(sources, train, asf, seen.fps)
+        if seen.fps != fps:
+            trained = _training(sources, train, asf, seen.fps)
         task, shape = opened(seen, choice, opening, trained, seed, threads, say)
         seen = replace(seen, body=task.body)
         method = prepare(choice, task)

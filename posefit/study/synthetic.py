@@ -1,6 +1,6 @@
 """Tracks of synthetic people whose truth is known, spoilt or seen as a study asks."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -83,6 +83,3 @@ def mean_error(scene: Scene, task: Task) -> float:
     angles = np.concatenate([motion.poses[:, 3:] for motion in task.training]).mean(axis=0)
     poses = np.column_stack([truth.poses[:, :3], np.tile(angles, (len(truth), 1))])
     return float(metrics.pose_error_degrees(truth.poses, poses).mean())
-
-
-Say = Callable[[str], None]

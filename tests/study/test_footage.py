@@ -317,6 +317,7 @@ def test_a_video_that_changes_its_size_is_named(tmp_path: Path, monkeypatch: pyt
         ),
         (["VIDEO", "--translation", "known"], "translation must be searched or aligned where only masks are given"),
         (["VIDEO", "--first-pose", "given"], "first_pose must be searched where only masks are given"),
+        (["VIDEO", "--train", "wlak"], "got 'wlak'; did you mean 'walk'?"),
         (["VIDEO", "--frames", "0:5"], "expected a person who moves before a still background, got none in any frame"),
         (["missing.mp4"], "missing.mp4: expected a video file, got nothing of that name"),
         (["TEXT"], "expected a video that OpenCV can read"),
