@@ -37,6 +37,7 @@ class Calibration:
     rotation: Array | None = field(repr=False)  # (3, 3) camera_from_world; None where the file does not place it
     translation: Array | None = field(repr=False)  # (3,)
     fisheye: bool = False
+    upright: bool = False  # whether +y is known to be up in its world, as in our own files
 
     @property
     def distorted(self) -> bool:
@@ -69,13 +70,13 @@ class Calibration:
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
 
-    Without `up` it is the axis, either way, that the images see pointing up most. Raises ValueError where `up` is
-    none.
+    It is +y already where a file says so; else, without `up`, the axis, either way, that the images see pointing up
+    most. Raises ValueError where `up` is none.
     """
     if up is not None and up not in TURNS:
         raise ValueError(f"up must be one of x, y, z, got {up!r}")
     placed = [one.rotation for one in calibrations if one.rotation is not None]
-    if not placed:
+    if not placed or any(one.upright for one in calibrations):
         return np.eye(3)
     seen = -np.sum([rotation[1] for rotation in placed], axis=0)  # images' up, in the world
     axis: Up = up or ("x", "y", "z")[int(np.abs(seen).argmax())]
@@ -121,7 +122,7 @@ def _reader(path: Path, text: str) -> Callable[[Path, str], list[Calibration]]:
 def _own(path: Path, _: str) -> list[Calibration]:
     camera = Camera.from_json(path)
     matrix, size = _pinhole(camera.focal, camera.centre - HALF), (camera.width, camera.height)
-    return [Calibration(path.stem, size, matrix, np.zeros(4), camera.rotation, camera.translation)]
+    return [Calibration(path.stem, size, matrix, np.zeros(4), camera.rotation, camera.translation, upright=True)]
 
 
 def _toml(_: Path, text: str) -> list[Calibration]:

@@ -5,6 +5,7 @@ Known truth, view 45, the same budget, seeds 0 to 4; prints the table that the f
 
 import sys
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -72,4 +73,8 @@ def figure(found: Curve, mean: float, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    figure(*curves(), Path(sys.argv[1] if len(sys.argv) > 1 else "degradation.png"))
+    if len(sys.argv) != 2:
+        sys.exit("usage: python -m posefit.study.degradation OUT.png")
+    if find_spec("matplotlib") is None:  # known before the minutes that the tracks take
+        sys.exit("the figure needs the library matplotlib: pip install posefit[figures]")
+    figure(*curves(), Path(sys.argv[1]))

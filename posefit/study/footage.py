@@ -16,7 +16,7 @@ from posefit.silhouette.foreground import Image
 from posefit.study.extract import store
 from posefit.study.masks import LazyMasks, Masks, Range, Straight, Views
 from posefit.study.segment import Segmentation
-from posefit.study.source import Scene, observed
+from posefit.study.source import FPS, Scene, observed
 from posefit.study.video import Video
 
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
@@ -34,10 +34,10 @@ class Seen:
     warnings: Sequence[str] = ()
 
 
-def masks_of(source: str | Path, fps: float, frames: Range) -> Seen:
-    """Return what a folder or an .npz of masks shows."""
-    masks = LazyMasks.of(Path(source), frames)
-    return Seen(masks, Views([masks]).sizes[0], None, fps)
+def masks_of(path: Path, fps: float | None, frames: Range) -> Seen:
+    """Return what a folder or an .npz of masks shows, at `fps`, or else at the rate that the file states, or 30."""
+    masks = LazyMasks.of(path, frames)
+    return Seen(masks, Views([masks]).sizes[0], None, fps or masks.fps or FPS)
 
 
 def video_of(video: Video, found: Segmentation, folder: Path, progress: Callable[..., Any] | None) -> Seen:

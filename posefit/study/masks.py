@@ -45,6 +45,7 @@ class LazyMasks:
     stack: NDArray[Any] | None = field(default=None, repr=False)
     known: NDArray[Any] | None = field(default=None, repr=False)  # of the same shape; 0 where nothing is known
     usable: NDArray[np.bool_] | None = field(default=None, repr=False)  # (T,)
+    fps: float | None = None  # where the file says it
 
     @classmethod
     def of(cls, path: Path, frames: Range) -> "LazyMasks":
@@ -60,7 +61,7 @@ class LazyMasks:
         try:
             with np.load(path, allow_pickle=False) as stored:
                 stack = stored["masks"]
-                known, usable = stored.get("valid"), stored.get("usable")
+                known, usable, fps = stored.get("valid"), stored.get("usable"), stored.get("fps")
         except (KeyError, ValueError, OSError, EOFError) as error:
             raise ValueError(f"{path}: expected an .npz file with the key masks, got {error}") from None
         if stack.ndim != 3 or not len(stack) or stack.dtype.kind not in "buif":
@@ -76,7 +77,9 @@ class LazyMasks:
         known, usable = (None if value is None else value[part] for value in (known, usable))
         if usable is not None and not usable.any():
             raise ValueError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
-        return cls(names, stack[part], known, usable)
+        if fps is not None and not (fps.shape == () and fps.dtype.kind in "iuf" and 0.0 < fps <= 1000.0):
+            raise ValueError(f"{path}: fps must be a number up to 1000, got {fps.tolist()}")
+        return cls(names, stack[part], known, usable, None if fps is None else float(fps))
 
     def __len__(self) -> int:
         return len(self.files)

@@ -180,8 +180,11 @@ def _times(seen: Scene, choice: Choice) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    box = tuple(map(int, sys.argv[2].split(",")))
-    first, last = map(int, sys.argv[3].split(":"))
+    try:
+        box = tuple(map(int, sys.argv[2].split(",")))
+        first, last = map(int, sys.argv[3].split(":"))
+    except (IndexError, ValueError):
+        sys.exit("usage: python -m posefit.study.real VIDEO X,Y,WIDTH,HEIGHT FIRST:STOP")
     print(json.dumps(speed(sys.argv[1], box, (first, last))), flush=True)  # type: ignore[arg-type]
     for seed in SEEDS:
         print(json.dumps(measure(sys.argv[1], box, (first, last), seed)), flush=True)  # type: ignore[arg-type]

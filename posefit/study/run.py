@@ -25,8 +25,10 @@ from posefit.study.method import Choice, prepare, training_angles
 from posefit.study.opening import Opening, opened
 from posefit.study.scenes import Source, Viewing, scene
 from posefit.study.segment import Extraction
-from posefit.study.source import Scene, kind_of, motion_of
+from posefit.study.source import FPS, Scene, kind_of, motion_of
 from posefit.study.writing import Nowhere, Output, OutputFolder
+
+_MAY_DIFFER = ("out", "force", "resume", "rerun", "progress", "say", "threads")  # between a track and its resumption
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,7 @@ def track(
     train: Sequence[Source] = (),
     view_degrees: float | Sequence[float] | None = None,
     size: tuple[int, int] = (320, 240),
-    fps: float = 30.0,
+    fps: float | None = None,
     frames: Range = (None, None),
     particles: int | None = None,
     iterations: int | None = None,
@@ -135,7 +137,7 @@ def track(
     if body_frames is None and asf is not None:
         body_frames = 0
     opening = Opening(kind_of(sources[0]) != "motion", translation, first_pose, restarts, body_frames, height)
-    trained = _training(sources, train, asf, fps)
+    trained = _training(sources, train, asf, FPS)  # before the work, as a name may be wrong
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
     if resume and out is None:
@@ -144,12 +146,16 @@ def track(
         from posefit.study.recording import check_recording
 
         check_recording(rerun)
-    folder = Nowhere() if out is None else OutputFolder(out, force, resume, _spec(arguments), say)
+    folder = (
+        Nowhere()
+        if out is None
+        else OutputFolder(out, force, resume, {**arguments, "version": posefit.__version__}, say)
+    )
     with folder as output, threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         seen, warnings = scene(sources, viewing, output.work, progress, say)
         for warning in warnings:
             say(f"warning: {warning}")
-        if seen.fps != fps:
+        if seen.fps != FPS:
             trained = _training(sources, train, asf, seen.fps)
         task, shape = opened(seen, choice, opening, trained, seed, threads, say)
         seen = replace(seen, body=task.body)
@@ -199,13 +205,6 @@ def track(
 def prior_of(source: Source) -> str:
     """Return the prior that a source is followed with by default."""
     return "pca" if kind_of(source) == "motion" else "loose"
-
-
-_MAY_DIFFER = ("out", "force", "resume", "rerun", "progress", "say", "threads")
-
-
-def _spec(arguments: Mapping[str, str]) -> dict[str, str]:
-    return {**arguments, "version": posefit.__version__}
 
 
 def _followed(

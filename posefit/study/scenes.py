@@ -15,7 +15,7 @@ from posefit.motion.motion import Motion
 from posefit.study.footage import Seen, calibrated, masks_of, scene_of, video_of
 from posefit.study.masks import Range
 from posefit.study.segment import Extraction, Segmentation
-from posefit.study.source import Scene, kind_of, motion_of, synthetic
+from posefit.study.source import FPS, Scene, kind_of, motion_of, synthetic
 from posefit.study.video import Video
 
 Source = str | Path | Motion
@@ -26,16 +26,17 @@ HEIGHTS = (0.3, 2.8)  # metres that a person may stand
 class Viewing:
     """How a source is looked at.
 
-    `cameras`, or calibration files, one a view; `view_degrees` from where, where no camera says; the `size` of rendered
-    pictures; the rate `fps` of motions and masks; which `frames`. For real footage: its `extraction`, how tall the
-    person stands in metres (`height`), and which axis of the calibration's world points up (`up`).
+    `cameras`, or calibration files, one a view; `view_degrees` from where, where no camera says; the `size` of
+    rendered pictures; the rate `fps` of motions and masks, by default 30 or what a file of masks states; which
+    `frames`. For real footage: its `extraction`, how tall the person stands in metres (`height`), and which axis of
+    the calibration's world points up (`up`).
     """
 
     asf: str | Path | None = None
     cameras: Sequence[Camera | str | Path] = ()
     view_degrees: Sequence[float] = ()
     size: tuple[int, int] = (320, 240)
-    fps: float = 30.0
+    fps: float | None = None
     frames: Range = (None, None)
     extraction: Extraction = field(default_factory=Extraction)
     height: float | None = None
@@ -45,7 +46,7 @@ class Viewing:
         for degrees in self.view_degrees:
             if not np.isfinite(degrees):
                 raise ValueError(f"view_degrees must be a finite number, got {degrees}")
-        if not (np.isfinite(self.fps) and self.fps > 0.0):
+        if self.fps is not None and not (np.isfinite(self.fps) and self.fps > 0.0):
             raise ValueError(f"fps must be a positive number, got {self.fps}")
         if min(self.size) < 1 or max(self.size) > 16_384:
             raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {self.size[0]}x{self.size[1]}")
@@ -71,7 +72,7 @@ def scene(
         if viewing.height is not None:
             raise ValueError(f"height must be given for footage only, a motion knows its own, got {viewing.height}")
         cameras = [camera for one in viewing.cameras for camera in _cameras(one, viewing)]
-        motion = motion_of(sources[0], viewing.asf, viewing.fps)
+        motion = motion_of(sources[0], viewing.asf, viewing.fps or FPS)
         return synthetic(motion, viewing.view_degrees, viewing.size, cameras, viewing.frames), []
     if len(kinds) > 1:
         raise ValueError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")

@@ -18,6 +18,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.study.masks import IMAGES, Range, Views, existing, span
 
 VIEW_DEGREES = 45.0  # where the camera of a synthetic sequence stands when nobody says: 0 is in front, 90 to the side
+FPS = 30.0  # of motions and masks, where nobody says
 MOTIONS = (".amc", ".bvh")
 NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".asf", ".json", ".csv", ".txt")
 Kind = Literal["motion", "masks", "video"]

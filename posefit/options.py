@@ -1,0 +1,95 @@
+"""The options that commands share, and how their values are read."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import click
+
+
+def _size(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
+    width, _sign, height = value.lower().partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise click.BadParameter(f"expected WIDTHxHEIGHT such as 320x240, got {value!r}")
+    return int(width), int(height)
+
+
+def frame_range(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int | None, int | None]:
+    """Return the ends of a range A:B, either of which may be left out."""
+    if value is None:
+        return None, None
+    start, colon, stop = value.partition(":")
+    try:
+        if colon:
+            return int(start) if start else None, int(stop) if stop else None
+    except ValueError:
+        pass
+    raise click.BadParameter(f"expected A:B such as 0:50, :50 or 10:, got {value!r}")
+
+
+def _box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...] | None:
+    if value is None:
+        return None
+    parts = value.split(",")
+    if len(parts) != 4 or not all(part.strip().isdigit() for part in parts):
+        raise click.BadParameter(f"expected X,Y,WIDTH,HEIGHT in pixels such as 0,420,1400,570, got {value!r}")
+    return tuple(map(int, parts))
+
+
+EXTRACTION = (
+    click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
+    click.option("--roi", callback=_box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
+    click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
+    click.option("--width", type=int, default=640, show_default=True, help="Larger videos are scaled down to this."),
+)
+TRACK = (
+    click.argument("source", nargs=-1),
+    click.option("--asf", metavar="FILE", help="Skeleton of SOURCE; by default the only .asf beside an .amc."),
+    click.option("--camera", multiple=True, metavar="FILE", help="Calibration, one a view; guessed where absent."),
+    click.option("--up", type=click.Choice(["x", "y", "z"]), help="Axis that points up in the calibration's world."),
+    click.option("--optimiser", default="sapso", show_default=True, help="See `posefit plugins`."),
+    click.option("--prior", help="By default pca, or loose where the truth is not known; see `posefit plugins`."),
+    click.option("--tracker", help="A tracker instead of optimiser and prior; see `posefit plugins`."),
+    click.option(
+        "--set", "settings", multiple=True, metavar="NAME.SETTING=VALUE", help="Such as sapso.cooling=0.9; repeatable."
+    ),
+    click.option("--train", multiple=True, metavar="SOURCE", help="Motion the prior learns from; may be repeated."),
+    click.option(
+        "--view-degrees",
+        type=float,
+        multiple=True,
+        help="Where a camera stands: 0 in front, 90 to the side; repeatable.",
+    ),
+    click.option("--size", default="320x240", show_default=True, callback=_size, help="Image of a rendered motion."),
+    click.option("--fps", type=float, help="Rate to resample a motion to, or of masks; by default 30, or theirs."),
+    click.option("--evaluations", type=int, help="Budget of a frame; by default N (C + 1) = 2440."),
+    click.option("--particles", type=int, help="N, by default 40."),
+    click.option("--iterations", type=int, help="C, by default 60."),
+    click.option("--first-pose", default="searched", show_default=True, help="searched, or given (the true one)."),
+    click.option("--ask-seconds", type=float, help="How long a plugin may take to propose a population."),
+    click.option("--translation", help="Root translation: known, searched or aligned."),
+    click.option("--height", type=float, metavar="METRES", help="How tall the person in the footage stands."),
+    click.option("--restarts", type=int, help="Searches of a first pose nobody knows; by default 8."),
+    click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
+    click.option(
+        "--extraction", default="mixture", show_default=True, help="Of video: mixture, median, mean, or masks."
+    ),
+    *EXTRACTION,
+    click.option("--seed", type=int, default=0, show_default=True),
+    click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),
+    click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),
+    click.option("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
+    click.option("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),
+    click.option("--rerun", metavar="FILE", help="Write a recording (.rrd) for the Rerun viewer."),
+    click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout."),
+)
+
+
+def options(chosen: Sequence[Callable[..., Any]]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that gives a command some options."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(chosen):
+            command = option(command)
+        return command
+
+    return decorate
