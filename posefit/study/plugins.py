@@ -78,6 +78,8 @@ def checked(kind: Kind, name: str, texts: Sequence[str]) -> Report:
             raise ValueError(f"--set must be SETTING=VALUE such as particles=20, got {text!r}")
         given[setting.rpartition(".")[2]] = value
     settings = parse(offer.name, offer.factory, given)
+    if kind == "prior" and settings:
+        offer.factory(**settings)  # a value that makes no sense is one mistake, not one a check
     checks = {
         "optimiser": lambda: optimiser_checks(offer.factory, next_frame=offer.next_frame, settings=settings),
         "prior": lambda: prior_checks(offer.factory, settings=settings),

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import posefit
+from posefit.cli import main
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import library
@@ -205,3 +207,9 @@ def test_no_freedom_at_all_is_the_space_of_pca() -> None:
     np.testing.assert_allclose(
         prior.inverse_transform(latents), pca.inverse_transform(pca.transform(poses)), atol=1e-12
     )
+
+
+def test_a_setting_that_makes_no_sense_is_one_line_of_check_and_not_one_a_rule() -> None:
+    result = CliRunner().invoke(main, ["check", "prior", "loose", "--set", "slack=-1"])
+    assert result.exit_code == 2
+    assert result.stderr.splitlines() == ["posefit: slack must be above 0, got -1"]
