@@ -1,0 +1,145 @@
+"""The motion models: how a body that walks, squats or jumps goes on to its next pose. VSMM step 3.
+
+A model is X_{k+1} = F X_k + W_k in a frame that turns with the body: its vertical axis is the world's, its heading the
+body's, its origin the root, so that it does not matter where somebody walks to. Lengths are counted in legs. The
+models were fitted by `fit_motion.py`, which says how good they are.
+"""
+
+import json
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from importlib.resources import files
+from typing import Any, Literal, get_args
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import BONES as SKELETON_BONES
+from posefit.geometry.skeleton import Skeleton
+from posefit_vsmm.state import ERROR, Reliance
+
+FPS = 30.0  # the rate that the models were fitted at (Reading V6)
+Shrink = Literal["identity", "zero"]  # what ridge regression draws F towards (Reading V5)
+
+
+@dataclass(frozen=True, eq=False)
+class MotionModel:
+    """One model, for a body and a frame rate; a `posefit_vsmm.imm.Model`."""
+
+    name: str
+    matrix: Array = field(repr=False)  # (43, 40) F less the identity, of the quaternions
+    offset: Array = field(repr=False)  # (43,)
+    noise: Array = field(repr=False)  # (33, 33) covariance of W
+    poses: Array = field(repr=False)  # (n, 40) quaternions of its typical poses, heading along +z
+    leg: float = 1.0  # metres
+    share: float = 1.0  # of the step at 30 frames a second
+
+    def predict(self, state: Array, covariance: Array) -> tuple[Array, Array]:
+        """Return the state (43,) one frame later, and the covariance (33, 33) of its error."""
+        moved, jacobian = self.step(state)
+        return moved, jacobian @ covariance @ jacobian.T + self.noise
+
+    def step(self, state: Array) -> tuple[Array, Array]:
+        """Return the state (43,) one frame later, and the Jacobian (33, 33) of its error by the error before.
+
+        The Jacobian takes the heading as known, which it is to a few degrees.
+        """
+        back, quaternions, signs = headed(state[3:].reshape(-1, 4))
+        change = self.share * (self.matrix @ quaternions.ravel() + self.offset)
+        turn = Rotation.from_quat(back, scalar_first=True).as_matrix()
+        after = quaternions + change[3:].reshape(-1, 4)
+        sizes = np.linalg.norm(after, axis=1, keepdims=True)
+        after /= sizes
+
+        moved = np.empty_like(state)
+        moved[:3] = state[:3] + self.leg * (turn @ change[:3])
+        found = signs * after
+        found[0] = product(back, found[0])
+        moved[3:] = found.ravel()
+
+        before, later = tangents(quaternions), tangents(after)
+        flow = self.share * (self.matrix @ before)  # (43, 30)
+        jacobian = np.eye(ERROR)
+        jacobian[:3, 3:] = self.leg * (turn @ flow[:3])
+        jacobian[3:, 3:] = 4.0 * later.T @ ((before + flow[3:]) / np.repeat(sizes[:, 0], 4)[:, None])
+        return moved, jacobian
+
+    def fitted_to(self, skeleton: Skeleton, fps: float) -> "MotionModel":
+        """Return the model for a body's legs and another frame rate, of which a step is a share of a step at 30."""
+        share = FPS / fps
+        scale = np.ones(ERROR)
+        scale[:3] = leg_of(skeleton)
+        noise = self.noise * np.outer(scale, scale) * share
+        return MotionModel(self.name, self.matrix, self.offset, noise, self.poses, float(scale[0]), share)
+
+
+@dataclass(frozen=True, eq=False)
+class Library:
+    """All models, and how the joints that a state does not hold follow it."""
+
+    models: dict[str, MotionModel]
+    reliance: Reliance
+    report: dict[str, dict[str, float]]  # degrees: one and ten steps on clips that were not used, against standing still
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The models' names."""
+        return tuple(self.models)
+
+
+@lru_cache(maxsize=2)
+def library(shrink: Shrink = "identity") -> Library:
+    """Return the models that the package carries. Raises ValueError for an unknown `shrink`."""
+    if shrink not in get_args(Shrink):
+        raise ValueError(f"shrink must be one of {', '.join(get_args(Shrink))}, got {shrink!r}")
+    stored: dict[str, Any] = json.loads((files("posefit_vsmm") / "models.json").read_text(encoding="utf-8"))
+    models = {
+        name: MotionModel(
+            name,
+            np.array(one[shrink]["matrix"]),
+            np.array(one[shrink]["offset"]),
+            np.array(one[shrink]["noise"]),
+            np.array(one["poses"]),
+        )
+        for name, one in stored["models"].items()
+    }
+    reliance = Reliance(*(np.array(stored["reliance"][key]) for key in ("matrix", "offset")))
+    return Library(models, reliance, {name: one["report"] for name, one in stored["models"].items()})
+
+
+def leg_of(skeleton: Skeleton) -> float:
+    """Return how long a leg is, in metres, from hip to ankle."""
+    return float(skeleton.lengths[[SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]].sum())
+
+
+def headed(quaternions: Array) -> tuple[Array, Array, Array]:
+    """Return the heading (4,) of quaternions (10, 4), and they without it, with w positive, and the signs (10, 1).
+
+    The heading is the part of the first one that turns about the vertical.
+    """
+    back = np.array([quaternions[0, 0], 0.0, quaternions[0, 2], 0.0])
+    size = np.linalg.norm(back)
+    back = back / size if size > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
+    found = quaternions.copy()
+    found[0] = product(back * np.array([1.0, -1.0, -1.0, -1.0]), found[0])
+    signs = np.where(found[:, :1] < 0.0, -1.0, 1.0)
+    return back, signs * found, signs
+
+
+def product(first: Array, second: Array) -> Array:
+    """Return the product (4,) of two quaternions (4,)."""
+    a, b, c, d = first
+    matrix = np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]])
+    return np.asarray(matrix @ second)
+
+
+def tangents(quaternions: Array) -> Array:
+    """Return the change (4 n, 3 n) of quaternions (n, 4) by small rotations on their right."""
+    w, x, y, z = quaternions.T
+    blocks = 0.5 * np.stack([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])  # (4, 3, n)
+    count = len(quaternions)
+    spread = np.zeros((count, 4, count, 3))
+    at = np.arange(count)
+    spread[at, :, at] = blocks.transpose(2, 0, 1)
+    return spread.reshape(4 * count, 3 * count)
