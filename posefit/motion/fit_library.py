@@ -19,6 +19,8 @@ from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotatio
 from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.motion.amc import read_clip
 from posefit.motion.asf import read_asf
+from posefit.motion.fit_arms import PHASES, drawn, held_out, waving
+from posefit.motion.library import kind_of
 
 ORIGIN = (
     "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
@@ -54,7 +56,13 @@ CLIPS = {
     "squat-b": Clip("14/14_06", 1015, 1565, 1.2, 3.3),
     "jump-a": Clip("49/49_02", 130, 400, 0.6, 1.2),
     "jump-b": Clip("16/16_01", 60, 262, 1.6, 1.69),
+    "arms-out-a": Clip("02/02_01", 0, None, 0.9, 1.35),
+    "arms-out-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
+    "wave-a": Clip("05/05_01", 0, 380, 0.9, 1.35),
+    "wave-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
 }
+# What the arms do where they do not do what the clip's do: each side's directions, by hand.
+ARMS = {"arms-out": {"l": held_out, "r": held_out}, "wave": {"r": waving}}
 STANDING = 0.2  # m/s; who is slower does not go anywhere, and faces where he looks on average
 # What is at its highest at phase 0 in each kind of motion: an angle rx, less another one, or less the root's height.
 BEATS = {
@@ -64,6 +72,8 @@ BEATS = {
     "jacks": ("lhumerus", None),
     "squat": (None, "root"),
     "jump": (None, "root"),
+    "arms-out": ("rfemur", "lfemur"),
+    "wave": ("rfemur", "lfemur"),
 }
 
 
@@ -133,6 +143,16 @@ def in_step(coefficients: Array, free: NDArray[np.int64], kind: str) -> Array:
     return np.vstack([coefficients[:1], *moved])
 
 
+def armed(model: dict[str, Any], skeleton: Skeleton, kind: str) -> None:
+    """Give a model of a walk the arms of its kind, as far as a trunk that leans and turns a little lets them."""
+    phases = np.arange(PHASES) / PHASES
+    for side, directions in ARMS.get(kind, {}).items():
+        places, angles = drawn(skeleton, side, *directions(phases, 1.0 if side == "l" else -1.0))
+        coefficients = np.linalg.lstsq(basis(phases, HARMONICS), angles, rcond=None)[0]
+        for place, series in zip(places, coefficients.T, strict=True):
+            model["series"][3 + model["angles"].index(place)] = np.round(series, DIGITS).tolist()
+
+
 def average(skeletons: list[Skeleton]) -> dict[str, Any]:
     """Return the mean of some skeletons and their mirror images."""
     flip = np.diag([-1.0, 1.0, 1.0])
@@ -181,8 +201,9 @@ def main(root: Path) -> None:
         tuple((bone, tuple(free)) for bone, free in bones["channels"]),
         np.radians(bones["limits_degrees"]),
     )
-    motions = {name: fitted(root, clip, name.split("-")[0]) for name, clip in CLIPS.items()}
+    motions = {name: fitted(root, clip, kind_of(name)) for name, clip in CLIPS.items()}
     for name, model in motions.items():
+        armed(model, skeleton, kind_of(name))
         grounded(model, skeleton)
         print(f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees")
     target = Path(__file__).with_name("library.json")
