@@ -1,4 +1,14 @@
-"""A variable-structure multiple-model tracker, patent application CN101894278, 2010.
+"""A variable-structure multiple-model tracker, patent application CN101894278, 2010: `vsmm`.
 
-So far `imm`, its filter, which knows nothing of bodies: any models of any state can be given to it.
+`imm`, its filter, knows nothing of bodies: any models of any state can be given to it.
 """
+
+from posefit import hookimpl
+from posefit.hooks import RegisterTracker
+
+
+@hookimpl
+def posefit_register_trackers(register: RegisterTracker) -> None:
+    from posefit_vsmm.tracker import vsmm
+
+    register("vsmm", vsmm)

@@ -21,7 +21,7 @@ from posefit_vsmm.joints import BODY, detected
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.points import POINTS, points_of
 from posefit_vsmm.preprocess import lines_of
-from posefit_vsmm.sight import head_radius
+from posefit_vsmm.sight import NARROWEST, head_radius
 
 MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a")
 AZIMUTHS = np.radians([0.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0])
@@ -46,7 +46,8 @@ def measured(rng: np.random.Generator) -> dict[str, list[Array]]:
             true, _ = camera.project(points_of(motion.skeleton.joints(pose[None], place[None])[0]))
             expected = true + rng.normal(0.0, OFF * leg * scale, true.shape)
             assert lines is not None
-            seen = detected(lines, expected, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2)))
+            gates = np.full(len(POINTS), NARROWEST * leg * scale)
+            seen = detected(lines, expected, gates, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2)))
             for k, one in enumerate(POINTS):
                 if seen.confidence[k] > 0.0:
                     found[one].append((seen.points[k] - true[k]) / (leg * scale))

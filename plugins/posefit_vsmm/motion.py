@@ -65,6 +65,14 @@ class MotionModel:
         jacobian[3:, 3:] = 4.0 * later.T @ ((before + flow[3:]) / np.repeat(sizes[:, 0], 4)[:, None])
         return moved, jacobian
 
+    def nearest(self, state: Array) -> Array:
+        """Return a state (43,) with its place and heading, in the typical pose that is nearest to it."""
+        back, quaternions, _ = headed(state[3:].reshape(-1, 4))
+        alike = np.abs(np.einsum("nij,ij->ni", self.poses.reshape(len(self.poses), -1, 4), quaternions))
+        pose = self.poses[np.arccos(np.minimum(alike, 1.0)).sum(axis=1).argmin()].copy()
+        pose[:4] = product(back, pose[:4])
+        return np.concatenate([state[:3], pose])
+
     def fitted_to(self, skeleton: Skeleton, fps: float) -> "MotionModel":
         """Return the model for a body's legs and another frame rate, of which a step is a share of a step at 30."""
         share = FPS / fps

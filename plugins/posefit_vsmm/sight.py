@@ -10,17 +10,33 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES
 from posefit_vsmm.imm import Measurement
-from posefit_vsmm.joints import Detection, Errors
+from posefit_vsmm.joints import OWN, Errors, detected
 from posefit_vsmm.motion import leg_of
-from posefit_vsmm.points import Figure
+from posefit_vsmm.points import NEAREST, Figure
+from posefit_vsmm.preprocess import Lines
 from posefit_vsmm.state import ERROR
 
+NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected
+DEVIATIONS = 3.0  # between these, so many standard deviations
+SURPRISE = 16.0  # squared standard deviations in the image: what is farther off is not believed
+LEAST = 0.05  # confidence that is counted as such
 KNOWN = 0.002  # metres: the deviation of a translation that is known
 
 
 def head_radius(body: Body) -> float:
     """Return the radius of the head in metres."""
     return float(body.radii[BONES.index("head")].mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What one camera measured."""
+
+    points: Array  # (17, 2) pixels
+    confidence: Array  # (17,); 0 is hidden
+    variances: Array = field(repr=False)  # (17, 2) square pixels
+    spare: int  # end points of the skeleton line that belong to none of them
+    surprise: float  # mean squared standard deviations of the points that the rules found by themselves
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,32 +48,46 @@ class Sight:
     figure: Figure
     errors: Errors = field(repr=False)
 
-    def scales(self, state: Array) -> list[float]:
-        """Return how many pixels a metre is at the root's depth, one a camera."""
-        depths = [float((camera.rotation @ state[:3] + camera.translation)[2]) for camera in self.cameras]
-        return [float(camera.focal.mean()) / max(z, 0.05) for camera, z in zip(self.cameras, depths, strict=True)]
+    def look(self, view: int, lines: Lines, expected: Array, spread: Array) -> Seen:
+        """Return what a camera sees of a state (43,) that is expected, to within a covariance (33, 33).
 
-    def noise(self, seen: Detection, scale: float) -> Array:
-        """Return the variances (17, 2) of a detection in square pixels: the measured ones, more where it is unsure."""
-        spread = self.errors.deviation * leg_of(self.body.skeleton) * scale
-        return np.asarray(spread**2 / np.maximum(seen.confidence, 0.05)[:, None])
+        What is too surprising is not believed.
+        """
+        camera = self.cameras[view]
+        pixels, jacobian = self.figure.seen(camera, expected)
+        depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
+        metre = float(camera.focal.mean()) / max(depth, NEAREST)  # in pixels, at the root's depth
+        leg = leg_of(self.body.skeleton) * metre
+        covariances = jacobian @ spread @ jacobian.transpose(0, 2, 1)
+        gates = DEVIATIONS * np.sqrt(np.einsum("pii->pi", covariances).max(axis=1))
+        gates = np.clip(gates, NARROWEST * leg, WIDEST * leg)
+        found = detected(lines, pixels, gates, leg, head_radius(self.body) * metre, self.errors.bias)
+        variances = (self.errors.deviation * leg) ** 2 / np.maximum(found.confidence, LEAST)[:, None]
+        off = found.points - pixels
+        distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
+        confidence = np.where(distance < SURPRISE, found.confidence, 0.0)
+        dropped = np.count_nonzero((confidence == 0.0) & (found.confidence > 0.0))
+        return Seen(found.points, confidence, variances, found.spare + int(dropped), _surprise(distance, found.confidence))
 
-    def measure(
-        self, state: Array, seen: Sequence[Detection | None], variances: Sequence[Array], known: Array | None
-    ) -> Measurement:
+    def measure(self, state: Array, seen: Sequence[Seen | None], known: Array | None) -> Measurement:
         """Return what was detected, less what a state (43,) would show; hidden joints have no row (Reading V9)."""
         residuals, jacobians, noise = [np.zeros(0)], [np.zeros((0, ERROR))], [np.zeros(0)]
-        for camera, one, variance in zip(self.cameras, seen, variances, strict=True):
+        for camera, one in zip(self.cameras, seen, strict=True):
             if one is None:
                 continue
             pixels, jacobian = self.figure.seen(camera, state)  # VSMM 6.1
             shown = one.confidence > 0.0
             residuals.append((one.points - pixels)[shown].ravel())
             jacobians.append(jacobian[shown].reshape(-1, ERROR))
-            noise.append(variance[shown].ravel())
+            noise.append(one.variances[shown].ravel())
         if known is not None:
             residuals.append(known - state[:3])
             jacobians.append(np.eye(3, ERROR))
             noise.append(np.full(3, KNOWN**2))
         return Measurement(np.concatenate(residuals), np.concatenate(jacobians), np.diag(np.concatenate(noise)))
 
+
+
+def _surprise(distance: Array, confidence: Array) -> float:
+    own = (confidence > 0.0) & OWN
+    return float(distance[own].mean() / 2.0) if own.any() else 0.0

@@ -56,6 +56,8 @@ CLIPS = {
     "squat-b": Clip("14/14_06", 1015, 1565, 1.2, 3.3),
     "jump-a": Clip("49/49_02", 130, 400, 0.6, 1.2),
     "jump-b": Clip("16/16_01", 60, 262, 1.6, 1.69),
+    "step-a": Clip("05/05_01", 0, 380, 0.9, 1.35),
+    "step-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
     "arms-out-a": Clip("02/02_01", 0, None, 0.9, 1.35),
     "arms-out-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
     "wave-a": Clip("05/05_01", 0, 380, 0.9, 1.35),
@@ -63,6 +65,7 @@ CLIPS = {
 }
 # What the arms do where they do not do what the clip's do: each side's directions, by hand.
 ARMS = {"arms-out": {"l": held_out, "r": held_out}, "wave": {"r": waving}}
+ON_THE_SPOT = ("step",)  # walks whose way is taken away
 STANDING = 0.2  # m/s; who is slower does not go anywhere, and faces where he looks on average
 # What is at its highest at phase 0 in each kind of motion: an angle rx, less another one, or less the root's height.
 BEATS = {
@@ -72,6 +75,7 @@ BEATS = {
     "jacks": ("lhumerus", None),
     "squat": (None, "root"),
     "jump": (None, "root"),
+    "step": ("rfemur", "lfemur"),
     "arms-out": ("rfemur", "lfemur"),
     "wave": ("rfemur", "lfemur"),
 }
@@ -117,7 +121,7 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
     return {
         "source": name,
         "period": round(period, 4),
-        "speed": round(speed, 4),
+        "speed": 0.0 if kind in ON_THE_SPOT else round(speed, 4),
         "residual_degrees": round(float(np.degrees(error)), 3),
         "angles": free.tolist(),
         "series": np.round(coefficients.T, DIGITS).tolist(),
