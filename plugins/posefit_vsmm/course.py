@@ -247,7 +247,8 @@ class Course:
         """Return the frame of a state; without one, the latest pose once more."""
         task = self._task
         if state is not None:
-            pose, place = decode(state, self._how.library.reliance)
+            poses, places = decode(state[None], self._how.library.reliance)
+            pose, place = poses[0], places[0]
         elif self._latest is not None:
             pose, place = self._latest.pose, self._latest.translation
         else:

@@ -28,8 +28,7 @@ class Matcher:
     def costs(self, states: Array) -> tuple[Array, Array]:
         """Return the costs (n,) of states (n, 43), and the states, moved to where their silhouettes fit."""
         task, seen = self._task, self._observation
-        poses = np.array([decode(state, self._reliance)[0] for state in states])
-        places = states[:, :3].copy()
+        poses, places = decode(states, self._reliance)
         if seen.translation is not None:
             places[:] = seen.translation
         else:

@@ -11,7 +11,6 @@ from typing import Protocol
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import logsumexp
 
 from posefit.geometry.rotation import Array
 
@@ -119,7 +118,7 @@ class IMM:
             repairs += repaired
         found = np.array(likelihoods)
         joint = found + mixed.log_probabilities  # VSMM 6.4
-        return Belief(np.array(states), np.array(covariances), joint - logsumexp(joint), found, repairs)
+        return Belief(np.array(states), np.array(covariances), joint - np.logaddexp.reduce(joint), found, repairs)
 
     def mixed(self, belief: Belief) -> Belief:
         """Return what each model starts its cycle from, and the probabilities c_j that it is the one.
@@ -128,7 +127,7 @@ class IMM:
         """
         with np.errstate(divide="ignore"):
             steps = np.log(np.asarray(self.transition, dtype=np.float64)) + belief.log_probabilities[:, None]
-        after = logsumexp(steps, axis=0)  # log c_j
+        after = np.logaddexp.reduce(steps, axis=0)  # log c_j
         states, covariances, repairs = [], [], belief.repairs
         for j, total in enumerate(after):
             weights = np.exp(steps[:, j] - total) if np.isfinite(total) else np.eye(len(after))[j]  # VSMM 6.2a

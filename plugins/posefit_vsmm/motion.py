@@ -12,8 +12,8 @@ from importlib.resources import files
 from typing import Any, Literal, get_args
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
@@ -45,29 +45,12 @@ class MotionModel:
 
         The Jacobian takes the heading as known, which it is to a few degrees.
         """
-        back, quaternions, signs = headed(state[3:].reshape(-1, 4))
-        change = self.share * (self.matrix @ quaternions.ravel() + self.offset)
-        turn = Rotation.from_quat(back, scalar_first=True).as_matrix()
-        after = quaternions + change[3:].reshape(-1, 4)
-        sizes = np.linalg.norm(after, axis=1, keepdims=True)
-        after /= sizes
-
-        moved = np.empty_like(state)
-        moved[:3] = state[:3] + self.leg * (turn @ change[:3])
-        found = signs * after
-        found[0] = product(back, found[0])
-        moved[3:] = found.ravel()
-
-        before, later = tangents(quaternions), tangents(after)
-        flow = self.share * (self.matrix @ before)  # (43, 30)
-        jacobian = np.eye(ERROR)
-        jacobian[:3, 3:] = self.leg * (turn @ flow[:3])
-        jacobian[3:, 3:] = 4.0 * later.T @ ((before + flow[3:]) / np.repeat(sizes[:, 0], 4)[:, None])
+        moved, jacobian = _step(self.matrix, self.offset, self.share, self.leg, state)
         return moved, jacobian
 
     def nearest(self, state: Array) -> Array:
         """Return a state (43,) with its place and heading, in the typical pose that is nearest to it."""
-        back, quaternions, _ = headed(state[3:].reshape(-1, 4))
+        back, quaternions = headed(state[3:].reshape(-1, 4))
         alike = np.abs(np.einsum("nij,ij->ni", self.poses.reshape(len(self.poses), -1, 4), quaternions))
         pose = self.poses[np.arccos(np.minimum(alike, 1.0)).sum(axis=1).argmin()].copy()
         pose[:4] = product(back, pose[:4])
@@ -121,33 +104,84 @@ def leg_of(skeleton: Skeleton) -> float:
     return float(skeleton.lengths[[SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]].sum())
 
 
-def headed(quaternions: Array) -> tuple[Array, Array, Array]:
-    """Return the heading (4,) of quaternions (10, 4), and they without it, with w positive, and the signs (10, 1).
+def headed(quaternions: Array) -> tuple[Array, Array]:
+    """Return the heading (4,) of quaternions (10, 4), and they without it, with w positive.
 
     The heading is the part of the first one that turns about the vertical.
     """
-    back = np.array([quaternions[0, 0], 0.0, quaternions[0, 2], 0.0])
-    size = np.linalg.norm(back)
-    back = back / size if size > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
-    found = quaternions.copy()
-    found[0] = product(back * np.array([1.0, -1.0, -1.0, -1.0]), found[0])
-    signs = np.where(found[:, :1] < 0.0, -1.0, 1.0)
-    return back, signs * found, signs
+    back, found, _ = _headed(quaternions)
+    return back, found
 
 
-def product(first: Array, second: Array) -> Array:
+@jit
+def product(first, second):
     """Return the product (4,) of two quaternions (4,)."""
     a, b, c, d = first
-    matrix = np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]])
-    return np.asarray(matrix @ second)
+    e, f, g, h = second
+    return np.array(
+        [
+            a * e - b * f - c * g - d * h,
+            a * f + b * e + c * h - d * g,
+            a * g - b * h + c * e + d * f,
+            a * h + b * g - c * f + d * e,
+        ]
+    )
 
 
-def tangents(quaternions: Array) -> Array:
+@jit
+def _headed(quaternions):
+    back = np.array([quaternions[0, 0], 0.0, quaternions[0, 2], 0.0])
+    size = np.sqrt(back[0] ** 2 + back[2] ** 2)
+    if size > 1e-9:
+        back /= size
+    else:
+        back[0], back[2] = 1.0, 0.0
+    found, signs = quaternions.copy(), np.ones(len(quaternions))
+    found[0] = product(np.array([back[0], 0.0, -back[2], 0.0]), found[0])
+    for j in range(len(found)):
+        if found[j, 0] < 0.0:
+            signs[j] = -1.0
+            found[j] *= -1.0
+    return back, found, signs
+
+
+@jit
+def _tangents(quaternions):
     """Return the change (4 n, 3 n) of quaternions (n, 4) by small rotations on their right."""
-    w, x, y, z = quaternions.T
-    blocks = 0.5 * np.stack([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])  # (4, 3, n)
-    count = len(quaternions)
-    spread = np.zeros((count, 4, count, 3))
-    at = np.arange(count)
-    spread[at, :, at] = blocks.transpose(2, 0, 1)
-    return spread.reshape(4 * count, 3 * count)
+    n = len(quaternions)
+    change = np.zeros((4 * n, 3 * n))
+    for j in range(n):
+        w, x, y, z = 0.5 * quaternions[j]
+        r, c = 4 * j, 3 * j
+        change[r, c], change[r, c + 1], change[r, c + 2] = -x, -y, -z
+        change[r + 1, c], change[r + 1, c + 1], change[r + 1, c + 2] = w, -z, y
+        change[r + 2, c], change[r + 2, c + 1], change[r + 2, c + 2] = z, w, -x
+        change[r + 3, c], change[r + 3, c + 1], change[r + 3, c + 2] = -y, x, w
+    return change
+
+
+@jit
+def _step(matrix, offset, share, leg, state):
+    back, before, signs = _headed(state[3:].copy().reshape(-1, 4))
+    change = share * (matrix @ before.ravel() + offset)
+    n = len(before)
+    sine, cosine = 2.0 * back[0] * back[2], back[0] ** 2 - back[2] ** 2
+    turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    after = before + change[3:].copy().reshape(n, 4)
+    sizes = np.empty(n)
+    for j in range(n):
+        sizes[j] = np.sqrt((after[j] ** 2).sum())
+        after[j] /= sizes[j]
+    moved = np.empty(state.size)
+    moved[:3] = state[:3] + leg * (turn @ change[:3].copy())
+    for j in range(n):
+        moved[3 + 4 * j : 7 + 4 * j] = signs[j] * (product(back, after[0]) if j == 0 else after[j])
+    flow = _tangents(before)
+    change_flow = share * (matrix @ flow)  # (43, 30)
+    flow += change_flow[3:]
+    for j in range(n):
+        flow[4 * j : 4 * j + 4] /= sizes[j]
+    jacobian = np.eye(3 + 3 * n)
+    jacobian[:3, 3:] = leg * (turn @ change_flow[:3].copy())
+    jacobian[3:, 3:] = 4.0 * (_tangents(after).T.copy() @ flow)
+    return moved, jacobian

@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
 from posefit.silhouette.mask import Mask
 
 PIECE = 0.05  # of the largest piece's area: a smaller piece is no part of a person
 SPUR = 1.2  # radii of the body where it branches off: a shorter branch of the skeleton line is a bump of the outline
-_AROUND = np.array([(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,21 +69,26 @@ def _ends(thin: Mask, radii: NDArray[np.float32]) -> NDArray[np.int64]:
     number = cv2.filter2D(thin.astype(np.uint8), -1, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT)
     found = []
     for end in np.argwhere(thin & (number == 2)):
-        branch = _branch(thin, number, end)
-        if branch is None or np.linalg.norm(end - branch) > SPUR * radii[tuple(branch)]:
+        row, column = _branch(thin, number, end[0], end[1])
+        if row < 0 or np.hypot(end[0] - row, end[1] - column) > SPUR * radii[row, column]:
             found.append(end)
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
-def _branch(thin: Mask, number: NDArray[np.uint8], end: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """Return where the line that ends in `end` meets another; None where it does not."""
-    here, before = (int(end[0]), int(end[1])), (-1, -1)
-    for _ in range(int(thin.sum())):
-        steps = [(here[0] + int(dy), here[1] + int(dx)) for dy, dx in _AROUND]
-        ahead = [there for there in steps if thin[there] and there != before]
-        if len(ahead) != 1:
-            return np.array(here) if ahead else None
-        before, here = here, ahead[0]
-        if number[here] > 3:
-            return np.array(here)
-    return None
+@jit
+def _branch(thin, number, row, column):
+    """Return row and column where the line that ends in a pixel meets another; -1, -1 where it does not."""
+    before_row, before_column = -1, -1
+    for _ in range(thin.size):
+        count, next_row, next_column = 0, -1, -1
+        for dy in range(-1, 2):
+            for dx in range(-1, 2):
+                y, x = row + dy, column + dx
+                if thin[y, x] and (dy or dx) and not (y == before_row and x == before_column):
+                    count, next_row, next_column = count + 1, y, x
+        if count != 1:
+            return (row, column) if count else (-1, -1)
+        before_row, before_column, row, column = row, column, next_row, next_column
+        if number[row, column] > 3:
+            return row, column
+    return -1, -1

@@ -61,15 +61,17 @@ def encode(poses: Array, translations: Array) -> Array:
     return np.column_stack([translations, quaternions.reshape(len(poses), -1)])
 
 
-def decode(state: Array, reliance: Reliance) -> tuple[Array, Array]:
-    """Return the pose (66,) and the translation (3,) of a state."""
-    quaternions = Rotation.from_quat(state[3:].reshape(-1, 4), scalar_first=True)
-    rotations = quaternions.as_matrix()
-    pose = np.zeros(ANGLES)
-    pose[:3] = root_angles_from_rotation(rotations[0])
-    pose[HELD_ANGLES] = joint_angles_from_rotation(rotations[1:]).ravel()
-    pose[OTHER_ANGLES] = reliance.matrix @ quaternions[1:].as_rotvec().ravel() + reliance.offset
-    return pose, state[:3].copy()
+def decode(states: Array, reliance: Reliance) -> tuple[Array, Array]:
+    """Return the poses (n, 66) and the translations (n, 3) of states (n, 43)."""
+    n = len(states)
+    quaternions = Rotation.from_quat(states[:, 3:].reshape(-1, 4), scalar_first=True)
+    rotations = quaternions.as_matrix().reshape(n, -1, 3, 3)
+    vectors = quaternions.as_rotvec().reshape(n, -1)[:, 3:]
+    poses = np.zeros((n, ANGLES))
+    poses[:, :3] = root_angles_from_rotation(rotations[:, 0])
+    poses[:, HELD_ANGLES] = joint_angles_from_rotation(rotations[:, 1:]).reshape(n, -1)
+    poses[:, OTHER_ANGLES] = vectors @ reliance.matrix.T + reliance.offset
+    return poses, states[:, :3].copy()
 
 
 @jit

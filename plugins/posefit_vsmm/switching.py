@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import logsumexp
 
 from posefit.geometry.rotation import Array, wrapped
 from posefit_vsmm.imm import Belief
@@ -104,7 +103,7 @@ def joined(
         belief,
         states=np.array(states),  # VSMM 8.3
         covariances=np.array(covariances),  # VSMM 8.2
-        log_probabilities=probabilities - logsumexp(probabilities),
+        log_probabilities=probabilities - np.logaddexp.reduce(probabilities),
         log_likelihoods=np.zeros(len(union)),
     )
 
@@ -113,7 +112,7 @@ def restricted(belief: Belief, models: Sequence[str], kept: Sequence[str]) -> Be
     """Return a belief over some of its models."""
     places = [models.index(name) for name in kept]
     probabilities = belief.log_probabilities[places]
-    total = logsumexp(probabilities)
+    total = np.logaddexp.reduce(probabilities)
     even = np.full(len(kept), -np.log(len(kept)))
     return replace(
         belief,
@@ -153,8 +152,8 @@ class Contest:
         old, new = ([models.index(name) for name in group] for group in (self.old, self.new))
         after = belief.log_probabilities
         before = after - belief.log_likelihoods
-        odds = float(logsumexp(after[new]) - logsumexp(after[old]))
-        ratio = odds - float(logsumexp(before[new]) - logsumexp(before[old]))  # of the groups' likelihoods
+        odds = float(np.logaddexp.reduce(after[new]) - np.logaddexp.reduce(after[old]))
+        ratio = odds - float(np.logaddexp.reduce(before[new]) - np.logaddexp.reduce(before[old]))  # of the groups' likelihoods
         self.frames += 1
         self.evidence += ratio
         if self.test == "patent":
