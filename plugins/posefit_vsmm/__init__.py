@@ -1,4 +1,4 @@
-"""A variable-structure multiple-model tracker, patent application CN101894278, 2010: `vsmm`.
+"""A variable-structure multiple-model tracker, patent application CN101894278, 2010: `vsmm`; and `sapso+vsmm`, a swarm led by it.
 
 `imm`, its filter, knows nothing of bodies: any models of any state can be given to it.
 """
@@ -9,6 +9,8 @@ from posefit.hooks import RegisterTracker
 
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
+    from posefit_vsmm.joined import joined
     from posefit_vsmm.tracker import vsmm
 
     register("vsmm", vsmm)
+    register("sapso+vsmm", joined)

@@ -1,10 +1,9 @@
-"""One track of the variable-structure filter, frame by frame. VSMM steps 5 to 9."""
+"""One track of the variable-structure filter, frame by frame."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, Literal, get_args
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,145 +12,131 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import Array
 from posefit.silhouette.cost import areas, mismatch
 from posefit_vsmm.fresh import Matcher, estimated
-from posefit_vsmm.groups import Topology
-from posefit_vsmm.imm import IMM, Belief, Measurement, start
+from posefit_vsmm.imm import Belief, Measurement, start
 from posefit_vsmm.joints import errors
-from posefit_vsmm.motion import Library
 from posefit_vsmm.points import AT, Figure
-from posefit_vsmm.preprocess import lines_of
+from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.shown import Shown
 from posefit_vsmm.sight import Seen, Sight
-from posefit_vsmm.state import ERROR, MANIFOLD, decode
-from posefit_vsmm.switching import Contest, New, Rules, enlarged, joined, restricted
+from posefit_vsmm.state import ERROR, decode
+from posefit_vsmm.structure import Measure, Models, Settings
 
-FIRST = 10  # cycles over all models before the first group is chosen
 COAST = 15  # frames that the models go on alone when nothing is seen; then the track is lost
 LOST = 0.35  # IoU: below it, for so many frames, the track is lost
 LOST_FRAMES = 8
-RECENT = 5  # frames: where the median of their surprise is larger than SURPRISED, the group is chosen anew
-SURPRISED = 2.0
 UNSURE = np.repeat([0.05, np.radians(15.0)], [3, ERROR - 3])  # metres and radians: deviations of a fresh estimation
 ASTRAY = 2  # frames: a limb that is not where it is sought, while an end point is nobody's, is sought all around
 ASTRAY_SPREAD = np.radians(15.0)  # deviation that each of its joints then gains a frame
 # which of the nine quaternions a limb's end depends on
 _LIMBS = {"left hand": (4, 5), "right hand": (6, 7), "left foot": (0, 1), "right foot": (2, 3)}
 
-Structure = Literal["variable", "all"]
-Measure = Callable[[Array], Measurement]
-
 
 @dataclass(frozen=True, eq=False)
-class Settings:
-    """What a course is run by: the models, their groups and how they switch."""
+class Found:
+    """What a search found in one frame."""
 
-    library: Library
-    topology: Topology
-    structure: Structure
-    rules: Rules
-    new: New
-    contest: Contest  # a blank one
+    pose: Array  # (66,)
+    translation: Array  # (3,) metres
+    evaluations: int
+    measure: Measure  # what it tells the filter
 
-    def __post_init__(self) -> None:
-        for name, choices in (("structure", Structure), ("new", New)):
-            if getattr(self, name) not in get_args(choices):
-                raise ValueError(f"{name} must be one of {', '.join(get_args(choices))}, got {getattr(self, name)!r}")
+
+class Searcher(Protocol):
+    """Looks around what the filter holds."""
+
+    def likelihood(self, state: Array, observation: Observation) -> float:
+        """Return the log-likelihood of a predicted state (43,), for one evaluation."""
+        ...
+
+    def find(
+        self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator
+    ) -> Found | None:
+        """Return what is found around a state (43,) with covariance (33, 33), for at most so many evaluations."""
+        ...
 
 
 class Course:
-    """One track, as far as it has come."""
+    """One track, as far as it has come; with a `searcher`, every frame ends in a search."""
 
-    def __init__(self, task: Task, settings: Settings, rng: np.random.Generator) -> None:
-        self._task, self._how, self._rng = task, settings, rng
-        skeleton, carried = task.body.skeleton, settings.library
-        self._topology = settings.topology
-        self._every = self._topology.union(self._topology.groups)
-        self._models = {name: carried.models[name].fitted_to(skeleton, task.fps) for name in self._every}
-        self._sight = Sight(task.body, task.cameras, Figure(skeleton, carried.reliance), errors())
-        self._imm = lru_cache(self._made)
+    def __init__(
+        self, task: Task, settings: Settings, rng: np.random.Generator, searcher: Searcher | None = None
+    ) -> None:
+        self._task, self._reliance, self._rng, self._searcher = task, settings.library.reliance, rng, searcher
+        self._models = Models(settings, task.body.skeleton, task.fps)
+        self._sight = Sight(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), errors())
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._shown: list[Shown] = []
         self._belief: Belief | None = None
-        self._forget()
-
-    def _made(self, names: tuple[str, ...]) -> IMM:
-        return IMM([self._models[name] for name in names], self._topology.transition(names), MANIFOLD)
-
-    def _forget(self) -> None:
-        """Start anew: all models, no group, nothing known of the limbs."""
-        self._active = self._every
-        self._group: str | None = None
-        self._newcomer: str | None = None
-        self._contest = self._how.contest
-        self._cycles = self._rested = self._unseen = self._bad = 0
+        self._unseen = self._bad = 0
         self._astray = dict.fromkeys(_LIMBS, 0)
-        self._surprises: list[float] = []  # of the latest frames
-        self._drawn: list[Array] = []  # projected points (17, 2) of the latest frames
 
     def frame(self, observation: Observation) -> Frame:
         """Return what is found in the next frame."""
-        began = time.perf_counter()
-        lines = [lines_of(silhouette.mask) for silhouette in observation.silhouettes]
-        blind = not observation.usable or all(one is None for one in lines)
+        began, models = time.perf_counter(), self._models
+        blind = not observation.usable
+        lines = [None if blind else lines_of(silhouette.mask) for silhouette in observation.silhouettes]
+        blind = all(one is None for one in lines)
         self._unseen = self._unseen + 1 if blind else 0
-        if self._belief is not None and (self._bad >= LOST_FRAMES or self._unseen > COAST):
-            self._belief = None  # lost
+        if self._bad >= LOST_FRAMES or self._unseen > COAST:
+            self._belief = None
         if self._belief is None and blind:
-            return self._told(None, observation, 0, began, {"lost": True})
+            return self._held(observation, began)
         spent = self._begin(observation) if self._belief is None else 0
-        belief, imm = self._belief, self._imm(self._active)
+        belief = self._belief
         assert belief is not None
-        state, spread = imm.fused(belief)
-        likely = self._models[self._active[int(belief.probabilities.argmax())]]
+        state, spread = models.imm.fused(belief)
+        likely = models.known[models.active[int(belief.probabilities.argmax())]]
         expected, spread = likely.predict(state, spread)
-
-        def look(spread: Array) -> list[Seen | None]:
-            return [
-                None if one is None or blind else self._sight.look(view, one, expected, spread)
-                for view, one in enumerate(lines)
-            ]
-
-        seen = look(spread)
+        seen = self._look(lines, expected, spread)
         if (extra := self._astray_spread(seen)).any():
             belief = replace(belief, covariances=belief.covariances + np.diag(extra))
-            seen = look(spread + np.diag(extra))
-        surprise = float(np.mean([one.surprise for one in seen if one is not None] or [0.0]))
-        self._surprises = [*self._surprises, surprise][-RECENT:]
-        details: dict[str, Any] = {"surprise": surprise, "lost": False, "detection_seconds": time.perf_counter() - began}
+            seen = self._look(lines, expected, spread + np.diag(extra))
+        details = {"detection_seconds": time.perf_counter() - began}
 
-        filtering = time.perf_counter()
+        filtering, used = time.perf_counter(), spent
 
         def measure(one: Array) -> Measurement:
-            return self._sight.measure(one, seen, observation.translation)
+            nonlocal used
+            found = self._sight.measure(one, seen, observation.translation)
+            if self._searcher is None or blind:
+                return found
+            used += 1
+            return replace(found, log_likelihood=self._searcher.likelihood(one, observation))
 
-        self._belief = imm.cycle(belief, measure)
-        if self._how.structure == "variable":
-            self._restructure(belief, measure)
-        state, _ = self._imm(self._active).fused(self._belief)
-        points, _ = self._sight.figure.seen(self._task.cameras[0], state)
-        self._drawn = [*self._drawn, points][-2 * self._how.rules.smoothing - 1 :]
-        details |= {
-            "filter_seconds": time.perf_counter() - filtering,
-            "models": self._active,
-            "probabilities": self._belief.probabilities,
-            "group": self._group,
-            "newcomer": self._newcomer,
-            "repairs": self._belief.repairs,
-        }
-        return self._told(state, observation, spent, began, details | self._joints(seen, expected))
+        surprise = float(np.mean([one.surprise for one in seen if one is not None] or [0.0]))
+        self._belief = models.cycle(belief, measure, surprise)
+        state, spread = models.imm.fused(self._belief)
+        details["filter_seconds"] = time.perf_counter() - filtering
+        poses, places = decode(state[None], self._reliance)
+        pose, place = poses[0], places[0]
+        if self._searcher is not None and not blind:
+            found = self._searcher.find(state, spread, observation, self._task.evaluations - used - 1, self._rng)
+            if found is not None:
+                pose, place, used = found.pose, found.translation, used + found.evaluations
+                self._belief = models.imm.updated(self._belief, found.measure)
+        models.drawn(self._sight.figure.seen(self._task.cameras[0], models.imm.fused(self._belief)[0])[0])
+        told = {**details, **self._joints(seen, expected), "surprise": surprise, **self._told()}
+        return self._frame(pose, place, observation, used + 1, began, told)
+
+    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[Seen | None]:
+        return [None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)]
 
     def _begin(self, observation: Observation) -> int:
         """Estimate a pose from this frame alone, all models alike; return how many evaluations that took."""
         task, latest = self._task, self._latest
-        matcher = Matcher(task, observation, self._how.library.reliance)
+        matcher = Matcher(task, observation, self._reliance)
         yaw, anchor, given = task.yaw, task.anchor, None
         if latest is not None:
             yaw, anchor, given = float(latest.pose[0]), latest.translation, latest.pose
         elif task.first_pose is not None:
             given = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
-        models = list(self._models.values())
-        state = estimated(matcher, models, yaw, np.asarray(anchor), given, task.evaluations - 1, self._rng)
-        self._forget()
-        self._belief = start(state, np.diag(UNSURE**2), len(self._active))
+        budget = task.evaluations - 1 if self._searcher is None else task.evaluations // 2
+        models = list(self._models.known.values())
+        state = estimated(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
+        self._models.restart()
+        self._belief = start(state, np.diag(UNSURE**2), len(models))
+        self._bad = 0
+        self._astray = dict.fromkeys(_LIMBS, 0)
         return matcher.evaluations
 
     def _astray_spread(self, seen: Sequence[Seen | None]) -> Array:
@@ -166,105 +151,49 @@ class Course:
                     extra[6 + 3 * k : 9 + 3 * k] = ASTRAY_SPREAD**2
         return extra
 
-    def _restructure(self, before: Belief, measure: Measure) -> None:
-        """Let groups come and go after a cycle that went on from `before`."""
-        assert self._belief is not None
-        topology = self._topology
-        self._cycles += 1
-        if self._group is None:
-            if self._cycles >= FIRST:
-                self._keep(topology.most_probable(self._active, self._belief.probabilities))  # VSMM 5
-            return
-        if self._newcomer is not None:
-            decision = self._contest.decide(self._belief, self._active)  # VSMM 9
-            if decision is not None:
-                self._keep(self._newcomer if decision == "new" else self._group)
-            return
-        self._rested += 1
-        if self._rested > self._how.rules.dwell and np.median(self._surprises) > SURPRISED:
-            self._reconsider(before, measure)
-            return
-        asked = self._how.rules.wanted(self._drawn) if self._rested > self._how.rules.dwell else None
-        names = tuple(topology.groups)
-        if asked is None or asked >= len(names) or names[asked] == self._group:
-            return
-        self._activate(names[asked], before, measure)
-
-    def _reconsider(self, before: Belief, measure: Measure) -> None:
-        """Choose the group anew, as at first: the present one cannot explain what is seen, and no rule saw it come."""
-        old, every = self._active, self._every
-        state, spread = self._imm(old).fused(before)
-        self._belief = self._imm(every).cycle(enlarged(before, old, every, state, spread), measure)
-        self._active, self._group, self._cycles, self._surprises = every, None, 0, []
-
-    def _activate(self, newcomer: str, before: Belief, measure: Measure) -> None:
-        """Bring a group into force beside the present one. VSMM step 8."""
-        assert self._belief is not None and self._group is not None
-        old, topology = self._active, self._topology
-        union = topology.union((self._group, newcomer))  # VSMM 8.4
-        imm = self._imm(union)
-        if self._how.new == "rerun":
-            state, spread = self._imm(old).fused(before)
-            self._belief = imm.cycle(enlarged(before, old, union, state, spread), measure)
-        else:
-            state, _ = self._imm(old).fused(self._belief)
-            self._belief = joined(self._belief, old, union, *self._starts(state, set(union) - set(old)))
-        self._newcomer, self._active = newcomer, union
-        groups = topology.groups
-        self._contest = replace(self._how.contest, old=groups[self._group], new=groups[newcomer])
-
-    def _starts(self, state: Array, names: set[str]) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Return, for new models, the typical pose nearest to a state, and their noise."""
-        poses, noise = {}, {}
-        for name in names:
-            model = self._models[name]
-            nearest = model.nearest(state)
-            poses[name], noise[name] = nearest, model.noise
-        return poses, noise
-
-    def _keep(self, group: str) -> None:
-        """Let one group alone go on."""
-        assert self._belief is not None
-        kept = self._topology.groups[group]
-        self._belief = restricted(self._belief, self._active, kept)
-        self._active, self._group, self._newcomer, self._rested = kept, group, None, 0
-
     def _joints(self, seen: Sequence[Seen | None], expected: Array) -> dict[str, Any]:
         """Return the 17 joints (views, 17, 2) as they are shown, and how sure the rules were of them (views, 17)."""
         points, confidence = [], []
         for view, (camera, one) in enumerate(zip(self._task.cameras, seen, strict=True)):
-            pixels = self._sight.figure.seen(camera, expected)[0] if one is None else one.points
+            if one is None:
+                pixels, _ = self._sight.figure.seen(camera, expected)
+                one = Seen(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
             if len(self._shown) == view:
-                self._shown.append(Shown(pixels))
-            sure = np.zeros(len(pixels)) if one is None else one.confidence
-            points.append(self._shown[view].follow(pixels, sure, np.ones((len(pixels), 2)) if one is None else one.variances))
-            confidence.append(sure)
+                self._shown.append(Shown(one.points))
+            points.append(self._shown[view].follow(one.points, one.confidence, one.variances))
+            confidence.append(one.confidence)
         return {"joints": np.array(points), "confidence": np.array(confidence)}
 
-    def _told(
-        self, state: Array | None, observation: Observation, spent: int, began: float, details: dict[str, Any]
-    ) -> Frame:
-        """Return the frame of a state; without one, the latest pose once more."""
-        task = self._task
-        if state is not None:
-            poses, places = decode(state[None], self._how.library.reliance)
-            pose, place = poses[0], places[0]
-        elif self._latest is not None:
+    def _told(self) -> dict[str, Any]:
+        """Return what is told of the models beside the pose."""
+        belief, models = self._belief, self._models
+        told: dict[str, Any] = {"lost": belief is None, "models": models.active}
+        told |= {"group": models.group, "newcomer": models.newcomer}
+        if belief is not None:
+            told |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
+        return told
+
+    def _held(self, observation: Observation, began: float) -> Frame:
+        """Return the latest pose once more, or an upright one, while nothing is seen."""
+        pose, place = np.zeros(66), np.array(self._task.anchor, dtype=np.float64)
+        pose[0] = self._task.yaw or 0.0
+        if self._latest is not None:
             pose, place = self._latest.pose, self._latest.translation
-        else:
-            pose, place = np.zeros(66), np.array(task.anchor, dtype=np.float64)
-            pose[0] = task.yaw or 0.0
+        return self._frame(pose, place, observation, 0, began, self._told())
+
+    def _frame(
+        self, pose: Array, place: Array, observation: Observation, used: int, began: float, details: dict[str, Any]
+    ) -> Frame:
+        task = self._task
         if observation.translation is not None:
             place = np.array(observation.translation, dtype=np.float64)
         views = zip(task.cameras, observation.silhouettes, strict=True)
         counts = np.concatenate([areas(task.body, camera, one, pose[None], place[None]) for camera, one in views])
         known = [one.known for one in observation.silhouettes]
         heard = counts[known] if any(known) else counts
-        cost, iou = float(mismatch(heard).mean()), float(metrics.iou(heard).mean())
-        if state is not None and not self._unseen:
-            self._bad = self._bad + 1 if iou < LOST else 0
+        cost = float(mismatch(heard).mean())
+        if not self._unseen:
+            self._bad = self._bad + 1 if float(metrics.iou(heard).mean()) < LOST else 0
         seconds = time.perf_counter() - began
-        used = spent + (state is not None)
-        frame = Frame(pose, place, cost, counts, used, seconds, np.array([cost]), details=details)
-        self._latest = frame
-        return frame
+        self._latest = Frame(pose, place, cost, counts, used, seconds, np.array([cost]), details=details)
+        return self._latest

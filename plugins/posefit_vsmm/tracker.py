@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit_vsmm.course import Course, Settings, Structure
+from posefit_vsmm.course import Course
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.motion import Shrink, library
+from posefit_vsmm.structure import Settings, Structure
 from posefit_vsmm.switching import Contest, New, Rules, Test
 
 
