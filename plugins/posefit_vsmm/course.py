@@ -36,7 +36,6 @@ class Found:
     """What a search found in one frame."""
 
     pose: Array  # (66,)
-    translation: Array  # (3,) metres
     evaluations: int
     measure: Measure  # what it tells the filter
 
@@ -112,8 +111,9 @@ class Course:
         if self._searcher is not None and not blind:
             found = self._searcher.find(state, spread, observation, self._task.evaluations - used - 1, self._rng)
             if found is not None:
-                pose, place, used = found.pose, found.translation, used + found.evaluations
+                pose, used = found.pose, used + found.evaluations
                 self._belief = models.imm.updated(self._belief, found.measure)
+                place = models.imm.fused(self._belief)[0][:3]  # one frame alone says little of the depth
         models.drawn(self._sight.figure.seen(self._task.cameras[0], models.imm.fused(self._belief)[0])[0])
         told = {**details, **self._joints(seen, expected), "surprise": surprise, **self._told()}
         return self._frame(pose, place, observation, used + 1, began, told)

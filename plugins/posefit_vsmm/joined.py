@@ -2,7 +2,7 @@
 
 Every model's own prediction is drawn, and its silhouette cost enters the model's likelihood. The filter's mean and
 covariance replace SAPSO (6) and (7): the search looks around the mean, along the directions in which the covariance is
-largest, as far as it is large.
+largest, as far as it is large; and a proposal costs what its silhouette costs and how far it is from the mean.
 """
 
 from collections.abc import Iterable, Iterator
@@ -67,18 +67,23 @@ class Search:
         space = space.around(space.centre, Start(np.zeros(space.dimensions), start, np.zeros(space.dimensions)))
         if observation.translation is not None:
             space = space.around(space.centre, space.start, observation.translation)
+        doubt = 0.5 * REACH**2 / self.weight  # of a proposal at the box's border
         problem = PoseProblem(
             self.task.body, self.task.cameras, observation.silhouettes, space, threads=self.task.threads
         )
         optimiser = self.factory(space, rng, **of_plugins.planned(self.factory, {}, budget))
-        best = minimise(problem.evaluate, optimiser, budget)
+
+        def posterior(proposals: Array) -> Array:  # in units of cost, less a constant
+            return np.asarray(problem.evaluate(proposals) + doubt * (proposals**2).sum(axis=1))
+
+        best = minimise(posterior, optimiser, budget)
         pose, place = problem.decode(best.proposal[None])
         found = encode(pose, place)[0]
 
         def measure(one: Array) -> Measurement:
             return Measurement(MANIFOLD.minus(found, one), np.eye(ERROR), np.diag(FOUND**2))
 
-        return Found(pose[0], place[0], best.evaluations, measure)
+        return Found(pose[0], best.evaluations, measure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +116,8 @@ def joined(
     """
     if dimensions < 1:
         raise ValueError(f"dimensions must be at least 1, got {dimensions}")
-    if not weight >= 0.0:
-        raise ValueError(f"weight must be 0 or more, got {weight}")
+    if not weight > 0.0:
+        raise ValueError(f"weight must be above 0, got {weight}")
     carried = library("identity")
     topology = read_topology(Path(groups) if groups else None, carried.names)
     how = Settings(carried, topology, "variable", Rules(), "rerun", Contest((), ()))

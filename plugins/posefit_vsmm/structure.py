@@ -73,6 +73,7 @@ class Models:
         after = self.imm.cycle(before, measure)
         self._surprises = [*self._surprises, surprise][-RECENT:]
         if self._how.structure == "all":
+            self.group = self._topology.most_probable(self.active, after.probabilities)
             return after
         self._cycles += 1
         if self.group is None:
