@@ -168,7 +168,7 @@ class Course:
         """Return what is told of the models beside the pose."""
         belief, models = self._belief, self._models
         told: dict[str, Any] = {"lost": belief is None, "models": models.active}
-        told |= {"group": models.group, "newcomer": models.newcomer}
+        told |= {"group": models.group, "newcomer": models.newcomer, "groups": models.groups}
         if belief is not None:
             told |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
         return told

@@ -44,7 +44,7 @@ class Models:
     """The models in force; at first all of them."""
 
     def __init__(self, settings: Settings, skeleton: Skeleton, fps: float) -> None:
-        self._how, self._topology = settings, settings.topology
+        self._how, self._topology, self.groups = settings, settings.topology, settings.topology.groups
         self.every = self._topology.union(self._topology.groups)
         self.known = {name: settings.library.models[name].fitted_to(skeleton, fps) for name in self.every}
         self._made = lru_cache(self._make)
