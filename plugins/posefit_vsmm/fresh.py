@@ -9,12 +9,13 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import Array
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit_vsmm.motion import MotionModel, product
-from posefit_vsmm.state import ERROR, Reliance, decode, encode, plus
+from posefit_vsmm.state import ERROR, Reliance, decode, encode, minus, plus
 
 NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # yaws that are tried where one is about known
 ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)
 SHARE = 0.6  # of the budget: what the typical poses may have
 ROUND = 40  # draws around the best so far
+USUAL = np.radians(15.0)  # as far from a typical pose, a quaternion costs 1 of 100, as much as 1 % of the silhouette
 SPREADS = np.radians([20.0, 12.0, 7.0, 4.0])  # of the draws, one a round, the last one for the rest
 
 
@@ -66,15 +67,22 @@ def estimated(
         states = np.concatenate([encode(given[None], anchor[None]), states])
     costs, states = matcher.costs(states)
     best, least = states[costs.argmin()], float(costs.min())
+    home = best
     left, turn = budget - len(states), 0
     while left >= ROUND:
         errors = rng.normal(0.0, SPREADS[min(turn, len(SPREADS) - 1)], (ROUND, ERROR))
         errors[:, :3] = 0.0
         costs, states = matcher.costs(np.array([plus(best, error) for error in errors]))
+        costs = costs + np.array([_doubt(state, home) for state in states])
         if costs.min() < least:
             best, least = states[costs.argmin()], float(costs.min())
         left, turn = left - ROUND, turn + 1
     return np.asarray(best)
+
+
+def _doubt(state: Array, home: Array) -> float:
+    """Return what a state costs beside its silhouette for being another pose than the typical one."""
+    return float(((minus(state, home)[3:] / USUAL) ** 2).sum())
 
 
 def _placed(pose: Array, yaw: float, anchor: Array) -> Array:

@@ -17,7 +17,7 @@ from posefit_vsmm.switching import Contest, New, Rules, enlarged, joined, restri
 
 FIRST = 10  # cycles over all models before a group is chosen
 RECENT = 5  # frames: where the median of their surprise is larger than SURPRISED, the group is chosen anew
-SURPRISED = 2.0
+SURPRISED = 1.2
 
 Structure = Literal["variable", "all"]
 Measure = Callable[[Array], Measurement]

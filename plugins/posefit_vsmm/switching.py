@@ -23,7 +23,7 @@ _LIMBS = np.array(
 _TRUNK = np.array([AT["root"], AT["torso"]])
 TWICE, HALF = 2.0, 0.5
 MOST = 3  # of four limbs
-HIPS = 2
+HIPS = 1  # of two
 
 New = Literal["rerun", "patent"]
 Test = Literal["sequential", "patent"]
