@@ -123,7 +123,7 @@ def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
     wanted = after - before - inputs @ target.T
     wanted[:, [0, 2]] = 0.0  # nobody's way over the ground is predicted: who steps on the spot walks, too
     mean = wanted.mean(axis=0)
-    normal = scaled.T @ scaled + LAMBDA * len(scaled) * np.eye(scaled.shape[1])
+    normal = scaled.T @ scaled + LAMBDA * len(scaled) * np.eye(scaled.shape[1])  # VSMM 3
     matrix = np.linalg.solve(normal, scaled.T @ (wanted - mean)).T / unit
     return matrix + target, mean - matrix @ middle
 

@@ -77,7 +77,7 @@ def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
     used = {model for mine in groups.values() for model in mine}
     for model in neighbours:
         _check(label, model, known)
-    return Topology(groups, {model: neighbours.get(model, ()) for model in used | set(neighbours)}, stay)
+    return Topology(groups, {model: neighbours.get(model, ()) for model in used | set(neighbours)}, stay)  # VSMM 4
 
 
 def _lists(label: str, key: str, table: Any, known: Collection[str]) -> dict[str, tuple[str, ...]]:

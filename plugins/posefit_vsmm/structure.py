@@ -81,7 +81,7 @@ class Models:
                 return after
             return self._keep(self._topology.most_probable(self.active, after.probabilities), after)  # VSMM 5
         if self.newcomer is not None:
-            decision = self._contest.decide(after, self.active)  # VSMM 9
+            decision = self._contest.decide(after, self.active)
             if decision is None:
                 return after
             return self._keep(self.newcomer if decision == "new" else self.group, after)
@@ -105,7 +105,7 @@ class Models:
     def _activated(self, before: Belief, after: Belief, measure: Measure) -> Belief:
         """Bring the group that the rules ask for into force beside the present one, if they ask for one."""
         groups, names = self._topology.groups, tuple(self._topology.groups)
-        asked = self._how.rules.wanted(self._drawn)  # VSMM 7
+        asked = self._how.rules.wanted(self._drawn)
         if self.group is None or asked is None or asked >= len(names) or names[asked] == self.group:
             return after
         old, imm = self.active, self.imm
