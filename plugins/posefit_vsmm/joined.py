@@ -106,7 +106,7 @@ def joined(
     *,
     optimiser: str = "sapso",
     dimensions: int = 16,
-    weight: float = 0.5,
+    weight: float = 0.25,
     groups: str = "",
 ) -> Joined:
     """The motion models of `vsmm` predict where a swarm starts, and learn from what it finds.

@@ -41,10 +41,7 @@ class MotionModel:
         return moved, jacobian @ covariance @ jacobian.T + self.noise
 
     def step(self, state: Array) -> tuple[Array, Array]:
-        """Return the state (43,) one frame later, and the Jacobian (33, 33) of its error by the error before.
-
-        The Jacobian takes the heading as known, which it is to a few degrees.
-        """
+        """Return the state (43,) one frame later, and the Jacobian (33, 33) of its error by the error before."""
         moved, jacobian = _step(self.matrix, self.offset, self.share, self.leg, state)
         return moved, jacobian
 
@@ -173,15 +170,22 @@ def _step(matrix, offset, share, leg, state):
         sizes[j] = np.sqrt((after[j] ** 2).sum())
         after[j] /= sizes[j]
     moved = np.empty(state.size)
-    moved[:3] = state[:3] + leg * (turn @ change[:3].copy())
+    gone = leg * (turn @ change[:3].copy())
+    moved[:3] = state[:3] + gone
     for j in range(n):
         moved[3 + 4 * j : 7 + 4 * j] = signs[j] * (product(back, after[0]) if j == 0 else after[j])
+    w, x, _, z = before[0]
+    by_heading = np.array([z / w, 1.0, -x / w])  # how the heading turns with an error of the whole body
     flow = _tangents(before)
+    flow[:4, :3] -= 0.5 * np.outer(np.array([0.0, z, w, -x]), by_heading)  # what is headed has no part of it
     change_flow = share * (matrix @ flow)  # (43, 30)
     flow += change_flow[3:]
     for j in range(n):
         flow[4 * j : 4 * j + 4] /= sizes[j]
+    w, x, y, z = after[0]
+    flow[:4, :3] += 0.5 * np.outer(np.array([-y, z, w, -x]), by_heading)
     jacobian = np.eye(3 + 3 * n)
     jacobian[:3, 3:] = leg * (turn @ change_flow[:3].copy())
+    jacobian[:3, 3:6] += np.outer(np.array([gone[2], 0.0, -gone[0]]), by_heading)
     jacobian[3:, 3:] = 4.0 * (_tangents(after).T.copy() @ flow)
     return moved, jacobian

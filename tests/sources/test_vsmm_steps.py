@@ -1,0 +1,471 @@
+"""The variable-structure multiple-model tracker, CN101894278: every step but the filter itself, on cases done by hand."""
+
+from collections.abc import Callable, Sequence
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array
+from posefit.motion import library as motions
+from posefit_vsmm.fit_motion import LAMBDA, ridge
+from posefit_vsmm.groups import read_topology
+from posefit_vsmm.imm import Belief, Measurement, start
+from posefit_vsmm.joints import detected
+from posefit_vsmm.motion import MotionModel, library
+from posefit_vsmm.points import AT, POINTS, Figure, points_of
+from posefit_vsmm.preprocess import Lines, lines_of
+from posefit_vsmm.shown import Shown
+from posefit_vsmm.state import ERROR, HELD_ANGLES, MANIFOLD, decode, encode, minus, plus
+from posefit_vsmm.structure import FIRST, Models, Settings
+from posefit_vsmm.switching import Contest, Rules, enlarged, joined, limb_angles, restricted
+
+SIZE = (240, 320)  # rows, columns
+NO_BIAS = np.zeros((len(POINTS), 2))
+
+
+def canvas() -> np.ndarray:
+    return np.zeros(SIZE, dtype=np.uint8)
+
+
+def lines(image: np.ndarray) -> Lines:
+    found = lines_of(image > 0)
+    assert found is not None
+    return found
+
+
+# ---------------------------------------------------------------------------------------------- 1: preprocessing
+
+
+def test_gaps_of_a_pixel_close_and_specks_go() -> None:  # VSMM 1.3
+    image = canvas()
+    image[50:150, 100:140] = 1
+    image[100, 100:140] = 0  # a line through the body: a gap of one pixel
+    image[20:23, 20:23] = 1  # nine pixels, a speck
+    found = lines(image)
+    assert found.area == 100 * 40
+    assert np.allclose(found.centroid, [120.0, 100.0])
+
+
+def test_a_bar_has_its_outline_and_its_middle_line() -> None:  # VSMM 1.4
+    image = canvas()
+    image[100:111, 60:161] = 1  # 11 rows, 101 columns
+    found = lines(image)
+    assert set(found.contour[:, 1]) == {k + 0.5 for k in range(100, 111)}
+    assert len(found.contour) == 2 * (11 + 101) - 4  # each pixel of the border once
+    inner = found.skeleton[(found.skeleton[:, 0] > 70) & (found.skeleton[:, 0] < 150)]
+    assert np.allclose(inner[:, 1], 105.5, atol=1.0)
+    assert len(found.ends) == 2
+    assert sorted(found.ends[:, 0])[0] < 70
+    assert sorted(found.ends[:, 0])[1] > 150
+
+
+def test_a_bump_of_the_outline_is_no_end_point() -> None:
+    image = canvas()
+    image[60:200, 100:130] = 1
+    cv2.circle(image, (131, 120), 5, 1, -1)  # a bump on the bar's right side
+    assert all(abs(end[1] - 120) > 40 for end in lines(image).ends)
+
+
+def test_nothing_seen_has_no_lines() -> None:
+    assert lines_of(np.zeros(SIZE, dtype=bool)) is None
+
+
+# --------------------------------------------------------------------------------------------- 2: joints in the image
+
+
+def figure() -> tuple[np.ndarray, Array]:
+    """Return a stick figure with thick limbs, and where its 17 points are."""
+    places = {
+        "head": (160, 50), "root": (160, 130), "torso": (160, 105), "left clavicle": (165, 80),
+        "right clavicle": (155, 80), "left shoulder": (175, 80), "right shoulder": (145, 80),
+        "left elbow": (205, 90), "right elbow": (115, 90), "left hand": (235, 100), "right hand": (85, 100),
+        "left hip": (168, 135), "right hip": (152, 135), "left knee": (180, 175), "right knee": (140, 175),
+        "left foot": (192, 215), "right foot": (128, 215),
+    }  # fmt: skip
+    image = canvas()
+    cv2.circle(image, places["head"], 14, 1, -1)
+    cv2.line(image, (160, 60), (160, 130), 1, 17)
+    for side in ("left", "right"):
+        cv2.line(image, places[f"{side} shoulder"], (160, 80), 1, 9)
+        cv2.line(image, places[f"{side} shoulder"], places[f"{side} hand"], 1, 7)
+        cv2.line(image, places[f"{side} hip"], (160, 130), 1, 9)
+        cv2.line(image, places[f"{side} hip"], places[f"{side} foot"], 1, 9)
+    return image, np.array([places[name] for name in POINTS], dtype=np.float64)
+
+
+def seen(off: float = 6.0, seed: int = 0, gate: float = 30.0) -> tuple[dict[str, Array], dict[str, float], Array]:
+    """Return the points found in the stick figure, how sure the rules are, and where points were expected."""
+    image, places = figure()
+    expected = places + np.random.default_rng(seed).normal(0.0, off, places.shape)
+    found = detected(lines(image), expected, np.full(len(POINTS), gate), 85.0, 14.0, NO_BIAS)
+    named = {name: found.points[AT[name]] for name in POINTS}
+    return named, {name: float(found.confidence[AT[name]]) for name in POINTS}, expected
+
+
+def test_the_head_is_where_a_ring_catches_most_of_the_contour() -> None:  # VSMM 2.1
+    points, sure, _ = seen()
+    assert np.linalg.norm(points["head"] - [160.5, 50.5]) < 3.0
+    assert sure["head"] > 0.5
+
+
+def test_the_root_is_the_centroid() -> None:  # VSMM 2.2
+    points, _, _ = seen()
+    rows, columns = np.nonzero(figure()[0])
+    assert np.allclose(points["root"], [columns.mean() + 0.5, rows.mean() + 0.5], atol=0.5)
+
+
+def test_the_torso_is_carried_along_with_the_root() -> None:  # VSMM 2.3
+    points, _, expected = seen()
+    moved = points["root"] - expected[AT["root"]]
+    for name in ("torso", "left clavicle", "right shoulder", "left hip"):
+        assert np.allclose(points[name], expected[AT[name]] + moved)
+
+
+def test_end_points_are_hands_and_feet() -> None:  # VSMM 2.4
+    points, sure, _ = seen()
+    _, places = figure()
+    for name in ("left hand", "right hand", "left foot", "right foot"):
+        assert np.linalg.norm(points[name] - places[AT[name]]) < 6.0
+        assert sure[name] > 0.0
+
+
+def test_an_end_point_out_of_reach_is_nobodys() -> None:
+    image, places = figure()
+    expected = places.copy()
+    expected[AT["left hand"]] += [0.0, 60.0]
+    found = detected(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, NO_BIAS)
+    assert found.confidence[AT["left hand"]] == 0.0
+    assert np.array_equal(found.points[AT["left hand"]], expected[AT["left hand"]])
+    assert found.spare == 1
+
+
+def test_knees_are_where_the_parallel_to_the_feet_crosses_the_legs() -> None:  # VSMM 2.5
+    points, sure, _ = seen()
+    image, _ = figure()
+    rows, _ = np.nonzero(image)
+    height = rows[rows + 0.5 > points["root"][1]].mean() + 0.5  # the feet stand level, and so does the parallel
+    for name, side in (("left knee", 1.0), ("right knee", -1.0)):
+        assert sure[name] > 0.0
+        assert abs(points[name][1] - height) < 2.0
+        leg = 160.5 + side * (8.0 + (height - 135.5) * 24.0 / 80.0)  # from the hip (8, 135) to the foot (32, 215)
+        assert abs(points[name][0] - leg) < 2.5
+
+
+def test_an_elbow_is_as_far_from_the_hand_as_from_the_shoulder() -> None:  # VSMM 2.6
+    points, sure, _ = seen()
+    for side in ("left", "right"):
+        elbow, hand, shoulder = (points[f"{side} {name}"] for name in ("elbow", "hand", "shoulder"))
+        assert sure[f"{side} elbow"] > 0.0
+        assert abs(np.linalg.norm(elbow - hand) - np.linalg.norm(elbow - shoulder)) < 1.5
+
+
+def test_a_hidden_joint_goes_on_as_it_went() -> None:  # VSMM 2.7
+    points, sure, variances = np.zeros((17, 2)), np.ones(17), np.full((17, 2), 0.01)
+    shown = Shown(points)
+    for k in range(1, 30):
+        shown.follow(points + [3.0 * k, -1.0 * k], sure, variances)
+    hidden = sure.copy()
+    hidden[AT["left hand"]] = 0.0
+    found = shown.follow(points + 500.0, hidden, variances)[AT["left hand"]]
+    assert np.allclose(found, [90.0, -30.0], atol=0.5)
+
+
+# --------------------------------------------------------------------------------------------------- 3: motion models
+
+
+def test_states_and_poses_lead_back_to_each_other() -> None:
+    walk, reliance = motions.built_in("walk"), library().reliance
+    states = encode(walk.poses, walk.translations)
+    poses, places = decode(states, reliance)
+    assert np.allclose(places, walk.translations)
+    assert np.allclose(poses[:, HELD_ANGLES], walk.poses[:, HELD_ANGLES], atol=1e-9)
+    assert np.allclose(np.linalg.norm(states[:, 3:].reshape(len(states), -1, 4), axis=2), 1.0)
+
+
+def test_plus_and_minus_undo_each_other() -> None:
+    rng = np.random.default_rng(0)
+    state = encode(motions.built_in("jacks").poses[:1], np.zeros((1, 3)))[0]
+    error = rng.normal(0.0, 0.5, ERROR)
+    assert np.allclose(minus(plus(state, error), state), error, atol=1e-12)
+    turned = Rotation.from_quat(state[3:7], scalar_first=True) * Rotation.from_rotvec(error[3:6])
+    assert np.allclose(Rotation.from_quat(plus(state, error)[3:7], scalar_first=True).as_matrix(), turned.as_matrix())
+
+
+def test_ridge_regression_is_least_squares_with_more_rows() -> None:  # VSMM 3
+    rng = np.random.default_rng(1)
+    before = np.column_stack([np.zeros((90, 3)), rng.normal(0.0, 0.3, (90, 40))])
+    after = before + rng.normal(0.0, 0.05, before.shape)
+    target = 0.1 * rng.normal(size=(43, 40))
+    matrix, offset = ridge(before, after, target)
+    inputs = before[:, 3:]
+    unit = np.sqrt(inputs.var(axis=0).sum() / 10.0)
+    scaled = (inputs - inputs.mean(axis=0)) / unit
+    wanted = after - before - inputs @ target.T
+    wanted[:, [0, 2]] = 0.0  # the way over the ground
+    rows = np.vstack([scaled, np.sqrt(LAMBDA * len(scaled)) * np.eye(40)])
+    found = np.linalg.lstsq(rows, np.vstack([wanted - wanted.mean(axis=0), np.zeros((40, 43))]), rcond=None)[0]
+    assert np.allclose(matrix, found.T / unit + target)
+    assert np.allclose(inputs @ (matrix - target).T + offset, scaled @ found + wanted.mean(axis=0))
+
+
+@pytest.mark.parametrize("name", ["walk", "jacks", "squat"])
+def test_a_models_jacobian_is_that_of_its_step(name: str) -> None:
+    walk = motions.built_in("march")
+    model = library().models[name].fitted_to(walk.skeleton, 25.0)
+    state = encode(walk.poses[7:8], walk.translations[7:8])[0]
+    moved, jacobian = model.step(state)
+    slow = np.array([minus(model.step(plus(state, e))[0], moved) for e in 1e-6 * np.eye(ERROR)]).T / 1e-6
+    assert np.abs(slow - jacobian).max() < 1e-4
+
+
+def test_a_model_does_not_care_where_somebody_stands_and_which_way_he_looks() -> None:
+    jump = motions.built_in("jump")
+    model = library().models["jump"].fitted_to(jump.skeleton, 30.0)
+    state = encode(jump.poses[3:4], jump.translations[3:4])[0]
+    turn = Rotation.from_euler("y", 1.1)
+    other = state.copy()
+    other[:3] = turn.apply(state[:3]) + [4.0, -1.0, 2.0]
+    other[3:7] = (turn * Rotation.from_quat(state[3:7], scalar_first=True)).as_quat(scalar_first=True)
+    first, second = model.step(state)[0], model.step(other)[0]
+    assert np.allclose(second[:3], turn.apply(first[:3]) + [4.0, -1.0, 2.0])
+    same = Rotation.from_quat(second[3:7], scalar_first=True).inv() * turn
+    assert (same * Rotation.from_quat(first[3:7], scalar_first=True)).magnitude() < 1e-9
+
+
+def test_the_models_are_no_worse_than_standing_still_where_the_report_says_so() -> None:
+    report = library().report
+    assert report["walk"]["identity_1"] < report["walk"]["still_1"]  # people who walk are alike
+    for figures in report.values():
+        assert figures["identity_1"] < 1.35 * figures["still_1"]
+        assert figures["zero_1"] > figures["identity_1"]  # Reading V5
+
+
+# ----------------------------------------------------------------------------------------------------- 4, 5: groups
+
+
+def test_the_groups_are_those_of_the_reading() -> None:  # VSMM 4
+    topology = read_topology(None, library().names)
+    assert topology.groups == {
+        "G1": ("stiff-walk", "walk", "arms-out"),
+        "G2": ("arms-out", "jacks", "jump"),
+        "G3": ("jacks", "jump", "squat"),
+    }
+    matrix = topology.transition(("walk", "arms-out", "jacks"))
+    assert np.allclose(matrix, [[0.92, 0.08, 0.0], [0.04, 0.92, 0.04], [0.0, 0.08, 0.92]])
+
+
+def models(**changes: object) -> Models:
+    carried = library()
+    given = {"structure": "variable", "rules": Rules(), "new": "rerun", "contest": Contest((), ())} | changes
+    settings = Settings(carried, read_topology(None, carried.names), **given)  # type: ignore[arg-type]
+    return Models(settings, motions.average_skeleton(), 30.0)
+
+
+def telling(name: str, running: Models) -> Callable[[Array], Measurement]:
+    """Return a measurement of nothing, but that the model's prediction is the most likely."""
+    asked = iter(range(10**6))
+
+    def measure(_: Array) -> Measurement:
+        likely = running.active[next(asked) % len(running.active)] == name
+        return Measurement(np.zeros(0), np.zeros((0, ERROR)), np.zeros((0, 0)), 0.0 if likely else -3.0)
+
+    return measure
+
+
+def begun(running: Models) -> Belief:
+    pose = motions.built_in("walk")
+    state = encode(pose.poses[:1], pose.translations[:1])[0]
+    return start(state, 0.01 * np.eye(ERROR), len(running.active))
+
+
+@pytest.mark.parametrize(("model", "group"), [("walk", "G1"), ("squat", "G3")])
+def test_after_ten_cycles_over_all_models_the_most_probable_group_stays(model: str, group: str) -> None:  # VSMM 5
+    running = models()
+    belief, measure = begun(running), telling(model, running)
+    for _ in range(FIRST - 1):
+        belief = running.cycle(belief, measure, 0.0)
+        assert running.group is None
+    belief = running.cycle(belief, measure, 0.0)
+    assert running.group == group
+    assert len(belief.probabilities) == 3
+    assert np.isclose(belief.probabilities.sum(), 1.0)
+
+
+# ------------------------------------------------------------------------------------------------- 6.1: what is seen
+
+
+def test_the_points_are_projected_and_their_jacobian_is_right() -> None:  # VSMM 6.1
+    jacks = motions.built_in("jacks-a")
+    shown = Figure(jacks.skeleton, library().reliance)
+    camera = Camera.around(np.array([0.0, 1.0, 0.0]), 0.4, 4.0, (320, 240))
+    for k in (0, 9, 21):
+        state = encode(jacks.poses[k : k + 1], jacks.translations[k : k + 1])[0]
+        pixels, jacobian = shown.seen(camera, state)
+        poses, places = decode(state[None], library().reliance)
+        assert np.allclose(pixels, camera.project(points_of(jacks.skeleton.joints(poses, places)[0]))[0])
+        step = 1e-6 * np.eye(ERROR)
+        slow = [(shown.seen(camera, plus(state, e))[0] - shown.seen(camera, plus(state, -e))[0]) / 2e-6 for e in step]
+        assert np.abs(np.moveaxis(slow, 0, 2) - jacobian).max() < 1e-4
+
+
+# ---------------------------------------------------------------------------------------- 7: which group is asked for
+
+
+def swinging(changes_degrees: Sequence[Sequence[float]]) -> list[Array]:
+    """Return points whose thighs and shanks (left, right, left, right) turn by so many degrees from frame to frame."""
+    points = figure()[1]
+    angles = np.cumsum([[0.0] * 4, *changes_degrees], axis=0)
+    found = []
+    for left, right, left_shank, right_shank in np.radians(angles):
+        one = points.copy()
+        for side, thigh, shank in (("left", left, left_shank), ("right", right, right_shank)):
+            hip = one[AT[f"{side} hip"]]
+            one[AT[f"{side} knee"]] = hip + 40.0 * np.array([np.sin(thigh), np.cos(thigh)])
+            one[AT[f"{side} foot"]] = one[AT[f"{side} knee"]] + 40.0 * np.array([np.sin(shank), np.cos(shank)])
+        found.append(one)
+    return found
+
+
+PATENT = Rules(smoothing=1, floor_degrees=0.0, dwell=0)
+
+
+def test_limb_angles_are_those_of_thighs_shanks_and_hips() -> None:
+    first, second = (limb_angles(points) for points in swinging([[10.0, -20.0, 30.0, 5.0]]))
+    assert np.allclose(np.degrees(second - first), [10.0, -20.0, 30.0, 5.0, 10.0, -20.0])
+
+
+def test_a_hip_that_turns_twice_as_fast_asks_for_the_third_group() -> None:  # VSMM 7a
+    assert PATENT.wanted(swinging([[2.0, 3.0, 3.0, 3.0], [4.0, 3.0, 3.0, 3.0]])) == 2
+    assert PATENT.wanted(swinging([[2.0, 3.0, 3.0, 3.0], [3.9, 3.0, 3.0, 3.0]])) is None
+
+
+def test_most_limbs_that_turn_twice_as_fast_ask_for_the_second_group() -> None:  # VSMM 7b
+    # the hips of the rule before turn with the thighs: here the trunk turns with them, so that the hips keep still
+    frames = swinging([[2.0, 2.0, 2.0, 2.0], [5.0, 5.0, 5.0, 2.0]])
+    for points, degrees in zip(frames, (0.0, 2.0, 7.0), strict=True):
+        points[AT["root"]] = points[AT["torso"]] + 25.0 * np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
+    assert PATENT.wanted(frames) == 1
+
+
+def test_most_limbs_that_turn_half_as_fast_ask_for_the_first_group() -> None:  # VSMM 7c
+    assert PATENT.wanted(swinging([[4.0, 4.0, 4.0, 4.0], [2.0, 3.0, 2.0, 2.0]])) == 0
+    assert PATENT.wanted(swinging([[4.0, 4.0, 4.0, 4.0], [2.0, 3.0, 3.0, 2.0]])) is None
+
+
+def test_small_changes_ask_for_nothing() -> None:
+    rules = Rules(smoothing=1, floor_degrees=2.0, dwell=0)
+    assert rules.wanted(swinging([[0.1, 0.1, 0.1, 0.1], [1.9, 1.9, 1.9, 1.9]])) is None
+    assert rules.wanted(swinging([[0.1, 0.1, 0.1, 0.1], [2.0, 2.0, 2.0, 2.0]])) == 2
+
+
+def test_changes_are_means_over_frames() -> None:
+    rules = Rules(smoothing=2, floor_degrees=0.0, dwell=0)
+    assert rules.wanted(swinging([[2.0] * 4] * 3)) is None  # too few frames
+    assert rules.wanted(swinging([[2.0] * 4, [2.0] * 4, [1.0] * 4, [7.1] * 4])) == 2
+
+
+# ------------------------------------------------------------------------------------------ 8: how a group begins
+
+
+OLD, UNION = ("walk", "arms-out"), ("walk", "arms-out", "jacks")
+
+
+def believing() -> Belief:
+    states = encode(motions.built_in("walk").poses[:2], np.zeros((2, 3)))
+    return Belief(states, np.tile(0.01 * np.eye(ERROR), (2, 1, 1)), np.log([0.8, 0.2]), np.array([-1.0, -2.0]))
+
+
+def patents() -> Belief:
+    before = believing()
+    return joined(before, OLD, UNION, {"jacks": before.states[0] * 1.0}, {"jacks": 0.5 * np.eye(ERROR)})
+
+
+def test_a_new_model_is_as_probable_as_the_most_probable_one() -> None:  # VSMM 8.1
+    assert np.allclose(patents().probabilities, np.array([0.8, 0.2, 0.8]) / 1.8)
+
+
+def test_a_new_models_covariance_is_its_noise() -> None:  # VSMM 8.2
+    assert np.array_equal(patents().covariances[2], 0.5 * np.eye(ERROR))
+    assert np.array_equal(patents().covariances[:2], believing().covariances)
+
+
+def test_a_new_model_starts_from_its_typical_pose() -> None:  # VSMM 8.3
+    walk = motions.built_in("walk")
+    state = encode(walk.poses[:1], walk.translations[:1])[0]
+    model = library().models["walk"]
+    found = model.nearest(state)
+    assert np.array_equal(found[:3], state[:3])
+    away = [np.abs(minus(np.concatenate([np.zeros(3), one]), np.concatenate([np.zeros(3), state[3:]]))[6:]) for one in model.poses]
+    nearest = model.poses[int(np.argmin([np.linalg.norm(one.reshape(-1, 3), axis=1).sum() for one in away]))]
+    assert np.allclose(found[7:], nearest[4:])
+
+
+def test_old_and_new_groups_are_in_force_together() -> None:  # VSMM 8.4
+    topology = read_topology(None, library().names)
+    assert topology.union(("G3", "G1")) == ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
+    assert topology.union(("G1", "G2")) == ("stiff-walk", "walk", "arms-out", "jacks", "jump")
+
+
+def test_by_default_a_new_model_gets_what_the_transitions_give_it() -> None:
+    before = believing()
+    belief = enlarged(before, OLD, UNION, before.states[0], before.covariances[0])
+    running = models()
+    running.active = UNION
+    after = running.imm.mixed(belief)
+    # walk goes on with 0.92 or to arms-out; arms-out to jacks with 0.04
+    assert np.allclose(after.probabilities, [0.8 * 0.92 + 0.2 * 0.04, 0.8 * 0.08 + 0.2 * 0.92, 0.2 * 0.04])
+    assert np.allclose(after.states[2], before.states[1])  # only arms-out changes into jacks
+
+
+def test_what_is_left_sums_to_one() -> None:
+    assert np.allclose(restricted(believing(), OLD, ("arms-out",)).probabilities, [1.0])
+
+
+# ------------------------------------------------------------------------------------------- 9: which group has to go
+
+
+def latest(probabilities: Sequence[float], likelihoods: Sequence[float]) -> Belief:
+    before = believing()
+    return Belief(before.states, before.covariances, np.log(probabilities), np.log(likelihoods))
+
+
+def test_the_patents_test_looks_at_one_frame() -> None:  # VSMM 9
+    contest = Contest(("walk",), ("jacks",), "patent")
+    models = ("walk", "jacks")
+    assert contest.decide(latest([0.6, 0.4], [1.0, 1.0]), models) == "old"  # 0.4 / 0.6 < 0.9
+    assert contest.decide(latest([0.51, 0.49], [1.0, 1.0]), models) is None  # 0.96
+    assert contest.decide(latest([0.4, 0.6], [1.0, 2.0]), models) == "new"
+    assert contest.decide(latest([0.4, 0.6], [1.0, 0.8]), models) == "old"  # the likelihoods' ratio is 0.8
+
+
+def test_the_sequential_test_waits_for_evidence_of_99_to_1() -> None:
+    models = ("walk", "jacks")
+    contest = Contest(("walk",), ("jacks",))
+    ratios = [3.0] * 4 + [1.3]  # 81, then 105
+    decisions = [contest.decide(latest([0.5, 0.5], [1.0, ratio]), models) for ratio in ratios]
+    assert decisions == [None] * 4 + ["new"]
+    contest = Contest(("walk",), ("jacks",))
+    decisions = [contest.decide(latest([0.5, 0.5], [1.0, 1.0 / ratio]), models) for ratio in ratios]
+    assert decisions == [None] * 4 + ["old"]
+
+
+def test_a_contest_that_is_never_decided_ends() -> None:
+    contest = Contest(("walk",), ("jacks",), longest=3)
+    models = ("walk", "jacks")
+    assert [contest.decide(latest([0.4, 0.6], [1.0, 1.0]), models) for _ in range(3)] == [None, None, "new"]
+
+
+def test_the_body_and_its_models_fit_any_frame_rate() -> None:
+    body = Body.of(motions.average_skeleton())
+    model = library().models["squat"]
+    slow, fast = (model.fitted_to(body.skeleton, fps) for fps in (30.0, 60.0))
+    state = encode(motions.built_in("squat").poses[5:6], np.zeros((1, 3)))[0]
+    whole, half = (minus(one.step(state)[0], state) for one in (slow, fast))
+    assert np.allclose(whole, 2.0 * half, atol=2e-3)
+    assert np.allclose(slow.noise, 2.0 * fast.noise)
+    assert isinstance(slow, MotionModel)
+    assert MANIFOLD.plus is plus
