@@ -14,11 +14,12 @@ from posefit.silhouette.cost import areas, mismatch
 from posefit_vsmm.fresh import Matcher, estimated
 from posefit_vsmm.imm import Belief, Measurement, start
 from posefit_vsmm.joints import errors
+from posefit_vsmm.motion import STIFF
 from posefit_vsmm.points import AT, Figure
 from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.shown import Shown
 from posefit_vsmm.sight import Seen, Sight
-from posefit_vsmm.state import ERROR, decode
+from posefit_vsmm.state import ERROR, decode, free_errors
 from posefit_vsmm.structure import Measure, Models, Settings
 
 COAST = 15  # frames that the models go on alone when nothing is seen; then the track is lost
@@ -63,6 +64,7 @@ class Course:
         self._task, self._reliance, self._rng, self._searcher = task, settings.library.reliance, rng, searcher
         self._models = Models(settings, task.body.skeleton, task.fps)
         self._sight = Sight(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), errors())
+        self._free = np.maximum(free_errors(task.body.skeleton), STIFF)
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._shown: list[Shown] = []
         self._belief: Belief | None = None
@@ -134,7 +136,7 @@ class Course:
         models = list(self._models.known.values())
         state = estimated(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
         self._models.restart()
-        self._belief = start(state, np.diag(UNSURE**2), len(models))
+        self._belief = start(state, np.diag((UNSURE * self._free) ** 2), len(models))
         self._bad = 0
         self._astray = dict.fromkeys(_LIMBS, 0)
         return matcher.evaluations
@@ -149,7 +151,7 @@ class Course:
             if self._astray[limb] >= ASTRAY:
                 for k in joints:
                     extra[6 + 3 * k : 9 + 3 * k] = ASTRAY_SPREAD**2
-        return extra
+        return extra * self._free**2
 
     def _joints(self, seen: Sequence[Seen | None], expected: Array) -> dict[str, Any]:
         """Return the 17 joints (views, 17, 2) as they are shown, and how sure the rules were of them (views, 17)."""
@@ -188,6 +190,7 @@ class Course:
         if observation.translation is not None:
             place = np.array(observation.translation, dtype=np.float64)
         views = zip(task.cameras, observation.silhouettes, strict=True)
+        pose = np.where(task.body.skeleton.free, pose, 0.0)
         counts = np.concatenate([areas(task.body, camera, one, pose[None], place[None]) for camera, one in views])
         known = [one.known for one in observation.silhouettes]
         heard = counts[known] if any(known) else counts

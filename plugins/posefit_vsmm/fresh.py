@@ -9,7 +9,7 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import Array
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit_vsmm.motion import MotionModel, product
-from posefit_vsmm.state import ERROR, Reliance, decode, encode, minus, plus
+from posefit_vsmm.state import ERROR, Reliance, decode, encode, free_errors, minus, plus
 
 NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # yaws that are tried where one is about known
 ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)
@@ -24,6 +24,7 @@ class Matcher:
 
     def __init__(self, task: Task, observation: Observation, reliance: Reliance, beta: float = BETA) -> None:
         self._task, self._observation, self._reliance, self._beta = task, observation, reliance, beta
+        self.free = free_errors(task.body.skeleton)
         self.evaluations = 0
 
     def costs(self, states: Array) -> tuple[Array, Array]:
@@ -72,6 +73,7 @@ def estimated(
     while left >= ROUND:
         errors = rng.normal(0.0, SPREADS[min(turn, len(SPREADS) - 1)], (ROUND, ERROR))
         errors[:, :3] = 0.0
+        errors *= matcher.free
         costs, states = matcher.costs(np.array([plus(best, error) for error in errors]))
         costs = costs + np.array([_doubt(state, home) for state in states])
         if costs.min() < least:

@@ -25,7 +25,7 @@ from posefit_vsmm.fresh import Matcher
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import Measurement
 from posefit_vsmm.motion import library
-from posefit_vsmm.state import ERROR, MANIFOLD, Reliance, decode, encode
+from posefit_vsmm.state import ERROR, MANIFOLD, Reliance, decode, encode, free_errors
 from posefit_vsmm.structure import Settings
 from posefit_vsmm.switching import Contest, Rules
 
@@ -59,7 +59,7 @@ class Search:
         if budget < LEAST_BUDGET:
             return None
         poses, places = decode(state[None], self.reliance)
-        around = spread + np.diag(LEAST**2)
+        around = spread + np.diag((LEAST * free_errors(self.task.body.skeleton)) ** 2)
         prior = Directions.of(state, around, self.reliance, self.dimensions, REACH)
         root = np.maximum(np.sqrt(np.diag(around)[[4, 3, 5]]), ROOT_LEAST)
         space = SearchSpace(prior, poses[0, :3], REACH * root, places[0], self.task.translation)

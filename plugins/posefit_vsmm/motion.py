@@ -17,9 +17,10 @@ from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
-from posefit_vsmm.state import ERROR, Reliance
+from posefit_vsmm.state import ERROR, Reliance, free_errors
 
 FPS = 30.0  # the rate that the models were fitted at (Reading V6)
+STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
 Shrink = Literal["identity", "zero"]  # what ridge regression draws F towards (Reading V5)
 
 
@@ -56,7 +57,7 @@ class MotionModel:
     def fitted_to(self, skeleton: Skeleton, fps: float) -> "MotionModel":
         """Return the model for a body's legs and another frame rate, of which a step is a share of a step at 30."""
         share = FPS / fps
-        scale = np.ones(ERROR)
+        scale = np.maximum(free_errors(skeleton), STIFF)
         scale[:3] = leg_of(skeleton)
         noise = self.noise * np.outer(scale, scale) * share
         return MotionModel(self.name, self.matrix, self.offset, noise, self.poses, float(scale[0]), share)

@@ -18,7 +18,7 @@ from posefit.geometry.rotation import (
     rotation_from_joint_angles,
     rotation_from_root_angles,
 )
-from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, angle_index
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, angle_index
 from posefit_vsmm.imm import Manifold
 
 BONES = (
@@ -59,6 +59,11 @@ def encode(poses: Array, translations: Array) -> Array:
         turned = np.einsum("ij,ij->i", quaternions[k], quaternions[k - 1]) < 0.0
         quaternions[k, turned] *= -1.0
     return np.column_stack([translations, quaternions.reshape(len(poses), -1)])
+
+
+def free_errors(skeleton: Skeleton) -> Array:
+    """Return 1 for each error (33,) that a skeleton's joints allow, and 0 for the others: a knee is a hinge."""
+    return np.concatenate([np.ones(6), skeleton.free[HELD_ANGLES].astype(np.float64)])
 
 
 def decode(states: Array, reliance: Reliance) -> tuple[Array, Array]:
