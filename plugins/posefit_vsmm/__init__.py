@@ -1,4 +1,4 @@
-"""A variable-structure multiple-model tracker, patent application CN101894278, 2010: `vsmm`; and `sapso+vsmm`, a swarm led by it.
+"""A variable-structure multiple-model tracker, CN101894278 (2010): `vsmm`; and `sapso+vsmm`, a swarm led by it.
 
 `imm`, its filter, knows nothing of bodies: any models of any state can be given to it.
 """

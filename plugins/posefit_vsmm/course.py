@@ -121,7 +121,9 @@ class Course:
         return self._frame(pose, place, observation, used + 1, began, told)
 
     def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[Seen | None]:
-        return [None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)]
+        return [
+            None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)
+        ]
 
     def _begin(self, observation: Observation) -> int:
         """Estimate a pose from this frame alone, all models alike; return how many evaluations that took."""
@@ -151,7 +153,7 @@ class Course:
             if self._astray[limb] >= ASTRAY:
                 for k in joints:
                     extra[6 + 3 * k : 9 + 3 * k] = ASTRAY_SPREAD**2
-        return extra * self._free**2
+        return np.asarray(extra * self._free**2)
 
     def _joints(self, seen: Sequence[Seen | None], expected: Array) -> dict[str, Any]:
         """Return the 17 joints (views, 17, 2) as they are shown, and how sure the rules were of them (views, 17)."""

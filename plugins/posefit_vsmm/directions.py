@@ -12,7 +12,7 @@ from posefit.geometry.skeleton import Skeleton
 from posefit_vsmm.state import MANIFOLD, Reliance, decode
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Directions:
     """Joint angles are `middle` + latents @ `ways`; a `posefit.fitting.prior.Prior` that needs no fit."""
 

@@ -51,7 +51,8 @@ def errors() -> Errors:
 def detected(lines: Lines, expected: Array, gates: Array, leg: float, head: float, bias: Array) -> Detection:
     """Return the points of a silhouette near where they are expected (17, 2).
 
-    What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg and of the head's radius in pixels; `bias` (17, 2) in legs is taken out.
+    What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg
+    and of the head's radius in pixels; `bias` (17, 2) in legs is taken out.
     """
     points, confidence = expected.copy(), np.zeros(len(POINTS))
 
@@ -109,9 +110,7 @@ def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, 
     return [pair for pair in pairs if pair[0] != AT["head"]], len(lines.ends) - len(pairs)
 
 
-def _elbow(
-    lines: Lines, points: Array, confidence: Array, expected: Array, side: str, gates: Array
-) -> Array | None:
+def _elbow(lines: Lines, points: Array, confidence: Array, expected: Array, side: str, gates: Array) -> Array | None:
     """Return the point of the skeleton line that is as far from the hand as from the shoulder."""
     if not confidence[AT[f"{side} hand"]]:
         return None

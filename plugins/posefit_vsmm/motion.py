@@ -17,7 +17,7 @@ from posefit.geometry.kinematics import jit
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
-from posefit_vsmm.state import ERROR, Reliance, free_errors
+from posefit_vsmm.state import Reliance, free_errors
 
 FPS = 30.0  # the rate that the models were fitted at (Reading V6)
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
@@ -69,7 +69,9 @@ class Library:
 
     models: dict[str, MotionModel]
     reliance: Reliance
-    report: dict[str, dict[str, float]]  # degrees: one and ten steps on clips that were not used, against standing still
+    report: dict[
+        str, dict[str, float]
+    ]  # degrees: one and ten steps on clips that were not used, against standing still
 
     @cached_property
     def names(self) -> tuple[str, ...]:

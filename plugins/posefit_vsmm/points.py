@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from posefit.geometry.camera import Camera
-from posefit.geometry.kinematics import Chain, jit, place_joints
+from posefit.geometry.kinematics import jit, place_joints
 from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, Skeleton
 from posefit_vsmm.state import ERROR, HELD, HELD_ANGLES, OTHER_ANGLES, Reliance

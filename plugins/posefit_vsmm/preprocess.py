@@ -38,11 +38,12 @@ def lines_of(mask: Mask) -> Lines | None:
         return None
     top, left = rows[0], columns[0]
     crop = np.pad(mask[top : rows[-1] + 1, left : columns[-1] + 1], 2).astype(np.uint8)
-    clean = _pieces(cv2.morphologyEx(crop, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)))  # VSMM 1.3
+    closed = cv2.morphologyEx(crop, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    clean = _pieces(np.asarray(closed, dtype=np.uint8))  # VSMM 1.3
     corner = np.array([left - 2, top - 2], dtype=np.float64) + 0.5  # pixel centres
     outlines, _ = cv2.findContours(clean, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     thin = skeletonize(clean > 0)  # VSMM 1.4
-    ends = _ends(thin, cv2.distanceTransform(clean, cv2.DIST_L2, 3))
+    ends = _ends(thin, np.asarray(cv2.distanceTransform(clean, cv2.DIST_L2, 3), dtype=np.float32))
     pixels = np.argwhere(clean)[:, ::-1] + corner
     return Lines(
         len(pixels),

@@ -29,4 +29,4 @@ class Shown:
         states[seen] += np.einsum("pij,pj->pi", gain, points[seen] - states[seen, :2])
         covariances[seen] -= gain @ across.transpose(0, 2, 1)
         self._states, self._covariances = states, covariances
-        return states[:, :2].copy()
+        return np.array(states[:, :2])

@@ -146,6 +146,8 @@ class Contest:
         for name in ("alpha", "beta"):
             if not 0.0 < getattr(self, name) < 0.5:
                 raise ValueError(f"{name} must be between 0 and 0.5, got {getattr(self, name)}")
+        if self.longest < 1:
+            raise ValueError(f"longest must be at least 1, got {self.longest}")
 
     def decide(self, belief: Belief, models: Sequence[str]) -> Literal["old", "new"] | None:
         """Return which group stays, after a cycle over both; None while both do."""
@@ -153,7 +155,9 @@ class Contest:
         after = belief.log_probabilities
         before = after - belief.log_likelihoods
         odds = float(np.logaddexp.reduce(after[new]) - np.logaddexp.reduce(after[old]))
-        ratio = odds - float(np.logaddexp.reduce(before[new]) - np.logaddexp.reduce(before[old]))  # of the groups' likelihoods
+        ratio = odds - float(
+            np.logaddexp.reduce(before[new]) - np.logaddexp.reduce(before[old])
+        )  # of the groups' likelihoods
         self.frames += 1
         self.evidence += ratio
         if self.test == "patent":

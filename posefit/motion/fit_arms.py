@@ -1,7 +1,6 @@
 """Arms drawn by hand on a walk: held out to the sides, or one of them waving. No clip of ours shows either alone."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from posefit.geometry.rotation import Array
@@ -36,18 +35,18 @@ def drawn(skeleton: Skeleton, side: str, upper: Array, fore: Array) -> tuple[lis
     shoulder, elbow, wrist = (JOINTS.index(side + name) for name in ("clavicle", "humerus", "radius"))
     first, bend = angle_index(elbow), angle_index(wrist)
     places = [first, first + 1, first + 2, bend]
+
+    def residual(angles: Array, upper: Array, fore: Array, before: Array) -> Array:
+        pose = np.zeros((1, ANGLES))
+        pose[0, places] = angles
+        joints = skeleton.joints(pose)[0]
+        ways = (joints[elbow] - joints[shoulder], upper), (joints[wrist] - joints[elbow], fore)
+        off = [way / np.linalg.norm(way) - wanted / np.linalg.norm(wanted) for way, wanted in ways]
+        return np.concatenate([*off, 0.02 * (angles - before)])
+
     found = np.zeros((len(upper), 4))
     guess = np.radians([0.0, 0.0, 0.0, 40.0])
-    for k, wanted in enumerate(zip(upper, fore, strict=True)):
-
-        def residual(angles: NDArray[np.float64], wanted: tuple[Array, Array] = wanted) -> Array:
-            pose = np.zeros((1, ANGLES))
-            pose[0, places] = angles
-            joints = skeleton.joints(pose)[0]
-            ways = joints[elbow] - joints[shoulder], joints[wrist] - joints[elbow]
-            off = [way / np.linalg.norm(way) - to / np.linalg.norm(to) for way, to in zip(ways, wanted, strict=True)]
-            return np.concatenate([*off, 0.02 * (angles - guess)])
-
-        guess = np.asarray(least_squares(residual, guess).x)
+    for k in range(len(upper)):
+        guess = np.asarray(least_squares(residual, guess, args=(upper[k], fore[k], guess)).x)
         found[k] = guess
     return places, found

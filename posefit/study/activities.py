@@ -12,7 +12,7 @@ import numpy as np
 from posefit.fitting.tracker import Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import wrapped
+from posefit.geometry.rotation import Array, wrapped
 from posefit.motion import library
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
@@ -98,9 +98,9 @@ def _film(
     wall = np.stack([150.0 + 40.0 * across, 160.0 - 30.0 * down, 140.0 + 20.0 * np.sin(9.0 * across)], axis=-1)
     clothes = np.where(down[..., None] < 0.55, [60.0, 50.0, 170.0], [130.0, 60.0, 40.0])
 
-    def noisy(image: np.ndarray) -> Image:
+    def noisy(image: Array) -> Image:
         grain = GRAIN * rng.standard_normal(image.shape, dtype=np.float32)
-        return np.clip(image + grain, 0.0, 255.0).astype(np.uint8)
+        return np.asarray(np.clip(image + grain, 0.0, 255.0).astype(np.uint8))
 
     def filmed() -> Iterator[Image]:
         for pose, place in zip(truth.poses, truth.translations, strict=True):

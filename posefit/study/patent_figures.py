@@ -44,10 +44,10 @@ def probabilities(run: Run) -> Figure:
     figure = Figure(figsize=(10.0, 4.6), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4.0, 1.0))
     seconds = np.arange(len(told)) / FPS
-    for name, row in zip(names, values, strict=True):
-        upper.plot(seconds, row, linewidth=1.2, label=name)
-    upper.set(ylabel="probability", ylim=(0.0, 1.05))
-    upper.legend(fontsize=7, frameon=False, ncols=len(names), loc="upper center", bbox_to_anchor=(0.5, 1.16))
+    for name, series in zip(names, values, strict=True):
+        upper.plot(seconds, series, linewidth=1.2, label=name)
+    upper.set(ylabel="probability", ylim=(0.0, 1.14))
+    upper.legend(fontsize=7, frameon=False, ncols=len(names), loc="upper center", bbox_to_anchor=(0.5, 1.14))
     groups = list(told[0]["groups"])
     for row, group in enumerate(groups):
         force = [k for k, one in enumerate(told) if group in (one["group"], one["newcomer"]) or one["group"] is None]
@@ -85,7 +85,7 @@ def _activities(axes: Any, run: Run, label: bool) -> None:
     for k, one in zip(switches, ACTIVITIES, strict=True):
         axes.axvline(k / FPS, color="0.7", linewidth=0.8, linestyle=":")
         if label:
-            axes.text(k / FPS + 0.1, 0.02, one.label, fontsize=7, color="0.35")
+            axes.text(k / FPS + 0.1, 1.06, one.label, fontsize=7, color="0.35")
     axes.spines[["top", "right"]].set_visible(False)
 
 
@@ -100,7 +100,9 @@ def _still(run: Run, k: int) -> Image:
     seen, frame = run.sequence, run.frames[k]
     mask = seen.observations[k].silhouettes[0].mask
     grey = np.where(mask, 150, 28).astype(np.uint8)
-    blank = cv2.cvtColor(cv2.resize(grey, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR)
+    blank = cv2.cvtColor(
+        cv2.resize(grey, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR
+    )
     marked = np.asarray(blank, dtype=np.uint8).copy()
     for point, sure in zip(frame.details["joints"][0], frame.details["confidence"][0], strict=True):
         cv2.circle(marked, _pixel(point), 4, _JOINT if sure > 0.0 else _HIDDEN, -1 if sure > 0.0 else 1, cv2.LINE_AA)
@@ -119,7 +121,7 @@ def _still(run: Run, k: int) -> Image:
 
 
 def _widest(parts: Sequence[Any]) -> int:
-    return max(part.shape[1] for part in parts)
+    return max(int(part.shape[1]) for part in parts)
 
 
 def _pixel(point: Array) -> tuple[int, int]:

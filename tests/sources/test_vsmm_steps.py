@@ -347,7 +347,9 @@ def test_most_limbs_that_turn_twice_as_fast_ask_for_the_second_group() -> None: 
     # the hips of the rule before turn with the thighs: here the trunk turns with them, so that the hips keep still
     frames = swinging([[2.0, 2.0, 2.0, 2.0], [5.0, 5.0, 5.0, 2.0]])
     for points, degrees in zip(frames, (0.0, 2.0, 7.0), strict=True):
-        points[AT["root"]] = points[AT["torso"]] + 25.0 * np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))])
+        points[AT["root"]] = points[AT["torso"]] + 25.0 * np.array(
+            [np.sin(np.radians(degrees)), np.cos(np.radians(degrees))]
+        )
     assert PATENT.wanted(frames) == 1
 
 
@@ -399,7 +401,10 @@ def test_a_new_model_starts_from_its_typical_pose() -> None:  # VSMM 8.3
     model = library().models["walk"]
     found = model.nearest(state)
     assert np.array_equal(found[:3], state[:3])
-    away = [np.abs(minus(np.concatenate([np.zeros(3), one]), np.concatenate([np.zeros(3), state[3:]]))[6:]) for one in model.poses]
+    away = [
+        np.abs(minus(np.concatenate([np.zeros(3), one]), np.concatenate([np.zeros(3), state[3:]]))[6:])
+        for one in model.poses
+    ]
     nearest = model.poses[int(np.argmin([np.linalg.norm(one.reshape(-1, 3), axis=1).sum() for one in away]))]
     assert np.allclose(found[7:], nearest[4:])
 

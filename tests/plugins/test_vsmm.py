@@ -1,0 +1,317 @@
+"""The vsmm trackers on what goes wrong: nothing to see, pieces, borders, wrong files; and whole, by name."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import posefit
+from posefit.cli import main
+from posefit.fitting import metrics
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.motion import library
+from posefit.registry import registry
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
+from posefit.study import activities, patent
+from posefit.testing import check_tracker
+from posefit_vsmm.course import COAST
+from posefit_vsmm.groups import read_topology
+from posefit_vsmm.joined import joined
+from posefit_vsmm.tracker import vsmm
+
+SIZE = (200, 240)
+NAMES = ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
+
+
+def seen(name: str = "jacks-b", frames: int = 40, azimuth: float = 0.1) -> tuple[Task, list[Observation]]:
+    """Return a task and what is seen of a built-in motion, from the front."""
+    motion = library.built_in(name, frames=frames)
+    body = Body.of(motion.skeleton)
+    camera = Camera.around(np.array([0.0, 1.05, 0.0]), azimuth, 4.4, SIZE)
+    found = [
+        Observation([Silhouette.of(project(body, camera, pose, place))])
+        for pose, place in zip(motion.poses, motion.translations, strict=True)
+    ]
+    return Task(body, [camera], 600, 0.0, motion.translations[0], "aligned"), found
+
+
+def blank(one: Observation) -> Observation:
+    return Observation([Silhouette.of(np.zeros_like(one.silhouettes[0].mask))])
+
+
+def redrawn(one: Observation, change: Any) -> Observation:
+    mask = one.silhouettes[0].mask.copy()
+    change(mask)
+    return Observation([Silhouette.of(mask)])
+
+
+def follow(task: Task, observations: list[Observation], factory: Any = vsmm, **settings: Any) -> list[Frame]:
+    frames = list(factory(task, **settings).track(observations, np.random.default_rng(0)))
+    assert len(frames) == len(observations)
+    for frame in frames:
+        assert np.isfinite(frame.pose).all()
+        assert np.isfinite(frame.translation).all()
+        assert np.isfinite(frame.cost)
+        probabilities = frame.details.get("probabilities")
+        if probabilities is not None:
+            assert np.isclose(probabilities.sum(), 1.0)
+    return frames
+
+
+def iou(frames: list[Frame]) -> np.ndarray:
+    return np.array([metrics.iou(frame.areas)[0] for frame in frames])
+
+
+@pytest.mark.parametrize("factory", [vsmm, joined])
+def test_it_keeps_the_rules_of_a_tracker(factory: Any) -> None:
+    result = check_tracker(factory)
+    assert result, str(result)
+
+
+def test_both_are_registered() -> None:
+    offers = registry().offers["tracker"]
+    assert offers["vsmm"].factory is vsmm
+    assert offers["sapso+vsmm"].factory is joined
+
+
+# ------------------------------------------------------------------------------------------------------- bad input
+
+
+@pytest.mark.parametrize("gap", [1, 10])
+def test_a_short_gap_is_coasted_through(gap: int) -> None:
+    task, observations = seen()
+    for k in range(15, 15 + gap):
+        observations[k] = blank(observations[k])
+    frames = follow(task, observations)
+    assert not any(frame.details["lost"] for frame in frames)
+    assert [frame.evaluations for frame in frames[1:]] == [1] * (len(frames) - 1)  # no fresh estimation
+    assert iou(frames)[-8:].mean() > 0.5
+
+
+def test_after_a_long_gap_the_track_is_lost_and_found_again() -> None:
+    task, observations = seen(frames=100)
+    for k in range(15, 75):
+        observations[k] = blank(observations[k])
+    frames = follow(task, observations)
+    lost = [k for k, frame in enumerate(frames) if frame.details["lost"]]
+    assert lost == list(range(15 + COAST, 75))
+    assert all(np.array_equal(frames[k].pose, frames[lost[0] - 1].pose) for k in lost)
+    assert frames[75].evaluations > 100  # estimated anew
+    assert iou(frames)[76:].mean() > 0.5
+
+
+def test_frames_that_are_not_usable_are_coasted_through() -> None:
+    task, observations = seen()
+    observations[20] = Observation(observations[20].silhouettes, usable=False)
+    assert not any(frame.details["lost"] for frame in follow(task, observations))
+
+
+def test_nothing_is_ever_seen() -> None:
+    task, observations = seen(frames=5)
+    frames = follow(task, [blank(one) for one in observations])
+    assert all(frame.details["lost"] for frame in frames)
+    assert all(frame.evaluations == 0 for frame in frames)
+
+
+@pytest.mark.parametrize("factory", [vsmm, joined])
+def test_what_is_no_person_is_no_reason_to_fail(factory: Any) -> None:
+    task, observations = seen(frames=24)
+    rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
+
+    def disc(mask: np.ndarray) -> None:  # its skeleton is a point: no end points
+        mask[:] = (rows - 120) ** 2 + (columns - 100) ** 2 < 40**2
+
+    def pieces(mask: np.ndarray) -> None:
+        mask[::30] = False
+        mask[1::30] = False
+        mask[2::30] = False
+        mask[3::30] = False
+
+    def border(mask: np.ndarray) -> None:
+        mask[:] = np.roll(mask, 90, axis=1)
+        mask[:, :40] = False
+
+    def dot(mask: np.ndarray) -> None:
+        mask[:] = False
+        mask[100, 100] = True
+
+    def everything(mask: np.ndarray) -> None:
+        mask[:] = True
+
+    for k, change in enumerate((disc, pieces, border, dot, everything)):
+        observations[6 + 3 * k] = redrawn(observations[6 + 3 * k], change)
+    frames = follow(task, observations, factory)
+    assert iou(frames)[:6].mean() > 0.5
+
+
+def test_a_single_model_is_a_group(tmp_path: Path) -> None:
+    file = tmp_path / "groups.toml"
+    file.write_text('stay = 0.9\n[groups]\nonly = ["jacks"]\n[neighbours]\n', encoding="utf-8")
+    task, observations = seen()
+    frames = follow(task, observations, groups=str(file))
+    assert {frame.details["models"] for frame in frames} == {("jacks",)}
+    assert iou(frames).mean() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('stay = 0.9\n[groups]\na = ["wlak"]\n[neighbours]\n', "a model must be one of stiff-walk, .*, got 'wlak'"),
+        ('stay = 0.9\n[groups]\na = ["walk"]\n[neighbours]\nfly = []\n', "a model must be one of .*, got 'fly'"),
+        ('stay = 1.5\n[groups]\na = ["walk"]\n[neighbours]\n', "stay must be a number between 0 and 1, got 1.5"),
+        ("stay = 0.9\n[groups]\n[neighbours]\n", "groups must hold at least one group of at least one model"),
+        ('stay = 0.9\ngroups = ["walk"]\n[neighbours]\n', "groups must be a table of lists of models"),
+        ('[groups]\na = ["walk"]\n', "expected stay, groups and neighbours, got"),
+        ("stay = ", "expected TOML"),
+    ],
+)
+def test_a_file_of_groups_that_is_wrong_is_named(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "groups.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=said) as found:
+        read_topology(file, NAMES)
+    assert str(found.value).startswith(str(file))
+
+
+def test_a_file_of_groups_that_is_not_there_is_one_line_and_status_2(tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, ["track", "walk", "--tracker", "vsmm", "--set", "vsmm.groups=no.toml"])
+    assert result.exit_code == 2
+    assert result.output.splitlines()[-1] == "posefit: no.toml: expected a file of groups, got none"
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("structure=some", "structure must be"),
+        ("new=old", "new must be"),
+        ("test=coin", "test must be"),
+        ("alpha=0.7", "alpha must be between 0 and 0.5, got 0.7"),
+        ("smoothing=0", "smoothing must be at least 1, got 0"),
+        ("dwell=-1", "dwell must be 0 or more, got -1"),
+        ("floor_degrees=-1.0", "floor_degrees must be 0 or more, got -1.0"),
+        ("longest=0", "longest must be at least 1, got 0"),
+        ("shrink=half", "shrink must be"),
+    ],
+)
+def test_a_senseless_setting_is_one_line_and_status_2(setting: str, said: str) -> None:
+    result = CliRunner().invoke(main, ["track", "walk", "--tracker", "vsmm", "--set", f"vsmm.{setting}"])
+    assert result.exit_code == 2
+    assert said in result.output.splitlines()[-1]
+
+
+@pytest.mark.parametrize("setting", ["dimensions=0", "weight=0.0", "optimiser=spaso"])
+def test_a_senseless_setting_of_the_joined_tracker_is_one_line(setting: str) -> None:
+    result = CliRunner().invoke(main, ["track", "walk", "--tracker", "sapso+vsmm", "--set", f"sapso+vsmm.{setting}"])
+    assert result.exit_code == 2
+    assert f"{setting.split('=')[0]} must be" in result.output.splitlines()[-1]
+
+
+# ------------------------------------------------------------------------------------------------------------ whole
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"structure": "all"},
+        {"smoothing": 1, "floor_degrees": 0.0, "dwell": 0, "new": "patent", "test": "patent"},
+        {"shrink": "zero"},
+    ],
+)
+def test_the_patents_own_form_runs(settings: dict[str, Any]) -> None:
+    task, observations = seen(frames=60)
+    follow(task, observations, **settings)
+
+
+def test_two_cameras_are_better_than_one() -> None:
+    motion = library.built_in("squat-b", frames=40)
+    body = Body.of(motion.skeleton)
+    cameras = [Camera.around(np.array([0.0, 1.0, 0.0]), azimuth, 4.4, SIZE) for azimuth in (0.2, 1.5)]
+    errors = []
+    for views in (cameras[:1], cameras):
+        observations = [
+            Observation([Silhouette.of(project(body, camera, pose, place)) for camera in views])
+            for pose, place in zip(motion.poses, motion.translations, strict=True)
+        ]
+        frames = follow(Task(body, views, 600, 0.0, motion.translations[0], "aligned"), observations)
+        found = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
+        joints = [body.skeleton.joints(*one) for one in ((motion.poses, motion.translations), found)]
+        errors.append(float(np.linalg.norm(joints[0] - joints[1], axis=2).mean()))
+    assert errors[1] < errors[0]
+
+
+def test_it_follows_motion_capture(cmu: Path) -> None:
+    found = posefit.track(
+        cmu / "14" / "14_06.amc", tracker="vsmm", frames=(0, 60), view_degrees=0.0, translation="aligned"
+    )
+    assert found.summary["iou"] > 0.55
+    assert found.summary["seconds_per_frame"] < 1.0
+
+
+def test_it_writes_what_a_track_writes(tmp_path: Path) -> None:
+    posefit.track(
+        "squat-a", tracker="vsmm", view_degrees=10.0, translation="aligned", frames=(0, 12), out=tmp_path / "new"
+    )
+    assert (tmp_path / "new" / "track.amc").stat().st_size > 0  # only free axes turn
+
+
+# ------------------------------------------------------------------------------------------------ the experiment
+
+
+@pytest.fixture(scope="module")
+def experiment() -> patent.Run:
+    return patent.run(patent.METHODS["vsmm"], activities.sequence(0), 0)
+
+
+def test_the_experiment_is_about_as_good_as_the_patents(experiment: patent.Run) -> None:
+    figures = experiment.figures
+    assert figures["dominant_fraction"] >= 0.8
+    assert figures["switch_delay_frames"] <= 15
+    assert figures["elbow_cm"] <= 5.2
+    assert figures["hand_cm"] <= 5.2
+
+
+def test_no_motion_of_the_experiment_was_learned_from() -> None:
+    from posefit_vsmm.fit_motion import PLANS
+
+    tested = {one.motion for one in activities.ACTIVITIES}
+    stored = json.loads((Path(library.__file__).parent / "library.json").read_text(encoding="utf-8"))["motions"]
+    sources = {stored[name]["source"] for name in tested}
+    parts = {(clip.path.split("/")[1], clip.start) for plan in PLANS.values() for clip in plan.fitted}
+    assert not sources & {name for name, _ in parts}
+    assert not tested & set(activities.TRAINING)
+    assert not tested & {name for plan in PLANS.values() for name in plan.drawn}
+
+
+def test_the_report_is_whole_or_not_there(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    from posefit.study import patent_figures
+
+    sequence = activities.sequence(0)
+    run = patent.run(patent.METHODS["vsmm"], sequence, 0)
+    names = patent_figures.draw(run, tmp_path)
+    assert all((tmp_path / name).stat().st_size > 10_000 for name in names)
+
+
+@pytest.mark.slow
+def test_reproduce_prints_the_figures_as_json(tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "1", "--json"])
+    assert result.exit_code == 0
+    figures = json.loads(result.stdout)
+    keys = {
+        "dominant_fraction", "switch_delay_frames", "elbow_cm", "hand_cm", "elbow_3d_cm", "hand_3d_cm", "filter_ms",
+        "detection_ms", "wrong_activations", "wrong_terminations",
+    }  # fmt: skip
+    assert keys <= set(figures)
+    assert keys <= set(figures["imm_all_six"])
+
+
+def test_reproduce_says_what_seeds_must_be() -> None:
+    result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "0"])
+    assert result.exit_code == 2
+    assert result.output.splitlines()[-1] == "posefit: seeds must be at least 1, got 0"
