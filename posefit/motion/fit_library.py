@@ -57,11 +57,11 @@ CLIPS = {
     "jump-a": Clip("49/49_02", 130, 400, 0.6, 1.2),
     "jump-b": Clip("16/16_01", 60, 262, 1.6, 1.69),
     "step-a": Clip("05/05_01", 0, 380, 0.9, 1.35),
-    "step-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
+    "step-b": Clip("16/16_17", 0, 200, 0.9, 1.35),
     "arms-out-a": Clip("02/02_01", 0, None, 0.9, 1.35),
-    "arms-out-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
+    "arms-out-b": Clip("16/16_17", 0, 200, 0.9, 1.35),
     "wave-a": Clip("05/05_01", 0, 380, 0.9, 1.35),
-    "wave-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
+    "wave-b": Clip("16/16_17", 0, 200, 0.9, 1.35),
 }
 # What the arms do where they do not do what the clip's do: each side's directions, by hand.
 ARMS = {"arms-out": {"l": held_out, "r": held_out}, "wave": {"r": waving}}
@@ -94,12 +94,15 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
     motion = motion.frames(clip.start, clip.stop or len(motion))
     times = np.arange(len(motion)) / motion.fps
     velocity = np.polyfit(times, motion.translations, 1)[0]
+    places = motion.translations
+    if kind in ON_THE_SPOT:
+        places, velocity = places - times[:, None] * velocity * [1.0, 0.0, 1.0], np.zeros(3)
     speed = float(np.hypot(velocity[0], velocity[2]))
     heading = np.arctan2(velocity[0], velocity[2])
     if speed < STANDING:
         speed, heading = 0.0, float(np.angle(np.exp(1j * motion.poses[:, 0]).mean()))
     turn = Rotation.from_euler("y", -heading).as_matrix()
-    path = motion.translations @ turn.T
+    path = places @ turn.T
     path[:, 2] -= speed * times
     path[:, [0, 2]] -= path[:, [0, 2]].mean(axis=0)
     series = np.column_stack([path, motion.poses])
@@ -121,7 +124,7 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
     return {
         "source": name,
         "period": round(period, 4),
-        "speed": 0.0 if kind in ON_THE_SPOT else round(speed, 4),
+        "speed": round(speed, 4),
         "residual_degrees": round(float(np.degrees(error)), 3),
         "angles": free.tolist(),
         "series": np.round(coefficients.T, DIGITS).tolist(),

@@ -30,11 +30,19 @@ CLIPS = {
     "squat-b": ("14/14_06", 1015, 1565),
     "jump-a": ("49/49_02", 130, 400),
     "jump-b": ("16/16_01", 60, 262),
+    "step-a": ("05/05_01", 0, 380),
+    "step-b": ("16/16_17", 0, 200),
+    "arms-out-a": ("02/02_01", 0, None),
+    "arms-out-b": ("16/16_17", 0, 200),
+    "wave-a": ("05/05_01", 0, 380),
+    "wave-b": ("16/16_17", 0, 200),
 }
 # The largest mean error over all 66 angles that a style may have: nobody does an exercise twice in the same way.
 RESIDUAL_DEGREES = {"walk": 1.0, "run": 1.0, "jacks": 1.6, "squat": 1.6, "jump": 1.6, "march": 3.2}
-KINDS = ("walk", "run", "march", "jacks", "squat", "jump")
-GAITS = ("walk", "run")
+RESIDUAL_DEGREES |= {"step": 1.0, "arms-out": 1.0, "wave": 1.0}
+KINDS = ("walk", "run", "march", "jacks", "squat", "jump", "step", "arms-out", "wave")
+GAITS = ("walk", "run", "arms-out", "wave")
+DRAWN = {"arms-out": "lr", "wave": "r"}  # whose arms are not the clip's
 CYCLE = 240  # frames
 
 each = pytest.mark.parametrize("name", library.names())
@@ -132,6 +140,8 @@ def test_an_arm_swings_with_the_leg_of_the_other_side(name: str) -> None:
     motion = cycle(name)
     ahead = joints(motion)[..., 2] - motion.translations[:, None, 2]
     for arm, leg in (("lwrist", "rfoot"), ("rwrist", "lfoot")):
+        if arm[0] in DRAWN.get(library.kind_of(name), ""):
+            continue
         assert np.corrcoef(ahead[:, JOINTS.index(arm)], ahead[:, JOINTS.index(leg)])[0, 1] > 0.5
 
 
@@ -255,26 +265,46 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
     times = np.arange(len(recorded)) / recorded.fps
     direction = np.polyfit(times, recorded.translations, 1)[0]
     poses = recorded.poses.copy()
-    if model["speed"]:
-        assert np.hypot(direction[0], direction[2]) == pytest.approx(model["speed"], abs=1e-3)
+    pace = np.hypot(direction[0], direction[2])
+    if pace > 0.2:
+        assert model["speed"] == (0.0 if name.startswith("step") else pytest.approx(pace, abs=1e-3))
         poses[:, 0] -= np.arctan2(direction[0], direction[2])
     else:
-        assert np.hypot(direction[0], direction[2]) < 0.2
+        assert model["speed"] == 0.0
         poses[:, 0] -= np.angle(np.exp(1j * poses[:, 0]).mean())
+
+    same = np.ones(66, dtype=bool)
+    for side in DRAWN.get(library.kind_of(name), ""):
+        shoulder, elbow = (angle_index(JOINTS.index(side + bone)) for bone in ("humerus", "radius"))
+        same[[shoulder, shoulder + 1, shoulder + 2, elbow]] = False
 
     def error(phase: float) -> float:
         made = library.built_in(name, frames=len(recorded), fps=recorded.fps, phase=phase)
         # a clip may have whole turns more
-        return float(np.degrees(np.abs((made.poses - poses + np.pi) % (2.0 * np.pi) - np.pi).mean()))
+        off = np.abs((made.poses - poses + np.pi) % (2.0 * np.pi) - np.pi)
+        return float(np.degrees(off[:, same].mean()))
 
     least = min(error(phase) for phase in np.arange(400) / 400)
     assert least < RESIDUAL_DEGREES[library.kind_of(name)]
-    assert least == pytest.approx(model["residual_degrees"], abs=0.05)
+    assert least == pytest.approx(model["residual_degrees"], abs=0.05 if same.all() else 0.3)
+
+
+def test_arms_that_are_held_out_are_level_and_one_that_waves_points_up() -> None:
+    out, wave = (joints(library.built_in(name, frames=40)) for name in ("arms-out", "wave"))
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        reach = out[:, JOINTS.index(f"{side}wrist")] - out[:, JOINTS.index(f"{side}clavicle")]
+        assert (sign * reach[:, 0] > 0.45).all()
+        assert (np.abs(reach[:, 1]) < 0.2).all()
+    forearm = wave[:, JOINTS.index("rradius")] - wave[:, JOINTS.index("rhumerus")]
+    assert (forearm[:, 1] > 0.12).all()
+    assert np.ptp(forearm[:, 0]) > 0.12
+    hanging = wave[:, JOINTS.index("lradius")] - wave[:, JOINTS.index("lclavicle")]
+    assert (hanging[:, 1] < 0.0).all()
 
 
 def test_the_library_is_small_and_states_its_origin() -> None:
     text = (files("posefit.motion") / "library.json").read_text(encoding="utf-8")
-    assert len(text.encode()) < 70_000
+    assert len(text.encode()) < 100_000
     origin = json.loads(text)["origin"]
     assert "The data used in this project was obtained from mocap.cs.cmu.edu." in origin
     assert "The database was created with funding from NSF EIA-0196217." in origin
