@@ -10,7 +10,6 @@ from functools import lru_cache
 from importlib.resources import files
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from posefit.geometry.rotation import Array
 from posefit_vsmm.points import AT, POINTS
@@ -104,6 +103,8 @@ def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, 
     if not len(lines.ends):
         return [], 0
     away = np.linalg.norm(expected[_TIPS][:, None] - lines.ends[None], axis=2)
+    from scipy.optimize import linear_sum_assignment  # half a second to import
+
     share = away / gates[_TIPS][:, None]
     who, which = linear_sum_assignment(np.minimum(share, 1.0))
     pairs = [(int(_TIPS[a]), lines.ends[b]) for a, b in zip(who, which, strict=True) if share[a, b] < 1.0]

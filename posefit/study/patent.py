@@ -138,14 +138,10 @@ def _came(before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
 
 
 def mean(rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the mean of each figure over seeds; of `switch_delays_frames`, a list a seed."""
+    """Return the mean of each figure over seeds, and `per_seed` the rows themselves."""
     found = list(rows)
-    return {
-        name: [row[name] for row in found]
-        if name == "switch_delays_frames"
-        else float(np.mean([row[name] for row in found]))
-        for name in found[0]
-    }
+    single = [name for name, value in found[0].items() if not isinstance(value, list)]
+    return {**{name: float(np.mean([row[name] for row in found])) for name in single}, "per_seed": found}
 
 
 def reproduce(
