@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from posefit import __version__
-from posefit.options import EXTRACTION, TRACK, frame_range, options
+from posefit.options import ENGINE, EXTRACTION, TRACK, frame_range, options
 
 
 class _Mistakes(click.Group):
@@ -119,6 +119,38 @@ def bench(threads: int | None, as_json: bool) -> None:
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
     for name, value in figures.items():
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
+
+
+@main.command()
+@click.argument("plan")
+@click.option("--out", metavar="DIR", help="The ledger: a new folder, or one that a sweep goes on in.")
+@options(ENGINE)
+@click.option("--dry-run", is_flag=True, help="Print the cells and about how long they take, and run none.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@click.pass_context
+def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, as_json: bool, **where: Any) -> None:
+    """Run the cells of PLAN, a .toml file, or `default`: methods, motions, views, corruptions and seeds.
+
+    It may be killed at any moment, and any number of them may work on one DIR: the same command goes on where it was.
+    Exit status 1 where cells were given up after three attempts, 130 where somebody stopped it.
+    """
+    from posefit.sweep import command
+    from posefit.sweep.limits import Limits
+
+    limits = Limits(where.pop("cell_seconds"), where.pop("cell_gigabytes"))
+    if dry_run:
+        found = command.preview(plan, out, limits=limits, **where)
+        if as_json:
+            click.echo(json.dumps(found))
+            return
+        for line in command.listed(found):
+            click.echo(line)
+        return
+    if out is None:
+        raise click.UsageError("--out must name a folder for the results, got none")
+    tally, status = command.sweep(plan, out, limits=limits, say=_say, **where)
+    click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.told(tally, out))
+    context.exit(status)
 
 
 @main.group(invoke_without_command=True)

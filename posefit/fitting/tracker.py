@@ -45,6 +45,7 @@ class Frame:
     seconds: float
     history: Array = field(repr=False)  # (populations,) best cost after each
     coordinates: Array | None = field(default=None, repr=False)  # (d,) where it was found in a search space
+    spent: Array | None = field(default=None, repr=False)  # (populations,) evaluations so far after each, where known
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,4 +216,6 @@ def _frame(problem: PoseProblem, best: Minimum, seconds: float) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
     counts = np.stack([areas[0] for areas in problem.areas(poses, translations)])
     found = problem.space.coordinates(best.proposal)
-    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, seconds, best.history, found)
+    return Frame(
+        poses[0], translations[0], best.cost, counts, best.evaluations, seconds, best.history, found, best.spent
+    )
