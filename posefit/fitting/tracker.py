@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
@@ -45,7 +46,8 @@ class Frame:
     seconds: float
     history: Array = field(repr=False)  # (populations,) best cost after each
     coordinates: Array | None = field(default=None, repr=False)  # (d,) where it was found in a search space
-    spent: Array | None = field(default=None, repr=False)  # (populations,) evaluations so far after each, where known
+    # (populations,) evaluations so far after each, where a tracker says
+    spent: NDArray[np.int64] | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -95,9 +95,9 @@ def track(
     video, or several masks or videos that cameras took at the same time; or a `Scene` of a known motion, as it is.
     `train` names the motions a prior learns from; by default the other styles of a built-in motion, else the built-in
     walks. The method is `optimiser` with `prior`, or `tracker`. The budget of a frame is `evaluations`, by default
-    particles x (iterations + 1) = 40 x 61, the same for every method. `translation` is "known" where the truth is, else "aligned". A `first_pose` that is
-    "given" starts the first frame around the true one. `ask_seconds` is how long a plugin may take to propose a
-    population.
+    particles x (iterations + 1) = 40 x 61, the same for every method. `translation` is "known" where the truth is, else
+    "aligned". A `first_pose` that is "given" starts the first frame around the true one. `ask_seconds` is how long a
+    plugin may take to propose a population.
 
     Where the truth is known the prior is `pca`. Where it is not it is `loose`, the first frame is searched `restarts`
     times (8), and the person's build is fitted to `body_frames` (30; none where an .asf is given), as tall as `height`

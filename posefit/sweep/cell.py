@@ -116,7 +116,7 @@ def run_cell(cell: Cell) -> Result:
         "trace": trace(result.found),
         "seconds": time.perf_counter() - began,
     }
-    return Result(row, _packed(estimate=estimate, truth=truth))
+    return Result(row, packed(estimate=estimate, truth=truth))
 
 
 def scene_of(cell: Cell) -> "Scene":
@@ -231,7 +231,8 @@ def _joint_errors_mm(truth: "Array", estimate: "Array") -> "Array":
     return np.asarray(1e3 * np.linalg.norm(difference, axis=-1).mean(axis=0))
 
 
-def _packed(**arrays: "Array") -> bytes:
+def packed(**arrays: "Array") -> bytes:
+    """Return arrays in metres as an .npz, float32."""
     import numpy as np
 
     buffer = io.BytesIO()
