@@ -2,8 +2,10 @@
 
 import importlib
 import logging
+import secrets
 import threading
 import time
+from dataclasses import dataclass
 from typing import Any
 
 from posefit.sweep.cell import Cell, run_cell
@@ -13,14 +15,25 @@ from posefit.sweep.limits import THREADS, Limits, limited, single_threaded
 PATIENCE = 30.0  # seconds to wait for a scheduler, or for workers, that are not there
 CONNECTING = 5.0  # seconds for one try
 ARRIVING = 10.0  # seconds for a result that is ready to come over
-WORKERS = 1.0  # seconds between two looks at how many workers there are
+LOOK = 1.0  # seconds between two looks at which workers there are
+
+
+@dataclass
+class _Sent:
+    """A cell on its way."""
+
+    cell: Cell
+    worker: str  # the address that it was sent to
+    began: float
+    missed: int = 0  # how often this worker was looked for in vain
 
 
 class Cluster:
     """An engine of Dask workers: of a scheduler at an address, or, with `workers` instead, so many on this machine.
 
-    One cell a worker at a time: a cell that is sent starts at once, and none is lost while it waits. A scheduler that
-    is not there is waited for `patience` seconds; after that EngineError is raised.
+    Each cell is sent to one worker that has no other. So it starts at once, no other cell dies with it, and Dask does
+    not run it again by itself. A scheduler that is not there, or has no workers, is waited for `patience` seconds;
+    after that EngineError is raised.
     """
 
     def __init__(
@@ -35,10 +48,10 @@ class Cluster:
         self._distributed = _library()
         self._local = None if workers is None else _local(self._distributed, workers)
         self._address = scheduler if self._local is None else self._local.scheduler_address
-        self._running: dict[Any, tuple[Cell, float]] = {}
+        self._running: dict[Any, _Sent] = {}
+        self._idle: list[str] = []
+        self._looked = 0.0
         self._woken = threading.Event()
-        self._sent = 0
-        self._counted, self._workers = 0.0, 0
         self._client: Any = None
         try:
             self._connect()
@@ -49,24 +62,21 @@ class Cluster:
     def window(self) -> int:
         """Return how many workers there are, once there are any."""
         until = time.monotonic() + self._patience
-        while time.monotonic() - self._counted > WORKERS or not self._workers:
-            self._workers = self._count()
-            self._counted = time.monotonic()
-            if not self._workers and not self._running:
-                if time.monotonic() > until:
-                    raise EngineError(f"scheduler {self._address} must have workers, got none for {self._patience:g} s")
-                time.sleep(WORKERS)
-            else:
-                break
-        return self._workers
+        self._look()
+        while not self._idle and not self._running:
+            if time.monotonic() > until:
+                raise EngineError(f"scheduler {self._address} must have workers, got none for {self._patience:g} s")
+            time.sleep(LOOK)
+            self._look()
+        return len(self._idle) + len(self._running)
 
     def submit(self, cell: Cell) -> None:
-        """Send a cell to a worker."""
-        self._sent += 1
-        future = self._client.submit(
-            limited, self._run, cell, self._limits, 0.0, key=f"{cell.key}-{self._sent}", pure=False, retries=0
-        )
-        self._running[future] = cell, time.monotonic()
+        """Send a cell to an idle worker."""
+        worker = self._idle.pop()
+        arguments = self._run, cell, self._limits, 0.0
+        name = f"{cell.key}-{secrets.token_hex(4)}"
+        future = self._client.submit(limited, *arguments, key=name, workers=[worker], pure=False, retries=0)
+        self._running[future] = _Sent(cell, worker, time.monotonic())
         future.add_done_callback(self._wake)
 
     def wait(self, seconds: float) -> list[Outcome]:
@@ -75,6 +85,7 @@ class Cluster:
         self._woken.clear()
         if self._client.status != "running":
             return self._lost()
+        self._look()
         outcomes = [self._outcome(future) for future in tuple(self._running)]
         return [outcome for outcome in outcomes if outcome is not None]
 
@@ -89,40 +100,54 @@ class Cluster:
 
     def _outcome(self, future: Any) -> Outcome | None:
         """Return what became of a cell, if anything has."""
-        cell, began = self._running[future]
+        sent = self._running[future]
         result, reason = None, None
         try:
             if future.status == "finished":
                 result = future.result(timeout=ARRIVING)
             elif future.status == "error":
-                reason = self._reason(future.exception(timeout=ARRIVING), time.monotonic() - began)
+                reason = self._reason(future.exception(timeout=ARRIVING), sent)
+            elif sent.missed > 1:
+                reason = self._reason(None, sent)
             elif future.status != "cancelled":
                 return None
         except (TimeoutError, OSError, self._distributed.CancelledError):
-            return None  # its worker died with the result; Dask runs it again
+            return None  # its worker died with the result
         except Exception as error:  # a result that cannot be read
             reason = reason_of(error, self._limits)
         del self._running[future]
-        future.release()
-        return Outcome(cell, result, reason)
+        future.cancel()
+        if result is not None:
+            self._idle.append(sent.worker)
+        else:
+            self._looked = 0.0  # the worker may be gone
+        return Outcome(sent.cell, result, reason)
 
-    def _reason(self, error: BaseException, seconds: float) -> str:
-        if type(error).__name__ != "KilledWorker":
+    def _reason(self, error: BaseException | None, sent: _Sent) -> str:
+        if error is not None and type(error).__name__ != "KilledWorker":
             return reason_of(error, self._limits)
-        return reason_of(TimeoutError(), self._limits) if seconds >= self._limits.seconds else "its worker died"
+        past = time.monotonic() - sent.began >= self._limits.seconds
+        return reason_of(TimeoutError(), self._limits) if past else "its worker died"
 
     def _lost(self) -> list[Outcome]:
         """Return all cells as lost with the scheduler, once there is one again."""
-        lost = [Outcome(cell) for cell, _ in self._running.values()]
+        lost = [Outcome(sent.cell) for sent in self._running.values()]
         self._running.clear()
         self._connect()
         return lost
 
-    def _count(self) -> int:
+    def _look(self) -> None:
+        """See which workers there are, once a second."""
+        if time.monotonic() - self._looked < LOOK:
+            return
         try:
-            return len(self._client.nthreads())
-        except (OSError, TimeoutError, self._distributed.CancelledError):  # the next `wait` sees to it
-            return 0
+            present = set(self._client.nthreads())
+        except (OSError, TimeoutError, self._distributed.CancelledError):
+            return  # the next `wait` sees to it
+        for sent in self._running.values():
+            sent.missed = 0 if sent.worker in present else sent.missed + 1
+        self._idle = sorted(present - {sent.worker for sent in self._running.values()})
+        self._looked = time.monotonic()
 
     def _connect(self) -> None:
         until = time.monotonic() + self._patience
@@ -130,14 +155,15 @@ class Cluster:
             if self._client is not None:
                 self._client.close(timeout=CONNECTING)
             try:
-                self._client = self._distributed.Client(self._address, timeout=CONNECTING, set_as_default=False)
+                limit = min(CONNECTING, self._patience)
+                self._client = self._distributed.Client(self._address, timeout=limit, set_as_default=False)
                 self._client.register_plugin(_plugin(self._distributed))
                 return
             except (OSError, ValueError, TimeoutError) as error:
                 if isinstance(error, ValueError) or time.monotonic() > until:
                     cause = " ".join(str(error).split())
                     raise EngineError(f"scheduler must be one that answers, got {self._address}: {cause}") from None
-                time.sleep(min(WORKERS, self._patience))
+                time.sleep(min(LOOK, self._patience))
 
     def _wake(self, _: Any) -> None:
         self._woken.set()
@@ -159,7 +185,7 @@ def _local(distributed: Any, workers: int) -> Any:
             threads_per_worker=1,
             processes=True,
             memory_limit=0,  # each cell has a limit of its own
-            dashboard_address=None,
+            dashboard_address=":0",
             silence_logs=logging.CRITICAL,
         )
 

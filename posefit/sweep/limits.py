@@ -44,9 +44,12 @@ def limited(run: Callable[[T], R], cell: T, limits: Limits, grace: float = GRACE
             timer(signal.ITIMER_REAL, limits.seconds + grace)
         try:
             return run(cell)
+        except MemoryError:
+            pass  # a new one is raised below: this one holds on to everything that filled the memory
         finally:
             if timer is not None:
                 timer(signal.ITIMER_REAL, 0.0)
+    raise MemoryError
 
 
 def alone() -> None:

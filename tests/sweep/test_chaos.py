@@ -94,12 +94,12 @@ def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: s
 
 
 def test_two_drivers_at_once_run_no_cell_twice(tmp_path: Path) -> None:
-    with driver(tmp_path, "pebble", 60) as one, driver(tmp_path, "pebble", 60) as other:
+    with driver(tmp_path, "pebble", 40, "slow") as one, driver(tmp_path, "pebble", 40, "slow") as other:
         assert one.wait(timeout=120) == 0
         assert other.wait(timeout=120) == 0
-    assert len(Ledger(tmp_path / "ledger")) == 60
+    assert len(Ledger(tmp_path / "ledger")) == 40
     runs = starts(tmp_path / "starts")
-    assert len(runs) == len({key for key, _ in runs}) == 60
+    assert len(runs) == len({key for key, _ in runs}) == 40
     assert len({worker for _, worker in runs}) > 2  # both took part
     assert not claimed(tmp_path)
 
