@@ -22,7 +22,7 @@ from posefit.sweep.processes import Processes
 from tests.sweep import fake
 from tests.sweep.fake import behave, cells, swept
 
-SHORT = Limits(seconds=3.0, gigabytes=1.0)
+SHORT = Limits(seconds=5.0, gigabytes=0.6)
 Make = Callable[..., Engine]
 
 
@@ -45,8 +45,8 @@ def test_poisoned_cells_are_given_up_with_their_reasons_and_all_others_finish(ma
     ledger = Ledger(tmp_path / "ledger")
     assert {row["key"] for row in ledger.rows()} == {cell.key for cell in cells(20)}
     given_up = {row["spec"]["frames"]: row["reasons"] for row in ledger.given_up()}
-    assert given_up[fake.ENDLESS] == ["it ran past its limit of 3 s"] * 3
-    assert given_up[fake.HOG] == ["it wanted more memory than its limit of 1 GB"] * 3
+    assert given_up[fake.ENDLESS] == ["it ran past its limit of 5 s"] * 3
+    assert given_up[fake.HOG] == ["it wanted more memory than its limit of 0.6 GB"] * 3
     assert given_up[fake.RAISE] == ["ZeroDivisionError: one by none"] * 3
     assert set(given_up[fake.SEGFAULT]) <= {"its process died of SIGSEGV", "its process died", "its worker died"}
     assert len(given_up[fake.SEGFAULT]) == 3
