@@ -34,7 +34,7 @@ def sweep(
     """Return how the sweep of a plan to a folder ended, and the exit status that says so."""
     cells = Plan.read(plan).cells
     start = engine(workers, scheduler, dask_local, limits)
-    with Driver(out, say) as driver:
+    with closing(start()) as running, Driver(out, say) as driver:  # without an engine there is no folder either
         already = sum(driver.state(cell.key) is not None for cell in cells)
         if already:
             say(f"{already} of {len(cells)} cells are done already")
@@ -43,7 +43,7 @@ def sweep(
             tally.done = sum(cell.key in driver.ledger for cell in cells)
             tally.given_up = len(cells) - tally.done
         else:
-            tally = _driven(cells, driver, start(), already, say)
+            tally = _driven(cells, driver, running, already, say)
     return tally, STOPPED if tally.stopped else GIVEN_UP if tally.given_up else DONE
 
 
