@@ -132,7 +132,7 @@ def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, 
     """Run the cells of PLAN, a .toml file, or `default`: methods, motions, views, corruptions and seeds.
 
     It may be killed at any moment, and any number of them may work on one DIR: the same command goes on where it was.
-    Exit status 1 where cells were given up after three attempts, 130 where somebody stopped it.
+    Exit status 1 where cells were quarantined after three attempts, 130 where somebody stopped it.
     """
     from posefit.sweep import command
     from posefit.sweep.limits import Limits

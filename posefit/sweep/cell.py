@@ -96,10 +96,15 @@ class Result:
 
 
 def run_cell(cell: Cell) -> Result:
-    """Return what following the cell's motion by its method measures. Raises ValueError where a file has changed."""
+    """Return what following the cell's motion by its method measures. Raises ValueError where a file has changed.
+
+    And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
+    """
     from posefit.study.run import track
 
     began = time.perf_counter()
+    if (planned := cell.version.partition(",")[0]) != posefit.__version__:
+        raise ValueError(f"a worker must have posefit {planned}, got {posefit.__version__}")
     for path, digest in cell.files.items():
         if (found := digest_of(path)) != digest:
             raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")

@@ -16,7 +16,7 @@ from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.limits import Limits
 from posefit.sweep.plan import Plan
 
-DONE, GIVEN_UP, STOPPED = 0, 1, 130  # exit statuses
+DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 
 Say = Callable[[str], None]
 
@@ -41,10 +41,10 @@ def sweep(
         if already == len(cells):
             tally = Tally(len(cells))
             tally.done = sum(cell.key in driver.ledger for cell in cells)
-            tally.given_up = len(cells) - tally.done
+            tally.quarantined = len(cells) - tally.done
         else:
             tally = _driven(cells, driver, running, already, say)
-    return tally, STOPPED if tally.stopped else GIVEN_UP if tally.given_up else DONE
+    return tally, STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
 
 
 def preview(
@@ -91,8 +91,8 @@ def engine(workers: int | None, scheduler: str | None, dask_local: int | None, l
 def told(tally: Tally, out: str) -> str:
     """Return in a line how a sweep ended."""
     line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
-    if tally.given_up:
-        line += f"; {tally.given_up} given up: the reasons are in {Path(out) / 'quarantine'}"
+    if tally.quarantined:
+        line += f"; {tally.quarantined} quarantined: the reasons are in {Path(out) / 'quarantine'}"
     if tally.stopped:
         line += "; stopped: the same command goes on from there"
     return line

@@ -27,7 +27,7 @@ class Tally:
     done: int = 0  # rows there are, whoever wrote them
     ran: int = 0  # of these, rows that this driver wrote
     failed: int = 0  # attempts of this driver that failed
-    given_up: int = 0
+    quarantined: int = 0
     stopped: bool = False  # somebody asked for it
 
 
@@ -65,9 +65,9 @@ def drive(
     say: Say,
     watch: Callable[[Tally], None],
 ) -> Tally:
-    """Return how a sweep ended: with all cells done or given up, or stopped. `watch` is told of every change.
+    """Return how a sweep ended: with all cells done or quarantined, or stopped. `watch` is told of every change.
 
-    A cell that fails is tried again after all others, until the ledger gives it up. Cells that other drivers run are
+    A cell that fails is tried again after all others, until it is quarantined. Cells that other drivers run are
     waited for. Raises ValueError where the ledger cannot be written to or the engine is gone; rows that were finished
     are safe.
     """
@@ -172,16 +172,16 @@ class _Sweep:
     def _count(self, state: State | None) -> bool:
         """Take note of a cell that needs no more work, and return whether it is one."""
         self.tally.done += state is State.DONE
-        self.tally.given_up += state is State.GIVEN_UP
-        return state in (State.DONE, State.GIVEN_UP)
+        self.tally.quarantined += state is State.QUARANTINED
+        return state in (State.DONE, State.QUARANTINED)
 
 
 def follow(bar: Any) -> Callable[[Tally], None]:
     """Return what tells a progress bar of tqdm how a sweep stands."""
 
     def watch(tally: Tally) -> None:
-        if tally.failed or tally.given_up:
-            bar.set_postfix(failures=tally.failed, given_up=tally.given_up, refresh=False)
-        bar.update(tally.done + tally.given_up - bar.n)
+        if tally.failed or tally.quarantined:
+            bar.set_postfix(failures=tally.failed, quarantined=tally.quarantined, refresh=False)
+        bar.update(tally.done + tally.quarantined - bar.n)
 
     return watch

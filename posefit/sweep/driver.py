@@ -29,7 +29,7 @@ class State(Enum):
     """Why a cell cannot be claimed."""
 
     DONE = "done"
-    GIVEN_UP = "given up"
+    QUARANTINED = "quarantined"
     ELSEWHERE = "elsewhere"  # another driver runs it
 
 
@@ -67,10 +67,10 @@ class Driver:
         self._log.close()
 
     def state(self, key: str) -> State | None:
-        """Return whether a cell is done or was given up; else None."""
+        """Return whether a cell is done or in quarantine; else None."""
         if key in self.ledger:
             return State.DONE
-        return State.GIVEN_UP if self.ledger.quarantined(key) else None
+        return State.QUARANTINED if self.ledger.in_quarantine(key) else None
 
     def claim(self, cell: Cell) -> Claim | State:
         """Return the right to run a cell, or why there is none."""
@@ -97,7 +97,7 @@ class Driver:
         content = {"key": cell.key, "spec": cell.spec, "status": "quarantined", "reasons": reasons}
         if appear(self.ledger.path / QUARANTINE / f"{cell.key}.json", content):
             self._clear(cell.key)
-        return State.GIVEN_UP
+        return State.QUARANTINED
 
     def finish(self, claim: Claim, result: Result) -> None:
         """Write the row of a claimed cell. Raises OSError where there is no room."""

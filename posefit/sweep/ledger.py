@@ -59,12 +59,12 @@ class Ledger:
     def __contains__(self, key: str) -> bool:
         return key in self._places
 
-    def quarantined(self, key: str) -> bool:
-        """Return whether a cell was given up."""
+    def in_quarantine(self, key: str) -> bool:
+        """Return whether a cell is in quarantine."""
         return (self.path / QUARANTINE / f"{key}.json").exists()
 
-    def given_up(self) -> list[dict[str, Any]]:
-        """Return the cells that were given up: key, spec, status, and the reason of each attempt."""
+    def quarantined(self) -> list[dict[str, Any]]:
+        """Return the cells in quarantine: key, spec, status, and the reason of each attempt."""
         return [
             json.loads(path.read_text(encoding="utf-8")) for path in sorted((self.path / QUARANTINE).glob("*.json"))
         ]
@@ -110,7 +110,7 @@ class Ledger:
             yield row["key"], np.array(row["trace"]["evaluations"]), np.array(row["trace"]["cost"])
 
     def frame(self) -> "pd.DataFrame":
-        """Return a table of all cells, finished or given up; see `posefit.sweep.table`."""
+        """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
         from posefit.sweep.table import frame
 
         return frame(self)

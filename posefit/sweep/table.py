@@ -34,7 +34,7 @@ def frame(ledger: "Ledger") -> "pd.DataFrame":
     for row in ledger.rows():
         _add(columns, count, _flat(row))
         count += 1
-    for row in ledger.given_up():
+    for row in ledger.quarantined():
         _add(columns, count, _flat(row))
         count += 1
     for values in columns.values():

@@ -90,4 +90,4 @@ if __name__ == "__main__":
     where, kind, many = sys.argv[1:4]
     made: Engine = Cluster(workers=2, limits=LIMITS, run=behave) if kind == "dask" else Processes(2, LIMITS, behave)
     tally = swept(Path(where), cells(int(many), SLOW if len(sys.argv) > 4 else 60), made)
-    sys.exit(1 if tally.given_up else 130 if tally.stopped else 0)
+    sys.exit(1 if tally.quarantined else 130 if tally.stopped else 0)

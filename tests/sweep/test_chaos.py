@@ -87,7 +87,7 @@ def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: s
     assert len(keys) == CELLS
     assert set(keys) == {cell.key for cell in cells(CELLS)}
     assert not claimed(tmp_path)
-    assert not ledger.given_up()
+    assert not ledger.quarantined()
     runs = Counter(key for key, _ in starts(noted))
     assert {key for key, count in runs.items() if count > 1} <= killed
     wait_for(lambda: not any(living(worker) for worker in {worker for _, worker in starts(noted)}), 10.0)

@@ -42,7 +42,7 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(pla
     again = run("sweep", plan, "--out", out, "--workers", 2, "--json")
     assert again.exit_code == 0, again.stderr
     assert json.loads(again.stdout) == {
-        "out": str(out), "cells": 8, "done": 8, "ran": 0, "failed": 0, "given_up": 0, "stopped": False,
+        "out": str(out), "cells": 8, "done": 8, "ran": 0, "failed": 0, "quarantined": 0, "stopped": False,
     }  # fmt: skip
     assert "8 of 8 cells are done already" in again.stderr
     rows = list(Ledger(out).rows())
@@ -77,13 +77,15 @@ def test_times_are_told_as_people_say_them() -> None:
     ]  # fmt: skip
 
 
-def test_a_cell_that_fails_is_given_up_and_the_exit_status_says_so(plan: Path, tmp_path: Path) -> None:
+def test_a_cell_that_fails_is_quarantined_and_the_exit_status_says_so(plan: Path, tmp_path: Path) -> None:
     plan.write_text(PLAN + '\n[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nsettings.pca.components = -1\n')
     out = tmp_path / "out"
     result = run("sweep", plan, "--out", out, "--workers", 1)
     assert result.exit_code == 1, result.stderr
-    assert f"8 of 9 cells done, 8 of them now, written to {out}; 1 given up: the reasons are in {out}" in result.stdout
-    (lost,) = Ledger(out).given_up()
+    assert (
+        f"8 of 9 cells done, 8 of them now, written to {out}; 1 quarantined: the reasons are in {out}" in result.stdout
+    )
+    (lost,) = Ledger(out).quarantined()
     assert "ValueError: " in lost["reasons"][0]
 
 

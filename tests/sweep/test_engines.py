@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from posefit.sweep.cell import TIMES
-from posefit.sweep.drive import drive
+from posefit.sweep.drive import Tally, drive
 from posefit.sweep.driver import ATTEMPTS, Driver
 from posefit.sweep.engine import Engine, EngineError
 from posefit.sweep.ledger import Ledger
@@ -37,25 +37,25 @@ def make(request: pytest.FixtureRequest) -> Make:
     return lambda run=behave, limits=SHORT: Cluster(workers=2, limits=limits, run=run)
 
 
-def test_poisoned_cells_are_given_up_with_their_reasons_and_all_others_finish(make: Make, tmp_path: Path) -> None:
+def test_poisoned_cells_are_quarantined_with_their_reasons_and_all_others_finish(make: Make, tmp_path: Path) -> None:
     poisons = [fake.SEGFAULT, fake.ENDLESS, fake.HOG, fake.RAISE]
     bad = [replace(cells(1)[0], frames=poison) for poison in poisons]
     tally = swept(tmp_path / "ledger", [*bad, *cells(20)], make())
-    assert (tally.done, tally.given_up, tally.failed) == (20, 4, ATTEMPTS * 4)
+    assert (tally.done, tally.quarantined, tally.failed) == (20, 4, ATTEMPTS * 4)
     ledger = Ledger(tmp_path / "ledger")
     assert {row["key"] for row in ledger.rows()} == {cell.key for cell in cells(20)}
-    given_up = {row["spec"]["frames"]: row["reasons"] for row in ledger.given_up()}
-    assert given_up[fake.ENDLESS] == ["it ran past its limit of 5 s"] * 3
-    assert given_up[fake.HOG] == ["it wanted more memory than its limit of 0.6 GB"] * 3
-    assert given_up[fake.RAISE] == ["ZeroDivisionError: one by none"] * 3
-    assert set(given_up[fake.SEGFAULT]) <= {"its process died of SIGSEGV", "its process died", "its worker died"}
-    assert len(given_up[fake.SEGFAULT]) == 3
+    quarantined = {row["spec"]["frames"]: row["reasons"] for row in ledger.quarantined()}
+    assert quarantined[fake.ENDLESS] == ["it ran past its limit of 5 s"] * 3
+    assert quarantined[fake.HOG] == ["it wanted more memory than its limit of 0.6 GB"] * 3
+    assert quarantined[fake.RAISE] == ["ZeroDivisionError: one by none"] * 3
+    assert set(quarantined[fake.SEGFAULT]) <= {"its process died of SIGSEGV", "its process died", "its worker died"}
+    assert len(quarantined[fake.SEGFAULT]) == 3
     assert not list((tmp_path / "ledger" / "claims").iterdir())
 
 
-def test_a_cell_that_was_given_up_is_tried_again_once_its_file_is_gone(tmp_path: Path) -> None:
+def test_a_cell_that_was_quarantined_is_tried_again_once_its_file_is_gone(tmp_path: Path) -> None:
     bad = [replace(cells(1)[0], frames=fake.RAISE)]
-    assert swept(tmp_path / "ledger", bad, Processes(1, SHORT, behave)).given_up == 1
+    assert swept(tmp_path / "ledger", bad, Processes(1, SHORT, behave)).quarantined == 1
     assert swept(tmp_path / "ledger", bad, Processes(1, SHORT, behave)).failed == 0
     for path in (tmp_path / "ledger" / "quarantine").iterdir():
         path.unlink()
@@ -162,24 +162,33 @@ def dask(*words: str) -> subprocess.Popen[bytes]:
     )
 
 
-@pytest.fixture
-def scheduler() -> Iterator[tuple[str, Callable[[], None]]]:
-    """Yield the address of a Dask scheduler with one worker, and what makes it go away."""
-    pytest.importorskip("distributed")
-    number = port()
-    address = f"tcp://127.0.0.1:{number}"
-    started = [
-        dask("dask_scheduler", "--port", str(number), "--host", "127.0.0.1", "--no-dashboard", "--no-show"),
-        dask("dask_worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "20"),
-    ]
+class Served:
+    """A Dask scheduler at an address, with one worker; it can go away and come back."""
 
-    def gone() -> None:
-        for process in started:
+    def __init__(self) -> None:
+        self._port = port()
+        self.address = f"tcp://127.0.0.1:{self._port}"
+        self._started: list[subprocess.Popen[bytes]] = []
+
+    def come(self) -> None:
+        self._started = [
+            dask("dask_scheduler", "--port", str(self._port), "--host", "127.0.0.1", "--no-dashboard", "--no-show"),
+            dask("dask_worker", self.address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "20"),
+        ]
+
+    def go(self) -> None:
+        for process in self._started:
             process.kill()
             process.wait()
 
-    yield address, gone
-    gone()
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    pytest.importorskip("distributed")
+    scheduler = Served()
+    scheduler.come()
+    yield scheduler
+    scheduler.go()
 
 
 def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
@@ -191,18 +200,16 @@ def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
         Cluster(address, run=behave, patience=1.0)
 
 
-def test_a_scheduler_that_goes_away_leaves_all_finished_rows(scheduler: Any, tmp_path: Path) -> None:
+def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp_path: Path) -> None:
     from posefit.sweep.cluster import Cluster
 
-    address, gone = scheduler
-    engine = Cluster(address, limits=SHORT, run=behave, patience=20.0)
+    engine = Cluster(served.address, limits=SHORT, run=behave, patience=20.0)
+    assert engine.window() == 1
     engine._patience = 1.0
-    seen = []
 
-    def watch(tally: Any) -> None:
-        seen.append(tally.done)
+    def watch(tally: Tally) -> None:
         if tally.done == 3:
-            gone()
+            served.go()
 
     with (
         Driver(tmp_path / "ledger") as driver,
@@ -212,3 +219,21 @@ def test_a_scheduler_that_goes_away_leaves_all_finished_rows(scheduler: Any, tmp
     assert 3 <= len(Ledger(tmp_path / "ledger")) < 20
     assert not list((tmp_path / "ledger" / "claims").iterdir())
     assert swept(tmp_path / "ledger", cells(20), Processes(2, SHORT, behave)).done == 20
+
+
+def test_a_scheduler_that_comes_back_is_waited_for(served: Served, tmp_path: Path) -> None:
+    from posefit.sweep.cluster import Cluster
+
+    engine = Cluster(served.address, limits=SHORT, run=behave, patience=30.0)
+    gone = []
+
+    def watch(tally: Tally) -> None:
+        if tally.done == 3 and not gone:
+            served.go()
+            gone.append(True)
+            served.come()
+
+    with Driver(tmp_path / "ledger") as driver:
+        tally = drive(cells(8), driver, engine, print, watch)
+    assert (tally.done, tally.quarantined) == (8, 0)
+    assert len(list(Ledger(tmp_path / "ledger").rows())) == 8

@@ -78,7 +78,7 @@ def test_a_frame_has_a_row_a_cell_whose_order_does_not_follow_from_when_it_was_r
             claim = driver.claim(bad)
             assert isinstance(claim, Claim)
             driver.fail(claim, "it had to")
-        assert driver.claim(bad) is State.GIVEN_UP
+        assert driver.claim(bad) is State.QUARANTINED
     table = Ledger(folder).frame()
     assert table["seed"].tolist() == [0, 1, 2, 3, 4, 5]
     assert table["status"].tolist() == ["done"] * 5 + ["quarantined"]
@@ -254,8 +254,8 @@ def test_nobody_runs_what_a_living_driver_has_claimed_and_a_dead_ones_cells_are_
         with Driver(tmp_path / "ledger") as dead:
             assert dead.claim(cells(2)[1]) == Claim(cells(2)[1], attempt)
     with Driver(tmp_path / "ledger") as last:
-        assert last.claim(cells(2)[1]) is State.GIVEN_UP
-    (lost,) = Ledger(tmp_path / "ledger").given_up()
+        assert last.claim(cells(2)[1]) is State.QUARANTINED
+    (lost,) = Ledger(tmp_path / "ledger").quarantined()
     assert all("its driver, process" in reason and reason.endswith("died") for reason in lost["reasons"])
 
 

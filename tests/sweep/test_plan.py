@@ -5,11 +5,16 @@ from typing import Any
 
 import pytest
 
+import posefit
 from posefit.motion import library
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
+from posefit.registry import Offer, Plugin, Registry
+from posefit.study import method
+from posefit.sweep import check
 from posefit.sweep.cell import Cell, digest_of, run_cell, scene_of, trace
 from posefit.sweep.plan import Plan
+from tests.testing.planted import Holds
 
 PRODUCT: dict[str, Any] = {"methods": ["sapso@pca"], "motions": ["walk"]}
 
@@ -110,8 +115,6 @@ def test_mistakes_are_named(tables: dict[str, Any], message: str) -> None:
 
 def test_a_method_whose_library_is_not_installed_says_what_to_install(monkeypatch: Any) -> None:
     monkeypatch.setattr("posefit.registry.find_spec", lambda name: None)
-    from posefit.sweep import check
-
     check._offers.cache_clear()
     with pytest.raises(ImportError, match="pip install 'posefit"):
         planned(product={**PRODUCT, "methods": ["pycma@pca"]})
@@ -203,3 +206,23 @@ def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_eval
     assert len(long["cost"]) <= 64
     assert long["evaluations"][-1] == 500
     assert long["cost"][-1] == 1.0
+
+
+def test_a_worker_of_another_version_does_not_run_a_cell() -> None:
+    with pytest.raises(ValueError, match=rf"a worker must have posefit 0.0.9, got {posefit.__version__}"):
+        run_cell(Cell("random@pca", "walk", ("walk-a",), version="0.0.9"))
+
+
+def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_version(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    offer = Offer("tracker", "hold+still", Holds, "posefit-hold", "2.5")
+    found = Registry((Plugin("hold", "posefit-hold", "2.5", "loaded", offers=(offer,)),))
+    for module in (check, method):
+        monkeypatch.setattr(module, "registry", lambda: found)
+    spec = {"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]}
+    (cell,) = Plan.of({"cells": [spec]})
+    assert cell.version == f"{posefit.__version__}, posefit-hold 2.5"
+    row = run_cell(cell).row
+    assert row["prior_floor_degrees"] is None
+    assert row["trace"]["evaluations"][-1] <= 2440
