@@ -5,7 +5,7 @@ import io
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -121,13 +121,15 @@ def run_cell(cell: Cell) -> Result:
         "trace": trace(result.found),
         "seconds": time.perf_counter() - began,
     }
+    try:
+        json.dumps(row, allow_nan=False)
+    except ValueError:
+        raise ValueError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
     return Result(row, packed(estimate=estimate, truth=truth))
 
 
 def scene_of(cell: Cell) -> "Scene":
     """Return what is seen in a cell; the same for all methods and seeds."""
-    from dataclasses import replace
-
     import numpy as np
 
     from posefit.motion import library

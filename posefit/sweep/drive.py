@@ -72,7 +72,7 @@ def drive(
     are safe.
     """
     stop = _Stop(say)
-    sweep = _Sweep(cells, driver, engine, stop, watch)
+    sweep = _Sweep(cells, driver, engine, stop, say, watch)
     with stop.heard():
         try:
             sweep.run()
@@ -91,9 +91,15 @@ class _Sweep:
     """One driver's way through the cells of a plan."""
 
     def __init__(
-        self, cells: Sequence[Cell], driver: Driver, engine: Engine, stop: _Stop, watch: Callable[[Tally], None]
+        self,
+        cells: Sequence[Cell],
+        driver: Driver,
+        engine: Engine,
+        stop: _Stop,
+        say: Say,
+        watch: Callable[[Tally], None],
     ) -> None:
-        self._driver, self._engine, self._stop, self._watch = driver, engine, stop, watch
+        self._driver, self._engine, self._stop, self._say, self._watch = driver, engine, stop, say, watch
         self.tally = Tally(len(cells))
         self._waiting: deque[Cell] = deque()
         self._elsewhere: list[Cell] = []
@@ -110,7 +116,7 @@ class _Sweep:
     def run(self) -> None:
         """Go on until nothing is left, or somebody stops it."""
         self._watch(self.tally)
-        looked = time.monotonic()
+        looked, told = time.monotonic(), False
         while True:
             if not self._stop.wishes:
                 self._fill()
@@ -118,6 +124,9 @@ class _Sweep:
             if self._stop.wishes > 1 or not (self._running or self._pending()):
                 break
             if not self._running:
+                if self._elsewhere and not told:
+                    self._say(f"waiting for {len(self._elsewhere)} cells that other drivers run")
+                    told = True
                 time.sleep(PATIENCE)
             for outcome in self._engine.wait(PATIENCE):
                 self._take(outcome)

@@ -11,6 +11,7 @@ import secrets
 import socket
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -132,11 +133,13 @@ class Driver:
             self._path(key, attempt).unlink(missing_ok=True)
 
     def _tidy(self) -> None:
-        """Remove what drivers left behind that died between writing a row and giving up their claim on it."""
+        """Remove what drivers left behind that died between what they wrote and giving up their claim on it."""
         for entry in os.scandir(self._claims):
-            if entry.name.partition(".")[0] in self.ledger or (
-                entry.name.startswith(".") and time.time() - entry.stat().st_mtime > LEFT
-            ):
+            if entry.name.startswith("."):
+                with suppress(FileNotFoundError):  # it got its name just now
+                    if time.time() - entry.stat().st_mtime > LEFT:
+                        os.unlink(entry)
+            elif self.state(entry.name.partition(".")[0]):
                 Path(entry).unlink(missing_ok=True)
 
     def _lives(self, name: str) -> bool:

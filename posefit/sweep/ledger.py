@@ -65,9 +65,8 @@ class Ledger:
 
     def quarantined(self) -> list[dict[str, Any]]:
         """Return the cells in quarantine: key, spec, status, and the reason of each attempt."""
-        return [
-            json.loads(path.read_text(encoding="utf-8")) for path in sorted((self.path / QUARANTINE).glob("*.json"))
-        ]
+        paths = sorted((self.path / QUARANTINE).glob("*.json"))
+        return [json.loads(path.read_text(encoding="utf-8")) for path in paths if path.stem not in self]
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it."""
@@ -136,9 +135,9 @@ def create(path: Path) -> None:
         if path.exists() and not path.is_dir():
             raise ValueError(f"{path}: expected a folder for the ledger, got a file")
         if not (path / INDEX).exists():
-            if path.is_dir() and (
-                strange := sorted(entry.name for entry in os.scandir(path) if entry.name not in FOLDERS)
-            ):
+            found = sorted(entry.name for entry in os.scandir(path)) if path.is_dir() else []
+            # another driver may be making the same ledger
+            if strange := [name for name in found if name not in FOLDERS and not name.lstrip(".").startswith(INDEX)]:
                 raise ValueError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
             for name in FOLDERS:
                 (path / name).mkdir(parents=True, exist_ok=True)

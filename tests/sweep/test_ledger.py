@@ -285,8 +285,30 @@ def test_what_a_dead_driver_left_behind_goes_away(tmp_path: Path) -> None:
     folder = filled(tmp_path / "ledger", 1)
     claims = folder / "claims"
     (claims / f"{cells(1)[0].key}.1").write_text("{}")  # its row was written, its claim not yet given up
+    (claims / f"{'0' * 64}.2").write_text("{}")
+    (folder / "quarantine" / f"{'0' * 64}.json").write_text("{}")  # quarantined, its claims not yet given up
     (claims / ".unnamed").write_text("")
     os.utime(claims / ".unnamed", (0, 0))
     filled(folder, 1)
     assert not list(claims.iterdir())
     assert len(list((folder / "rows").iterdir())) == 2  # a driver that wrote nothing leaves nothing
+
+
+def test_many_drivers_may_make_the_same_ledger_at_once(tmp_path: Path) -> None:
+    (tmp_path / "ledger" / "rows").mkdir(parents=True)
+    (tmp_path / "ledger" / ".ledger.json.0123").write_text("")
+    assert len(Driver(tmp_path / "ledger").ledger) == 0
+    failed: list[Exception] = []
+
+    def make() -> None:
+        try:
+            Driver(tmp_path / "new")
+        except ValueError as error:
+            failed.append(error)
+
+    threads = [threading.Thread(target=make) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failed

@@ -1,5 +1,6 @@
 """A plan is checked as a whole, before anything runs; a mistake in it is one line."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -147,6 +148,15 @@ def test_a_key_follows_from_the_spec_and_the_version_alone() -> None:
     assert one.key == same.key != other.key
     assert len(one.key) == 64
     assert Cell("sapso@pca", "walk", ("walk-a",), seed=1, version="0.0.9").key != one.key
+
+
+def test_a_cell_is_restored_from_its_rows_spec() -> None:
+    spec = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
+    (cell,) = Plan.of({"cells": [{**spec, "corruption": {"holes": 0.5}, "settings": {"pca.components": 4}}]})
+    row = run_cell(cell).row
+    again = Cell(**json.loads(json.dumps(row))["spec"])
+    assert again.key == cell.key == row["key"]
+    assert run_cell(again).row["error_degrees"] == row["error_degrees"]
 
 
 def test_instances_differ_and_a_number_is_the_same_for_every_method_and_seed() -> None:
