@@ -38,7 +38,8 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
             raise ValueError(f"a cell must say its {name}, got none")
     values = {name: _CHECKS[name](name, value) for name, value in spec.items()}
     offers = _offers(values["method"])
-    settings = _settings(values["method"], tuple(settings_text(values.get("settings", {}))))
+    texts = tuple(settings_text(values.get("settings", {})))
+    settings = _settings(values["method"], texts)
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
         raise ValueError(f"train must not contain the motion itself, got {values['motion']}")
@@ -46,7 +47,8 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
     foreign = sorted({f"{offer.distribution} {offer.version}" for offer in offers if offer.distribution != PROJECT})
     version = ", ".join([posefit.__version__, *foreign])
     cell = Cell(**{**values, "settings": settings, "train": train, "files": files, "version": version})
-    _check_budget(cell, offers[0])
+    if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
+        raise ValueError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
     if files.get(cell.motion) and cell.frames > (length := _length(cell.motion, cell.fps)):
         raise ValueError(f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}")
     return cell
@@ -92,15 +94,19 @@ def _settings(method: str, texts: tuple[str, ...]) -> dict[str, Any]:
     return dict(sorted(typed.items()))
 
 
-def _check_budget(cell: Cell, offer: Offer) -> None:
+@lru_cache(maxsize=1024)
+def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
+    """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
+    offer = _offers(method)[0]
     if offer.kind != "optimiser":
-        return
-    family = offer.name.partition(":")[0]
-    mine = {name.partition(".")[2]: value for name, value in cell.settings.items() if name.startswith(f"{family}.")}
+        return 1
+    family = f"{offer.name.partition(':')[0]}."
+    mine = {
+        name.removeprefix(family): value for name, value in _settings(method, texts).items() if name.startswith(family)
+    }
     known = {setting.name: setting.default for setting in offer.settings}
-    size = planned(offer.factory, mine, cell.evaluations).get("particles", known.get("particles", 1))
-    if isinstance(size, int) and size > cell.evaluations:
-        raise ValueError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
+    size = planned(offer.factory, mine, evaluations).get("particles", known.get("particles", 1))
+    return size if isinstance(size, int) else 1
 
 
 def _other_styles(motion: str) -> tuple[str, ...]:

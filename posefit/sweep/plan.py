@@ -135,6 +135,8 @@ def _entries(name: str, values: Any) -> list[dict[str, Any]]:
     """Return the fields that each entry of one list of a product stands for."""
     field = LISTS[name]
     if field in ("instance", "seed") and type(values) is int:
+        if values > MOST:
+            raise ValueError(f"product.{name} must be at most {MOST:,}, got {values:,}")
         values = list(range(values))
     if not isinstance(values, list | tuple):
         raise ValueError(f"product.{name} must be a list, got {values!r}")
