@@ -46,7 +46,7 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
     files = {path: digest for one in (values["motion"], *train) for path, digest in _files(one)}
     foreign = sorted({f"{offer.distribution} {offer.version}" for offer in offers if offer.distribution != PROJECT})
     version = ", ".join([posefit.__version__, *foreign])
-    cell = Cell(**{**values, "settings": settings, "train": train, "files": files, "version": version})
+    cell = Cell(**{**values, "settings": dict(settings), "train": train, "files": files, "version": version})
     if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
         raise ValueError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
     if files.get(cell.motion) and cell.frames > (length := _length(cell.motion, cell.fps)):
