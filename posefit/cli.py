@@ -153,6 +153,26 @@ def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, 
     context.exit(status)
 
 
+@main.group()
+def reproduce() -> None:
+    """Repeat the experiments of the publications that posefit follows."""
+
+
+@reproduce.command()
+@click.option("--seeds", type=int, default=10, show_default=True, help="Sequences, each in other phases and views.")
+@click.option("--searches", is_flag=True, help="Compare with SAPSO and with the joined tracker too; minutes more.")
+@click.option("--out", metavar="DIR", help="New folder for report.json and the figures; needs posefit[figures].")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def vsmm(seeds: int, searches: bool, out: str | None, as_json: bool) -> None:
+    """Stepping, waving, jumping jacks and squats: the experiment of CN101894278, against an IMM over all models."""
+    from posefit.study.patent_report import report, table
+
+    figures = report(seeds, searches, out, _progress)
+    click.echo(json.dumps(figures) if as_json else table(figures))
+    if out and not as_json:
+        click.echo(f"written to {out}: look at figure-9-joints.png, figure-10-probabilities.png, figure-11-errors.png")
+
+
 @main.group(invoke_without_command=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context

@@ -6,12 +6,11 @@ with logarithms of likelihoods, so that a residual of any size leaves probabilit
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import logsumexp
 
 from posefit.geometry.rotation import Array
 
@@ -74,6 +73,7 @@ class Measurement:
     residual: Array  # (m,) measured minus expected
     jacobian: Array  # (m, e) of what is expected, by the error of the state
     covariance: Array  # (m, m) of the noise
+    log_likelihood: float = 0.0  # of the state itself, by what cannot be written as a residual
 
 
 def start(state: Array, covariance: Array, models: int) -> Belief:
@@ -119,7 +119,7 @@ class IMM:
             repairs += repaired
         found = np.array(likelihoods)
         joint = found + mixed.log_probabilities  # VSMM 6.4
-        return Belief(np.array(states), np.array(covariances), joint - logsumexp(joint), found, repairs)
+        return Belief(np.array(states), np.array(covariances), joint - np.logaddexp.reduce(joint), found, repairs)
 
     def mixed(self, belief: Belief) -> Belief:
         """Return what each model starts its cycle from, and the probabilities c_j that it is the one.
@@ -128,7 +128,7 @@ class IMM:
         """
         with np.errstate(divide="ignore"):
             steps = np.log(np.asarray(self.transition, dtype=np.float64)) + belief.log_probabilities[:, None]
-        after = logsumexp(steps, axis=0)  # log c_j
+        after = np.logaddexp.reduce(steps, axis=0)  # log c_j
         states, covariances, repairs = [], [], belief.repairs
         for j, total in enumerate(after):
             weights = np.exp(steps[:, j] - total) if np.isfinite(total) else np.eye(len(after))[j]  # VSMM 6.2a
@@ -139,6 +139,17 @@ class IMM:
             repairs += repaired
         return Belief(np.array(states), np.array(covariances), after, belief.log_likelihoods, repairs)
 
+    def updated(self, belief: Belief, measure: Callable[[Array], Measurement]) -> Belief:
+        """Return the belief after one more measurement of the same frame; the models' probabilities stay."""
+        states, covariances, repairs = [], [], belief.repairs
+        for state, covariance in zip(belief.states, belief.covariances, strict=True):
+            moved, left, _ = update(state, covariance, measure(state), self.manifold)
+            left, repaired = positive(left)
+            states.append(moved)
+            covariances.append(left)
+            repairs += repaired
+        return replace(belief, states=np.array(states), covariances=np.array(covariances), repairs=repairs)
+
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state and covariance that stand for all models. VSMM step 6."""
         middle = self.manifold.mean(belief.states, belief.probabilities)  # VSMM 6.5
@@ -148,7 +159,7 @@ class IMM:
 def update(state: Array, covariance: Array, seen: Measurement, manifold: Manifold) -> tuple[Array, Array, float]:
     """Return state and covariance after a measurement, and the log of its likelihood; as they were without one."""
     if not len(seen.residual):
-        return state, covariance, 0.0
+        return state, covariance, seen.log_likelihood
     jacobian, noise = seen.jacobian, seen.covariance
     innovation = jacobian @ covariance @ jacobian.T + noise  # VSMM 6.3b
     factor = cho_factor(innovation, lower=True)
@@ -158,7 +169,7 @@ def update(state: Array, covariance: Array, seen: Measurement, manifold: Manifol
     gain = cho_solve(factor, jacobian @ covariance).T  # VSMM 6.3d
     keep = np.eye(len(covariance)) - gain @ jacobian
     left = keep @ covariance @ keep.T + gain @ noise @ gain.T  # Joseph's form, which stays symmetric
-    return manifold.plus(state, gain @ seen.residual), left, likelihood
+    return manifold.plus(state, gain @ seen.residual), left, likelihood + seen.log_likelihood
 
 
 def positive(covariance: Array) -> tuple[Array, int]:

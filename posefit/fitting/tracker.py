@@ -1,9 +1,9 @@
 """Tracking by synthesis: predict, search, commit, frame by frame. SAPSO section 4."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol, cast
+from typing import Any, Literal, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,7 @@ class Frame:
     coordinates: Array | None = field(default=None, repr=False)  # (d,) where it was found in a search space
     # (populations,) evaluations so far after each, where a tracker says
     spent: NDArray[np.int64] | None = field(default=None, repr=False)
+    details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
 
 
 @dataclass(frozen=True, eq=False)

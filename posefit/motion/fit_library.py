@@ -19,6 +19,8 @@ from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotatio
 from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.motion.amc import read_clip
 from posefit.motion.asf import read_asf
+from posefit.motion.fit_arms import PHASES, drawn, held_out, waving
+from posefit.motion.library import kind_of
 
 ORIGIN = (
     "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
@@ -54,7 +56,16 @@ CLIPS = {
     "squat-b": Clip("14/14_06", 1015, 1565, 1.2, 3.3),
     "jump-a": Clip("49/49_02", 130, 400, 0.6, 1.2),
     "jump-b": Clip("16/16_01", 60, 262, 1.6, 1.69),
+    "step-a": Clip("05/05_01", 0, 380, 0.9, 1.35),
+    "step-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
+    "arms-out-a": Clip("02/02_01", 0, None, 0.9, 1.35),
+    "arms-out-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
+    "wave-a": Clip("05/05_01", 0, 380, 0.9, 1.35),
+    "wave-b": Clip("16/16_17", 0, 250, 0.9, 1.35),
 }
+# What the arms do where they do not do what the clip's do: each side's directions, by hand.
+ARMS = {"arms-out": {"l": held_out, "r": held_out}, "wave": {"r": waving}}
+ON_THE_SPOT = ("step",)  # walks whose way is taken away
 STANDING = 0.2  # m/s; who is slower does not go anywhere, and faces where he looks on average
 # What is at its highest at phase 0 in each kind of motion: an angle rx, less another one, or less the root's height.
 BEATS = {
@@ -64,6 +75,9 @@ BEATS = {
     "jacks": ("lhumerus", None),
     "squat": (None, "root"),
     "jump": (None, "root"),
+    "step": ("rfemur", "lfemur"),
+    "arms-out": ("rfemur", "lfemur"),
+    "wave": ("rfemur", "lfemur"),
 }
 
 
@@ -107,7 +121,7 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
     return {
         "source": name,
         "period": round(period, 4),
-        "speed": round(speed, 4),
+        "speed": 0.0 if kind in ON_THE_SPOT else round(speed, 4),
         "residual_degrees": round(float(np.degrees(error)), 3),
         "angles": free.tolist(),
         "series": np.round(coefficients.T, DIGITS).tolist(),
@@ -131,6 +145,16 @@ def in_step(coefficients: Array, free: NDArray[np.int64], kind: str) -> Array:
     cosines, sines = coefficients[1 : 1 + HARMONICS], coefficients[1 + HARMONICS :]
     moved = cosines * np.cos(turns) + sines * np.sin(turns), sines * np.cos(turns) - cosines * np.sin(turns)
     return np.vstack([coefficients[:1], *moved])
+
+
+def armed(model: dict[str, Any], skeleton: Skeleton, kind: str) -> None:
+    """Give a model of a walk the arms of its kind, as far as a trunk that leans and turns a little lets them."""
+    phases = np.arange(PHASES) / PHASES
+    for side, directions in ARMS.get(kind, {}).items():
+        places, angles = drawn(skeleton, side, *directions(phases, 1.0 if side == "l" else -1.0))
+        coefficients = np.linalg.lstsq(basis(phases, HARMONICS), angles, rcond=None)[0]
+        for place, series in zip(places, coefficients.T, strict=True):
+            model["series"][3 + model["angles"].index(place)] = np.round(series, DIGITS).tolist()
 
 
 def average(skeletons: list[Skeleton]) -> dict[str, Any]:
@@ -181,8 +205,9 @@ def main(root: Path) -> None:
         tuple((bone, tuple(free)) for bone, free in bones["channels"]),
         np.radians(bones["limits_degrees"]),
     )
-    motions = {name: fitted(root, clip, name.split("-")[0]) for name, clip in CLIPS.items()}
+    motions = {name: fitted(root, clip, kind_of(name)) for name, clip in CLIPS.items()}
     for name, model in motions.items():
+        armed(model, skeleton, kind_of(name))
         grounded(model, skeleton)
         print(f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees")
     target = Path(__file__).with_name("library.json")

@@ -1,14 +1,15 @@
 """The built-in motions: small periodic models, so that everything runs without any data.
 
-Every kind, `walk`, `run`, `march` (raising the knees on the spot), `jacks` (jumping jacks), `squat` and `jump`, has
-styles, each from another person: `walk-a`, `walk-b`, ... Without a letter it is somebody in between: the mean of the
+Every kind, `walk`, `run`, `march` (raising the knees on the spot), `jacks` (jumping jacks), `squat`, `jump`, `step`
+(walking on the spot), `arms-out` and `wave` (walking with both arms held out, or with one waving), has styles, each from another person: `walk-a`, `walk-b`, ... Without a letter it is somebody in between: the mean of the
 styles, in step. So `walk` is none of the motions that its prior is trained on, but within their reach; a prior trained
 on other people only, as for `walk-a`, is the harder case.
-They were fitted to CMU clips by `fit_library.py`. The data used in this project was obtained from mocap.cs.cmu.edu.
+They were fitted to CMU clips by `fit_library.py`; the arms that are held out or wave are drawn by hand. The data used in this project was obtained from mocap.cs.cmu.edu.
 The database was created with funding from NSF EIA-0196217.
 """
 
 import json
+import re
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
@@ -30,14 +31,18 @@ def _library() -> dict[str, Any]:
 def names() -> tuple[str, ...]:
     """Return the names that `built_in` takes."""
     styles = tuple(_library()["motions"])
-    return tuple(dict.fromkeys(name.split("-")[0] for name in styles)) + styles
+    return tuple(dict.fromkeys(kind_of(name) for name in styles)) + styles
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of motion that a name is of: `walk` of `walk-a`, `arms-out` of `arms-out`."""
+    return re.sub(r"-[a-z]$", "", name)
 
 
 def other_styles(name: str) -> tuple[str, ...]:
     """Return the other styles of a motion's kind, what its prior is trained on by default."""
     _check(name)
-    kind = name.split("-")[0]
-    return tuple(style for style in _library()["motions"] if style.split("-")[0] == kind and style != name)
+    return tuple(style for style in _library()["motions"] if kind_of(style) == kind_of(name) and style != name)
 
 
 @lru_cache(maxsize=1)

@@ -50,8 +50,7 @@ def scene_of(motion: str, views_degrees: Sequence[float], frames: int = 60) -> S
 def task_of(scene: Scene, choice: Choice, body: Body, **changes: Any) -> Task:
     """Return the task of following a scene with a body that need not be the true one."""
     assert scene.truth is not None
-    kind = scene.name.split("-")[0]
-    training = [library.built_in(style) for style in library.other_styles(scene.name if "-" in scene.name else kind)]
+    training = [library.built_in(style) for style in library.other_styles(scene.name)]
     made = Task(body, scene.cameras, choice.budget(), scene.yaw, scene.anchor, training=training)
     return replace(made, **changes)
 

@@ -74,7 +74,7 @@ def test_the_other_styles_of_a_motion_never_contain_it() -> None:
         others = library.other_styles(name)
         assert others
         assert name not in others
-        assert {other.split("-")[0] for other in others} == {name.split("-")[0]}
+        assert {library.kind_of(other) for other in others} == {library.kind_of(name)}
 
 
 @each
@@ -268,7 +268,7 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
         return float(np.degrees(np.abs((made.poses - poses + np.pi) % (2.0 * np.pi) - np.pi).mean()))
 
     least = min(error(phase) for phase in np.arange(400) / 400)
-    assert least < RESIDUAL_DEGREES[name.split("-")[0]]
+    assert least < RESIDUAL_DEGREES[library.kind_of(name)]
     assert least == pytest.approx(model["residual_degrees"], abs=0.05)
 
 

@@ -1,0 +1,199 @@
+"""One track of the variable-structure filter, frame by frame."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from posefit.fitting import metrics
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.geometry.rotation import Array
+from posefit.silhouette.cost import areas, mismatch
+from posefit_vsmm.fresh import Matcher, estimated
+from posefit_vsmm.imm import Belief, Measurement, start
+from posefit_vsmm.joints import errors
+from posefit_vsmm.points import AT, Figure
+from posefit_vsmm.preprocess import Lines, lines_of
+from posefit_vsmm.shown import Shown
+from posefit_vsmm.sight import Seen, Sight
+from posefit_vsmm.state import ERROR, decode
+from posefit_vsmm.structure import Measure, Models, Settings
+
+COAST = 15  # frames that the models go on alone when nothing is seen; then the track is lost
+LOST = 0.35  # IoU: below it, for so many frames, the track is lost
+LOST_FRAMES = 8
+UNSURE = np.repeat([0.05, np.radians(15.0)], [3, ERROR - 3])  # metres and radians: deviations of a fresh estimation
+ASTRAY = 2  # frames: a limb that is not where it is sought, while an end point is nobody's, is sought all around
+ASTRAY_SPREAD = np.radians(15.0)  # deviation that each of its joints then gains a frame
+# which of the nine quaternions a limb's end depends on
+_LIMBS = {"left hand": (4, 5), "right hand": (6, 7), "left foot": (0, 1), "right foot": (2, 3)}
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search found in one frame."""
+
+    pose: Array  # (66,)
+    evaluations: int
+    measure: Measure  # what it tells the filter
+
+
+class Searcher(Protocol):
+    """Looks around what the filter holds."""
+
+    def likelihood(self, state: Array, observation: Observation) -> float:
+        """Return the log-likelihood of a predicted state (43,), for one evaluation."""
+        ...
+
+    def find(
+        self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator
+    ) -> Found | None:
+        """Return what is found around a state (43,) with covariance (33, 33), for at most so many evaluations."""
+        ...
+
+
+class Course:
+    """One track, as far as it has come; with a `searcher`, every frame ends in a search."""
+
+    def __init__(
+        self, task: Task, settings: Settings, rng: np.random.Generator, searcher: Searcher | None = None
+    ) -> None:
+        self._task, self._reliance, self._rng, self._searcher = task, settings.library.reliance, rng, searcher
+        self._models = Models(settings, task.body.skeleton, task.fps)
+        self._sight = Sight(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), errors())
+        self._latest: Frame | None = task.before[-1] if task.before else None
+        self._shown: list[Shown] = []
+        self._belief: Belief | None = None
+        self._unseen = self._bad = 0
+        self._astray = dict.fromkeys(_LIMBS, 0)
+
+    def frame(self, observation: Observation) -> Frame:
+        """Return what is found in the next frame."""
+        began, models = time.perf_counter(), self._models
+        blind = not observation.usable
+        lines = [None if blind else lines_of(silhouette.mask) for silhouette in observation.silhouettes]
+        blind = all(one is None for one in lines)
+        self._unseen = self._unseen + 1 if blind else 0
+        if self._bad >= LOST_FRAMES or self._unseen > COAST:
+            self._belief = None
+        if self._belief is None and blind:
+            return self._held(observation, began)
+        spent = self._begin(observation) if self._belief is None else 0
+        belief = self._belief
+        assert belief is not None
+        state, spread = models.imm.fused(belief)
+        likely = models.known[models.active[int(belief.probabilities.argmax())]]
+        expected, spread = likely.predict(state, spread)
+        seen = self._look(lines, expected, spread)
+        if (extra := self._astray_spread(seen)).any():
+            belief = replace(belief, covariances=belief.covariances + np.diag(extra))
+            seen = self._look(lines, expected, spread + np.diag(extra))
+        details = {"detection_seconds": time.perf_counter() - began}
+
+        filtering, used = time.perf_counter(), spent
+
+        def measure(one: Array) -> Measurement:
+            nonlocal used
+            found = self._sight.measure(one, seen, observation.translation)
+            if self._searcher is None or blind:
+                return found
+            used += 1
+            return replace(found, log_likelihood=self._searcher.likelihood(one, observation))
+
+        surprise = float(np.mean([one.surprise for one in seen if one is not None] or [0.0]))
+        self._belief = models.cycle(belief, measure, surprise)
+        state, spread = models.imm.fused(self._belief)
+        details["filter_seconds"] = time.perf_counter() - filtering
+        poses, places = decode(state[None], self._reliance)
+        pose, place = poses[0], places[0]
+        if self._searcher is not None and not blind:
+            found = self._searcher.find(state, spread, observation, self._task.evaluations - used - 1, self._rng)
+            if found is not None:
+                pose, used = found.pose, used + found.evaluations
+                self._belief = models.imm.updated(self._belief, found.measure)
+                place = models.imm.fused(self._belief)[0][:3]  # one frame alone says little of the depth
+        models.drawn(self._sight.figure.seen(self._task.cameras[0], models.imm.fused(self._belief)[0])[0])
+        told = {**details, **self._joints(seen, expected), "surprise": surprise, **self._told()}
+        return self._frame(pose, place, observation, used + 1, began, told)
+
+    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[Seen | None]:
+        return [None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)]
+
+    def _begin(self, observation: Observation) -> int:
+        """Estimate a pose from this frame alone, all models alike; return how many evaluations that took."""
+        task, latest = self._task, self._latest
+        matcher = Matcher(task, observation, self._reliance)
+        yaw, anchor, given = task.yaw, task.anchor, None
+        if latest is not None:
+            yaw, anchor, given = float(latest.pose[0]), latest.translation, latest.pose
+        elif task.first_pose is not None:
+            given = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
+        budget = task.evaluations - 1 if self._searcher is None else task.evaluations // 2
+        models = list(self._models.known.values())
+        state = estimated(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
+        self._models.restart()
+        self._belief = start(state, np.diag(UNSURE**2), len(models))
+        self._bad = 0
+        self._astray = dict.fromkeys(_LIMBS, 0)
+        return matcher.evaluations
+
+    def _astray_spread(self, seen: Sequence[Seen | None]) -> Array:
+        """Return the variances (33,) to add for limbs whose ends are not found though an end point is nobody's."""
+        extra = np.zeros(ERROR)
+        spare = any(one.spare for one in seen if one is not None)
+        for limb, joints in _LIMBS.items():
+            found = any(one.confidence[AT[limb]] > 0.0 for one in seen if one is not None)
+            self._astray[limb] = self._astray[limb] + 1 if spare and not found else 0
+            if self._astray[limb] >= ASTRAY:
+                for k in joints:
+                    extra[6 + 3 * k : 9 + 3 * k] = ASTRAY_SPREAD**2
+        return extra
+
+    def _joints(self, seen: Sequence[Seen | None], expected: Array) -> dict[str, Any]:
+        """Return the 17 joints (views, 17, 2) as they are shown, and how sure the rules were of them (views, 17)."""
+        points, confidence = [], []
+        for view, (camera, one) in enumerate(zip(self._task.cameras, seen, strict=True)):
+            if one is None:
+                pixels, _ = self._sight.figure.seen(camera, expected)
+                one = Seen(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
+            if len(self._shown) == view:
+                self._shown.append(Shown(one.points))
+            points.append(self._shown[view].follow(one.points, one.confidence, one.variances))
+            confidence.append(one.confidence)
+        return {"joints": np.array(points), "confidence": np.array(confidence)}
+
+    def _told(self) -> dict[str, Any]:
+        """Return what is told of the models beside the pose."""
+        belief, models = self._belief, self._models
+        told: dict[str, Any] = {"lost": belief is None, "models": models.active}
+        told |= {"group": models.group, "newcomer": models.newcomer, "groups": models.groups}
+        if belief is not None:
+            told |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
+        return told
+
+    def _held(self, observation: Observation, began: float) -> Frame:
+        """Return the latest pose once more, or an upright one, while nothing is seen."""
+        pose, place = np.zeros(66), np.array(self._task.anchor, dtype=np.float64)
+        pose[0] = self._task.yaw or 0.0
+        if self._latest is not None:
+            pose, place = self._latest.pose, self._latest.translation
+        return self._frame(pose, place, observation, 0, began, self._told())
+
+    def _frame(
+        self, pose: Array, place: Array, observation: Observation, used: int, began: float, details: dict[str, Any]
+    ) -> Frame:
+        task = self._task
+        if observation.translation is not None:
+            place = np.array(observation.translation, dtype=np.float64)
+        views = zip(task.cameras, observation.silhouettes, strict=True)
+        counts = np.concatenate([areas(task.body, camera, one, pose[None], place[None]) for camera, one in views])
+        known = [one.known for one in observation.silhouettes]
+        heard = counts[known] if any(known) else counts
+        cost = float(mismatch(heard).mean())
+        if not self._unseen:
+            self._bad = self._bad + 1 if float(metrics.iou(heard).mean()) < LOST else 0
+        seconds = time.perf_counter() - began
+        self._latest = Frame(pose, place, cost, counts, used, seconds, np.array([cost]), details=details)
+        return self._latest

@@ -1,0 +1,94 @@
+"""Which models belong together, and which change into each other. VSMM steps 4 and 5, Reading V1.
+
+A TOML file says it: `stay`, a table `groups` of names and their models, and a table `neighbours` of models and those
+that they change into.
+"""
+
+import tomllib
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posefit.geometry.rotation import Array
+
+SIZE_LIMIT = 100_000  # bytes
+
+
+@dataclass(frozen=True)
+class Topology:
+    """Groups of models, in the order in which they are numbered, and the neighbours of each model."""
+
+    groups: Mapping[str, tuple[str, ...]]
+    neighbours: Mapping[str, tuple[str, ...]]
+    stay: float
+
+    def transition(self, models: Sequence[str]) -> Array:
+        """Return how probable each of some models (r, r) is after each: `stay`, the rest among its neighbours there.
+
+        A model without a neighbour there may change into any, as a group of its own can only be left that way.
+        """
+        matrix = np.zeros((len(models), len(models)))
+        for i, name in enumerate(models):
+            others = [j for j, other in enumerate(models) if other in self.neighbours[name] and j != i]
+            others = others or [j for j in range(len(models)) if j != i]
+            matrix[i, others] = (1.0 - self.stay) / max(1, len(others))
+            matrix[i, i] = self.stay if others else 1.0
+        return matrix
+
+    def union(self, names: Collection[str]) -> tuple[str, ...]:
+        """Return the models of some groups, each once, in the order of the groups."""
+        return tuple(dict.fromkeys(model for name, mine in self.groups.items() if name in names for model in mine))
+
+    def most_probable(self, models: Sequence[str], probabilities: Array) -> str:
+        """Return the group whose models are the most probable together. VSMM step 5."""
+        mine = dict(zip(models, probabilities, strict=True))
+        sums = {name: sum(mine.get(model, 0.0) for model in group) for name, group in self.groups.items()}
+        return max(sums, key=lambda name: sums[name])
+
+
+def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
+    """Return the topology of a TOML file, or the one that the package carries.
+
+    Raises ValueError naming the file where it is not what it should be, or names a model that is not known.
+    """
+    source = files("posefit_vsmm") / "groups.toml" if path is None else Path(path)
+    if isinstance(source, Path):
+        if not source.is_file():
+            raise ValueError(f"{source}: expected a file of groups, got none")
+        if source.stat().st_size > SIZE_LIMIT:
+            raise ValueError(f"{source}: expected at most {SIZE_LIMIT} bytes, got {source.stat().st_size}")
+    label = "groups.toml" if path is None else str(path)
+    try:
+        values = tomllib.loads(source.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:  # bad UTF-8, bad TOML, endless nesting
+        raise ValueError(f"{label}: expected TOML with stay, groups and neighbours, got {error}") from None
+    if set(values) != {"stay", "groups", "neighbours"}:
+        raise ValueError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
+    stay = values["stay"]
+    if not isinstance(stay, float) or not 0.0 < stay < 1.0:
+        raise ValueError(f"{label}: stay must be a number between 0 and 1, got {stay!r}")
+    groups, neighbours = (_lists(label, key, values[key], known) for key in ("groups", "neighbours"))
+    if not groups or not all(groups.values()):
+        raise ValueError(f"{label}: groups must hold at least one group of at least one model, got {values['groups']}")
+    used = {model for mine in groups.values() for model in mine}
+    for model in neighbours:
+        _check(label, model, known)
+    return Topology(groups, {model: neighbours.get(model, ()) for model in used | set(neighbours)}, stay)  # VSMM 4
+
+
+def _lists(label: str, key: str, table: Any, known: Collection[str]) -> dict[str, tuple[str, ...]]:
+    if not isinstance(table, dict) or not all(isinstance(mine, list) for mine in table.values()):
+        raise ValueError(f"{label}: {key} must be a table of lists of models, got {table!r}")
+    for mine in table.values():
+        for model in mine:
+            _check(label, model, known)
+    return {str(name): tuple(dict.fromkeys(mine)) for name, mine in table.items()}
+
+
+def _check(label: str, model: Any, known: Collection[str]) -> None:
+    if model not in known:
+        raise ValueError(f"{label}: a model must be one of {', '.join(known)}, got {model!r}")

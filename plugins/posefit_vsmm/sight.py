@@ -1,0 +1,93 @@
+"""What cameras measure of a state: the rules' joints, against where the state's points are seen. VSMM 6.1."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import BONES
+from posefit_vsmm.imm import Measurement
+from posefit_vsmm.joints import OWN, Errors, detected
+from posefit_vsmm.motion import leg_of
+from posefit_vsmm.points import NEAREST, Figure
+from posefit_vsmm.preprocess import Lines
+from posefit_vsmm.state import ERROR
+
+NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected
+DEVIATIONS = 3.0  # between these, so many standard deviations
+SURPRISE = 16.0  # squared standard deviations in the image: what is farther off is not believed
+LEAST = 0.05  # confidence that is counted as such
+KNOWN = 0.002  # metres: the deviation of a translation that is known
+
+
+def head_radius(body: Body) -> float:
+    """Return the radius of the head in metres."""
+    return float(body.radii[BONES.index("head")].mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What one camera measured."""
+
+    points: Array  # (17, 2) pixels
+    confidence: Array  # (17,); 0 is hidden
+    variances: Array = field(repr=False)  # (17, 2) square pixels
+    spare: int  # end points of the skeleton line that belong to none of them
+    surprise: float  # mean squared standard deviations of the points that the rules found by themselves
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A body before cameras."""
+
+    body: Body
+    cameras: Sequence[Camera]
+    figure: Figure
+    errors: Errors = field(repr=False)
+
+    def look(self, view: int, lines: Lines, expected: Array, spread: Array) -> Seen:
+        """Return what a camera sees of a state (43,) that is expected, to within a covariance (33, 33).
+
+        What is too surprising is not believed.
+        """
+        camera = self.cameras[view]
+        pixels, jacobian = self.figure.seen(camera, expected)
+        depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
+        metre = float(camera.focal.mean()) / max(depth, NEAREST)  # in pixels, at the root's depth
+        leg = leg_of(self.body.skeleton) * metre
+        covariances = jacobian @ spread @ jacobian.transpose(0, 2, 1)
+        gates = DEVIATIONS * np.sqrt(np.einsum("pii->pi", covariances).max(axis=1))
+        gates = np.clip(gates, NARROWEST * leg, WIDEST * leg)
+        found = detected(lines, pixels, gates, leg, head_radius(self.body) * metre, self.errors.bias)
+        variances = (self.errors.deviation * leg) ** 2 / np.maximum(found.confidence, LEAST)[:, None]
+        off = found.points - pixels
+        distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
+        confidence = np.where(distance < SURPRISE, found.confidence, 0.0)
+        dropped = np.count_nonzero((confidence == 0.0) & (found.confidence > 0.0))
+        return Seen(found.points, confidence, variances, found.spare + int(dropped), _surprise(distance, found.confidence))
+
+    def measure(self, state: Array, seen: Sequence[Seen | None], known: Array | None) -> Measurement:
+        """Return what was detected, less what a state (43,) would show; hidden joints have no row (Reading V9)."""
+        residuals, jacobians, noise = [np.zeros(0)], [np.zeros((0, ERROR))], [np.zeros(0)]
+        for camera, one in zip(self.cameras, seen, strict=True):
+            if one is None:
+                continue
+            pixels, jacobian = self.figure.seen(camera, state)  # VSMM 6.1
+            shown = one.confidence > 0.0
+            residuals.append((one.points - pixels)[shown].ravel())
+            jacobians.append(jacobian[shown].reshape(-1, ERROR))
+            noise.append(one.variances[shown].ravel())
+        if known is not None:
+            residuals.append(known - state[:3])
+            jacobians.append(np.eye(3, ERROR))
+            noise.append(np.full(3, KNOWN**2))
+        return Measurement(np.concatenate(residuals), np.concatenate(jacobians), np.diag(np.concatenate(noise)))
+
+
+
+def _surprise(distance: Array, confidence: Array) -> float:
+    own = (confidence > 0.0) & OWN
+    return float(distance[own].mean() / 2.0) if own.any() else 0.0

@@ -1,0 +1,169 @@
+"""When a group of models comes into force, and when it goes. VSMM steps 7 to 9.
+
+Groups are numbered as in their file: the rules speak of the first, the second and the third.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from posefit.geometry.rotation import Array, wrapped
+from posefit_vsmm.imm import Belief
+from posefit_vsmm.points import AT
+
+_LIMBS = np.array(
+    [
+        [AT[f"{side} {upper}"], AT[f"{side} {lower}"]]
+        for upper, lower in (("hip", "knee"), ("knee", "foot"))
+        for side in ("left", "right")
+    ]
+)  # thighs, then shanks
+_TRUNK = np.array([AT["root"], AT["torso"]])
+TWICE, HALF = 2.0, 0.5
+MOST = 3  # of four limbs
+HIPS = 1  # of two
+
+New = Literal["rerun", "patent"]
+Test = Literal["sequential", "patent"]
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Step 7. Reading V10: `smoothing` frames a mean, changes below `floor_degrees` a frame, and `dwell` frames.
+
+    The patent's own form has smoothing 1, floor 0 and dwell 0.
+    """
+
+    smoothing: int = 4
+    floor_degrees: float = 2.0
+    dwell: int = 10
+
+    def __post_init__(self) -> None:
+        if self.smoothing < 1:
+            raise ValueError(f"smoothing must be at least 1, got {self.smoothing}")
+        if not self.floor_degrees >= 0.0:
+            raise ValueError(f"floor_degrees must be 0 or more, got {self.floor_degrees}")
+        if self.dwell < 0:
+            raise ValueError(f"dwell must be 0 or more, got {self.dwell}")
+
+    def wanted(self, seen: Sequence[Array]) -> int | None:
+        """Return which group, 0 to 2, the latest projected points (17, 2) ask for; None where it is no other."""
+        if len(seen) < 2 * self.smoothing + 1:
+            return None
+        angles = np.array([limb_angles(points) for points in seen[-2 * self.smoothing - 1 :]])
+        changes = np.degrees(np.abs(wrapped(np.diff(angles, axis=0))))
+        before, now = changes[: self.smoothing].mean(axis=0), changes[self.smoothing :].mean(axis=0)
+        moves, moved = now >= self.floor_degrees, before >= self.floor_degrees
+        grown, shrunk = (now >= TWICE * before) & moves, (now <= HALF * before) & moved
+        hips, limbs = slice(4, 6), slice(0, 4)
+        if grown[hips].sum() >= HIPS:  # VSMM 7a
+            return 2
+        if grown[limbs].sum() >= MOST:  # VSMM 7b
+            return 1
+        if shrunk[limbs].sum() >= MOST:  # VSMM 7c
+            return 0
+        return None
+
+
+def limb_angles(points: Array) -> Array:
+    """Return the angles (6,) in the image of thighs and shanks, left and right, and of the thighs to the trunk."""
+    ways = points[_LIMBS[:, 1]] - points[_LIMBS[:, 0]]
+    trunk = points[_TRUNK[0]] - points[_TRUNK[1]]
+    angles = np.arctan2(ways[:, 0], ways[:, 1])
+    return np.concatenate([angles, angles[:2] - np.arctan2(trunk[0], trunk[1])])
+
+
+def enlarged(belief: Belief, old: Sequence[str], union: Sequence[str], fused: Array, spread: Array) -> Belief:
+    """Return a belief over more models: the new ones hold nothing, and the transitions give them all. Reading V11."""
+    places = [old.index(name) if name in old else None for name in union]
+    states = np.array([fused if k is None else belief.states[k] for k in places])
+    covariances = np.array([spread if k is None else belief.covariances[k] for k in places])
+    probabilities = np.array([-np.inf if k is None else belief.log_probabilities[k] for k in places])
+    return replace(
+        belief,
+        states=states,
+        covariances=covariances,
+        log_probabilities=probabilities,
+        log_likelihoods=np.zeros(len(union)),
+    )
+
+
+def joined(
+    belief: Belief, old: Sequence[str], union: Sequence[str], poses: dict[str, Array], noise: dict[str, Array]
+) -> Belief:
+    """Return a belief over more models as the patent has it: the new ones start from their own best pose."""
+    top = belief.log_probabilities.max()  # VSMM 8.1
+    places = [old.index(name) if name in old else None for name in union]
+    probabilities = np.array([top if k is None else belief.log_probabilities[k] for k in places])
+    covariances = [noise[name] if k is None else belief.covariances[k] for name, k in zip(union, places, strict=True)]
+    states = [poses[name] if k is None else belief.states[k] for name, k in zip(union, places, strict=True)]
+    return replace(
+        belief,
+        states=np.array(states),  # VSMM 8.3
+        covariances=np.array(covariances),  # VSMM 8.2
+        log_probabilities=probabilities - np.logaddexp.reduce(probabilities),
+        log_likelihoods=np.zeros(len(union)),
+    )
+
+
+def restricted(belief: Belief, models: Sequence[str], kept: Sequence[str]) -> Belief:
+    """Return a belief over some of its models."""
+    places = [models.index(name) for name in kept]
+    probabilities = belief.log_probabilities[places]
+    total = np.logaddexp.reduce(probabilities)
+    even = np.full(len(kept), -np.log(len(kept)))
+    return replace(
+        belief,
+        states=belief.states[places],
+        covariances=belief.covariances[places],
+        log_probabilities=probabilities - total if np.isfinite(total) else even,
+        log_likelihoods=belief.log_likelihoods[places],
+    )
+
+
+@dataclass
+class Contest:
+    """Step 9: an old group of models against a new one, until one of them has to go.
+
+    `sequential` is Wald's test with error rates `alpha` and `beta` on the likelihood ratio since the new group came;
+    `patent` looks at the latest frame alone (Reading V12). After `longest` frames the more probable group stays.
+    """
+
+    old: Sequence[str]
+    new: Sequence[str]
+    test: Test = "sequential"
+    alpha: float = 0.01
+    beta: float = 0.01
+    longest: int = 45
+    evidence: float = 0.0
+    frames: int = 0
+
+    def __post_init__(self) -> None:
+        if self.test not in get_args(Test):
+            raise ValueError(f"test must be one of {', '.join(get_args(Test))}, got {self.test!r}")
+        for name in ("alpha", "beta"):
+            if not 0.0 < getattr(self, name) < 0.5:
+                raise ValueError(f"{name} must be between 0 and 0.5, got {getattr(self, name)}")
+
+    def decide(self, belief: Belief, models: Sequence[str]) -> Literal["old", "new"] | None:
+        """Return which group stays, after a cycle over both; None while both do."""
+        old, new = ([models.index(name) for name in group] for group in (self.old, self.new))
+        after = belief.log_probabilities
+        before = after - belief.log_likelihoods
+        odds = float(np.logaddexp.reduce(after[new]) - np.logaddexp.reduce(after[old]))
+        ratio = odds - float(np.logaddexp.reduce(before[new]) - np.logaddexp.reduce(before[old]))  # of the groups' likelihoods
+        self.frames += 1
+        self.evidence += ratio
+        if self.test == "patent":
+            if min(odds, ratio) < np.log(0.9):  # VSMM 9
+                return "old"
+            return "new" if min(odds, ratio) > 0.0 else None
+        if self.evidence >= np.log((1.0 - self.beta) / self.alpha):
+            return "new"
+        if self.evidence <= np.log(self.beta / (1.0 - self.alpha)):
+            return "old"
+        if self.frames >= self.longest:
+            return "new" if odds > 0.0 else "old"
+        return None
