@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import click
@@ -173,6 +174,28 @@ def vsmm(seeds: int, searches: bool, out: str | None, as_json: bool) -> None:
         click.echo(f"written to {out}: look at figure-9-joints.png, figure-10-probabilities.png, figure-11-errors.png")
 
 
+@reproduce.command()
+@click.option(
+    "--clips",
+    envvar="POSEFIT_CMU",
+    metavar="CMU_DIR",
+    help="Folder of CMU clips; by default POSEFIT_CMU, else built-in.",
+)
+@click.option("--seeds", type=int, default=5, show_default=True, help="Tracks of each method, motion and view.")
+@click.option("--quick", is_flag=True, help="30 frames from one view, a sixth of the time.")
+@click.option("--out", metavar="DIR", help="New folder for the report and the figures; needs posefit[figures].")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def sapso(clips: str | None, seeds: int, quick: bool, out: str | None, as_json: bool) -> None:
+    """A walk, a walk with a turn and a run: tables 1 and 2 and figures 3-7 and 9 of Acta Automatica Sinica 38(5)."""
+    from posefit.study.paper import QUICK, Scale
+    from posefit.sweep.paper_report import report, text
+
+    told = report(clips, seeds, QUICK if quick else Scale(), out, partial(_progress, unit="run"))
+    click.echo(json.dumps(told) if as_json else text(told))
+    if out and not as_json:
+        click.echo(f"written to {out}: look at {', '.join(told['figures'])}")
+
+
 @main.group(invoke_without_command=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
@@ -260,10 +283,10 @@ def _say(message: str) -> None:
     click.echo(message, err=True)
 
 
-def _progress(frames: Iterator[Any], count: int) -> Iterator[Any]:
+def _progress(frames: Iterator[Any], count: int, unit: str = "frame") -> Iterator[Any]:
     from tqdm import tqdm
 
-    return iter(tqdm(frames, total=count, unit="frame", file=sys.stderr, dynamic_ncols=True))
+    return iter(tqdm(frames, total=count, unit=unit, file=sys.stderr, dynamic_ncols=True))
 
 
 def _degrees(pose: Any) -> list[float]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
-from posefit.geometry.rotation import Array
+from posefit.geometry.rotation import Array, wrapped
 from posefit.registry import registry
 from posefit.study.evaluation import nearest
 from posefit.study.method import ITERATIONS
@@ -123,6 +123,11 @@ class Results:
         poses, truth = self.poses(case, name), self.cases[case].test.poses
         return np.array([[metrics.pose_error_degrees(truth, one) for one in view] for view in poses])
 
+    def angle_errors(self, case: str, name: str) -> Array:
+        """Return the mean absolute error (66,) of each angle in degrees, over views, seeds and frames."""
+        away = wrapped(self.poses(case, name) - self.cases[case].test.poses)
+        return np.asarray(np.degrees(np.abs(away)).mean(axis=(0, 1, 2)))
+
 
 def reproduce(clips: str | Path | None, seeds: int, scale: Scale, progress: Progress | None = None) -> Results:
     """Return what the experiments give, in two processes.
@@ -224,12 +229,13 @@ class Swarm:
     scene: Scene
     poses: Sequence[Array] = field(repr=False)  # of each iteration (n, 66)
     translations: Sequence[Array] = field(repr=False)  # of each iteration (n, 3)
+    best: Sequence[int]  # of each iteration, the proposal of lowest cost
     history: Array = field(repr=False)  # (iterations + 1,) lowest cost so far
 
 
 def swarm(case: Case, scale: Scale, particles: int, seed: int = 0) -> Swarm:
     """Return the proposals of SAPSO in the first frame."""
-    scene, asked, spaces = scene_of(case, scale.shown, (0, 1)), [], []
+    scene, asked, spaces, best = scene_of(case, scale.shown, (0, 1)), [], [], []
     make = registry().optimiser("sapso")
 
     class Watched:
@@ -244,6 +250,7 @@ def swarm(case: Case, scale: Scale, particles: int, seed: int = 0) -> Swarm:
             return proposals
 
         def tell(self, proposals: Array, costs: Array) -> None:
+            best.append(int(np.argmin(costs)))
             self._optimiser.tell(proposals, costs)
 
     found = track(
@@ -256,4 +263,4 @@ def swarm(case: Case, scale: Scale, particles: int, seed: int = 0) -> Swarm:
         seed=seed,
     )
     decoded = [spaces[-1].decode(proposals) for proposals in asked]
-    return Swarm(scene, [one[0] for one in decoded], [one[1] for one in decoded], found.found[0].history)
+    return Swarm(scene, [one[0] for one in decoded], [one[1] for one in decoded], best, found.found[0].history)
