@@ -1,12 +1,12 @@
 """The experiments of the SAPSO paper's section 5: tracks of three motions, first frames, and what anybody reaches."""
 
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from posefit.geometry.rotation import Array, wrapped
 from posefit.registry import registry
 from posefit.study.evaluation import nearest
 from posefit.study.method import ITERATIONS
-from posefit.study.paper_motions import Case, cases
+from posefit.study.paper_motions import Case
 from posefit.study.paper_numbers import FRAMES
 from posefit.study.run import track
 from posefit.study.source import Scene, synthetic
@@ -129,14 +129,13 @@ class Results:
         return np.asarray(np.degrees(np.abs(away)).mean(axis=(0, 1, 2)))
 
 
-def reproduce(clips: str | Path | None, seeds: int, scale: Scale, progress: Progress | None = None) -> Results:
-    """Return what the experiments give, in two processes.
+def reproduce(made: dict[str, Case], seeds: int, scale: Scale, progress: Progress | None = None) -> Results:
+    """Return what the experiments give on the motions of `cases`, from two processes.
 
-    Raises ValueError where `seeds` is no positive number, or `clips` no folder of CMU clips.
+    Raises ValueError where `seeds` is no positive number.
     """
     if seeds < 1:
         raise ValueError(f"seeds must be at least 1, got {seeds}")
-    made = cases(clips, scale.frames)
     tracks = [
         Cell(case, method, view, seed)
         for case, view, seed in product(made, scale.views, range(seeds))
@@ -149,7 +148,8 @@ def reproduce(clips: str | Path | None, seeds: int, scale: Scale, progress: Prog
         *(partial(baselines, made[case], view) for case, view in seen),
         *(partial(converge, made[case], scale, seed) for case, seed in starts),
     ]
-    pool = ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn"))
+    # Ctrl-C reaches every process; here it ends the whole, and the workers go quietly after their last run
+    pool = ProcessPoolExecutor(WORKERS, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN))
     try:
         coming = pool.map(_call, jobs)
         found = list(progress(coming, len(jobs)) if progress else coming)
@@ -235,12 +235,17 @@ class Swarm:
 
 def swarm(case: Case, scale: Scale, particles: int, seed: int = 0) -> Swarm:
     """Return the proposals of SAPSO in the first frame."""
-    scene, asked, spaces, best = scene_of(case, scale.shown, (0, 1)), [], [], []
+    scene = scene_of(case, scale.shown, (0, 1))
+    spaces: list[Any] = []
+    asked: list[Array] = []
+    best: list[int] = []
     make = registry().optimiser("sapso")
 
     class Watched:
         def __init__(self, space: Any, rng: np.random.Generator, *, particles: int, iterations: int) -> None:
             self._optimiser = make(space, rng, particles=particles, iterations=iterations)
+            asked.clear()  # so that the last search stays alone; the one before it only compiles
+            best.clear()
             spaces.append(space)
 
         def ask(self) -> Array:

@@ -71,6 +71,7 @@ def _space(figure: Figure, k: int) -> Any:
     axes: Any = figure.add_subplot(1, len(MOTIONS), k + 1, projection="3d")
     axes.set(xlabel="latent 1", ylabel="latent 2", zlabel="latent 3")
     axes.tick_params(labelsize=7)
+    axes.set_box_aspect(None, zoom=0.88)  # else the last label is cut
     return axes
 
 
@@ -78,7 +79,7 @@ def particles(seen: Swarm) -> Figure:
     """Return the silhouette, and on it the bones of all particles after some iterations; the best in colour."""
     scene, shown = seen.scene, [k for k in SHOWN_ITERATIONS if k < len(seen.poses)]
     camera, mask = scene.cameras[0], scene.observations[0].silhouettes[0].mask
-    figure = Figure(figsize=(12.5, 3.6), layout="constrained")
+    figure = Figure(figsize=(12.5, 3.1), layout="constrained")
     panels: Any = figure.subplots(1, 1 + len(shown), squeeze=False)[0]
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     side = 0.62 * max(np.ptp(rows), np.ptp(columns))
@@ -93,7 +94,7 @@ def particles(seen: Swarm) -> Figure:
         bones = _bones(camera.project(scene.body.skeleton.joints(seen.poses[k], seen.translations[k]))[0])
         axes.add_collection(LineCollection([*bones.reshape(-1, 2, 2)], colors="black", linewidths=0.5, alpha=0.12))
         axes.add_collection(LineCollection([*bones[seen.best[k]]], colors=COLOURS[1], linewidths=1.4))
-        axes.set_title(f"iteration {k}: {len(bones)} particles, lowest cost {seen.history[k]:.1f}", fontsize=9)
+        axes.set_title(f"iteration {k}, N = {len(bones)}\nlowest cost so far {seen.history[k]:.1f}", fontsize=9)
     return figure
 
 

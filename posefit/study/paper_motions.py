@@ -20,6 +20,7 @@ CLIPS = {
     "turn": ("16/16_17", ("16/16_15",)),
     "run": ("16/16_35", ("09/09_01", "127/127_03")),
 }
+BROKEN = 1  # frames left out at the start of every clip: 16_15 begins with an arm held out that is gone 1/60 s later
 LABELS = {"walk": "walk", "turn": "walk with a turn", "run": "run"}
 
 
@@ -52,6 +53,7 @@ def _clip(folder: Path, name: str) -> Case:
         if not (folder / f"{clip}.amc").is_file():
             raise ValueError(f"clips must be a folder of CMU clips such as {clip}.amc, got {folder}, which has none")
     motions = [motion_of(folder / f"{clip}.amc", None, FPS) for clip in (test, *training)]
+    motions = [motion.frames(BROKEN, len(motion)) for motion in motions]
     return Case(name, motions[0], motions[1:])
 
 
