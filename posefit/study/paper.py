@@ -64,7 +64,7 @@ class Scale:
 
     @property
     def shown(self) -> float:
-        """The view of table 1 and of figures 5 and 6, the middle one."""
+        """The view of table 1 and of figure 5, the middle one."""
         return self.views[len(self.views) // 2]
 
 
@@ -100,7 +100,7 @@ class Results:
     seeds: int
     runs: dict[Cell, Run] = field(repr=False)
     baselines: dict[tuple[str, float], dict[str, Array]] = field(repr=False)  # poses (T, 66) of each baseline
-    histories: dict[tuple[str, int], Array] = field(repr=False)  # (swarms, iterations + 1) lowest cost, case and seed
+    histories: dict[tuple[str, float, int], Array] = field(repr=False)  # (swarms, iterations + 1) lowest cost
 
     def of(self, case: str, method: str) -> list[Run]:
         """Return the runs of a method, view by view and seed by seed."""
@@ -142,11 +142,11 @@ def reproduce(made: dict[str, Case], seeds: int, scale: Scale, progress: Progres
         for method in COMPARED[case]
     ]
     seen = list(product(made, scale.views))
-    starts = list(product(("walk", "run"), range(seeds)))
+    starts = list(product(("walk", "run"), scale.views, range(seeds)))
     jobs: list[Callable[[], Any]] = [
         *(partial(follow, made[one.case], one, scale) for one in tracks),
         *(partial(baselines, made[case], view) for case, view in seen),
-        *(partial(converge, made[case], scale, seed) for case, seed in starts),
+        *(partial(converge, made[case], scale, view, seed) for case, view, seed in starts),
     ]
     # Ctrl-C reaches every process; here it ends the whole, and the workers go quietly after their last run
     pool = ProcessPoolExecutor(WORKERS, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN))
@@ -206,9 +206,9 @@ def baselines(case: Case, view: float) -> dict[str, Array]:
     return {"mean_pose": mean, "persistence": held, "nearest": best}
 
 
-def converge(case: Case, scale: Scale, seed: int) -> Array:
+def converge(case: Case, scale: Scale, view: float, seed: int) -> Array:
     """Return the lowest cost after each iteration (swarms, iterations + 1) in the first frame, for each N."""
-    scene = scene_of(case, scale.shown, (0, 1))
+    scene = scene_of(case, view, (0, 1))
     histories = [
         track(scene, train=case.training, particles=count, iterations=scale.iterations, seed=seed).found[0].history
         for count in scale.swarms

@@ -108,7 +108,7 @@ def convergence(results: Results) -> Figure:
     figure = Figure(figsize=(10.0, 3.8), layout="constrained")
     panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)
     for axes, motion in zip(panels, MOTIONS, strict=True):
-        found = np.array([history for (case, _), history in results.histories.items() if case == motion])
+        found = np.array([history for (case, *_), history in results.histories.items() if case == motion])
         for k, count in enumerate(results.scale.swarms):
             _band(axes, found[:, k], COLOURS[k], f"N = {count}")
         axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
