@@ -58,7 +58,7 @@ def _judged(pairs: Sequence[_Pair]) -> list[Claim]:
             pair.source,
             _borne_out(test.difference < 0.0) if p < LEVEL and test.difference else "not confirmed",
             f"median difference {test.difference:+.3g} {pair.unit}, Wilcoxon p = {test.p_value:.2g}, "
-            f"{p:.2g} after Holm for {len(pairs)} tests, {_counted(pair.errors[0].size, len(pairs))}",
+            f"{p:.3g} after Holm for {len(pairs)} tests, {_counted(pair.errors[0].size, len(pairs))}",
         )
         for pair, test, p in zip(pairs, tests, holm([test.p_value for test in tests]), strict=True)
     ]
