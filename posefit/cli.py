@@ -3,12 +3,13 @@
 import json
 import sys
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import click
 
 from posefit import __version__
-from posefit.options import EXTRACTION, TRACK, frame_range, options
+from posefit.options import ENGINE, EXTRACTION, TRACK, frame_range, options
 
 
 class _Mistakes(click.Group):
@@ -121,6 +122,38 @@ def bench(threads: int | None, as_json: bool) -> None:
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
 
 
+@main.command()
+@click.argument("plan")
+@click.option("--out", metavar="DIR", help="The ledger: a new folder, or one that a sweep goes on in.")
+@options(ENGINE)
+@click.option("--dry-run", is_flag=True, help="Print the cells and about how long they take, and run none.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@click.pass_context
+def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, as_json: bool, **where: Any) -> None:
+    """Run the cells of PLAN, a .toml file, or `default`: methods, motions, views, corruptions and seeds.
+
+    It may be killed at any moment, and any number of them may work on one DIR: the same command goes on where it was.
+    Exit status 1 where cells were quarantined after three attempts, 130 where somebody stopped it.
+    """
+    from posefit.sweep import command
+    from posefit.sweep.limits import Limits
+
+    limits = Limits(where.pop("cell_seconds"), where.pop("cell_gigabytes"))
+    if dry_run:
+        found = command.preview(plan, out, limits=limits, **where)
+        if as_json:
+            click.echo(json.dumps(found))
+            return
+        for line in command.listed(found):
+            click.echo(line)
+        return
+    if out is None:
+        raise click.UsageError("--out must name a folder for the results, got none")
+    tally, status = command.sweep(plan, out, limits=limits, say=_say, **where)
+    click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.told(tally, out))
+    context.exit(status)
+
+
 @main.group()
 def reproduce() -> None:
     """Repeat the experiments of the publications that posefit follows."""
@@ -139,6 +172,28 @@ def vsmm(seeds: int, searches: bool, out: str | None, as_json: bool) -> None:
     click.echo(json.dumps(figures) if as_json else table(figures))
     if out and not as_json:
         click.echo(f"written to {out}: look at figure-9-joints.png, figure-10-probabilities.png, figure-11-errors.png")
+
+
+@reproduce.command()
+@click.option(
+    "--clips",
+    envvar="POSEFIT_CMU",
+    metavar="CMU_DIR",
+    help="Folder of CMU clips; by default POSEFIT_CMU, else built-in.",
+)
+@click.option("--seeds", type=int, default=5, show_default=True, help="Tracks of each method, motion and view.")
+@click.option("--quick", is_flag=True, help="30 frames from one view, a sixth of the time.")
+@click.option("--out", metavar="DIR", help="New folder for the report and the figures; needs posefit[figures].")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def sapso(clips: str | None, seeds: int, quick: bool, out: str | None, as_json: bool) -> None:
+    """A walk, a walk with a turn and a run: tables 1 and 2 and figures 3-7 and 9 of Acta Automatica Sinica 38(5)."""
+    from posefit.study.paper import QUICK, Scale
+    from posefit.sweep.paper_report import report, text
+
+    told = report(clips, seeds, QUICK if quick else Scale(), out, partial(_progress, unit="run"))
+    click.echo(json.dumps(told) if as_json else text(told))
+    if out and not as_json:
+        click.echo(f"written to {out}: look at {', '.join(told['figures'])}")
 
 
 @main.group(invoke_without_command=True)
@@ -228,10 +283,10 @@ def _say(message: str) -> None:
     click.echo(message, err=True)
 
 
-def _progress(frames: Iterator[Any], count: int) -> Iterator[Any]:
+def _progress(frames: Iterator[Any], count: int, unit: str = "frame") -> Iterator[Any]:
     from tqdm import tqdm
 
-    return iter(tqdm(frames, total=count, unit="frame", file=sys.stderr, dynamic_ncols=True))
+    return iter(tqdm(frames, total=count, unit=unit, file=sys.stderr, dynamic_ncols=True))
 
 
 def _degrees(pose: Any) -> list[float]:

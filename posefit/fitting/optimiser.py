@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.fitting.box import Space
 from posefit.geometry.rotation import Array
@@ -49,6 +50,7 @@ class Minimum:
     cost: float
     evaluations: int
     history: Array = field(repr=False)  # (populations,) best cost so far after each population
+    spent: NDArray[np.int64] = field(repr=False)  # (populations,) evaluations so far after each population
 
 
 def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluations: int) -> Minimum:
@@ -58,7 +60,7 @@ def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluatio
     evaluated. A cost that is nan never counts as best. Raises ValueError where the budget does not hold one
     population, or where every cost is nan.
     """
-    best, cost, used, history = None, np.inf, 0, []
+    best, cost, used, history, spent = None, np.inf, 0, [], []
     while True:
         proposals = optimiser.ask()
         if not len(proposals) or used + len(proposals) > evaluations:
@@ -71,9 +73,10 @@ def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluatio
         if best is None or math.isnan(cost) or costs[lowest] < cost:
             best, cost = proposals[lowest].copy(), float(costs[lowest])
         history.append(cost)
+        spent.append(used)
         optimiser.tell(proposals, costs)
     if best is None:
         raise ValueError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
     if math.isnan(cost):
         raise ValueError(f"costs must be numbers, got nan for all {used} proposals")
-    return Minimum(best, cost, used, np.array(history))
+    return Minimum(best, cost, used, np.array(history), np.array(spent))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
@@ -45,6 +46,8 @@ class Frame:
     seconds: float
     history: Array = field(repr=False)  # (populations,) best cost after each
     coordinates: Array | None = field(default=None, repr=False)  # (d,) where it was found in a search space
+    # (populations,) evaluations so far after each, where a tracker says
+    spent: NDArray[np.int64] | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
 
 
@@ -216,4 +219,6 @@ def _frame(problem: PoseProblem, best: Minimum, seconds: float) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
     counts = np.stack([areas[0] for areas in problem.areas(poses, translations)])
     found = problem.space.coordinates(best.proposal)
-    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, seconds, best.history, found)
+    return Frame(
+        poses[0], translations[0], best.cost, counts, best.evaluations, seconds, best.history, found, best.spent
+    )

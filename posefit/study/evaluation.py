@@ -8,8 +8,19 @@ from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.rotation import Array
-from posefit.silhouette.cost import areas, mismatch
+from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.study.source import Scene
+
+
+def nearest(scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA) -> Array:
+    """Return the pose (66,) of least cost in frame k of joint angles (n, 63), with the true root and translation."""
+    assert scene.truth is not None
+    poses = np.column_stack([np.tile(scene.truth.poses[k, :3], (len(training), 1)), training])
+    translations = np.tile(scene.truth.translations[k], (len(poses), 1))
+    costs = np.zeros(len(poses))
+    for camera, silhouette in zip(scene.cameras, observation.silhouettes, strict=True):
+        costs += mismatch(areas(scene.body, camera, silhouette, poses, translations), beta)
+    return np.array(poses[costs.argmin()])
 
 
 class Evaluation:
@@ -37,16 +48,8 @@ class Evaluation:
         if self._scene.truth is not None:
             truth = self._scene.truth.poses[k]
             row["error_degrees"] = float(metrics.pose_error_degrees(truth[None], frame.pose[None])[0])
-            self._nearest.append(self._closest(truth, self._scene.truth.translations[k], observation))
+            self._nearest.append(nearest(self._scene, self._training, k, observation, self._beta))
         return row
-
-    def _closest(self, truth: Array, translation: Array, observation: Observation) -> Array:
-        poses = np.column_stack([np.tile(truth[:3], (len(self._training), 1)), self._training])
-        translations = np.tile(translation, (len(poses), 1))
-        costs = np.zeros(len(poses))
-        for camera, silhouette in zip(self._scene.cameras, observation.silhouettes, strict=True):
-            costs += mismatch(areas(self._scene.body, camera, silhouette, poses, translations), self._beta)
-        return np.array(poses[costs.argmin()])
 
     def close(self) -> tuple[list[dict[str, float]], dict[str, Any]]:
         """Return the rows of all frames and the summary's figures."""

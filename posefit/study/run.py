@@ -39,6 +39,7 @@ class Track:
     truth: Motion | None = field(repr=False)
     frames: list[dict[str, float]] = field(repr=False)  # one row a frame: cost, IoU, errors
     summary: dict[str, Any] = field(repr=False)  # what `posefit track --json` prints
+    found: list[Frame] = field(repr=False)  # what the tracker yielded
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ class Fit:
 
 
 def track(
-    source: Source | Sequence[Source] = "walk",
+    source: Source | Scene | Sequence[Source] = "walk",
     *,
     asf: str | Path | None = None,
     camera: Camera | str | Path | Sequence[Camera | str | Path] | None = None,
@@ -91,12 +92,12 @@ def track(
     """Return the motion followed through a source's silhouettes, with its errors where the truth is known.
 
     `source` is a built-in motion's name, a `Motion`, an .amc or .bvh file, a folder of mask images, an .npz of masks, a
-    video, or several masks or videos that cameras took at the same time. `train` names the motions a prior learns
-    from; by default the other styles of a built-in motion, else the built-in walks. The method is `optimiser` with
-    `prior`, or `tracker`. The budget of a frame is `evaluations`, by default particles x (iterations + 1) = 40 x 61,
-    the same for every method. `translation` is "known" where the truth is, else "aligned". A `first_pose` that is
-    "given" starts the first frame around the true one. `ask_seconds` is how long a plugin may take to propose a
-    population.
+    video, or several masks or videos that cameras took at the same time; or a `Scene` of a known motion, as it is.
+    `train` names the motions a prior learns from; by default the other styles of a built-in motion, else the built-in
+    walks. The method is `optimiser` with `prior`, or `tracker`. The budget of a frame is `evaluations`, by default
+    particles x (iterations + 1) = 40 x 61, the same for every method. `translation` is "known" where the truth is, else
+    "aligned". A `first_pose` that is "given" starts the first frame around the true one. `ask_seconds` is how long a
+    plugin may take to propose a population.
 
     Where the truth is known the prior is `pca`. Where it is not it is `loose`, the first frame is searched `restarts`
     times (8), and the person's build is fitted to `body_frames` (30; none where an .asf is given), as tall as `height`
@@ -109,7 +110,8 @@ def track(
     """
     arguments = {name: repr(value) for name, value in sorted(locals().items()) if name not in _MAY_DIFFER}
     say = say or _nothing
-    sources = source if isinstance(source, Sequence) and not isinstance(source, str) else [source]
+    prepared = source if isinstance(source, Scene) else None
+    sources = _sources(source)
     viewing = Viewing(
         asf,
         () if camera is None else (camera,) if isinstance(camera, Camera | str | Path) else tuple(camera),
@@ -152,7 +154,7 @@ def track(
         else OutputFolder(out, force, resume, {**arguments, "version": posefit.__version__}, say)
     )
     with folder as output, threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
-        seen, warnings = scene(sources, viewing, output.work, progress, say)
+        seen, warnings = scene(sources if prepared is None else prepared, viewing, output.work, progress, say)
         for warning in warnings:
             say(f"warning: {warning}")
         if seen.fps != FPS:
@@ -199,7 +201,15 @@ def track(
             from posefit.study.recording import record
 
             record(rerun, seen, estimate)
-    return Track(estimate, seen.truth, rows, summary)
+    return Track(estimate, seen.truth, rows, summary, found)
+
+
+def _sources(source: Source | Scene | Sequence[Source]) -> Sequence[Source]:
+    if isinstance(source, Scene):
+        if source.truth is None:
+            raise ValueError(f"a scene must be of a known motion, got {source.name}, whose truth nobody knows")
+        return [source.truth]
+    return source if isinstance(source, Sequence) and not isinstance(source, str) else [source]
 
 
 def prior_of(source: Source) -> str:

@@ -55,7 +55,7 @@ class Viewing:
 
 
 def scene(
-    sources: Sequence[Source],
+    sources: Sequence[Source] | Scene,
     viewing: Viewing,
     work: Path,
     progress: Callable[..., Any] | None,
@@ -65,6 +65,10 @@ def scene(
 
     Masks of videos are written to the folder `work`. Raises ValueError where something does not fit.
     """
+    if isinstance(sources, Scene):
+        if viewing != Viewing():
+            raise ValueError(f"a scene must be followed as it is, got {viewing}")
+        return sources, []
     kinds = {kind_of(source) for source in sources}
     if kinds == {"motion"}:
         if len(sources) > 1:

@@ -35,7 +35,7 @@ FILES = (
     "summary.png",
 )
 _FOUND, _SPEC = "found.jsonl", "spec.json"
-_ARRAYS = ("pose", "translation", "areas", "history", "coordinates")
+_ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
 _NUMBERS = ("cost", "evaluations", "seconds")
 
 Rows = Sequence[Mapping[str, float]]

@@ -123,6 +123,7 @@ def test_the_budget_is_spent_in_whole_populations() -> None:
     assert len(walker.told) == 5
     assert best.cost == -4.0
     assert best.history.tolist() == [0.0, -1.0, -2.0, -3.0, -4.0]
+    assert best.spent.tolist() == [7, 14, 21, 28, 35]
 
 
 def test_nan_is_never_the_best_cost() -> None:

@@ -212,3 +212,19 @@ def test_every_prior_can_be_searched(prior: str) -> None:
     summary = posefit.track("walk", prior=prior, **QUICK).summary
     assert summary["method"] == f"sapso + {prior}"
     assert summary["iou"] > 0.4
+
+
+def test_a_scene_is_followed_as_it_is() -> None:
+    from posefit.motion import library
+    from posefit.study.source import synthetic
+
+    motion = library.built_in("walk", frames=3)
+    seen = synthetic(motion, [45.0], (120, 90), [], (None, None))
+    result = posefit.track(seen, train=library.other_styles("walk"), evaluations=200)
+    by_name = posefit.track(motion, train=library.other_styles("walk"), evaluations=200, size=(120, 90))
+    np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
+    assert [frame.cost for frame in result.found] == [row["cost"] for row in result.frames]
+    with pytest.raises(ValueError, match="a scene must be followed as it is, got Viewing"):
+        posefit.track(seen, fps=20.0)
+    with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth nobody knows"):
+        posefit.track(replace(seen, truth=None))

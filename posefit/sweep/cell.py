@@ -1,0 +1,259 @@
+"""A cell: one run of a sweep, told completely by names and numbers; and what it measured."""
+
+import hashlib
+import io
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import posefit
+
+if TYPE_CHECKING:
+    from posefit.fitting.tracker import Frame
+    from posefit.geometry.rotation import Array
+    from posefit.motion.motion import Motion
+    from posefit.study.source import Scene
+
+SALT = 2013  # part of the seed of every instance
+SPEED = 0.15  # how far the cadence of a built-in motion's instance is from its own at most
+VIEW_DEGREES = 10.0  # how far the cameras of an instance are turned at most
+POINTS = 64  # of an anytime trace at most
+TIMES = ("seconds", "seconds_per_frame")  # what two runs of a cell do not have in common
+DROPPED = "dropped"  # the corruption that takes whole frames away, a share of them
+_MEASURED = (
+    "error_degrees",
+    "geodesic_degrees",
+    "free_error_degrees",
+    "mpjpe_mm",
+    "pa_mpjpe_mm",
+    "iou",
+    "cost",
+    "swap_rate",
+    "lost_rate",
+    "held_frames",
+    "skill",
+    "baselines_degrees",
+    "prior_floor_degrees",
+    "seconds_per_frame",
+    "warnings",
+)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Everything a run depends on. `posefit.sweep.plan` makes cells that are checked.
+
+    `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
+    0 is the motion as it is; any other number changes its phase, its speed and the view a little, or where in a file
+    the frames begin. `corruption` gives kinds of `posefit.silhouette.corruption` their strength, 0 to 1, and
+    `dropped` the share of frames that are not seen; what is spoilt follows from the instance, so that every method and
+    seed sees the same. `files` holds the SHA-256 of every capture file that is read.
+    """
+
+    method: str
+    motion: str
+    train: tuple[str, ...]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    view_degrees: tuple[float, ...] = (45.0,)
+    corruption: Mapping[str, float] = field(default_factory=dict)
+    instance: int = 0
+    frames: int = 60
+    fps: float = 30.0
+    size: tuple[int, int] = (320, 240)
+    evaluations: int = 2440
+    translation: str = "known"
+    first_pose: str = "searched"
+    seed: int = 0
+    files: Mapping[str, str] = field(default_factory=dict)
+    version: str = posefit.__version__  # of posefit, and of plugins that are not its own
+
+    @cached_property
+    def spec(self) -> dict[str, Any]:
+        """The cell as JSON holds it."""
+        spec: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        return spec
+
+    @cached_property
+    def key(self) -> str:
+        """The cell's name: the SHA-256 of its spec, version included, as 64 hexadecimal digits."""
+        canonical = json.dumps(self.spec, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(canonical.encode()).hexdigest()
+
+    def __str__(self) -> str:
+        return f"{self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
+
+    row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
+    joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres
+
+
+def run_cell(cell: Cell) -> Result:
+    """Return what following the cell's motion by its method measures. Raises ValueError where a file has changed.
+
+    And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
+    """
+    from posefit.study.run import track
+
+    began = time.perf_counter()
+    if (planned := cell.version.partition(",")[0]) != posefit.__version__:
+        raise ValueError(f"a worker must have posefit {planned}, got {posefit.__version__}")
+    for path, digest in cell.files.items():
+        if (found := digest_of(path)) != digest:
+            raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
+    result = track(scene_of(cell), train=cell.train, seed=cell.seed, **_chosen(cell))
+    truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
+    errors = _joint_errors_mm(truth, estimate)
+    row = {
+        "key": cell.key,
+        "spec": cell.spec,
+        "status": "done",
+        **{name: result.summary[name] for name in _MEASURED},
+        "evaluations_used": result.summary["evaluations"],
+        "joint_errors_mm": [round(float(error), 3) for error in errors],
+        "trace": trace(result.found),
+        "seconds": time.perf_counter() - began,
+    }
+    try:
+        json.dumps(row, allow_nan=False)
+    except ValueError:
+        raise ValueError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
+    return Result(row, packed(estimate=estimate, truth=truth))
+
+
+def scene_of(cell: Cell) -> "Scene":
+    """Return what is seen in a cell; the same for all methods and seeds."""
+    import numpy as np
+
+    from posefit.motion import library
+    from posefit.study.source import motion_of, synthetic
+    from posefit.study.synthetic import Spoilt
+
+    rng = np.random.default_rng([SALT, cell.instance])
+    speed, phase, turn, start = (
+        1.0 + SPEED * rng.uniform(-1.0, 1.0),
+        rng.uniform(),
+        rng.uniform(-1.0, 1.0),
+        rng.uniform(),
+    )
+    if cell.instance == 0:
+        speed, phase, turn, start = 1.0, 0.0, 0.0, 0.0
+    if cell.motion in library.names():
+        motion = library.built_in(cell.motion, frames=cell.frames, fps=cell.fps, speed=speed, phase=phase)
+    else:
+        motion = motion_of(cell.motion, None, cell.fps)
+        if cell.frames > len(motion):
+            raise ValueError(f"frames must be at most {len(motion)}, the length of {cell.motion}, got {cell.frames}")
+        first = int(start * (len(motion) - cell.frames + 1))
+        motion = motion.frames(first, first + cell.frames)
+    views = [view + VIEW_DEGREES * turn for view in cell.view_degrees]
+    scene = synthetic(motion, views, cell.size, [], (None, None))
+    noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
+    if not cell.corruption:
+        return scene
+    spoilt = Spoilt(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
+    return replace(scene, observations=spoilt)
+
+
+def digest_of(path: str | Path) -> str:
+    """Return the SHA-256 of a file's content."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def parts(method: str) -> tuple[str, str, str | None]:
+    """Return the optimiser, the prior and the tracker that a method names; without a tracker the last is None.
+
+    A tracker has no optimiser and no prior: these are "".
+    """
+    optimiser, at, prior = method.partition("@")
+    return (optimiser, prior, None) if at else ("", "", method)
+
+
+def settings_text(settings: Mapping[str, Any]) -> list[str]:
+    """Return settings as `--set` takes them."""
+    return [f"{name}={_text(value)}" for name, value in settings.items()]
+
+
+def trace(found: "list[Frame]") -> dict[str, list[float]]:
+    """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
+
+    A frame that spent fewer keeps its last cost; frames that were held do not count. There are at most 64 points.
+    """
+    import numpy as np
+
+    searched = [frame for frame in found if len(frame.history)]
+    if not searched:
+        return {"evaluations": [], "cost": []}
+    spent = [_spent(frame) for frame in searched]
+    points = np.unique(np.concatenate(spent))
+    points = points[points >= max(one[0] for one in spent)]  # from where every frame has a cost
+    if len(points) > POINTS:
+        wanted = np.geomspace(points[0], points[-1], POINTS)
+        points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
+    costs = [
+        frame.history[np.searchsorted(one, points, side="right") - 1]
+        for frame, one in zip(searched, spent, strict=True)
+    ]
+    mean = np.mean(costs, axis=0)
+    return {"evaluations": [int(point) for point in points], "cost": [float(f"{cost:.6g}") for cost in mean]}
+
+
+def _spent(frame: "Frame") -> "Array":
+    """Return the evaluations (populations,) after each population; of equal ones where the tracker does not say."""
+    import numpy as np
+
+    if frame.spent is not None:
+        return np.asarray(frame.spent)
+    count = len(frame.history)
+    return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
+
+
+def _chosen(cell: Cell) -> dict[str, Any]:
+    from posefit.study.method import parse_settings
+
+    optimiser, prior, tracker = parts(cell.method)
+    settings = parse_settings(settings_text(cell.settings), optimiser, prior, tracker)
+    named = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
+    told = {name: getattr(cell, name) for name in ("evaluations", "translation", "first_pose")}
+    return {**named, **told, **settings}
+
+
+def _joints(motion: "Motion | None") -> "Array":
+    assert motion is not None
+    return motion.skeleton.joints(motion.poses, motion.translations)
+
+
+def _joint_errors_mm(truth: "Array", estimate: "Array") -> "Array":
+    """Return each joint's mean distance (27,) in millimetres, both roots at one point, as in `mpjpe_mm`."""
+    import numpy as np
+
+    difference = (truth - truth[:, :1]) - (estimate - estimate[:, :1])
+    return np.asarray(1e3 * np.linalg.norm(difference, axis=-1).mean(axis=0))
+
+
+def packed(**arrays: "Array") -> bytes:
+    """Return arrays in metres as an .npz, float32."""
+    import numpy as np
+
+    buffer = io.BytesIO()
+    # to half a millimetre: the digits after that do not compress, and no picture shows them
+    rounded: dict[str, Any] = {
+        name: (np.round(array * 1024.0) / 1024.0).astype(np.float32) for name, array in arrays.items()
+    }
+    np.savez_compressed(buffer, **rounded)
+    return buffer.getvalue()
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool) or value is None:
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return ",".join(_text(one) for one in value)
+    return str(value)

@@ -1,0 +1,241 @@
+"""Checks a cell's spec, so that nothing wrong with it is found only after hours."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from difflib import get_close_matches
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import posefit
+from posefit.fitting.space import TRANSLATIONS
+from posefit.hooks import PROJECT
+from posefit.motion import library
+from posefit.registry import Kind, Offer, registry
+from posefit.settings import planned
+from posefit.silhouette.corruption import CORRUPTIONS
+from posefit.study.method import parse_settings
+from posefit.study.source import FPS, MOTIONS, motion_of
+from posefit.sweep.cell import DROPPED, Cell, digest_of, parts, settings_text
+
+FIELDS = tuple(one.name for one in fields(Cell) if one.name not in ("files", "version"))
+LARGEST = 16_384  # pixels
+
+
+def cell_of(spec: Mapping[str, Any]) -> Cell:
+    """Return the cell that a spec describes, complete: settings as their types ask, training motions by name.
+
+    Raises ValueError where a name is not known or a value makes no sense, and ImportError where a method needs a
+    library that is not installed.
+    """
+    for name in spec:
+        if name not in FIELDS:
+            raise ValueError(f"a cell must say {', '.join(FIELDS)}, got {name!r}{_nearest(name, FIELDS)}")
+    for name in ("method", "motion"):
+        if name not in spec:
+            raise ValueError(f"a cell must say its {name}, got none")
+    values = {name: _CHECKS[name](name, value) for name, value in spec.items()}
+    offers = _offers(values["method"])
+    texts = tuple(settings_text(values.get("settings", {})))
+    settings = _settings(values["method"], texts)
+    train = values.get("train") or _other_styles(values["motion"])
+    if values["motion"] in train:
+        raise ValueError(f"train must not contain the motion itself, got {values['motion']}")
+    files = {path: digest for one in (values["motion"], *train) for path, digest in _files(one)}
+    foreign = sorted({f"{offer.distribution} {offer.version}" for offer in offers if offer.distribution != PROJECT})
+    version = ", ".join([posefit.__version__, *foreign])
+    cell = Cell(**{**values, "settings": dict(settings), "train": train, "files": files, "version": version})
+    if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
+        raise ValueError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
+    if files.get(cell.motion) and cell.frames > (length := _length(cell.motion, cell.fps)):
+        raise ValueError(f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}")
+    return cell
+
+
+@lru_cache(maxsize=256)
+def names_of(method: str) -> tuple[str, ...]:
+    """Return the names that settings of a method begin with."""
+    optimiser, prior, tracker = parts(method)
+    chosen = (optimiser, prior, "tracker") if tracker is None else (tracker,)
+    return tuple(name.partition(":")[0] for name in chosen)
+
+
+@lru_cache(maxsize=256)
+def _offers(method: str) -> tuple[Offer, ...]:
+    optimiser, prior, tracker = parts(method)
+    if tracker is None:
+        wanted: list[tuple[Kind, str]] = [("optimiser", optimiser), ("prior", prior)]
+        return tuple(registry().offer(kind, name) for kind, name in wanted)
+    known = registry().offers
+    if tracker not in known["tracker"] and tracker.partition(":")[0] in known["optimiser"]:
+        raise ValueError(f"method must be a tracker or OPTIMISER@PRIOR, got {tracker!r}; did you mean '{tracker}@pca'?")
+    if tracker.partition(":")[0] not in known["tracker"]:
+        trackers = ", ".join(sorted(known["tracker"])) or "of which there are none"
+        near = _nearest(tracker, [*known["tracker"], *(f"{name}@pca" for name in known["optimiser"])])
+        raise ValueError(f"method must be a tracker ({trackers}) or OPTIMISER@PRIOR, got {tracker!r}{near}")
+    return (registry().offer("tracker", tracker),)
+
+
+@lru_cache(maxsize=1024)
+def _settings(method: str, texts: tuple[str, ...]) -> dict[str, Any]:
+    """Return the settings that texts such as `sapso.cooling=0.9` give, sorted, each of the type that it has to be."""
+    optimiser, prior, tracker = parts(method)
+    for text in texts:
+        if text.partition(".")[0] not in names_of(method):
+            raise ValueError(f"settings must be of {', '.join(names_of(method))}, which {method} uses, got {text!r}")
+    parsed = parse_settings(texts, optimiser, prior, tracker)
+    homes = {optimiser: "optimiser", prior: "prior", "tracker": "tracker"} if tracker is None else {tracker: "tracker"}
+    typed: dict[str, Any] = {}
+    for name, kind in homes.items():
+        family = name.partition(":")[0]
+        typed |= {f"{family}.{setting}": value for setting, value in parsed[f"{kind}_settings"].items()}
+    return dict(sorted(typed.items()))
+
+
+@lru_cache(maxsize=1024)
+def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
+    """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
+    offer = _offers(method)[0]
+    if offer.kind != "optimiser":
+        return 1
+    family = f"{offer.name.partition(':')[0]}."
+    mine = {
+        name.removeprefix(family): value for name, value in _settings(method, texts).items() if name.startswith(family)
+    }
+    known = {setting.name: setting.default for setting in offer.settings}
+    size = planned(offer.factory, mine, evaluations).get("particles", known.get("particles", 1))
+    return size if isinstance(size, int) else 1
+
+
+def _other_styles(motion: str) -> tuple[str, ...]:
+    return library.other_styles(motion if motion in library.names() else "walk")
+
+
+@lru_cache(maxsize=1024)
+def _files(motion: str) -> tuple[tuple[str, str], ...]:
+    """Return the files that a motion is read from, each with its digest; none for a built-in one."""
+    if motion in library.names():
+        return ()
+    motion_of(motion, None, FPS)  # raises where it cannot be read
+    path = Path(motion)
+    beside = sorted(path.parent.glob("*.asf")) if path.suffix.lower() == ".amc" else []
+    return tuple((str(one), digest_of(one)) for one in (path, *beside))
+
+
+@lru_cache(maxsize=1024)
+def _length(motion: str, fps: float) -> int:
+    return len(motion_of(motion, None, fps))
+
+
+def _nearest(name: str, known: Sequence[str]) -> str:
+    near = get_close_matches(name, known, 1)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def _name(field: str, value: Any) -> str:
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"{field} must be a name, got {value!r}")
+    return value
+
+
+def _motion(field: str, value: Any) -> str:
+    name = _name(field, value)
+    if name not in library.names() and Path(name).suffix.lower() not in MOTIONS:
+        raise ValueError(
+            f"{field} must be an .amc file, a .bvh file or one of {', '.join(library.names())}, "
+            f"got {name!r}{_nearest(name, library.names())}"
+        )
+    return name
+
+
+def _motions(field: str, value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple):
+        raise ValueError(f"{field} must be a list of motions, got {value!r}")
+    return tuple(_motion(field, one) for one in value)
+
+
+def _views(field: str, value: Any) -> tuple[float, ...]:
+    views = value if isinstance(value, list | tuple) else [value]
+    if not views:
+        raise ValueError(f"{field} must be at least one angle, got none")
+    return tuple(_number(field, view) for view in views)
+
+
+def _number(field: str, value: Any, low: float = -np.inf, high: float = np.inf) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise ValueError(f"{field} must be a finite number, got {value!r}")
+    if not low <= value <= high:
+        raise ValueError(f"{field} must lie in {low:g} to {high:g}, got {value}")
+    return float(value)
+
+
+def _rate(field: str, value: Any) -> float:
+    if (rate := _number(field, value)) <= 0.0:
+        raise ValueError(f"{field} must be a positive number, got {value}")
+    return rate
+
+
+def _whole(least: int) -> Callable[[str, Any], int]:
+    def check(field: str, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise ValueError(f"{field} must be a whole number of at least {least}, got {value!r}")
+        return value
+
+    return check
+
+
+def _size(field: str, value: Any) -> tuple[int, int]:
+    sides = list(value) if isinstance(value, list | tuple) else []
+    if len(sides) != 2 or not all(type(side) is int and 1 <= side <= LARGEST for side in sides):
+        raise ValueError(f"{field} must be [width, height] in pixels, up to {LARGEST}, got {value!r}")
+    return sides[0], sides[1]
+
+
+def _corruption(field: str, value: Any) -> dict[str, float]:
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {value!r}")
+    kinds = (*CORRUPTIONS, DROPPED)
+    for kind in value:
+        if kind not in kinds:
+            raise ValueError(f"{field} must be of {', '.join(kinds)}, got {kind!r}{_nearest(kind, kinds)}")
+    strengths = {kind: _number(f"{field} {kind}", value[kind], 0.0, 1.0) for kind in sorted(value)}
+    return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
+
+
+def flattened(field: str, value: Any) -> dict[str, Any]:
+    """Return settings whose names are NAME.SETTING, of a table that may hold a table for each NAME."""
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {value!r}")
+    flat: dict[str, Any] = {}
+    for name, inner in value.items():
+        flat |= {f"{name}.{one}": what for one, what in inner.items()} if isinstance(inner, Mapping) else {name: inner}
+    return flat
+
+
+def _one_of(*choices: str) -> Callable[[str, Any], str]:
+    def check(field: str, value: Any) -> str:
+        if value not in choices:
+            raise ValueError(f"{field} must be one of {', '.join(choices)}, got {value!r}")
+        return str(value)
+
+    return check
+
+
+_CHECKS: dict[str, Callable[[str, Any], Any]] = {
+    "method": _name,
+    "motion": _motion,
+    "train": _motions,
+    "settings": flattened,
+    "view_degrees": _views,
+    "corruption": _corruption,
+    "instance": _whole(0),
+    "frames": _whole(1),
+    "fps": _rate,
+    "size": _size,
+    "evaluations": _whole(1),
+    "translation": _one_of(*TRANSLATIONS),
+    "first_pose": _one_of("searched", "given"),
+    "seed": _whole(0),
+}

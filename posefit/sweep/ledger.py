@@ -1,0 +1,182 @@
+"""The ledger: a folder in which every finished cell has its row, whatever happens to those who write to it.
+
+ledger.json          the version of posefit whose results these are
+rows/NAME.jsonl      finished rows, one log a driver, never changed afterwards
+rows/NAME.joints     the joints of the rows' frames
+claims/KEY.n         the nth attempt at a cell: who runs it, or why it failed
+quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
+aside/               damaged lines that were found; their cells are run again
+"""
+
+import io
+import json
+import os
+import secrets
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import posefit
+from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from posefit.geometry.rotation import Array
+
+INDEX = "ledger.json"
+ROWS, CLAIMS, QUARANTINE, ASIDE = FOLDERS = ("rows", "claims", "quarantine", "aside")
+FORMAT = 1
+
+
+class Ledger:
+    """Reads a ledger, whoever writes to it meanwhile. Raises ValueError where the folder is no ledger."""
+
+    def __init__(self, path: str | Path, say: Callable[[str], None] | None = None) -> None:
+        self.path = Path(path)
+        self._say = say or _nothing
+        self.version = _version(self.path)
+        self._ends: dict[str, int] = {}  # how far each log was read
+        self._places: dict[str, tuple[str, int]] = {}  # of every finished row: its log, and where in it
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Take note of what was written since."""
+        for name in self._logs():
+            for offset, line in lines(self.path / ROWS / name, self._ends.get(name, 0)):
+                self._ends[name] = offset + len(line)
+                found = decoded(line)
+                if found is None:
+                    self._set_aside(Damage(self.path / ROWS / name, offset, line))
+                else:
+                    # twice the same row can only come of a lock that a file system did not keep: the first one counts
+                    self._places[found[0]] = min((name, offset), self._places.get(found[0], (name, offset)))
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._places
+
+    def in_quarantine(self, key: str) -> bool:
+        """Return whether a cell is in quarantine."""
+        return (self.path / QUARANTINE / f"{key}.json").exists()
+
+    def quarantined(self) -> list[dict[str, Any]]:
+        """Return the cells in quarantine: key, spec, status, and the reason of each attempt."""
+        paths = sorted((self.path / QUARANTINE).glob("*.json"))
+        return [json.loads(path.read_text(encoding="utf-8")) for path in paths if path.stem not in self]
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it."""
+        for name in self._logs():
+            for offset, line in lines(self.path / ROWS / name):
+                found = decoded(line)
+                if found is not None and self._places.get(found[0]) == (name, offset):
+                    yield json.loads(found[1])
+
+    def row(self, key: str) -> dict[str, Any]:
+        """Return the row of a cell. Raises KeyError where there is none."""
+        name, offset = self._places[key]
+        with (self.path / ROWS / name).open("rb") as file:
+            file.seek(offset)
+            found = decoded(file.readline())
+        if found is None or found[0] != key:
+            raise ValueError(f"{self.path / ROWS / name}: the row of cell {key[:8]} must be whole, got a damaged one")
+        row: dict[str, Any] = json.loads(found[1])
+        return row
+
+    def joints(self, key: str) -> dict[str, "Array"]:
+        """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
+        import numpy as np
+
+        start, length, checksum = self.row(key)["joints"]
+        path = (self.path / ROWS / self._places[key][0]).with_suffix(JOINTS)
+        with path.open("rb") as file:
+            file.seek(start)
+            data = file.read(length)
+        if zlib.crc32(data) != checksum:
+            raise ValueError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
+        with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+            return dict(stored)
+
+    def traces(self) -> Iterator[tuple[str, "Array", "Array"]]:
+        """Yield the key of every finished cell with its anytime trace: evaluations of a frame, and the best cost."""
+        import numpy as np
+
+        for row in self.rows():
+            yield row["key"], np.array(row["trace"]["evaluations"]), np.array(row["trace"]["cost"])
+
+    def frame(self) -> "pd.DataFrame":
+        """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
+        from posefit.sweep.table import frame
+
+        return frame(self)
+
+    def _logs(self) -> list[str]:
+        return sorted(entry.name for entry in os.scandir(self.path / ROWS) if entry.name.endswith(SUFFIX))
+
+    def _set_aside(self, damage: Damage) -> None:
+        aside = self.path / ASIDE / f"{damage.path.stem}-{damage.offset}.txt"
+        if aside.exists():
+            return
+        try:
+            aside.write_bytes(damage.text)
+        except OSError as error:
+            self._say(f"warning: {damage}, and cannot be put aside: {error.strerror}; it does not count")
+        else:
+            self._say(f"warning: {damage}; put aside as {aside}, to be run again")
+
+
+def create(path: Path) -> None:
+    """Make a folder a ledger of this version, if it is none yet. Raises ValueError where it may not be one."""
+    try:
+        if path.exists() and not path.is_dir():
+            raise ValueError(f"{path}: expected a folder for the ledger, got a file")
+        if not (path / INDEX).exists():
+            found = sorted(entry.name for entry in os.scandir(path)) if path.is_dir() else []
+            # another driver may be making the same ledger
+            if strange := [name for name in found if name not in FOLDERS and not name.lstrip(".").startswith(INDEX)]:
+                raise ValueError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
+            for name in FOLDERS:
+                (path / name).mkdir(parents=True, exist_ok=True)
+            appear(path / INDEX, {"format": FORMAT, "version": posefit.__version__})
+    except OSError as error:
+        raise ValueError(f"{path}: expected a folder that can be written to, got {error.strerror}") from None
+    version = _version(path)
+    if version != posefit.__version__:
+        raise ValueError(
+            f"{path}: expected a ledger of posefit {posefit.__version__}, got one of {version}; its rows are kept "
+            "apart: choose another folder"
+        )
+
+
+def appear(path: Path, content: Any) -> bool:
+    """Write a JSON file that appears whole, and only where there is none of its name; return whether it did."""
+    temporary = path.parent / f".{path.name}.{secrets.token_hex(8)}"
+    try:
+        temporary.write_text(json.dumps(content), encoding="utf-8")
+        os.link(temporary, path)
+    except FileExistsError:
+        return False
+    finally:
+        temporary.unlink(missing_ok=True)
+    return True
+
+
+def _version(path: Path) -> str:
+    """Return the version of posefit whose results a ledger holds."""
+    try:
+        index = json.loads((path / INDEX).read_text(encoding="utf-8"))
+        if index["format"] != FORMAT:
+            raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {index['format']}")
+        return str(index["version"])
+    except FileNotFoundError:
+        raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None
+    except (json.JSONDecodeError, KeyError, TypeError, OSError) as error:
+        raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {error}") from None
+
+
+def _nothing(_: str) -> None:
+    """Say nothing."""

@@ -1,0 +1,128 @@
+"""Append-only files of finished rows. Each driver writes to one of its own, so no two ever write to the same.
+
+A line is a row with its key and a checksum; `.joints` beside it holds the rows' arrays, one after the other. A line
+that was cut off when its driver died has no end, and counts for nothing.
+"""
+
+import fcntl
+import json
+import os
+import re
+import secrets
+import time
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+SUFFIX, JOINTS = ".jsonl", ".joints"
+_LINE = re.compile(rb'\{"key": "([0-9a-f]{64})", "crc": "([0-9a-f]{8})", "row": (\{.*\})\}\n', re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Damage:
+    """A line that is not what was written."""
+
+    path: Path
+    offset: int
+    text: bytes = field(repr=False)
+
+    def __str__(self) -> str:
+        named = re.search(rb'"key": "([0-9a-f]{8})', self.text)
+        cell = f", the row of cell {named[1].decode()}," if named else ""
+        return f"{self.path} at byte {self.offset}{cell} is damaged"
+
+
+def encoded(key: str, row: Mapping[str, Any]) -> bytes:
+    """Return the line of a row."""
+    text = json.dumps(row, allow_nan=False).encode()
+    return b'{"key": "%s", "crc": "%08x", "row": %s}\n' % (key.encode(), zlib.crc32(key.encode() + text), text)
+
+
+def decoded(line: bytes) -> tuple[str, bytes] | None:
+    """Return the key and the row, as JSON, of a line; None where it is damaged."""
+    found = _LINE.fullmatch(line)
+    if found is None or int(found[2], 16) != zlib.crc32(found[1] + found[3]):
+        return None
+    return found[1].decode(), found[3]
+
+
+class Writer:
+    """Writes one log; as long as it is open, its file is locked, and everybody can see that its driver lives."""
+
+    def __init__(self, folder: Path) -> None:
+        self.name = f"{time.strftime('%Y%m%dT%H%M%S', time.gmtime())}-{secrets.token_hex(4)}"
+        self._paths = folder / f"{self.name}{SUFFIX}", folder / f"{self.name}{JOINTS}"
+        # opened for this process alone: no worker inherits the lock
+        self._rows, self._joints = (os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644) for path in self._paths)
+        fcntl.flock(self._rows, fcntl.LOCK_EX)
+        self._ends = {self._rows: 0, self._joints: 0}
+        self._synced = time.monotonic()
+
+    def append(self, key: str, row: Mapping[str, Any], joints: bytes) -> None:
+        """Add a row with its arrays. Raises OSError where there is no room, and leaves the log as it was."""
+        place = [self._ends[self._joints], len(joints), zlib.crc32(joints)]
+        self._add(self._joints, joints)
+        self._add(self._rows, encoded(key, {**row, "joints": place}))
+
+    def sync(self, seconds: float) -> None:
+        """Bring everything to the disk, if it is so long ago that this was done."""
+        if time.monotonic() - self._synced >= seconds:
+            for file in (self._joints, self._rows):
+                os.fsync(file)
+            self._synced = time.monotonic()
+
+    def close(self) -> None:
+        """End the log; one without rows goes away."""
+        try:
+            self.sync(0.0)
+            if not self._ends[self._rows]:
+                for path in self._paths:
+                    path.unlink(missing_ok=True)
+        finally:
+            for file in (self._joints, self._rows):
+                os.close(file)
+
+    def _add(self, file: int, data: bytes) -> None:
+        end = self._ends[file]
+        done = 0
+        try:
+            while done < len(data):
+                done += os.pwrite(file, data[done:], end + done)
+        except OSError:
+            os.ftruncate(file, end)
+            raise
+        self._ends[file] = end + len(data)
+
+
+def lines(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
+    """Yield offset and text of each line of a log, from one that starts at `start`; not one that has no end yet."""
+    try:
+        if path.stat().st_size == start:
+            return
+        file = path.open("rb")
+    except FileNotFoundError:  # an empty log that went away
+        return
+    with file:
+        file.seek(start)
+        for line in file:
+            if not line.endswith(b"\n"):
+                return
+            yield start, line
+            start += len(line)
+
+
+def alive(folder: Path, name: str) -> bool:
+    """Return whether the driver that writes a log lives."""
+    try:
+        file = os.open(folder / f"{name}{SUFFIX}", os.O_RDONLY)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False

@@ -1,0 +1,74 @@
+"""The rows of a ledger as a table of pandas, one row a cell.
+
+Columns are `key`, `version`, `status` ("done" or "quarantined"), `reason`; the cell's spec, with `settings`,
+`corruption`, `train`, `view_degrees` and `size` as text, so that rows can be grouped by them; every figure, those of a
+kind as `error_degrees.mean`, `skill.nearest`, `baselines_degrees.mean_pose`; `joint_errors_mm.NAME` of the 27 joints;
+and `seconds` and `seconds_per_frame`, the only ones that differ when a cell is run again. Rows are sorted by what the
+spec says, not by when they were finished.
+"""
+
+import importlib
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from posefit.geometry.skeleton import JOINTS
+from posefit.sweep.cell import settings_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from posefit.sweep.ledger import Ledger
+
+ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings", "seed", "key")
+_TEXTS = ("key", "version", "status", "reason", "method", "motion", "train", "settings", "view_degrees", "corruption")
+
+
+def frame(ledger: "Ledger") -> "pd.DataFrame":
+    """Return the table. Raises ImportError where pandas is not installed."""
+    try:
+        pandas = importlib.import_module("pandas")
+    except ImportError as error:
+        raise ImportError("tables need the library pandas: python -m pip install 'posefit[sweep]'") from error
+    columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
+    count = 0
+    for row in ledger.rows():
+        _add(columns, count, _flat(row))
+        count += 1
+    for row in ledger.quarantined():
+        _add(columns, count, _flat(row))
+        count += 1
+    for values in columns.values():
+        values.extend([None] * (count - len(values)))
+    table: pd.DataFrame = pandas.DataFrame({name: pandas.Series(values) for name, values in columns.items()})
+    return table.sort_values(list(ORDER), ignore_index=True) if count else table
+
+
+def _add(columns: dict[str, list[Any]], count: int, values: Mapping[str, Any]) -> None:
+    for name, value in values.items():
+        column = columns.setdefault(name, [])
+        if len(column) < count:
+            column.extend([None] * (count - len(column)))
+        column.append(value)
+
+
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the columns of a row."""
+    spec = row["spec"]
+    flat: dict[str, Any] = {"key": row["key"], "version": spec["version"], "status": row["status"]}
+    flat["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
+    flat |= {name: value for name, value in spec.items() if name not in ("files", "version")}
+    flat["settings"] = ", ".join(settings_text(spec["settings"]))
+    flat["corruption"] = ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items()))
+    flat["train"] = ", ".join(spec["train"])
+    flat["view_degrees"] = ", ".join(f"{view:g}" for view in spec["view_degrees"])
+    flat["size"] = "x".join(map(str, spec["size"]))
+    for name, value in row.items():
+        if name in ("key", "spec", "status", "reasons", "trace", "joints"):
+            continue
+        if name == "joint_errors_mm":
+            flat |= {f"{name}.{joint}": error for joint, error in zip(JOINTS, value, strict=True)}
+        elif isinstance(value, Mapping):
+            flat |= {f"{name}.{inner}": one for inner, one in value.items()}
+        else:
+            flat[name] = "; ".join(value) if isinstance(value, list) else value
+    return flat

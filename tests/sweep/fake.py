@@ -1,0 +1,93 @@
+"""Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
+
+`python -m tests.sweep.fake DIR pebble|dask CELLS` drives a sweep of such cells; what a cell does follows from its
+`frames`: see `behave`.
+"""
+
+import ctypes
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from posefit.sweep.cell import Cell, Result, packed
+from posefit.sweep.cluster import Cluster
+from posefit.sweep.drive import Tally, drive
+from posefit.sweep.driver import Driver
+from posefit.sweep.engine import Engine
+from posefit.sweep.limits import Limits
+from posefit.sweep.processes import Processes
+
+STARTS = "POSEFIT_STARTS"
+SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND = 1001, 1002, 1003, 1004, 1005, 1006
+LIMITS = Limits(seconds=20.0, gigabytes=1.0)
+
+
+def cells(count: int, frames: int = 60) -> list[Cell]:
+    """Return so many cells that differ by their seed."""
+    return [Cell("random@pca", "walk", ("walk-a",), seed=seed, frames=frames) for seed in range(count)]
+
+
+def behave(cell: Cell) -> Result:
+    """Return a result that follows from the cell alone, or do harm."""
+    if STARTS in os.environ:
+        file = os.open(os.environ[STARTS], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        os.write(file, f"{cell.key} {os.getpid()}\n".encode())
+        os.close(file)
+    match cell.frames:
+        case n if n == SEGFAULT:
+            ctypes.string_at(0)
+        case n if n == ENDLESS:
+            while True:
+                pass
+        case n if n == HOG:
+            hoard = [np.ones(2**24) for _ in range(10_000)]
+            del hoard
+        case n if n == RAISE:
+            raise ZeroDivisionError("one\nby none")
+        case n if n == SECOND:
+            time.sleep(1.0)
+        case n if n == SLOW:
+            time.sleep(0.5)
+        case _:
+            time.sleep(0.05)
+    return result(cell)
+
+
+def result(cell: Cell) -> Result:
+    """Return the result of a cell."""
+    numbers = np.random.default_rng(cell.seed).random(3)
+    row = {
+        "key": cell.key,
+        "spec": cell.spec,
+        "status": "done",
+        "cost": float(numbers[0]),
+        "error_degrees": {"mean": float(numbers[1]), "max": float(numbers[2])},
+        "joint_errors_mm": [float(cell.seed)] * 27,
+        "trace": {"evaluations": [40, 80], "cost": [2.0, 1.0]},
+        "seconds": time.time(),
+    }
+    joints = np.full((1, 27, 3), float(cell.seed))
+    return Result(row, packed(estimate=joints, truth=joints))
+
+
+def swept(out: Path, chosen: Sequence[Cell], engine: Engine) -> Tally:
+    """Return how a sweep ended."""
+    with Driver(out) as driver:
+        return drive(chosen, driver, engine, print, lambda _: None)
+
+
+def starts(path: Path) -> list[tuple[str, int]]:
+    """Return key and process of each start that was noted."""
+    lines = path.read_text().splitlines() if path.exists() else []
+    return [(key, int(process)) for key, process in (line.split() for line in lines)]
+
+
+if __name__ == "__main__":
+    where, kind, many = sys.argv[1:4]
+    made: Engine = Cluster(workers=2, limits=LIMITS, run=behave) if kind == "dask" else Processes(2, LIMITS, behave)
+    tally = swept(Path(where), cells(int(many), SLOW if len(sys.argv) > 4 else 60), made)
+    sys.exit(1 if tally.quarantined else 130 if tally.stopped else 0)

@@ -1,0 +1,134 @@
+"""Whatever is killed, no row is lost, none comes twice, and nothing runs again that was not killed."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from posefit.sweep.ledger import Ledger
+from tests.sweep.fake import LIMITS, STARTS, cells, starts
+
+ROOT = Path(__file__).parents[2]
+CELLS, WORKER_KILLS, DRIVER_KILLS = 300, 5, 2
+ENGINES = ["pebble", "dask"]
+
+
+@contextmanager
+def driver(folder: Path, engine: str, count: int, *more: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a driver of its own process group; nothing of it is left over afterwards."""
+    words = [sys.executable, "-m", "tests.sweep.fake", str(folder / "ledger"), engine, str(count), *more]
+    environment = {**os.environ, STARTS: str(folder / "starts"), "PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(words, cwd=ROOT, env=environment, start_new_session=True)
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def wait_for(what: Callable[[], bool], seconds: float = 60.0) -> None:
+    until = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < until, "waited too long"
+        time.sleep(0.02)
+
+
+def living(process: int) -> bool:
+    """Return whether a process runs, and is no zombie."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def claimed(folder: Path) -> set[str]:
+    return {path.name.partition(".")[0] for path in (folder / "ledger" / "claims").glob("[!.]*")}
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for left-over processes in /proc")
+@pytest.mark.parametrize("engine", ENGINES)
+def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: str, tmp_path: Path) -> None:
+    if engine == "dask":
+        pytest.importorskip("distributed")
+    choice, noted, killed = random.Random(7), tmp_path / "starts", set()
+    events = ["worker"] * WORKER_KILLS
+    for place in (2, 5):
+        events.insert(place, "driver")
+    for round_ in range(DRIVER_KILLS + 1):
+        with driver(tmp_path, engine, CELLS) as process:
+            while events:
+                before = len(starts(noted))
+                wait_for(lambda before=before: len(starts(noted)) > before + choice.randint(5, 15))
+                event = events.pop(0)
+                if event == "driver":
+                    process.kill()
+                    process.wait()
+                    killed |= claimed(tmp_path)
+                    break
+                alive = [one for one in {worker for _, worker in starts(noted)[-4:]} if living(one)]
+                victim = choice.choice(sorted(alive))
+                os.kill(victim, signal.SIGKILL)
+                wait_for(lambda victim=victim: not living(victim))
+                killed.add([key for key, worker in starts(noted) if worker == victim][-1])
+            else:
+                assert process.wait(timeout=120) == 0
+                assert round_ == DRIVER_KILLS
+    ledger = Ledger(tmp_path / "ledger")
+    keys = [row["key"] for row in ledger.rows()]
+    assert len(keys) == CELLS
+    assert set(keys) == {cell.key for cell in cells(CELLS)}
+    assert not claimed(tmp_path)
+    assert not ledger.quarantined()
+    runs = Counter(key for key, _ in starts(noted))
+    assert {key for key, count in runs.items() if count > 1} <= killed
+    wait_for(lambda: not any(living(worker) for worker in {worker for _, worker in starts(noted)}), 10.0)
+
+
+def test_two_drivers_at_once_run_no_cell_twice(tmp_path: Path) -> None:
+    with driver(tmp_path, "pebble", 40, "slow") as one, driver(tmp_path, "pebble", 40, "slow") as other:
+        assert one.wait(timeout=120) == 0
+        assert other.wait(timeout=120) == 0
+    assert len(Ledger(tmp_path / "ledger")) == 40
+    runs = starts(tmp_path / "starts")
+    assert len(runs) == len({key for key, _ in runs}) == 40
+    assert len({worker for _, worker in runs}) > 2  # both took part
+    assert not claimed(tmp_path)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_ctrl_c_finishes_the_running_cells_and_the_next_sweep_goes_on(engine: str, tmp_path: Path) -> None:
+    if engine == "dask":
+        pytest.importorskip("distributed")
+    noted = tmp_path / "starts"
+    with driver(tmp_path, engine, 40, "slow") as process:
+        wait_for(lambda: len(starts(noted)) > 5)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
+        assert process.wait(timeout=30) == 130
+    rows = {row["key"] for row in Ledger(tmp_path / "ledger").rows()}
+    assert rows == {key for key, _ in starts(noted)}  # whatever was begun was finished
+    assert len(rows) < 40
+    assert not claimed(tmp_path)
+
+
+def test_ctrl_c_twice_stops_at_once_and_loses_no_row(tmp_path: Path) -> None:
+    noted = tmp_path / "starts"
+    with driver(tmp_path, "pebble", 40, "slow") as process:
+        wait_for(lambda: len(starts(noted)) > 5)
+        for _ in range(2):
+            os.killpg(process.pid, signal.SIGINT)
+            time.sleep(0.05)
+        assert process.wait(timeout=30) == 130
+    rows = {row["key"] for row in Ledger(tmp_path / "ledger").rows()}
+    begun = [key for key, _ in starts(noted)]
+    assert set(begun[:-2]) <= rows <= set(begun)  # two cells ran
+    assert not claimed(tmp_path)
+    assert LIMITS.seconds > 1.0  # it was not the limit that stopped them

@@ -1,0 +1,129 @@
+"""What a user types, and what comes back: rows, a preview, and one line for every mistake."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from posefit.cli import main
+from posefit.sweep.command import described
+from posefit.sweep.ledger import Ledger
+from tests.study.test_command_line import fails, run
+
+PLAN = """
+[defaults]
+frames = 2
+size = [80, 60]
+evaluations = 80
+settings.sapso.cooling = 0.9
+
+[product]
+methods = ["sapso@pca", "random@full"]
+motions = ["walk"]
+corruptions = [{}, { holes = 0.5 }]
+seeds = 2
+"""
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    path = tmp_path / "plan.toml"
+    path.write_text(PLAN)
+    return path
+
+
+def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(plan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "out"
+    first = run("sweep", plan, "--out", out, "--workers", 2)
+    assert first.exit_code == 0, first.stderr
+    assert first.stdout == f"8 of 8 cells done, 8 of them now, written to {out}\n"
+    assert "8/8" in first.stderr
+    again = run("sweep", plan, "--out", out, "--workers", 2, "--json")
+    assert again.exit_code == 0, again.stderr
+    assert json.loads(again.stdout) == {
+        "out": str(out), "cells": 8, "done": 8, "ran": 0, "failed": 0, "quarantined": 0, "stopped": False,
+    }  # fmt: skip
+    assert "8 of 8 cells are done already" in again.stderr
+    rows = list(Ledger(out).rows())
+    assert {row["spec"]["method"] for row in rows} == {"sapso@pca", "random@full"}
+    sapso = next(row for row in rows if row["spec"]["method"] == "sapso@pca")
+    assert sapso["spec"]["settings"] == {"sapso.cooling": 0.9}
+    assert len(sapso["joint_errors_mm"]) == 27
+    assert sum(sapso["joint_errors_mm"]) / 27 == pytest.approx(sapso["mpjpe_mm"], abs=1e-3)
+    assert set(sapso["skill"]) == {"mean_pose", "persistence", "nearest"}
+    assert sapso["evaluations_used"] == 2 * 80
+    assert Ledger(out).joints(sapso["key"])["estimate"].shape == (2, 27, 3)
+
+
+def test_a_preview_lists_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> None:
+    result = run("sweep", plan, "--dry-run", "--workers", 2)
+    assert result.exit_code == 0, result.stderr
+    lines = result.stdout.splitlines()
+    assert len(lines) == 9
+    assert "sapso@pca on walk, view 45, instance 0, seed 1, sapso.cooling=0.9, holes 0.5" in lines[3]
+    assert lines[-1].startswith("8 cells, 8 of them to run: about ")
+    assert lines[-1].endswith(" on 2 workers")
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
+    run("sweep", plan, "--out", tmp_path / "out")
+    found = json.loads(run("sweep", plan, "--dry-run", "--json", "--out", tmp_path / "out").stdout)
+    assert [cell["done"] for cell in found["cells"]] == [True] * 8
+    assert found["seconds"] == 0.0
+
+
+def test_times_are_told_as_people_say_them() -> None:
+    assert [described(seconds) for seconds in (4.4, 89.0, 90.0, 5400.0)] == [
+        "4 seconds", "89 seconds", "1.5 minutes", "1.5 hours",
+    ]  # fmt: skip
+
+
+def test_a_cell_that_fails_is_quarantined_and_the_exit_status_says_so(plan: Path, tmp_path: Path) -> None:
+    plan.write_text(PLAN + '\n[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nsettings.pca.components = -1\n')
+    out = tmp_path / "out"
+    result = run("sweep", plan, "--out", out, "--workers", 1)
+    assert result.exit_code == 1, result.stderr
+    assert (
+        f"8 of 9 cells done, 8 of them now, written to {out}; 1 quarantined: the reasons are in {out}" in result.stdout
+    )
+    (lost,) = Ledger(out).quarantined()
+    assert "ValueError: " in lost["reasons"][0]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["none.toml", "--out", "OUT"], "none.toml: expected a plan (.toml) or default, got no file of that name"),
+        (["PLAN"], "--out must name a folder for the results, got none"),
+        (["PLAN", "--out", "OUT", "--workers", "0"], "--workers must be at least 1, got 0"),
+        (["PLAN", "--out", "OUT", "--dask-local", "-1"], "--dask-local must be at least 1, got -1"),
+        (["PLAN", "--out", "OUT", "--workers", "1", "--dask-local", "1"], "--workers must not be given with --dask-local"),
+        (["PLAN", "--out", "OUT", "--cell-seconds", "0"], "the limit of seconds must be above 0, got 0.0"),
+        (["PLAN", "--out", "OUT", "--scheduler", "nonsense"], "scheduler must be one that answers, got nonsense"),
+        (["BAD", "--out", "OUT"], "bad.toml: defaults must be of"),
+        (["BAD", "--out", "OUT", "--dry-run"], "bad.toml: defaults must be of"),
+        (["PLAN", "--out", "PLAN"], "expected a folder for the ledger, got a file"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_one_line_and_write_nothing(
+    words: list[str], message: str, plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if "--scheduler" in words:
+        cluster = pytest.importorskip("posefit.sweep.cluster")
+        pytest.importorskip("distributed")
+        monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+    (tmp_path / "bad.toml").write_text("[defaults]\nframe = 3\n")
+    places = {"PLAN": plan, "OUT": tmp_path / "out", "BAD": tmp_path / "bad.toml"}
+    assert message in fails("sweep", *(places.get(word, word) for word in words))
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_distributed_dask_says_what_to_install(
+    plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    line = fails("sweep", plan, "--out", tmp_path / "out", "--dask-local", 2)
+    assert line.endswith("python -m pip install 'posefit[dask]'")
+
+
+def test_help_tells_what_a_sweep_is() -> None:
+    assert "methods, motions, views" in CliRunner().invoke(main, ["sweep", "--help"]).output

@@ -1,0 +1,239 @@
+"""What a cell can do wrong ends with that cell; what runs it makes no difference."""
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from posefit.sweep.cell import TIMES
+from posefit.sweep.drive import Tally, drive
+from posefit.sweep.driver import ATTEMPTS, Driver
+from posefit.sweep.engine import Engine, EngineError
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.limits import Limits
+from posefit.sweep.plan import Plan
+from posefit.sweep.processes import Processes
+from tests.sweep import fake
+from tests.sweep.fake import behave, cells, swept
+
+SHORT = Limits(seconds=5.0, gigabytes=0.6)
+Make = Callable[..., Engine]
+
+
+@pytest.fixture(params=["pebble", "dask"])
+def make(request: pytest.FixtureRequest) -> Make:
+    """Return what makes an engine of two workers."""
+    if request.param == "pebble":
+        return lambda run=behave, limits=SHORT: Processes(2, limits, run)
+    pytest.importorskip("distributed")
+    from posefit.sweep.cluster import Cluster
+
+    return lambda run=behave, limits=SHORT: Cluster(workers=2, limits=limits, run=run)
+
+
+def test_poisoned_cells_are_quarantined_with_their_reasons_and_all_others_finish(make: Make, tmp_path: Path) -> None:
+    poisons = [fake.SEGFAULT, fake.ENDLESS, fake.HOG, fake.RAISE]
+    bad = [replace(cells(1)[0], frames=poison) for poison in poisons]
+    tally = swept(tmp_path / "ledger", [*bad, *cells(20)], make())
+    assert (tally.done, tally.quarantined, tally.failed) == (20, 4, ATTEMPTS * 4)
+    ledger = Ledger(tmp_path / "ledger")
+    assert {row["key"] for row in ledger.rows()} == {cell.key for cell in cells(20)}
+    quarantined = {row["spec"]["frames"]: row["reasons"] for row in ledger.quarantined()}
+    assert quarantined[fake.ENDLESS] == ["it ran past its limit of 5 s"] * 3
+    assert quarantined[fake.HOG] == ["it wanted more memory than its limit of 0.6 GB"] * 3
+    assert quarantined[fake.RAISE] == ["ZeroDivisionError: one by none"] * 3
+    assert set(quarantined[fake.SEGFAULT]) <= {"its process died of SIGSEGV", "its process died", "its worker died"}
+    assert len(quarantined[fake.SEGFAULT]) == 3
+    assert not list((tmp_path / "ledger" / "claims").iterdir())
+
+
+def test_a_cell_that_was_quarantined_is_tried_again_once_its_file_is_gone(tmp_path: Path) -> None:
+    bad = [replace(cells(1)[0], frames=fake.RAISE)]
+    assert swept(tmp_path / "ledger", bad, Processes(1, SHORT, behave)).quarantined == 1
+    assert swept(tmp_path / "ledger", bad, Processes(1, SHORT, behave)).failed == 0
+    for path in (tmp_path / "ledger" / "quarantine").iterdir():
+        path.unlink()
+    assert swept(tmp_path / "ledger", bad, Processes(1, SHORT, behave)).failed == 3
+
+
+def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    from posefit.sweep.cluster import Cluster
+
+    plan = Plan.of(
+        {
+            "defaults": {"frames": 3, "size": [80, 60], "evaluations": 200},
+            "product": {
+                "methods": ["sapso@pca", "cma@pca", "particle@full"],
+                "motions": ["walk"],
+                "corruptions": [{}, {"holes": 0.5, "dropped": 0.5}],
+                "views": [[0, 90]],
+                "instances": [1],
+                "seeds": 2,
+            },
+        }
+    )
+    runs: list[tuple[str, Any, Engine]] = [
+        ("pebble", plan.cells, Processes(2)),
+        ("again", plan.cells[::-1], Processes(1)),
+        ("dask", plan.cells[::-1], Cluster(workers=2)),
+    ]
+    found = []
+    for name, chosen, engine in runs:
+        assert swept(tmp_path / name, chosen, engine).done == len(plan)
+        ledger = Ledger(tmp_path / name)
+        rows = {row["key"]: row for row in ledger.rows()}
+        for row in rows.values():
+            assert row.pop("joints")[1] > 0
+            for column in TIMES:
+                assert row.pop(column) > 0.0
+        joints = {key: {k: v.tobytes() for k, v in ledger.joints(key).items()} for key in rows}
+        found.append((rows, joints))
+    assert found[0] == found[1] == found[2]
+    first = next(iter(found[0][0].values()))
+    assert first["trace"]["evaluations"][-1] <= 200
+    assert first["trace"]["cost"] == sorted(first["trace"]["cost"], reverse=True)
+
+
+def timed(count: int, engine: Engine, folder: Path) -> float:
+    """Return how long cells of a second each take, once the workers are there."""
+    with Driver(folder) as driver:
+        for _ in range(engine.window()):  # each worker has one cell behind it
+            engine.submit(cells(1)[0])
+        warm = 0
+        while warm < engine.window():
+            warm += len(engine.wait(1.0))
+        began = time.perf_counter()
+        tally = drive(cells(count, fake.SECOND), driver, Unclosed(engine), print, lambda _: None)
+        taken = time.perf_counter() - began
+    engine.close()
+    assert tally.done == count
+    return taken
+
+
+class Unclosed:
+    """An engine that goes on after a sweep."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.window, self.submit, self.wait = engine.window, engine.submit, engine.wait
+
+    def close(self) -> None:
+        """Stay."""
+
+
+def test_cells_of_a_second_take_at_most_5_percent_longer_and_two_workers_halve_the_time(
+    make: Make, tmp_path: Path
+) -> None:
+    one = timed(8, Processes(1, SHORT, behave), tmp_path / "one")
+    two = timed(16, make(), tmp_path / "two")
+    assert one <= 1.05 * 8
+    assert two <= 1.05 * 8
+    assert 16 / 8 * one / two >= 1.9
+
+
+def test_a_number_of_workers_below_one_is_a_mistake() -> None:
+    with pytest.raises(ValueError, match="workers must be at least 1, got 0"):
+        Processes(0)
+
+
+def test_a_limit_of_nothing_is_a_mistake() -> None:
+    with pytest.raises(ValueError, match="the limit of seconds must be above 0, got 0"):
+        Limits(seconds=0.0)
+
+
+def port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+def dask(*words: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        cwd=Path(__file__).parents[2],
+    )
+
+
+class Served:
+    """A Dask scheduler at an address, with one worker; it can go away and come back."""
+
+    def __init__(self) -> None:
+        self._port = port()
+        self.address = f"tcp://127.0.0.1:{self._port}"
+        self._started: list[subprocess.Popen[bytes]] = []
+
+    def come(self) -> None:
+        self._started = [
+            dask("dask_scheduler", "--port", str(self._port), "--host", "127.0.0.1", "--no-dashboard", "--no-show"),
+            dask("dask_worker", self.address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "20"),
+        ]
+
+    def go(self) -> None:
+        for process in self._started:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    pytest.importorskip("distributed")
+    scheduler = Served()
+    scheduler.come()
+    yield scheduler
+    scheduler.go()
+
+
+def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    from posefit.sweep.cluster import Cluster
+
+    address = f"tcp://127.0.0.1:{port()}"
+    with pytest.raises(EngineError, match=f"scheduler must be one that answers, got {address}"):
+        Cluster(address, run=behave, patience=1.0)
+
+
+def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp_path: Path) -> None:
+    from posefit.sweep.cluster import Cluster
+
+    engine = Cluster(served.address, limits=SHORT, run=behave, patience=20.0)
+    assert engine.window() == 1
+    engine._patience = 1.0
+
+    def watch(tally: Tally) -> None:
+        if tally.done == 3:
+            served.go()
+
+    with (
+        Driver(tmp_path / "ledger") as driver,
+        pytest.raises(ValueError, match=r"127.*; \d of 20 cells are done and safe: the same command goes on"),
+    ):
+        drive(cells(20), driver, engine, print, watch)
+    assert 3 <= len(Ledger(tmp_path / "ledger")) < 20
+    assert not list((tmp_path / "ledger" / "claims").iterdir())
+    assert swept(tmp_path / "ledger", cells(20), Processes(2, SHORT, behave)).done == 20
+
+
+def test_a_scheduler_that_comes_back_is_waited_for(served: Served, tmp_path: Path) -> None:
+    from posefit.sweep.cluster import Cluster
+
+    engine = Cluster(served.address, limits=SHORT, run=behave, patience=30.0)
+    gone = []
+
+    def watch(tally: Tally) -> None:
+        if tally.done == 3 and not gone:
+            served.go()
+            gone.append(True)
+            served.come()
+
+    with Driver(tmp_path / "ledger") as driver:
+        tally = drive(cells(8), driver, engine, print, watch)
+    assert (tally.done, tally.quarantined) == (8, 0)
+    assert len(list(Ledger(tmp_path / "ledger").rows())) == 8

@@ -1,0 +1,314 @@
+"""A ledger keeps every row, whatever becomes of its files and of those who write to it."""
+
+import errno
+import json
+import os
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.sweep import log
+from posefit.sweep.cell import Cell
+from posefit.sweep.drive import drive
+from posefit.sweep.driver import Claim, Driver, State
+from posefit.sweep.engine import Outcome
+from posefit.sweep.ledger import Ledger
+from tests.sweep.fake import cells, result
+
+
+class Here:
+    """An engine that makes up a cell's result at once."""
+
+    def __init__(self) -> None:
+        self.ended: list[Outcome] = []
+
+    def window(self) -> int:
+        return 1
+
+    def submit(self, cell: Cell) -> None:
+        self.ended.append(Outcome(cell, result(cell)))
+
+    def wait(self, seconds: float) -> list[Outcome]:
+        ended, self.ended = self.ended, []
+        return ended
+
+    def close(self) -> None: ...
+
+
+def filled(folder: Path, count: int = 5, start: int = 0) -> Path:
+    """Return a ledger with the rows of so many cells."""
+    with Driver(folder) as driver:
+        assert drive(cells(start + count)[start:], driver, Here(), print, lambda _: None).done == count
+    return folder
+
+
+def the_log(folder: Path) -> Path:
+    (path,) = (folder / "rows").glob("*.jsonl")
+    return path
+
+
+def test_rows_and_joints_come_back_as_they_were_written(tmp_path: Path) -> None:
+    ledger = Ledger(filled(tmp_path / "ledger"))
+    assert len(ledger) == 5
+    for cell in cells(5):
+        row = ledger.row(cell.key)
+        assert {name: value for name, value in row.items() if name not in ("joints", "seconds")} == {
+            name: value for name, value in result(cell).row.items() if name != "seconds"
+        }
+        joints = ledger.joints(cell.key)
+        assert joints["estimate"].dtype == np.float32
+        np.testing.assert_array_equal(joints["truth"], np.full((1, 27, 3), cell.seed))
+    key, evaluations, cost = next(ledger.traces())
+    assert key in ledger
+    assert evaluations.tolist() == [40, 80]
+    assert cost.tolist() == [2.0, 1.0]
+
+
+def test_a_frame_has_a_row_a_cell_whose_order_does_not_follow_from_when_it_was_run(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    folder = filled(tmp_path / "ledger", 3, start=2)
+    filled(folder, 2)
+    bad = cells(6)[5]
+    with Driver(folder) as driver:
+        for _ in range(3):
+            claim = driver.claim(bad)
+            assert isinstance(claim, Claim)
+            driver.fail(claim, "it had to")
+        assert driver.claim(bad) is State.QUARANTINED
+    table = Ledger(folder).frame()
+    assert table["seed"].tolist() == [0, 1, 2, 3, 4, 5]
+    assert table["status"].tolist() == ["done"] * 5 + ["quarantined"]
+    assert table["reason"].iloc[5] == "it had to; it had to; it had to"
+    assert table["version"].unique().tolist() == [posefit.__version__]
+    assert table["view_degrees"].unique().tolist() == ["45"]
+    assert table["evaluations"].unique().tolist() == [2440]
+    assert table["error_degrees.mean"].iloc[0] == result(cells(1)[0]).row["error_degrees"]["mean"]
+    assert table["joint_errors_mm.rhand"].iloc[4] == 4.0
+    assert np.isnan(table["cost"].iloc[5])
+    assert Ledger(filled(tmp_path / "other", 1)).frame().shape[0] == 1
+
+
+def test_without_pandas_a_frame_says_what_to_install(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    with pytest.raises(ImportError, match=r"pip install 'posefit\[sweep\]'"):
+        Ledger(filled(tmp_path / "ledger", 1)).frame()
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda line: line.replace(b'"cost": 0', b'"cost": 1'),
+        lambda line: line[:200] + b"\n",
+        lambda line: b"\x00" * (len(line) - 1) + b"\n",
+        lambda line: b"\n",
+    ],
+)
+def test_a_damaged_row_is_named_put_aside_and_run_again(harm: Any, tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger")
+    lines = the_log(folder).read_bytes().splitlines(keepends=True)
+    key = log.decoded(lines[2])[0]  # type: ignore[index]
+    lines[2] = harm(lines[2])
+    the_log(folder).write_bytes(b"".join(lines))
+
+    said: list[str] = []
+    ledger = Ledger(folder, said.append)
+    assert len(ledger) == len(list(ledger.rows())) == 4
+    assert key not in ledger
+    assert len(said) == 1
+    assert str(the_log(folder)) in said[0]
+    assert "put aside" in said[0]
+    if b"key" in lines[2]:
+        assert f"the row of cell {key[:8]}" in said[0]
+    (aside,) = (folder / "aside").iterdir()
+    assert aside.read_bytes() == lines[2]
+
+    with Driver(folder, said.append) as driver:
+        assert drive(cells(5), driver, Here(), print, lambda _: None).ran == 1
+    assert len(said) == 1
+    assert sorted(row["key"] for row in Ledger(folder).rows()) == sorted(cell.key for cell in cells(5))
+
+
+def test_a_row_that_was_cut_off_when_its_driver_died_is_no_row(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger")
+    whole = the_log(folder).read_bytes()
+    for cut in (1, 100):
+        the_log(folder).write_bytes(whole[:-cut])
+        said: list[str] = []
+        assert len(Ledger(folder, said.append)) == 4
+        assert not said
+    filled(folder)
+
+
+def test_damaged_joints_are_named(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger", 1)
+    path = the_log(folder).with_suffix(".joints")
+    path.write_bytes(b"x" + path.read_bytes()[1:])
+    with pytest.raises(ValueError, match=r"\.joints: the joints of cell .* must be whole, got damaged ones"):
+        Ledger(folder).joints(cells(1)[0].key)
+
+
+def test_a_ledger_of_another_version_is_read_but_never_written_to(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger")
+    index = json.loads((folder / "ledger.json").read_text())
+    (folder / "ledger.json").write_text(json.dumps({**index, "version": "0.0.9"}))
+    with pytest.raises(
+        ValueError, match=r"expected a ledger of posefit .*, got one of 0\.0\.9; its rows are kept apart"
+    ):
+        Driver(folder)
+    assert Ledger(folder).version == "0.0.9"
+    assert len(Ledger(folder)) == 5
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{", "expected the index of a ledger, got"),
+        ("[]", "expected the index of a ledger, got"),
+        ('{"format": 1}', "expected the index of a ledger, got 'version'"),
+        ('{"format": 9, "version": "9"}', "expected a ledger of format 1, got 9"),
+    ],
+)
+def test_an_index_that_is_none_is_named(content: str, message: str, tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger", 1)
+    (folder / "ledger.json").write_text(content)
+    for opened in (Ledger, Driver):
+        with pytest.raises(ValueError, match=message):
+            opened(folder)
+
+
+def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="expected a ledger, a folder that posefit sweep wrote, got none"):
+        Ledger(tmp_path / "nowhere")
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(ValueError, match="expected a new folder or a ledger, got one with mine.txt"):
+        Driver(tmp_path)
+    with pytest.raises(ValueError, match="expected a folder for the ledger, got a file"):
+        Driver(tmp_path / "mine.txt")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_folder_that_cannot_be_written_to_is_named(tmp_path: Path, monkeypatch: Any) -> None:
+    folder = filled(tmp_path / "ledger")
+    opened = os.open
+
+    def refuse(path: Any, flags: int, *more: Any, **named: Any) -> int:
+        if flags & os.O_CREAT:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+        return opened(path, flags, *more, **named)
+
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(ValueError, match="ledger: expected a folder that can be written to, got Read-only file system"):
+        Driver(folder).__enter__()
+    assert len(list(Ledger(folder).rows())) == 5
+    monkeypatch.setattr(Path, "mkdir", lambda self, *_, **__: refuse(self, os.O_CREAT))
+    with pytest.raises(ValueError, match="new: expected a folder that can be written to, got Read-only file system"):
+        Driver(tmp_path / "new")
+
+
+@pytest.mark.parametrize("room", [3, 1500])
+def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
+    room: int, tmp_path: Path, monkeypatch: Any
+) -> None:
+    folder = filled(tmp_path / "ledger", 3)
+    left, write = [room], os.pwrite
+
+    def fill(file: int, data: bytes, offset: int) -> int:
+        if not left[0]:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        done = write(file, data[: left[0]], offset)
+        left[0] -= done
+        return done
+
+    monkeypatch.setattr(os, "pwrite", fill)
+    with (
+        Driver(folder) as driver,
+        pytest.raises(
+            ValueError, match=r"expected room to write to, got No space left on device; \d of 9 cells are done"
+        ),
+    ):
+        drive(cells(9), driver, Here(), print, lambda _: None)
+    monkeypatch.undo()
+    said: list[str] = []
+    assert 3 <= len(Ledger(folder, said.append)) < 9
+    assert not said
+    assert not list((folder / "claims").iterdir())
+    filled(folder, 9)
+
+
+def test_nobody_runs_what_a_living_driver_has_claimed_and_a_dead_ones_cells_are_tried_again(tmp_path: Path) -> None:
+    cell = cells(1)[0]
+    with Driver(tmp_path / "ledger") as one, Driver(tmp_path / "ledger") as other:
+        claim = one.claim(cell)
+        assert claim == Claim(cell, 1)
+        assert other.claim(cell) is State.ELSEWHERE
+        assert one.claim(cell) is State.ELSEWHERE
+        one.release(claim)
+        assert other.claim(cell) == Claim(cell, 1)
+        other.finish(Claim(cell, 1), result(cell))
+        assert one.claim(cell) is State.DONE
+    for attempt in (1, 2, 3):
+        with Driver(tmp_path / "ledger") as dead:
+            assert dead.claim(cells(2)[1]) == Claim(cells(2)[1], attempt)
+    with Driver(tmp_path / "ledger") as last:
+        assert last.claim(cells(2)[1]) is State.QUARANTINED
+    (lost,) = Ledger(tmp_path / "ledger").quarantined()
+    assert all("its driver, process" in reason and reason.endswith("died") for reason in lost["reasons"])
+
+
+def test_of_many_drivers_that_claim_the_same_cells_one_gets_each(tmp_path: Path) -> None:
+    chosen = cells(60)
+    got: list[str] = []
+
+    def work() -> None:
+        with Driver(tmp_path / "ledger") as driver:
+            for cell in chosen:
+                claim = driver.claim(cell)
+                if isinstance(claim, Claim):
+                    got.append(cell.key)
+                    driver.finish(claim, result(cell))
+
+    threads = [threading.Thread(target=work) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(got) == sorted(cell.key for cell in chosen)
+    assert len(list(Ledger(tmp_path / "ledger").rows())) == 60
+    assert not list((tmp_path / "ledger" / "claims").iterdir())
+
+
+def test_what_a_dead_driver_left_behind_goes_away(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger", 1)
+    claims = folder / "claims"
+    (claims / f"{cells(1)[0].key}.1").write_text("{}")  # its row was written, its claim not yet given up
+    (claims / f"{'0' * 64}.2").write_text("{}")
+    (folder / "quarantine" / f"{'0' * 64}.json").write_text("{}")  # quarantined, its claims not yet given up
+    (claims / ".unnamed").write_text("")
+    os.utime(claims / ".unnamed", (0, 0))
+    filled(folder, 1)
+    assert not list(claims.iterdir())
+    assert len(list((folder / "rows").iterdir())) == 2  # a driver that wrote nothing leaves nothing
+
+
+def test_many_drivers_may_make_the_same_ledger_at_once(tmp_path: Path) -> None:
+    (tmp_path / "ledger" / "rows").mkdir(parents=True)
+    (tmp_path / "ledger" / ".ledger.json.0123").write_text("")
+    assert len(Driver(tmp_path / "ledger").ledger) == 0
+    failed: list[Exception] = []
+
+    def make() -> None:
+        try:
+            Driver(tmp_path / "new")
+        except ValueError as error:
+            failed.append(error)
+
+    threads = [threading.Thread(target=make) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failed

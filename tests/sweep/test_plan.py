@@ -1,0 +1,239 @@
+"""A plan is checked as a whole, before anything runs; a mistake in it is one line."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import posefit
+from posefit.motion import library
+from posefit.motion.amc import write_amc
+from posefit.motion.asf import write_asf
+from posefit.registry import Offer, Plugin, Registry
+from posefit.study import method
+from posefit.sweep import check
+from posefit.sweep.cell import Cell, digest_of, run_cell, scene_of, trace
+from posefit.sweep.plan import Plan
+from tests.testing.planted import Holds
+
+PRODUCT: dict[str, Any] = {"methods": ["sapso@pca"], "motions": ["walk"]}
+
+
+def planned(**tables: Any) -> Plan:
+    return Plan.of({"product": PRODUCT, **tables})
+
+
+def test_a_product_holds_every_combination_and_cells_come_beside_it() -> None:
+    plan = Plan.of(
+        {
+            "defaults": {"frames": 7, "evaluations": 100},
+            "product": {
+                "methods": ["sapso@pca", "cma@full"],
+                "motions": ["walk", {"motion": "run", "frames": 9}],
+                "views": [45, [0, 90]],
+                "corruptions": [{}, {"holes": 0.5}],
+                "instances": [1, 2],
+                "seeds": 3,
+            },
+            "cells": [{"method": "random@pca", "motion": "jump"}],
+        }
+    )
+    assert len(plan) == 2 * 2 * 2 * 2 * 2 * 3 + 1
+    assert len({cell.key for cell in plan}) == len(plan)
+    assert {cell.frames for cell in plan if cell.motion == "run"} == {9}
+    assert {cell.frames for cell in plan if cell.motion != "run"} == {7}
+    assert {cell.view_degrees for cell in plan} == {(45.0,), (0.0, 90.0)}
+    assert {cell.seed for cell in plan} == {0, 1, 2}
+    assert plan.cells[-1].train == library.other_styles("jump")
+
+
+def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
+    plan = Plan.of(
+        {
+            "defaults": {"settings": {"sapso": {"cooling": 0.9}, "tracker.floor": 0.1}},
+            "product": {
+                "methods": ["sapso@pca", "cma@pca", {"method": "sapso@pca", "settings": {"sapso": {"cooling": 0.8}}}],
+                "motions": ["walk"],
+            },
+        }
+    )
+    assert [dict(cell.settings) for cell in plan] == [
+        {"sapso.cooling": 0.9, "tracker.floor": 0.1},
+        {"tracker.floor": 0.1},
+        {"sapso.cooling": 0.8, "tracker.floor": 0.1},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"product": None}, "a plan must hold at least one cell, got none"),
+        ({"product": {**PRODUCT, "seeds": []}}, "product.seeds must hold at least one, got none: an empty product"),
+        ({"product": {**PRODUCT, "seeds": 0}}, "product.seeds must hold at least one, got none: an empty product"),
+        ({"product": {**PRODUCT, "seeds": "3"}}, "product.seeds must be a list, got '3'"),
+        ({"product": {**PRODUCT, "colours": [1]}}, "product must hold methods, motions, .*, got 'colours'"),
+        ({"product": {"motions": ["walk"]}}, "a cell must say its method, got none"),
+        ({"product": {**PRODUCT, "motions": [{"motion": "walk", "seed": 1}], "seeds": [1]}}, "seed in one list, got it in"),
+        ({"product": {**PRODUCT, "seeds": 10**12}}, "product.seeds must be at most 1,000,000, got 1,000,000,000,000"),
+        ({"product": {**PRODUCT, "seeds": 2000, "instances": 2000}}, "product must hold at most 1,000,000 cells, got 4,"),
+        ({"sweep": {}}, "a plan must hold defaults, product, cells, got 'sweep'"),
+        ({"defaults": {"sed": 1}}, "defaults must be of method, .*, got 'sed'"),
+        ({"defaults": [1]}, "defaults must be a table, got"),
+        ({"cells": 3}, "cells must be a list of tables, got 3"),
+        ({"cells": [{"method": "sapso@pca", "motion": "walk"}]}, "must differ, got sapso@pca on walk, .* seed 0 twice"),
+        ({"product": {**PRODUCT, "views": [45, 45.0]}}, "the cells of a plan must differ"),
+        ({"product": {**PRODUCT, "methods": ["sapzo@pca"]}}, "did you mean 'sapso'"),
+        ({"product": {**PRODUCT, "methods": ["sapso@pcb"]}}, "did you mean 'pca'"),
+        ({"product": {**PRODUCT, "methods": ["sapso"]}}, "or OPTIMISER@PRIOR, got 'sapso'; did you mean 'sapso@pca'"),
+        ({"product": {**PRODUCT, "methods": ["vsnm"]}}, "method must be a tracker .* or OPTIMISER@PRIOR, got 'vsnm'"),
+        ({"product": {**PRODUCT, "methods": [3]}}, "method must be a name, got 3"),
+        ({"product": {**PRODUCT, "motions": ["wolk"]}}, "got 'wolk'; did you mean 'walk'"),
+        ({"product": {**PRODUCT, "motions": ["none.amc"]}}, "none.amc"),
+        ({"product": {**PRODUCT, "views": [[]]}}, "view_degrees must be at least one angle, got none"),
+        ({"product": {**PRODUCT, "views": [float("nan")]}}, "view_degrees must be a finite number, got nan"),
+        ({"product": {**PRODUCT, "corruptions": [{"hole": 1}]}}, "got 'hole'; did you mean 'holes'"),
+        ({"product": {**PRODUCT, "corruptions": [{"holes": 2}]}}, "corruption holes must lie in 0 to 1, got 2"),
+        ({"product": {**PRODUCT, "corruptions": [0.5]}}, "corruption must be a table of strengths .*, got 0.5"),
+        ({"product": {**PRODUCT, "instances": [-1]}}, "instance must be a whole number of at least 0, got -1"),
+        ({"defaults": {"frames": True}}, "frames must be a whole number of at least 1, got True"),
+        ({"defaults": {"fps": 0}}, "fps must be a positive number, got 0"),
+        ({"defaults": {"size": [320]}}, r"size must be \[width, height\] in pixels, up to 16384, got \[320\]"),
+        ({"defaults": {"translation": "guessed"}}, "translation must be one of known, searched, aligned, got 'guessed'"),
+        ({"defaults": {"first_pose": "mine"}}, "first_pose must be one of searched, given, got 'mine'"),
+        ({"defaults": {"evaluations": 30}}, "evaluations must hold one population of 40, got 30"),
+        ({"defaults": {"train": "walk-a"}}, "train must be a list of motions, got 'walk-a'"),
+        ({"defaults": {"train": ["walk"]}}, "train must not contain the motion itself, got walk"),
+        ({"defaults": {"settings": {"sapso.coling": 1}}}, "got 'coling'; did you mean 'cooling'"),
+        ({"defaults": {"settings": {"sapso.cooling": "cold"}}}, "sapso.cooling must be float, got 'cold'"),
+        ({"defaults": {"settings": {"cma.sigma": 1}}}, "settings must be of the plan's methods, got 'cma.sigma', which none"),
+        ({"product": {**PRODUCT, "methods": [{"method": "sapso@pca", "settings": {"cma.sigma": 1}}]}}, "got 'cma.sigma=1'"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_named(tables: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        planned(**tables)
+
+
+def test_a_method_whose_library_is_not_installed_says_what_to_install(monkeypatch: Any) -> None:
+    monkeypatch.setattr("posefit.registry.find_spec", lambda name: None)
+    check._offers.cache_clear()
+    with pytest.raises(ImportError, match="pip install 'posefit"):
+        planned(product={**PRODUCT, "methods": ["pycma@pca"]})
+
+
+def test_a_file_that_is_no_plan_is_named(tmp_path: Path) -> None:
+    with pytest.raises(
+        ValueError, match=r"nowhere.toml: expected a plan \(.toml\) or default, got no file of that name"
+    ):
+        Plan.read("nowhere.toml")
+    with pytest.raises(ValueError, match="expected a plan .* got a folder"):
+        Plan.read(tmp_path)
+    path = tmp_path / "plan.toml"
+    path.write_text("[product\n")
+    with pytest.raises(ValueError, match=r"plan.toml: .*line 1"):
+        Plan.read(path)
+    path.write_bytes(b"\xff")
+    with pytest.raises(ValueError, match="expected a plan in TOML"):
+        Plan.read(path)
+
+
+def test_the_default_plan_holds_the_papers_three_methods_at_one_budget() -> None:
+    plan = Plan.read("default")
+    assert {"sapso@pca", "sapso@full", "particle@full"} <= {cell.method for cell in plan}
+    assert len({cell.evaluations for cell in plan}) == 1
+
+
+def test_a_key_follows_from_the_spec_and_the_version_alone() -> None:
+    one, same, other = (Cell("sapso@pca", "walk", ("walk-a",), seed=seed) for seed in (1, 1, 2))
+    assert one.key == same.key != other.key
+    assert len(one.key) == 64
+    assert Cell("sapso@pca", "walk", ("walk-a",), seed=1, version="0.0.9").key != one.key
+
+
+def test_a_cell_is_restored_from_its_rows_spec() -> None:
+    spec = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
+    (cell,) = Plan.of({"cells": [{**spec, "corruption": {"holes": 0.5}, "settings": {"pca.components": 4}}]})
+    row = run_cell(cell).row
+    again = Cell(**json.loads(json.dumps(row))["spec"])
+    assert again.key == cell.key == row["key"]
+    assert run_cell(again).row["error_degrees"] == row["error_degrees"]
+
+
+def test_instances_differ_and_a_number_is_the_same_for_every_method_and_seed() -> None:
+    def seen(**spec: Any) -> tuple[bytes, bytes]:
+        (cell,) = Plan.of({"cells": [{"method": "sapso@pca", "motion": "walk", "frames": 4, "size": [80, 60], **spec}]})
+        scene = scene_of(cell)
+        assert scene.truth is not None
+        return scene.truth.poses.tobytes(), scene.observations[2].silhouettes[0].mask.tobytes()
+
+    assert seen(instance=0)[0] == library.built_in("walk", frames=4).poses.tobytes()
+    assert seen(instance=1) == seen(instance=1, method="cma@full", seed=5)
+    assert seen(instance=1)[0] != seen(instance=2)[0] != seen(instance=0)[0]
+    spoilt = {"holes": 0.5}
+    assert seen(corruption=spoilt, seed=1) == seen(corruption=spoilt, seed=2)
+    assert seen(corruption=spoilt)[1] != seen()[1]
+
+
+def test_a_share_of_the_frames_is_dropped() -> None:
+    (cell,) = Plan.of(
+        {"cells": [{"method": "sapso@pca", "motion": "walk", "size": [80, 60], "corruption": {"dropped": 0.5}}]}
+    )
+    usable = [observation.usable for observation in scene_of(cell).observations]
+    assert usable[0]
+    assert 15 <= usable.count(False) <= 45  # of 60
+
+
+def test_a_file_that_changed_after_it_was_planned_is_not_followed(tmp_path: Path) -> None:
+    motion = library.built_in("walk-b", frames=12)
+    write_asf(tmp_path / "one.asf", motion.skeleton)
+    write_amc(tmp_path / "one.amc", motion)
+    source = str(tmp_path / "one.amc")
+    spec = {"method": "random@pca", "motion": source, "frames": 1, "fps": 120, "size": [80, 60], "evaluations": 80}
+    (cell,) = Plan.of({"cells": [spec]})
+    assert cell.files == {str(path): digest_of(path) for path in (tmp_path / "one.amc", tmp_path / "one.asf")}
+    assert run_cell(cell).row["status"] == "done"
+    with pytest.raises(ValueError, match=r"frames must be at most \d+, the length of"):
+        Plan.of({"cells": [{**spec, "frames": 500}]})
+    (tmp_path / "one.amc").write_text((tmp_path / "one.amc").read_text() + "\n")
+    with pytest.raises(ValueError, match="one.amc must be the file that was planned, "):
+        run_cell(cell)
+
+
+def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_evaluations() -> None:
+    import numpy as np
+
+    from posefit.fitting.tracker import Frame
+
+    def frame(history: list[float], spent: list[int] | None, used: int) -> Frame:
+        told = None if spent is None else np.array(spent)
+        return Frame(np.zeros(66), np.zeros(3), 1.0, np.zeros((1, 3)), used, 0.0, np.array(history), None, told)
+
+    # by hand: after 20 evaluations the frames have 6 and 9, after 30: 4 and 9, after 40: 4 and 1
+    found = [frame([8.0, 6.0, 4.0], [10, 20, 30], 30), frame([9.0, 1.0], None, 40), frame([], None, 0)]
+    assert trace(found) == {"evaluations": [20, 30, 40], "cost": [7.5, 6.5, 2.5]}
+    assert trace([frame([], None, 0)]) == {"evaluations": [], "cost": []}
+    long = trace([frame(list(range(500, 0, -1)), None, 500)])
+    assert len(long["cost"]) <= 64
+    assert long["evaluations"][-1] == 500
+    assert long["cost"][-1] == 1.0
+
+
+def test_a_worker_of_another_version_does_not_run_a_cell() -> None:
+    with pytest.raises(ValueError, match=rf"a worker must have posefit 0.0.9, got {posefit.__version__}"):
+        run_cell(Cell("random@pca", "walk", ("walk-a",), version="0.0.9"))
+
+
+def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_version(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    offer = Offer("tracker", "hold+still", Holds, "posefit-hold", "2.5")
+    found = Registry((Plugin("hold", "posefit-hold", "2.5", "loaded", offers=(offer,)),))
+    for module in (check, method):
+        monkeypatch.setattr(module, "registry", lambda: found)
+    spec = {"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]}
+    (cell,) = Plan.of({"cells": [spec]})
+    assert cell.version == f"{posefit.__version__}, posefit-hold 2.5"
+    row = run_cell(cell).row
+    assert row["prior_floor_degrees"] is None
+    assert row["trace"]["evaluations"][-1] <= 2440
