@@ -129,9 +129,10 @@ def bench(threads: int | None, as_json: bool) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 @click.pass_context
 def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, as_json: bool, **where: Any) -> None:
-    """Run the cells of PLAN, a .toml file, or `default`: methods, motions, views, corruptions and seeds.
+    """Run the cells of PLAN: methods, motions, views, corruptions and seeds.
 
-    It may be killed at any moment, and any number of them may work on one DIR: the same command goes on where it was.
+    PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment, and any number of
+    them may work on one DIR: the same command goes on where it was.
     Exit status 1 where cells were quarantined after three attempts, 130 where somebody stopped it.
     """
     from posefit.sweep import command
