@@ -119,7 +119,9 @@ class Course:
         return self._frame(pose, place, observation, used + 1, began, told)
 
     def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[Seen | None]:
-        return [None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)]
+        return [
+            None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)
+        ]
 
     def _begin(self, observation: Observation) -> int:
         """Estimate a pose from this frame alone, all models alike; return how many evaluations that took."""

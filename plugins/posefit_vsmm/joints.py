@@ -109,9 +109,7 @@ def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, 
     return [pair for pair in pairs if pair[0] != AT["head"]], len(lines.ends) - len(pairs)
 
 
-def _elbow(
-    lines: Lines, points: Array, confidence: Array, expected: Array, side: str, gates: Array
-) -> Array | None:
+def _elbow(lines: Lines, points: Array, confidence: Array, expected: Array, side: str, gates: Array) -> Array | None:
     """Return the point of the skeleton line that is as far from the hand as from the shoulder."""
     if not confidence[AT[f"{side} hand"]]:
         return None

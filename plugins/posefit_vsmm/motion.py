@@ -71,7 +71,9 @@ class Library:
 
     models: dict[str, MotionModel]
     reliance: Reliance
-    report: dict[str, dict[str, float]]  # degrees: one and ten steps on clips that were not used, against standing still
+    report: dict[
+        str, dict[str, float]
+    ]  # degrees: one and ten steps on clips that were not used, against standing still
 
     @cached_property
     def names(self) -> tuple[str, ...]:

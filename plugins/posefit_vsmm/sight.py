@@ -67,7 +67,9 @@ class Sight:
         distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
         confidence = np.where(distance < SURPRISE, found.confidence, 0.0)
         dropped = np.count_nonzero((confidence == 0.0) & (found.confidence > 0.0))
-        return Seen(found.points, confidence, variances, found.spare + int(dropped), _surprise(distance, found.confidence))
+        return Seen(
+            found.points, confidence, variances, found.spare + int(dropped), _surprise(distance, found.confidence)
+        )
 
     def measure(self, state: Array, seen: Sequence[Seen | None], known: Array | None) -> Measurement:
         """Return what was detected, less what a state (43,) would show; hidden joints have no row (Reading V9)."""
@@ -85,7 +87,6 @@ class Sight:
             jacobians.append(np.eye(3, ERROR))
             noise.append(np.full(3, KNOWN**2))
         return Measurement(np.concatenate(residuals), np.concatenate(jacobians), np.diag(np.concatenate(noise)))
-
 
 
 def _surprise(distance: Array, confidence: Array) -> float:

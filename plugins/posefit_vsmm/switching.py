@@ -153,7 +153,9 @@ class Contest:
         after = belief.log_probabilities
         before = after - belief.log_likelihoods
         odds = float(np.logaddexp.reduce(after[new]) - np.logaddexp.reduce(after[old]))
-        ratio = odds - float(np.logaddexp.reduce(before[new]) - np.logaddexp.reduce(before[old]))  # of the groups' likelihoods
+        ratio = odds - float(
+            np.logaddexp.reduce(before[new]) - np.logaddexp.reduce(before[old])
+        )  # of the groups' likelihoods
         self.frames += 1
         self.evidence += ratio
         if self.test == "patent":

@@ -100,7 +100,9 @@ def _still(run: Run, k: int) -> Image:
     seen, frame = run.sequence, run.frames[k]
     mask = seen.observations[k].silhouettes[0].mask
     grey = np.where(mask, 150, 28).astype(np.uint8)
-    blank = cv2.cvtColor(cv2.resize(grey, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR)
+    blank = cv2.cvtColor(
+        cv2.resize(grey, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR
+    )
     marked = np.asarray(blank, dtype=np.uint8).copy()
     for point, sure in zip(frame.details["joints"][0], frame.details["confidence"][0], strict=True):
         cv2.circle(marked, _pixel(point), 4, _JOINT if sure > 0.0 else _HIDDEN, -1 if sure > 0.0 else 1, cv2.LINE_AA)

@@ -47,7 +47,11 @@ def test_the_command_brings_back_the_row(tmp_path: Path) -> None:
     cell = cell_of(SMALL | SPECS[0])
     path = os.pathsep.join([str(posefit.parent), os.environ["PATH"]])
     subprocess.run(
-        [bash, "-c", command(cell.spec)], cwd=tmp_path, env={**os.environ, "PATH": path}, check=True, capture_output=True
+        [bash, "-c", command(cell.spec)],
+        cwd=tmp_path,
+        env={**os.environ, "PATH": path},
+        check=True,
+        capture_output=True,
     )
     (row,) = Ledger(tmp_path / "rerun").rows()
     expected = run_cell(cell).row
@@ -57,7 +61,9 @@ def test_the_command_brings_back_the_row(tmp_path: Path) -> None:
     assert row == expected
 
 
-@pytest.mark.parametrize("name", ['a"b', "END", "a\nEND\nrm -rf /", "$(id) `id` 'x' \\", "\x7f\x85\u2028</script>", "é漢"])
+@pytest.mark.parametrize(
+    "name", ['a"b', "END", "a\nEND\nrm -rf /", "$(id) `id` 'x' \\", "\x7f\x85\u2028</script>", "é漢"]
+)
 def test_nothing_in_a_name_ends_the_plan_or_reaches_the_shell(name: str) -> None:
     cell = replace(cells(1)[0], motion=name, train=(name,), settings={f"sapso.{name}": name}, corruption={name: 0.5})
     (found,) = plan_in(command(cell.spec))["cells"]

@@ -1,0 +1,123 @@
+"""What `posefit report` says of a ledger, as data: what was run, who won, how sure that is, and every run."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from posefit.geometry.rotation import Array
+from posefit.geometry.skeleton import JOINTS, PARENTS
+from posefit.sweep import curves
+from posefit.sweep.contest import Contest, baselines, claim, contest_of, leaderboard, pairs, resamples
+from posefit.sweep.figures import COLOURS
+from posefit.sweep.gallery import gallery
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.runs import BASELINES, Runs, runs_of
+
+_DIGITS = {  # of each figure of a row, after the point
+    "error": 3,
+    **{f"skill_{name}": 3 for name in BASELINES},
+    "lost": 3,
+    "swapped": 3,
+    "mpjpe": 1,
+    "iou": 4,
+    "ms": 2,
+    "evaluations": 1,
+}
+
+
+def data_of(ledger: Ledger, say: Callable[[str], None]) -> dict[str, Any]:
+    """Return everything that the page shows. Raises ValueError where the ledger has no finished row."""
+    runs = runs_of(ledger)
+    contest = contest_of(runs)
+    pictures = gallery(ledger, runs, say)
+    return {
+        "header": _header(runs, contest, pictures),
+        "methods": [{"name": name, **about} for name, about in zip(runs.methods, runs.variants, strict=True)],
+        "instances": _instances(runs),
+        "joints": JOINTS,
+        "parents": PARENTS,
+        "colours": len(COLOURS),
+        **(_compared(contest) if contest is not None else {}),
+        "rows": _rows(runs),
+        "heads": runs.heads,
+        "gallery": pictures,
+        "failures": runs.failures,
+    }
+
+
+def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> dict[str, Any]:
+    def all_of(name: str) -> list[str]:
+        return sorted({str(place[name]) for place in runs.places})
+
+    return {
+        "version": runs.version,
+        "versions": sorted({str(one["version"]) for one in runs.variants}),
+        "done": len(runs),
+        "failed": len(runs.failures),
+        "motions": all_of("motion"),
+        "views": sorted({", ".join(f"{view:g}" for view in place["view_degrees"]) for place in runs.places}),
+        "corruptions": sorted(
+            {
+                ", ".join(f"{kind} {share:g}" for kind, share in sorted(place["corruption"].items())) or "none"
+                for place in runs.places
+            }
+        ),
+        "frames": all_of("frames"),
+        "translations": all_of("translation"),
+        "budgets": sorted({int(one["evaluations"]) for one in runs.variants}),
+        "seeds": sorted(set(runs.seed.tolist()))[:50],
+        "hours": float(
+            np.nansum(runs.figures["ms"] * np.array([place["frames"] for place in runs.places])[runs.instance]) / 3.6e6
+        ),
+        "shared": None if contest is None else int(contest.rows.size),
+        "shared_instances": None if contest is None else contest.rows.shape[1],
+        "shared_seeds": None if contest is None else contest.rows.shape[2],
+        "apart": [] if contest is None else [m for m in range(len(runs.methods)) if m not in contest.methods],
+        "resamples": None if contest is None else resamples(contest.rows.size),
+        "pictures": len(pictures["tracks"]),
+    }
+
+
+def _compared(contest: Contest) -> dict[str, Any]:
+    evaluations = curves.grid(contest)
+    enough = len(contest.methods) > 1 and contest.rows[0].size > 1
+    return {
+        "leaderboard": leaderboard(contest),
+        "baselines": baselines(contest),
+        "pairs": pairs(contest) if enough else None,
+        "claim": claim(contest),
+        "taking_part": contest.methods,
+        "evaluations": evaluations,
+        "convergence": [curves.shown(one) for one in curves.convergence(contest, evaluations)],
+        "reached": curves.reached(contest, evaluations) if len(evaluations) else [],
+        "joint_errors": [curves.shown(one) for one in curves.joint_errors(contest)],
+    }
+
+
+def _instances(runs: Runs) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = [
+        {"name": name, "number": place["instance"]} for name, place in zip(runs.instances, runs.places, strict=True)
+    ]
+    for name in BASELINES:
+        for one, value in zip(found, _by_instance(runs, f"baseline_{name}"), strict=True):
+            one[name] = value
+    return found
+
+
+def _by_instance(runs: Runs, figure: str) -> Array:
+    """Return the mean of a figure on each instance (instances,), nan where no row has it."""
+    values = runs.figures[figure]
+    known = np.isfinite(values)
+    count = len(runs.instances)
+    total = np.bincount(runs.instance[known], values[known], minlength=count)
+    met = np.bincount(runs.instance[known], minlength=count)
+    return np.where(met > 0, total / np.maximum(met, 1), np.nan)
+
+
+def _rows(runs: Runs) -> dict[str, Any]:
+    """Return the columns of all rows, short enough for a page of a hundred thousand of them."""
+    columns = {name: getattr(runs, name).tolist() for name in ("method", "instance", "head", "seed")}
+    for name, digits in _DIGITS.items():
+        columns[name] = np.round(runs.figures[name], digits).tolist()
+    return {**columns, "key": [key[:8] for key in runs.keys]}
