@@ -184,7 +184,7 @@ def claim(contest: Contest) -> dict[str, Any] | None:
         "methods": [contest.methods[m] for m in chosen],
         "errors": [middle(one.ravel()) for one in errors],
         "steps": [
-            {"difference": -one.difference, "p": one.p_value, "adjusted": one.adjusted, "by_instance": other.adjusted}
+            {"difference": one.difference, "p": one.p_value, "adjusted": one.adjusted, "by_instance": other.adjusted}
             for one, other in zip(wilcoxon(errors, steps), by_instance, strict=True)
         ],
         "blocks": errors[0].size,
