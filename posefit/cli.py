@@ -154,6 +154,26 @@ def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, 
     context.exit(status)
 
 
+@main.command()
+@click.argument("ledger", metavar="DIR")
+@click.option("--out", required=True, metavar="FILE.html", help="The page; an earlier report is replaced.")
+@click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
+@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
+@click.option("--csv", metavar="FILE", help="New file of all rows.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def report(ledger: str, out: str, as_json: bool, **others: Any) -> None:
+    """Write what a sweep to DIR found as one page that any browser opens, offline.
+
+    It may be written while the sweep goes on, of the cells that are done.
+    """
+    from posefit.sweep.reporting import report as run
+    from posefit.sweep.reporting import told
+
+    found = run(ledger, out, say=_say, **others)
+    for line in [json.dumps(found)] if as_json else told(found):
+        click.echo(line)
+
+
 @main.group()
 def reproduce() -> None:
     """Repeat the experiments of the publications that posefit follows."""

@@ -16,7 +16,7 @@ from posefit.sweep.runs import BASELINES, FIGURES, Runs
 
 SEED = 2013  # of every bootstrap
 WORK = 2e8  # numbers that all resamples of one study may come to
-MOST_PAIRS, MOST_SEEDS = 500, 200  # beyond these, probabilities of improvement have no intervals
+MOST_PAIRS, SEEDS = 500, range(3, 201)  # beyond these, probabilities of improvement have no intervals
 LEAST_SHARE = 0.5  # of the runs of all methods but one, that are shared with it; below, it does not take part
 CLAIM = ("particle@full", "sapso@full", "sapso@pca")  # worst first, as the SAPSO paper has it
 
@@ -142,7 +142,7 @@ def pairs(contest: Contest) -> dict[str, Any]:
     ranking, rng = friedman(errors), np.random.default_rng(SEED)
     better = probability_of_improvement(errors)
     compared = wilcoxon(errors)
-    cheap = len(compared) <= MOST_PAIRS and errors.shape[2] <= MOST_SEEDS
+    cheap = len(compared) <= MOST_PAIRS and errors.shape[2] in SEEDS
     count = resamples(errors[0].size * max(len(compared), 1))
     listed = []
     for one in compared:

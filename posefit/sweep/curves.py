@@ -54,7 +54,7 @@ def reached(contest: Contest, evaluations: Array) -> Array:
     methods, instances, seeds = contest.rows.shape
     found = np.zeros((methods, len(evaluations)))
     for i in range(instances):
-        traces = [contest.runs.traces[k] for k in contest.rows[:, i].ravel()]
+        traces = [contest.runs.traces[int(k)] for k in contest.rows[:, i].ravel()]
         usable = [trace for trace in traces if len(trace[0])]
         if not usable:
             continue
@@ -80,4 +80,4 @@ def shown(curve: Intervals | None) -> dict[str, Any] | None:
 
 
 def _traces(contest: Contest, methods: Any) -> list[Trace]:
-    return [contest.runs.traces[k] for m in methods for k in contest.rows[m].ravel()]
+    return [contest.runs.traces[int(k)] for m in methods for k in contest.rows[m].ravel()]

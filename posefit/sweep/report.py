@@ -12,7 +12,7 @@ from posefit.sweep.contest import Contest, baselines, claim, contest_of, leaderb
 from posefit.sweep.figures import COLOURS
 from posefit.sweep.gallery import gallery
 from posefit.sweep.ledger import Ledger
-from posefit.sweep.runs import BASELINES, Runs, runs_of
+from posefit.sweep.runs import BASELINES, Runs
 
 _DIGITS = {  # of each figure of a row, after the point
     "error": 3,
@@ -26,9 +26,8 @@ _DIGITS = {  # of each figure of a row, after the point
 }
 
 
-def data_of(ledger: Ledger, say: Callable[[str], None]) -> dict[str, Any]:
-    """Return everything that the page shows. Raises ValueError where the ledger has no finished row."""
-    runs = runs_of(ledger)
+def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str, Any]:
+    """Return everything that the page shows of a ledger's runs."""
     contest = contest_of(runs)
     pictures = gallery(ledger, runs, say)
     return {

@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +37,7 @@ _PLACE = ("motion", "view_degrees", "corruption", "instance")  # what is always 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """All rows. Methods are told apart by settings, budget and version; instances by everything but that and the seed."""
+    """All rows. Methods are told apart by settings, budget and version, instances by everything else but the seed."""
 
     version: str
     methods: tuple[str, ...]  # named so that no two are alike, the lowest mean error first

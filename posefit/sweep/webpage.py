@@ -1,4 +1,4 @@
-"""A page that holds everything it needs: markup, style, scripts and data in one file, which asks nobody for anything."""
+"""A page that holds everything it needs, markup, style, scripts and data, and asks nobody for anything."""
 
 import json
 from importlib.resources import files
@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-PARTS = ("base", "tables", "charts", "ranks", "body", "gallery", "author", "main")  # scripts, in this order
+SCRIPTS = ("base", "tables", "charts", "ranks", "body", "gallery", "author", "main")  # in this order
+PART = "<!--part-->"  # where style, data and scripts go
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
 _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
@@ -18,10 +19,22 @@ def document(data: dict[str, Any]) -> str:
     def read(name: str) -> str:
         return (page / name).read_text(encoding="utf-8")
 
-    scripts = "\n".join(read(f"{name}.js") for name in PARTS)
-    before, style, script, end = read("report.html").split("<!--part-->")
-    script = f'{script}<script type="application/json" id="data">{embedded(data)}</script>\n'
-    return f'{MARK}{before}<style>\n{read("report.css")}</style>{style}{script}<script>\n"use strict";\n(() => {{\n{scripts}}})();\n</script>{end}'
+    before, middle, after, end = read("report.html").split(PART)
+    style = f"<style>\n{read('report.css')}</style>"
+    held = f'<script type="application/json" id="data">{embedded(data)}</script>'
+    scripts = "\n".join(read(f"{name}.js") for name in SCRIPTS)
+    return "".join(
+        [
+            MARK,
+            before,
+            style,
+            middle,
+            held,
+            after,
+            f'<script>\n"use strict";\n(() => {{\n{scripts}}})();\n</script>',
+            end,
+        ]
+    )
 
 
 def embedded(value: Any) -> str:

@@ -56,6 +56,10 @@ function chart(width, series, most, label, stepped) {
     svg.append(draw("polygon", { points: [...there, ...back].join(" "), style: `fill: ${colour(m)}`, opacity: 0.13 }));
   }
   for (const { m, values } of series) {
+    if (values.filter(given).length === 1) {
+      const k = values.findIndex(given);
+      svg.append(draw("circle", { cx: x(used[k]) - 3, cy: y(Math.min(values[k], most)), r: 4, style: `fill: ${colour(m)}` }, draw("title", {}, `${METHODS[m]}: ${number(values[k], 3)}`)));
+    }
     let path = "";
     values.forEach((value, k) => {
       if (!given(value)) return;
