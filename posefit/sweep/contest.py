@@ -1,8 +1,8 @@
 """The methods of a sweep held against each other on the runs that they share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from scipy.stats import trim_mean
@@ -15,8 +15,8 @@ from posefit.sweep.ranks import friedman, wilcoxon
 from posefit.sweep.runs import BASELINES, FIGURES, Runs
 
 SEED = 2013  # of every bootstrap
-WORK = 2e8  # numbers that all resamples of one study may come to
-MOST_PAIRS, SEEDS = 500, range(3, 201)  # beyond these, probabilities of improvement have no intervals
+WORK = 1e8  # numbers that the resamples of one study may come to
+LEAST_SEEDS = 3  # below, a probability of improvement has no interval: two seeds say too little
 LEAST_SHARE = 0.5  # of the runs of all methods but one, that are shared with it; below, it does not take part
 CLAIM = ("particle@full", "sapso@full", "sapso@pca")  # worst first, as the SAPSO paper has it
 
@@ -34,6 +34,11 @@ class Contest:
     def of(self, figure: str) -> Array:
         """Return a figure of all runs (methods, instances, seeds)."""
         return np.asarray(self.runs.figures[figure][self.rows])
+
+    def fewer(self, points: int) -> Self:
+        """Return the contest of so few of the first seeds that intervals at so many points are not too much work."""
+        most = WORK / (LEAST_RESAMPLES * max(points, 1) * self.rows[:, :, 0].size)
+        return replace(self, rows=self.rows[:, :, : max(2, int(most))])
 
 
 def contest_of(runs: Runs) -> Contest | None:
@@ -142,12 +147,12 @@ def pairs(contest: Contest) -> dict[str, Any]:
     ranking, rng = friedman(errors), np.random.default_rng(SEED)
     better = probability_of_improvement(errors)
     compared = wilcoxon(errors)
-    cheap = len(compared) <= MOST_PAIRS and errors.shape[2] in SEEDS
-    count = resamples(errors[0].size * max(len(compared), 1))
+    count = int(min(WORK / (errors[0].size * errors.shape[2] * len(compared)), RESAMPLES))
+    bounded = errors.shape[2] >= LEAST_SEEDS and count >= LEAST_RESAMPLES
     listed = []
     for one in compared:
         ends = (np.nan, np.nan)
-        if cheap:
+        if bounded:
             ends = improvement_interval(errors[one.first], errors[one.second], rng, resamples=count)[1:]
         listed.append(
             [one.first, one.second, one.difference, one.p_value, one.adjusted, better[one.first, one.second], *ends]
@@ -161,7 +166,6 @@ def pairs(contest: Contest) -> dict[str, Any]:
         "critical_difference": ranking.critical_difference,
         "cliques": ranking.cliques,
         "pairs": listed,
-        "resamples": count if cheap else None,
     }
 
 

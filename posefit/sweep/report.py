@@ -74,12 +74,14 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
         "shared_seeds": None if contest is None else contest.rows.shape[2],
         "apart": [] if contest is None else [m for m in range(len(runs.methods)) if m not in contest.methods],
         "resamples": None if contest is None else resamples(contest.rows.size),
+        "curve_seeds": None if contest is None else _some(contest).rows.shape[2],
         "pictures": len(pictures["tracks"]),
     }
 
 
 def _compared(contest: Contest) -> dict[str, Any]:
-    evaluations = curves.grid(contest)
+    some = _some(contest)
+    evaluations = curves.grid(some)
     enough = len(contest.methods) > 1 and contest.rows[0].size > 1
     return {
         "leaderboard": leaderboard(contest),
@@ -88,10 +90,15 @@ def _compared(contest: Contest) -> dict[str, Any]:
         "claim": claim(contest),
         "taking_part": contest.methods,
         "evaluations": evaluations,
-        "convergence": [curves.shown(one) for one in curves.convergence(contest, evaluations)],
-        "reached": curves.reached(contest, evaluations) if len(evaluations) else [],
-        "joint_errors": [curves.shown(one) for one in curves.joint_errors(contest)],
+        "convergence": [curves.shown(one) for one in curves.convergence(some, evaluations)],
+        "reached": curves.reached(some, evaluations) if len(evaluations) else [],
+        "joint_errors": [curves.shown(one) for one in curves.joint_errors(some)],
     }
+
+
+def _some(contest: Contest) -> Contest:
+    """Return the contest of the seeds that curves are drawn of: all, but in a sweep of very many."""
+    return contest.fewer(max(curves.POINTS, len(JOINTS)))
 
 
 def _instances(runs: Runs) -> list[dict[str, Any]]:

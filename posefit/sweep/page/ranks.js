@@ -51,7 +51,7 @@ function comparison() {
     { title: "Wilcoxon p", value: row => row.p, show: row => probability(row.p) },
     { title: "p after Holm", about: `Adjusted for all ${P.pairs.length} comparisons`, value: row => row.adjusted, show: row => probability(row.adjusted) },
     { title: "probability of improvement", about: "That a run of the chosen method has the lower error", down: true, value: row => row.better, show: row => number(row.better, 2) },
-    { title: "95 % interval", value: row => row.low, show: row => given(row.low) ? `${number(row.low, 2)} – ${number(row.high, 2)}` : "–" },
+    { title: "95 % interval", about: "From three seeds on, where the runs are not too many", value: row => row.low, show: row => given(row.low) ? `${number(row.low, 2)} – ${number(row.high, 2)}` : "–" },
     { title: "verdict", text: true, value: row => verdict(row), show: row => verdict(row) },
   ], duelsOf(m), { by: 1, name: "Paired tests" });
   show(first);
