@@ -36,9 +36,15 @@ class Contest:
         return np.asarray(self.runs.figures[figure][self.rows])
 
     def fewer(self, points: int) -> Self:
-        """Return the contest of so few of the first seeds that intervals at so many points are not too much work."""
-        most = WORK / (LEAST_RESAMPLES * max(points, 1) * self.rows[:, :, 0].size)
-        return replace(self, rows=self.rows[:, :, : max(2, int(most))])
+        """Return the contest of so few seeds, or instances too, that intervals at so many points are little work.
+
+        The first seeds are kept, and every so many-th instance.
+        """
+        most = int(WORK / (LEAST_RESAMPLES * max(points, 1) * len(self.methods)))  # runs of a method
+        _, instances, seeds = self.rows.shape
+        kept = min(seeds, max(2, most // instances))
+        step = -(-instances * kept // most)
+        return replace(self, instances=self.instances[::step], rows=self.rows[:, ::step, :kept])
 
 
 def contest_of(runs: Runs) -> Contest | None:

@@ -74,7 +74,7 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
         "shared_seeds": None if contest is None else contest.rows.shape[2],
         "apart": [] if contest is None else [m for m in range(len(runs.methods)) if m not in contest.methods],
         "resamples": None if contest is None else resamples(contest.rows.size),
-        "curve_seeds": None if contest is None else _some(contest).rows.shape[2],
+        "drawn": None if contest is None else _some(contest).rows.shape[1:],
         "pictures": len(pictures["tracks"]),
     }
 
@@ -97,7 +97,7 @@ def _compared(contest: Contest) -> dict[str, Any]:
 
 
 def _some(contest: Contest) -> Contest:
-    """Return the contest of the seeds that curves are drawn of: all, but in a sweep of very many."""
+    """Return the contest that curves are drawn of: all of it, but in a sweep of very many runs."""
     return contest.fewer(max(curves.POINTS, len(JOINTS)))
 
 

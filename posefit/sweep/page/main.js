@@ -17,7 +17,7 @@ function header() {
     if (H.shared_seeds === 1) notes.push("One seed says nothing about others: there are no intervals.");
     else if (H.shared / Math.max(D.taking_part.length, 1) < 20) notes.push("Fewer than 20 runs of each method: the intervals are wide.");
     if (H.resamples < 2000) notes.push(`So many runs have ${H.resamples} bootstrap resamples instead of 2,000.`);
-    if (H.curve_seeds < H.shared_seeds) notes.push(`Curves and joints are of the first ${whole(H.curve_seeds)} of ${whole(H.shared_seeds)} seeds.`);
+    if (H.drawn[0] * H.drawn[1] < H.shared_instances * H.shared_seeds) notes.push(`Curves and joints are of ${whole(H.drawn[0])} instances with ${whole(H.drawn[1])} seeds each, not of all.`);
   }
   if (H.budgets.length > 1) notes.push("Budgets differ: compare methods of one budget only.");
   if (H.versions.length > 1) notes.push("Commands run rows again where the same versions are installed.");
