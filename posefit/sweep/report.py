@@ -39,6 +39,7 @@ def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str,
         "colours": len(COLOURS),
         **(_compared(contest) if contest is not None else {}),
         "rows": _rows(runs),
+        "seeds": [_exact(seed) for seed in runs.seeds],
         "heads": runs.heads,
         "gallery": pictures,
         "failures": runs.failures,
@@ -65,7 +66,8 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
         "frames": all_of("frames"),
         "translations": all_of("translation"),
         "budgets": sorted({int(one["evaluations"]) for one in runs.variants}),
-        "seeds": sorted(set(runs.seed.tolist()))[:50],
+        "seeds": [_exact(seed) for seed in runs.seeds[:50]],
+        "seed_count": len(runs.seeds),
         "hours": float(
             np.nansum(runs.figures["ms"] * np.array([place["frames"] for place in runs.places])[runs.instance]) / 3.6e6
         ),
@@ -103,12 +105,18 @@ def _some(contest: Contest) -> Contest:
 
 def _instances(runs: Runs) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = [
-        {"name": name, "number": place["instance"]} for name, place in zip(runs.instances, runs.places, strict=True)
+        {"name": name, "number": _exact(place["instance"])}
+        for name, place in zip(runs.instances, runs.places, strict=True)
     ]
     for name in BASELINES:
         for one, value in zip(found, _by_instance(runs, f"baseline_{name}"), strict=True):
             one[name] = value
     return found
+
+
+def _exact(number: int) -> int | str:
+    """Return a number that a browser does not round: a text, where its floats would."""
+    return number if abs(number) < 2**53 else str(number)
 
 
 def _by_instance(runs: Runs, figure: str) -> Array:
@@ -123,7 +131,7 @@ def _by_instance(runs: Runs, figure: str) -> Array:
 
 def _rows(runs: Runs) -> dict[str, Any]:
     """Return the columns of all rows, short enough for a page of a hundred thousand of them."""
-    columns = {name: getattr(runs, name).tolist() for name in ("method", "instance", "head", "seed")}
+    columns: dict[str, Any] = {name: getattr(runs, name) for name in ("method", "instance", "head", "seed")}
     for name, digits in _DIGITS.items():
-        columns[name] = np.round(runs.figures[name], digits).tolist()
+        columns[name] = np.round(runs.figures[name], digits)
     return {**columns, "key": [key[:8] for key in runs.keys]}

@@ -45,11 +45,11 @@ class Runs:
     instances: tuple[str, ...]  # so named too
     places: tuple[dict[str, Any], ...]  # of each instance: the fields of a spec that make it
     heads: tuple[str, ...]  # what commands that run rows again begin with
-    method: Array  # (n,) of each row, an index
+    method: Array  # (n,) of each row an index, as are the next three
     instance: Array  # (n,)
     head: Array  # (n,)
-    number: Array  # (n,) the instance's number
     seed: Array  # (n,)
+    seeds: tuple[int, ...]  # there are, rising
     keys: tuple[str, ...]
     figures: dict[str, Array] = field(repr=False)  # of each of FIGURES (n,), nan where a row has none
     joint_errors: Array = field(repr=False)  # (n, 27) mm
@@ -82,7 +82,8 @@ class _Table:
         self.places: dict[str, int] = {}
         self.heads: dict[str, int] = {}
         self.known: dict[str, tuple[int, int]] = {}  # variant and head of a spec without instance and seed
-        self.numbers: list[tuple[int, ...]] = []
+        self.numbers: list[tuple[int, int, int]] = []
+        self.seeds: list[int] = []  # of any size, so not for an array
         self.keys: list[str] = []
         self.figures: list[list[float]] = []
         self.joints: list[Array] = []
@@ -98,7 +99,8 @@ class _Table:
         place = _index(
             self.places, _text({name: value for name, value in spec.items() if name not in (*_VARIANT, "seed")})
         )
-        self.numbers.append((variant, place, begun, spec["instance"], spec["seed"]))
+        self.numbers.append((variant, place, begun))
+        self.seeds.append(spec["seed"])
         self.keys.append(row["key"])
         self.figures.append(_figures(row))
         self.joints.append(np.array(row.get("joint_errors_mm") or [np.nan] * len(JOINTS), dtype=np.float32))
@@ -120,31 +122,37 @@ class _Table:
         numbers[:, 0], numbers[:, 1] = np.argsort(best)[numbers[:, 0]], np.argsort(sorted_places)[numbers[:, 1]]
         heads = sorted(range(len(self.heads)), key=list(self.heads).__getitem__)
         numbers[:, 2] = np.argsort(heads)[numbers[:, 2]]
-        order = np.lexsort((numbers[:, 4], numbers[:, 0], numbers[:, 1]))
+        ranks = {seed: k for k, seed in enumerate(sorted(set(self.seeds)))}
+        seeds = np.array([ranks[seed] for seed in self.seeds])
+        order = np.lexsort((seeds, numbers[:, 0], numbers[:, 1]))
         variants, places = [variants[m] for m in best], [places[i] for i in sorted_places]
         methods = _distinct([one["method"] for one in variants], [_variation(one) for one in variants])
-        columns = numbers[order].T
+        method, instance, begun = numbers[order].T
         return Runs(
-            version,
-            methods,
-            tuple({**one, "settings": ", ".join(settings_text(one["settings"]))} for one in variants),
-            _distinct([_place(one) for one in places], [_rest(one) for one in places]),
-            tuple(places),
-            tuple(list(self.heads)[k] for k in heads),
-            *columns,
-            tuple(self.keys[k] for k in order),
-            dict(zip(FIGURES, figures[order].T, strict=True)),
-            np.array(self.joints)[order],
-            tuple(self.traces[k] for k in order),
-            tuple(_failure(one) for one in quarantined),
-            dict(Counter(one["spec"]["method"] for one in quarantined)),
+            version=version,
+            methods=methods,
+            variants=tuple({**one, "settings": ", ".join(settings_text(one["settings"]))} for one in variants),
+            instances=_distinct([_place(one) for one in places], [_rest(one) for one in places]),
+            places=tuple(places),
+            heads=tuple(list(self.heads)[k] for k in heads),
+            method=method,
+            instance=instance,
+            head=begun,
+            seed=seeds[order],
+            seeds=tuple(ranks),
+            keys=tuple(self.keys[k] for k in order),
+            figures=dict(zip(FIGURES, figures[order].T, strict=True)),
+            joint_errors=np.array(self.joints)[order],
+            traces=tuple(self.traces[k] for k in order),
+            failures=tuple(_failure(one) for one in quarantined),
+            failed=dict(Counter(one["spec"]["method"] for one in quarantined)),
         )
 
 
 def _figures(row: Mapping[str, Any]) -> list[float]:
     frames = row["spec"]["frames"]
     skill, baselines = row.get("skill") or {}, row.get("baselines_degrees") or {}
-    values = {
+    values: dict[str, Any] = {
         "error": (row.get("error_degrees") or {}).get("mean"),
         "lost": row.get("lost_rate"),
         "swapped": row.get("swap_rate"),

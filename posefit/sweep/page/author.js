@@ -43,7 +43,7 @@ function author(m) {
   const lost = range(R.key.length).filter(k => R.method[k] === m && (R.lost[k] > 0 || R.swapped[k] > 0));
   table($("tracks"), [
     { title: "instance", text: true, value: k => R.instance[k], show: k => INSTANCES[R.instance[k]] },
-    { title: "seed", value: k => R.seed[k], show: k => String(R.seed[k]) },
+    { title: "seed", value: k => R.seed[k], show: k => String(D.seeds[R.seed[k]]) },
     { title: "lost %", value: k => R.lost[k], show: k => percent(R.lost[k]), down: true },
     { title: "swapped %", value: k => R.swapped[k], show: k => percent(R.swapped[k]), down: true },
     { title: "error °", value: k => R.error[k], show: k => number(R.error[k], 2), down: true },

@@ -57,10 +57,10 @@ function swatch(m) {
 // The command that runs a row again: the beginning that it shares with others, then its instance and seed.
 function commandOf(row) {
   const R = D.rows, place = D.instances[R.instance[row]];
-  return `${D.heads[R.head[row]]}instance = ${place.number}\nseed = ${R.seed[row]}\nEND`;
+  return `${D.heads[R.head[row]]}instance = ${place.number}\nseed = ${D.seeds[R.seed[row]]}\nEND`;
 }
 
-const called = row => `${METHODS[D.rows.method[row]]} on ${INSTANCES[D.rows.instance[row]]}, seed ${D.rows.seed[row]}`;
+const called = row => `${METHODS[D.rows.method[row]]} on ${INSTANCES[D.rows.instance[row]]}, seed ${D.seeds[D.rows.seed[row]]}`;
 
 function showCommand(title, text) {
   $("again-what").textContent = title;

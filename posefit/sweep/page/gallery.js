@@ -41,7 +41,7 @@ function choices(row) {
     const same = here.filter(one => R.method[one] === +$("viewer-method").value);
     openTrack(same.find(one => R.seed[one] === R.seed[show.row]) ?? same[0]);
   });
-  choose($("viewer-seed"), here.filter(one => R.method[one] === R.method[row]).map(one => [String(one), String(R.seed[one])]), String(row), () => openTrack(+$("viewer-seed").value));
+  choose($("viewer-seed"), here.filter(one => R.method[one] === R.method[row]).map(one => [String(one), String(D.seeds[R.seed[one]])]), String(row), () => openTrack(+$("viewer-seed").value));
   choose($("viewer-camera"), scene.cameras.map((_, k) => [String(k), String(k + 1)]), String(show.camera), () => { show.camera = +$("viewer-camera").value; paint(); });
   $("camera-label").hidden = scene.cameras.length < 2;
   $("overlay").parentNode.hidden = !scene.cameras.length;

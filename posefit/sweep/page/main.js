@@ -5,7 +5,7 @@ function header() {
     `${H.failed ? `; ${whole(H.failed)} cells failed` : "; no cell failed"}.`;
   const facts = [
     ["methods", words(METHODS)], ["motions", words(H.motions)], ["views, degrees", words(H.views)], ["corruptions", words(H.corruptions)],
-    ["frames", words(H.frames)], ["translation", words(H.translations)], ["seeds", H.seeds.join(", ")], ["evaluations a frame", H.budgets.map(whole).join("; ")],
+    ["frames", words(H.frames)], ["translation", words(H.translations)], ["seeds", H.seeds.join(", ") + (H.seed_count > H.seeds.length ? `, … (${whole(H.seed_count)})` : "")], ["evaluations a frame", H.budgets.map(whole).join("; ")],
     ["posefit", words(H.versions)], ["time in the loop", H.hours < 0.1 ? `${number(60 * H.hours, 1)} minutes` : `${number(H.hours, 1)} hours`],
   ];
   $("facts").append(...facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));

@@ -74,7 +74,7 @@ function allRows() {
     { title: "method", text: true, value: k => R.method[k], show: k => METHODS[R.method[k]] },
     { title: "settings", text: true, value: k => D.methods[R.method[k]].settings, show: k => D.methods[R.method[k]].settings || "default" },
     { title: "instance", text: true, value: k => R.instance[k], show: k => INSTANCES[R.instance[k]] },
-    column("seed", "seed", String),
+    column("seed", "seed", seed => String(D.seeds[seed])),
     column("error °", "error", value => number(value, 2)),
     ...skills.map(([name, title]) => column(`skill, ${title}`, `skill_${name}`, value => number(value, 2), true)),
     column("lost %", "lost", percent),
