@@ -113,12 +113,8 @@ class _Table:
         error = np.nan_to_num(figures[:, FIGURES.index("error")], nan=np.inf)
         means = [float(np.mean(error[numbers[:, 0] == m])) for m in range(len(variants))]
         best = sorted(range(len(variants)), key=lambda m: (means[m], list(self.variants)[m]))
-        sorted_places = sorted(
-            range(len(places)),
-            key=lambda i: (
-                [str(places[i][name]) for name in _PLACE[:3]] + [f"{places[i]['instance']:09d}", list(self.places)[i]]
-            ),
-        )
+        texts = list(self.places)
+        sorted_places = sorted(range(len(places)), key=lambda i: (_rank(places[i]), texts[i]))
         numbers[:, 0], numbers[:, 1] = np.argsort(best)[numbers[:, 0]], np.argsort(sorted_places)[numbers[:, 1]]
         heads = sorted(range(len(self.heads)), key=list(self.heads).__getitem__)
         numbers[:, 2] = np.argsort(heads)[numbers[:, 2]]
@@ -183,6 +179,12 @@ def _variation(variant: Mapping[str, Any]) -> list[str]:
         f"{variant['evaluations']} evaluations",
         *([foreign] if foreign else []),
     ]
+
+
+def _rank(place: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return what instances are sorted by: the undamaged before the damaged."""
+    damage = sorted(place["corruption"].items())
+    return place["motion"], place["view_degrees"], len(damage), damage, place["instance"]
 
 
 def _place(place: Mapping[str, Any]) -> str:

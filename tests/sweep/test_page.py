@@ -149,7 +149,7 @@ def test_the_gallery_plays_and_the_skeleton_turns(chromium: Any, swept: Path) ->
         assert changes("turning", lambda: page.keyboard.press("+"))
         assert changes("overlay", lambda: page.locator("#frame").fill("3"))
         assert "frame 3: MPJPE" in page.locator("#reading").inner_text()
-        assert changes("overlay", lambda: page.locator("#viewer-camera").select_option(value="1"))
+        assert changes("overlay", lambda: page.locator("#viewer-camera").select_option(index=1))
         page.locator("#viewer-method").select_option(label="random@pca")
         page.locator("#play").click()
         page.wait_for_function("!document.getElementById('reading').textContent.includes('frame 3:')")
