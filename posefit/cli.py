@@ -130,9 +130,10 @@ def bench(threads: int | None, as_json: bool) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 @click.pass_context
 def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, as_json: bool, **where: Any) -> None:
-    """Run the cells of PLAN, a .toml file, or `default`: methods, motions, views, corruptions and seeds.
+    """Run the cells of PLAN: methods, motions, views, corruptions and seeds.
 
-    It may be killed at any moment, and any number of them may work on one DIR: the same command goes on where it was.
+    PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment, and any number of
+    them may work on one DIR: the same command goes on where it was.
     Exit status 1 where cells were quarantined after three attempts, 130 where somebody stopped it.
     """
     from posefit.sweep import command
@@ -152,6 +153,26 @@ def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, 
     tally, status = command.sweep(plan, out, limits=limits, say=_say, **where)
     click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.told(tally, out))
     context.exit(status)
+
+
+@main.command()
+@click.argument("ledger", metavar="DIR")
+@click.option("--out", required=True, metavar="FILE.html", help="The page; an earlier report is replaced.")
+@click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
+@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
+@click.option("--csv", metavar="FILE", help="New file of all rows.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def report(ledger: str, out: str, as_json: bool, **others: Any) -> None:
+    """Write what a sweep to DIR found as one page that any browser opens, offline.
+
+    It may be written while the sweep goes on, of the cells that are done.
+    """
+    from posefit.sweep.reporting import report as run
+    from posefit.sweep.reporting import told
+
+    found = run(ledger, out, say=_say, **others)
+    for line in [json.dumps(found)] if as_json else told(found):
+        click.echo(line)
 
 
 @main.group()

@@ -178,7 +178,7 @@ def parts(method: str) -> tuple[str, str, str | None]:
 
 def settings_text(settings: Mapping[str, Any]) -> list[str]:
     """Return settings as `--set` takes them."""
-    return [f"{name}={_text(value)}" for name, value in settings.items()]
+    return [f"{name}={setting_text(value)}" for name, value in settings.items()]
 
 
 def trace(found: "list[Frame]") -> dict[str, list[float]]:
@@ -251,9 +251,10 @@ def packed(**arrays: "Array") -> bytes:
     return buffer.getvalue()
 
 
-def _text(value: Any) -> str:
+def setting_text(value: Any) -> str:
+    """Return a setting's value as `--set` takes it."""
     if isinstance(value, bool) or value is None:
         return str(value).lower()
     if isinstance(value, list | tuple):
-        return ",".join(_text(one) for one in value)
+        return ",".join(setting_text(one) for one in value)
     return str(value)

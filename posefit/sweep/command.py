@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import sys
 from collections.abc import Callable
 from contextlib import closing
@@ -89,12 +90,15 @@ def engine(workers: int | None, scheduler: str | None, dask_local: int | None, l
 
 
 def told(tally: Tally, out: str) -> str:
-    """Return in a line how a sweep ended."""
+    """Return how a sweep ended, and the command that shows what it found."""
     line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
     if tally.quarantined:
         line += f"; {tally.quarantined} quarantined: the reasons are in {Path(out) / 'quarantine'}"
     if tally.stopped:
         line += "; stopped: the same command goes on from there"
+    elif tally.done:
+        page = shlex.quote(f"{out.rstrip(os.sep)}.html")
+        line += f"\nwhat was found: posefit report {shlex.quote(out)} --out {page}"
     return line
 
 

@@ -20,6 +20,7 @@ An entry of a list of the product is the value of a cell's field, or a table of 
 `posefit.sweep.cell.Cell` for what the fields are.
 """
 
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,6 +42,7 @@ LISTS = {
 }
 TABLES = ("defaults", "product", "cells")
 DEFAULT = "default"  # the name of the plan that posefit brings along
+INPUT = "-"  # the name of a plan that is read from standard input
 MOST = 1_000_000  # cells
 
 
@@ -61,9 +63,14 @@ class Plan:
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
-        """Return the plan of a TOML file, or posefit's own for `default`. Raises ValueError naming the file."""
+        """Return the plan of a TOML file, posefit's own for `default`, or that on standard input for `-`.
+
+        Raises ValueError naming the file.
+        """
         if str(path) == DEFAULT:
             text = (files("posefit.sweep") / "default.toml").read_text(encoding="utf-8")
+        elif str(path) == INPUT:
+            text = sys.stdin.read()
         elif not Path(path).is_file():
             raise ValueError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {_what(Path(path))}")
         else:

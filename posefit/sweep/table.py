@@ -32,10 +32,10 @@ def frame(ledger: "Ledger") -> "pd.DataFrame":
     columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
     count = 0
     for row in ledger.rows():
-        _add(columns, count, _flat(row))
+        _add(columns, count, flat(row))
         count += 1
     for row in ledger.quarantined():
-        _add(columns, count, _flat(row))
+        _add(columns, count, flat(row))
         count += 1
     for values in columns.values():
         values.extend([None] * (count - len(values)))
@@ -51,8 +51,8 @@ def _add(columns: dict[str, list[Any]], count: int, values: Mapping[str, Any]) -
         column.append(value)
 
 
-def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the columns of a row."""
+def flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the columns of a row of a ledger."""
     spec = row["spec"]
     flat: dict[str, Any] = {"key": row["key"], "version": spec["version"], "status": row["status"]}
     flat["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""

@@ -1,0 +1,45 @@
+"""The command that runs one row of a ledger again: a plan of one cell, on standard input."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from posefit.sweep.cell import setting_text
+from posefit.sweep.check import FIELDS
+
+LAST = ("instance", "seed")  # what rows of one head differ by
+_ESCAPES = {'"': '\\"', "\\": "\\\\"}
+
+
+def command(spec: Mapping[str, Any]) -> str:
+    """Return what a shell runs to get the row of a cell's spec again, in the ledger `rerun`."""
+    return head(spec) + "".join(f"{name} = {spec[name]}\n" for name in LAST) + "END"
+
+
+def head(spec: Mapping[str, Any]) -> str:
+    """Return the command up to the lines for the instance and the seed, and the line END, which follow.
+
+    The shell reads the plan as it is, whatever names it holds: each of its lines begins with a field's name.
+    """
+    lines = [f"{name} = {_toml(_plain(name, spec[name]))}\n" for name in FIELDS if name not in LAST]
+    return "posefit sweep - --out rerun <<'END'\n[[cells]]\n" + "".join(lines)
+
+
+def _plain(name: str, value: Any) -> Any:
+    """Return a field's value without null, which TOML has not: settings are read from their text again."""
+    return {one: setting_text(what) for one, what in value.items()} if name == "settings" else value
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_string(name)} = {_toml(one)}" for name, one in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return _string(value) if isinstance(value, str) else str(value)
+
+
+def _string(text: str) -> str:
+    return '"' + "".join(_ESCAPES.get(sign) or _sign(sign) for sign in text) + '"'
+
+
+def _sign(sign: str) -> str:
+    return f"\\u{ord(sign):04x}" if ord(sign) < 32 or 127 <= ord(sign) < 160 or sign in "\u2028\u2029" else sign

@@ -1,0 +1,94 @@
+"""A headless Chromium for tests of pages, and ledgers to show in it."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.sweep.cell import Cell, Result, packed
+from posefit.sweep.driver import Driver
+from posefit.sweep.ledger import QUARANTINE, ROWS, appear
+from posefit.sweep.log import Writer
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+@dataclass
+class Watched:
+    """A page, and what it should not have done."""
+
+    page: Any
+    complaints: list[str] = field(default_factory=list)  # errors and messages on the console
+    requests: list[str] = field(default_factory=list)
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Give a browser; the test is skipped where there is none. POSEFIT_BROWSER names one that is elsewhere."""
+    library = pytest.importorskip("playwright.sync_api", reason="pages need playwright: pip install posefit[browser]")
+    found = os.environ.get("POSEFIT_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip(f"pages need a browser: none of {', '.join(NAMES)} is installed")
+    with library.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        try:
+            yield chromium
+        finally:
+            chromium.close()
+
+
+@contextmanager
+def opened(chromium: Any, path: Path, width: int = 1280, **how: Any) -> Iterator[Watched]:
+    """Give a file's page in a window so many pixels wide, offline."""
+    context = chromium.new_context(viewport={"width": width, "height": 900}, offline=True, **how)
+    watched = Watched(context.new_page())
+    watched.page.on("console", lambda message: watched.complaints.append(message.text))
+    watched.page.on("pageerror", lambda error: watched.complaints.append(str(error)))
+    watched.page.on("request", lambda request: watched.requests.append(request.url))
+    try:
+        watched.page.goto(path.as_uri())
+        yield watched
+    finally:
+        context.close()
+
+
+def result(cell: Cell, error: float, **more: Any) -> Result:
+    """Return a result as large as a real one: a walker on the spot, each joint wrong by the error in centimetres."""
+    skill = dict.fromkeys(("mean_pose", "persistence", "nearest"), 1.0 - error / 4.0)
+    row = {
+        "key": cell.key,
+        "spec": cell.spec,
+        "status": "done",
+        "error_degrees": {"mean": error, "std": 0.0, "max": error},
+        **dict.fromkeys(("geodesic_degrees", "free_error_degrees", "mpjpe_mm", "pa_mpjpe_mm", "cost"), error),
+        **{"iou": 0.9, "swap_rate": 0.0, "lost_rate": 0.0, "held_frames": 0, "skill": skill, "warnings": []},
+        "baselines_degrees": dict.fromkeys(skill, 4.0),
+        "prior_floor_degrees": 0.5,
+        "seconds_per_frame": 0.01,
+        "seconds": 0.01 * cell.frames,
+        "evaluations_used": cell.evaluations * cell.frames,
+        "joint_errors_mm": [error * joint for joint in range(27)],
+        "trace": {"evaluations": [40, 80, 120], "cost": [4.0 * error, 2.0 * error, error]},
+    } | more
+    truth = np.random.default_rng(cell.instance).normal(0.0, 0.3, (4, 27, 3))
+    return Result(row, packed(truth=truth, estimate=truth + 0.01 * error))
+
+
+def ledger(path: Path, results: list[Result], failures: list[tuple[Cell, list[str]]] | None = None) -> Path:
+    """Write a ledger of results and of cells in quarantine with their reasons."""
+    with Driver(path):
+        pass
+    writer = Writer(path / ROWS)
+    for one in results:
+        writer.append(one.row["key"], one.row, one.joints)
+    writer.close()
+    for cell, reasons in failures or []:
+        content = {"key": cell.key, "spec": cell.spec, "status": "quarantined", "reasons": reasons}
+        appear(path / QUARANTINE / f"{cell.key}.json", content)
+    return path
