@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -59,9 +59,15 @@ def opened(chromium: Any, path: Path, width: int = 1280, **how: Any) -> Iterator
 
 
 def result(cell: Cell, error: float, **more: Any) -> Result:
-    """Return a result as large as a real one: a walker on the spot, each joint wrong by the error in centimetres."""
+    """Return a result as large as a real one; of four frames, each joint wrong by the error in centimetres."""
+    truth = np.random.default_rng(cell.instance).normal(0.0, 0.3, (4, 27, 3))
+    return Result(row_of(cell, error, **more), packed(truth=truth, estimate=truth + 0.01 * error))
+
+
+def row_of(cell: Cell, error: float, **more: Any) -> dict[str, Any]:
+    """Return a row as large as a real one, with that error in degrees."""
     skill = dict.fromkeys(("mean_pose", "persistence", "nearest"), 1.0 - error / 4.0)
-    row = {
+    return {
         "key": cell.key,
         "spec": cell.spec,
         "status": "done",
@@ -76,11 +82,9 @@ def result(cell: Cell, error: float, **more: Any) -> Result:
         "joint_errors_mm": [error * joint for joint in range(27)],
         "trace": {"evaluations": [40, 80, 120], "cost": [4.0 * error, 2.0 * error, error]},
     } | more
-    truth = np.random.default_rng(cell.instance).normal(0.0, 0.3, (4, 27, 3))
-    return Result(row, packed(truth=truth, estimate=truth + 0.01 * error))
 
 
-def ledger(path: Path, results: list[Result], failures: list[tuple[Cell, list[str]]] | None = None) -> Path:
+def ledger(path: Path, results: Iterable[Result], failures: list[tuple[Cell, list[str]]] | None = None) -> Path:
     """Write a ledger of results and of cells in quarantine with their reasons."""
     with Driver(path):
         pass

@@ -33,7 +33,7 @@ function author(m) {
   const all = duels.flatMap(row => row.errors.filter(given)).sort((a, b) => a - b), most = all[Math.floor(0.98 * (all.length - 1))] || 1;
   table($("duels"), [
     { title: "instance", text: true, value: row => row.instance, show: row => row.name },
-    { title: "all methods", show: row => dots(row.errors, m, most) },
+    { title: "all methods", text: true, show: row => dots(row.errors, m, most) },
     { title: "error °", value: row => row.mine, show: row => number(row.mine, 2) },
     { title: "rank", value: row => row.rank, show: row => `${row.rank} of ${row.of}` },
     { title: "best other °", value: row => row.least, show: row => given(row.least) ? [number(row.least, 2), make("small", {}, METHODS[row.best])] : "–" },
