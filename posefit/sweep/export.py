@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from posefit import __version__
 from posefit.silhouette.cost import SCALE
-from posefit.sweep.profiles import Trace, trace
 from posefit.study.whole import new_file, new_folder
+from posefit.sweep.profiles import Trace, trace
 
 FORMAT = "0.3.18"  # the IOHexperimenter that the layout is of
 SUITE = "posefit"

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.geometry.rotation import Array
+from posefit.study.whole import new_file
 from posefit.sweep.intervals import Intervals
 from posefit.sweep.ranks import Ranking
-from posefit.study.whole import new_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
