@@ -8,5 +8,6 @@
 
 `plan` says which cells there are, `cell` what a cell is and runs it, `ledger` keeps what cells measured, `driver` is a
 process's right to write to a ledger, `engines` run cells in processes of this machine or on a Dask cluster, and `drive`
-is the loop.
+is the loop. `reporting` writes the page that shows what was found: `runs` are the rows as numbers, `contest` holds
+methods against each other, `curves` and `gallery` are what is drawn, and the folder `page` is the page itself.
 """

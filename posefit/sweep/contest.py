@@ -119,7 +119,7 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
                 "method": m,
                 "name": name,
                 "runs": len(mine),
-                "failed": runs.failed.get(runs.variants[m]["method"], 0),
+                "failed": runs.failed[m],
                 "taking_part": place is not None,
                 "low": low,
                 "high": high,

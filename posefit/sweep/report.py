@@ -55,6 +55,7 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
         "versions": sorted({str(one["version"]) for one in runs.variants}),
         "done": len(runs),
         "failed": len(runs.failures),
+        "unfinished": runs.unfinished,
         "motions": all_of("motion"),
         "views": sorted({", ".join(f"{view:g}" for view in place["view_degrees"]) for place in runs.places}),
         "corruptions": sorted(

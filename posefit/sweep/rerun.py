@@ -20,7 +20,7 @@ def head(spec: Mapping[str, Any]) -> str:
 
     The shell reads the plan as it is, whatever names it holds: each of its lines begins with a field's name.
     """
-    lines = [f"{name} = {_toml(_plain(name, spec[name]))}\n" for name in FIELDS if name not in LAST]
+    lines = [f"{name} = {_toml(_plain(name, spec[name]))}\n" for name in FIELDS if name in spec and name not in LAST]
     return "posefit sweep - --out rerun <<'END'\n[[cells]]\n" + "".join(lines)
 
 

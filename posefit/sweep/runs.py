@@ -55,7 +55,8 @@ class Runs:
     joint_errors: Array = field(repr=False)  # (n, 27) mm
     traces: tuple[tuple[Array, Array], ...] = field(repr=False)  # evaluations and best costs (k,) of each row
     failures: tuple[dict[str, Any], ...] = field(repr=False)  # cells in quarantine: name, reasons, command
-    failed: dict[str, int] = field(repr=False)  # how many of each spec's method are in quarantine
+    failed: tuple[int, ...] = field(repr=False)  # how many cells of each method are in quarantine
+    unfinished: tuple[str, ...]  # methods of which every cell is in quarantine
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -93,7 +94,7 @@ class _Table:
         spec = row["spec"]
         kind = _text({name: value for name, value in spec.items() if name not in LAST})
         if kind not in self.known:
-            variant = _index(self.variants, _text({name: spec[name] for name in _VARIANT}))
+            variant = _index(self.variants, _variant(spec))
             self.known[kind] = variant, _index(self.heads, head(spec))
         variant, begun = self.known[kind]
         place = _index(
@@ -124,6 +125,7 @@ class _Table:
         variants, places = [variants[m] for m in best], [places[i] for i in sorted_places]
         methods = _distinct([one["method"] for one in variants], [_variation(one) for one in variants])
         method, instance, begun = numbers[order].T
+        lost = Counter(_variant(one["spec"]) for one in quarantined)
         return Runs(
             version=version,
             methods=methods,
@@ -141,7 +143,8 @@ class _Table:
             joint_errors=np.array(self.joints)[order],
             traces=tuple(self.traces[k] for k in order),
             failures=tuple(_failure(one) for one in quarantined),
-            failed=dict(Counter(one["spec"]["method"] for one in quarantined)),
+            failed=tuple(lost[text] for text in (list(self.variants)[m] for m in best)),
+            unfinished=tuple(sorted({json.loads(text)["method"] for text in lost if text not in self.variants})),
         )
 
 
@@ -170,6 +173,10 @@ def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:
     name = f"{spec['method']} on {spec['motion']}, instance {spec['instance']}, seed {spec['seed']}"
     tail = "".join(f"{one} = {spec[one]}\n" for one in LAST)
     return {"name": name, "reasons": list(dict.fromkeys(lost["reasons"])), "command": head(spec) + tail + "END"}
+
+
+def _variant(spec: Mapping[str, Any]) -> str:
+    return _text({name: spec[name] for name in _VARIANT})
 
 
 def _variation(variant: Mapping[str, Any]) -> list[str]:

@@ -102,7 +102,10 @@ def test_a_ledger_without_rows_is_refused(tmp_path: Path) -> None:
 def test_failures_keep_their_reasons_and_their_command(tmp_path: Path) -> None:
     made = ledger(tmp_path / "results", [result(FIRST, 1.0)], [(SAPSO, ["slow", "slow", "dead"])])
     found = runs_of(Ledger(made))
-    assert found.failed == {"sapso@pca": 1}
+    other = ledger(tmp_path / "other", [result(SAPSO, 1.0), result(COOLER, 2.0)], [(replace(COOLER, seed=1), ["slow"])])
+    assert runs_of(Ledger(other)).failed == (0, 1)
+    assert found.failed == (0,)
+    assert found.unfinished == ("sapso@pca",)
     assert found.failures[0]["name"] == str(SAPSO)
     assert found.failures[0]["reasons"] == ["slow", "dead"]
     assert 'method = "sapso@pca"' in found.failures[0]["command"]

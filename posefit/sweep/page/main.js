@@ -28,6 +28,7 @@ function header() {
     const most = [...sorts].sort((a, b) => b[1] - a[1]).slice(0, 5);
     $("notes").append(make("div", { class: "note warn" }, `${whole(H.failed)} cells failed, each in every attempt:`, make("ul", {}, ...most.map(([reason, count]) => make("li", {}, `${count} × ${reason}`)))));
   }
+  if (H.unfinished.length) $("notes").append(make("p", { class: "note warn" }, `No cell finished, so not on the leaderboard: ${words(H.unfinished)}.`));
   $("foot").textContent = `posefit ${H.version}. This file holds everything it shows and asks the network for nothing.`;
 }
 
