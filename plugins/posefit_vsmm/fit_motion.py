@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 from sklearn.cluster import KMeans
 from sklearn.covariance import LedoitWolf
 
-from posefit.geometry.rotation import Array, joint_angles_from_rotation
-from posefit.geometry.skeleton import ANGLES
+from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
+from posefit.geometry.skeleton import ANGLES, INNER, MIRROR, angle_index
 from posefit.motion import library
 from posefit.motion.amc import FPS as AMC_FPS
 from posefit.motion.amc import read_clip
@@ -154,8 +154,12 @@ def ahead(model: MotionModel, clip: Recorded, frames: int) -> tuple[float, float
             state = model.step(state)[0]
         errors.append(minus(second, state))
         still.append(minus(second, first))
-    found, stood = (np.array(one)[:, 3:].reshape(len(one), -1, 3) for one in (errors, still))
-    return tuple(float(np.degrees(np.linalg.norm(one, axis=2).mean())) for one in (found, stood))  # type: ignore[return-value]
+    return _mean_degrees(errors), _mean_degrees(still)
+
+
+def _mean_degrees(errors: list[Array]) -> float:
+    turns = np.array(errors)[:, 3:].reshape(-1, 3)
+    return float(np.degrees(np.linalg.norm(turns, axis=1).mean()))
 
 
 def relied(clips: list[Recorded]) -> dict[str, Any]:
@@ -175,9 +179,6 @@ def relied(clips: list[Recorded]) -> dict[str, Any]:
 
 def mirrored_angles(poses: Array) -> Array:
     """Return the poses (n, 66) of the mirror image, left for right."""
-    from posefit.geometry.rotation import rotation_from_joint_angles
-    from posefit.geometry.skeleton import INNER, MIRROR, angle_index
-
     flip = np.diag([-1.0, 1.0, 1.0])
     other = np.zeros((len(poses), ANGLES))
     for joint in INNER:
@@ -193,10 +194,13 @@ def rounded(values: Array) -> Any:
 
 
 def main(root: Path) -> None:
-    """Write models.json beside this file."""
+    """Write models.json beside this file. Raises ValueError where a clip it needs is missing."""
     stored: dict[str, Any] = {}
     every: list[Recorded] = []
     identity = np.vstack([np.zeros((3, STATE - 3)), np.eye(STATE - 3)])
+    for clip in (clip for plan in PLANS.values() for clip in (*plan.fitted, plan.kept)):
+        if not (root / f"{clip.path}.amc").is_file():
+            raise ValueError(f"CMU_DIR must hold {clip.path}.amc, got {root} without it")
     for name, plan in PLANS.items():
         clips = [recorded(root, clip) for clip in plan.fitted]
         clips += [moving(library.built_in(one, frames=DRAWN, fps=AMC_FPS)) for one in plan.drawn]
@@ -227,4 +231,7 @@ if __name__ == "__main__":
     folders = sys.argv[1:] or [folder for folder in [os.environ.get("POSEFIT_CMU")] if folder]
     if len(folders) != 1:
         sys.exit("usage: python -m posefit_vsmm.fit_motion CMU_DIR")
-    main(Path(folders[0]))
+    try:
+        main(Path(folders[0]))
+    except ValueError as error:
+        sys.exit(str(error))
