@@ -189,7 +189,7 @@ def vsmm(seeds: int, searches: bool, out: str | None, as_json: bool) -> None:
     """Stepping, waving, jumping jacks and squats: the experiment of CN101894278, against an IMM over all models."""
     from posefit.study.patent_report import report, table
 
-    figures = report(seeds, searches, out, _progress)
+    figures = report(seeds, searches, out, partial(_progress, unit="run"))
     click.echo(json.dumps(figures) if as_json else table(figures))
     if out and not as_json:
         click.echo(f"written to {out}: look at figure-9-joints.png, figure-10-probabilities.png, figure-11-errors.png")
