@@ -292,6 +292,10 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     from posefit.study.run import prior_of
     from posefit.study.segment import Extraction
 
+    context = click.get_current_context()
+    for name in ("optimiser", "prior"):
+        if options["tracker"] and context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
+            raise ValueError(f"{name} must not be given beside a tracker, got {options[name]} and {options['tracker']}")
     how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
     options["extraction"] = Extraction(method=options["extraction"], **how)
     options["source"] = options["source"] or ("walk",)

@@ -54,7 +54,7 @@ def table(figures: Mapping[str, Any]) -> str:
     """Return the figures as a table: a row a method, the means over seeds."""
     rows: dict[str, Mapping[str, Any]] = {"vsmm": figures}
     rows |= {name: one for name, one in figures.items() if isinstance(one, Mapping)}
-    lines = ["  ".join([f"{figures['seeds']:.0f} seeds".ljust(12), *(label.rjust(10) for _, label, _ in _COLUMNS)])]
+    lines = ["  ".join([f"seeds: {figures['seeds']:.0f}".ljust(12), *(label.rjust(10) for _, label, _ in _COLUMNS)])]
     for name, row in rows.items():
         cells = [f"{row[key]:.{digits}f}" if key in row else "-" for key, _, digits in _COLUMNS]
         lines.append("  ".join([name.ljust(12), *(cell.rjust(10) for cell in cells)]))

@@ -97,6 +97,8 @@ def new(name: str, kind: Kind, folder: str | Path | None = None) -> Path:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise ValueError(f"name must be small letters, digits, - and _, and begin with a letter, got {name!r}")
+    if name in (known := registry().offers[kind]):
+        raise ValueError(f"name must be a new one, got {name!r}, which {known[name].distribution} registers already")
     module = name.replace("-", "_")
     words = {
         "name": name,

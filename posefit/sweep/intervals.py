@@ -17,6 +17,7 @@ TRIMMED = 0.25  # share of the runs left out at either end
 LEVEL = 0.95
 RESAMPLES = 2000
 LEAST_RESAMPLES = 100
+LEAST_RUNS = 8  # of a method; the middle half of fewer has hardly any spread of its own
 _BLOCK = 1 << 14  # numbers worked on at once, which a core's cache holds
 
 
@@ -52,14 +53,14 @@ def iqm_intervals(
     skewed, heavy-tailed or those of runs of which some got lost. Fewer than 20 runs make it wide; it never reaches
     beyond the lowest and the highest run.
 
-    One seed says nothing about others: low and high are nan. Every method has the same resamples, so that its interval
-    does not depend on which others there are. Raises ValueError where errors are not finite or not of that shape,
-    `resamples` is below 100 or `level` not between 0 and 1.
+    One seed says nothing about others, and fewer than 8 runs too little: low and high are nan. Every method has the
+    same resamples, so that its interval does not depend on which others there are. Raises ValueError where errors are
+    not finite or not of that shape, `resamples` is below 100 or `level` not between 0 and 1.
     """
     found = checked("errors", errors, ("methods", "instances", "seeds"))
     check_bootstrap(resamples, level)
     values, seeds = iqm(found), found.shape[2]
-    if seeds == 1:
+    if seeds == 1 or found[0].size < LEAST_RUNS:
         return Intervals(values, np.full(len(found), np.nan), np.full(len(found), np.nan))
     pivots = np.empty((len(found), resamples))
     strata = np.arange(found.shape[1])[:, None]

@@ -15,7 +15,7 @@ from posefit.sweep.ranks import LEVEL, holm, wilcoxon
 FALLEN = 0.95  # share of the fall of the cost at which a search counts as converged; the paper gives no measure
 SWAPPED = 0.01  # share of frames with left and right swapped that still counts as none
 
-Verdict = Literal["confirmed", "not confirmed", "not contradicted", "the opposite holds"]
+Verdict = Literal["confirmed", "not confirmed", "not contradicted", "the opposite holds", "undecided"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def _judged(pairs: Sequence[_Pair]) -> list[Claim]:
         Claim(
             pair.text,
             pair.source,
-            _borne_out(test.difference < 0.0) if p < LEVEL and test.difference else "not confirmed",
+            _judgement(test.difference, p, pair.errors[0].size, len(pairs)),
             f"median difference {test.difference:+.3g} {pair.unit}, Wilcoxon p = {test.p_value:.2g}, "
             f"{p:.3g} after Holm for {len(pairs)} tests, {_counted(pair.errors[0].size, len(pairs))}",
         )
@@ -64,14 +64,21 @@ def _judged(pairs: Sequence[_Pair]) -> list[Claim]:
     ]
 
 
-def _borne_out(lower: bool) -> Verdict:
-    return "confirmed" if lower else "the opposite holds"
+def _judgement(difference: float, p: float, pairs: int, tests: int) -> Verdict:
+    if not _enough(pairs, tests):
+        return "undecided"
+    if p >= LEVEL or not difference:
+        return "not confirmed"
+    return "confirmed" if difference < 0.0 else "the opposite holds"
+
+
+def _enough(pairs: int, tests: int) -> bool:
+    """Return whether so many pairs can confirm anything: all signed ranks of one sign, and Holm's largest factor."""
+    return 2.0 ** (1 - pairs) * tests < LEVEL
 
 
 def _counted(pairs: int, tests: int) -> str:
-    """Return how many pairs there are, and whether so many can confirm anything at all."""
-    least = 2.0 ** (1 - pairs) * tests  # all signed ranks of one sign, and Holm's largest factor
-    return f"{pairs} pairs" + ("" if least < LEVEL else ", too few to confirm anything")
+    return f"{pairs} pairs" + ("" if _enough(pairs, tests) else ", too few to confirm anything")
 
 
 def _told(good: bool) -> Verdict:

@@ -315,3 +315,11 @@ def test_reproduce_says_what_seeds_must_be() -> None:
     result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "0"])
     assert result.exit_code == 2
     assert result.output.splitlines()[-1] == "posefit: seeds must be at least 1, got 0"
+
+
+@pytest.mark.parametrize("option", [("--optimiser", "cma"), ("--prior", "full"), ("--optimiser", "sapso")])
+def test_an_optimiser_or_a_prior_beside_a_tracker_is_refused(option: tuple[str, str]) -> None:
+    result = CliRunner().invoke(main, ["track", "walk", "--tracker", "vsmm", *option])
+    assert result.exit_code == 2
+    said = f"posefit: {option[0][2:]} must not be given beside a tracker, got {option[1]} and vsmm"
+    assert result.output.splitlines()[-1] == said

@@ -144,7 +144,7 @@ def test_every_claim_of_the_paper_has_a_verdict_on_one_line(told: dict[str, Any]
         assert f"  {one['verdict']}: {one['text']}{end}: {one['evidence']}" in lines
     tested = [one for one in told["claims"] if "Wilcoxon" in one["evidence"] and "after Holm" in one["evidence"]]
     assert len(tested) == 16
-    assert all(one["verdict"] == "not confirmed" for one in tested)  # two pairs confirm nothing
+    assert all(one["verdict"] == "undecided" for one in tested)  # two pairs confirm nothing
     assert all("too few to confirm anything" in one["evidence"] for one in tested)
 
 

@@ -103,7 +103,7 @@ def test_curves_start_and_end_with_the_traces(tmp_path: Path) -> None:
     assert curve is not None
     assert curve.values[0] == pytest.approx(4.0 * 1.055, rel=1e-6)  # of 1, 1.01, 1.1, 1.11 the middle two, times 4
     assert curve.values[-1] == pytest.approx(1.055, rel=1e-6)
-    assert (curve.low <= curve.values).all()
+    assert np.isnan(curve.low).all()  # of four runs
     shares = reached(found, evaluations)
     assert (np.diff(shares) >= 0.0).all()
     assert (shares[0] >= shares[1]).all()

@@ -90,8 +90,16 @@ def test_a_method_without_chance_has_an_interval_of_no_width():
 
 
 def test_few_runs_give_a_finite_interval_within_the_runs():
-    found = iqm_intervals([[[1.0, 2.0]]], np.random.default_rng(0))
-    assert (found.low[0], found.values[0], found.high[0]) == (1.0, 1.5, 2.0)
+    found = iqm_intervals([[[1.0, 2.0, 1.5, 3.0, 2.5, 1.0, 2.0, 8.0]]], np.random.default_rng(0))
+    assert found.values[0] == 2.0  # the mean of 1.5, 2, 2, 2.5
+    assert 1.0 <= found.low[0] < 2.0 < found.high[0] <= 8.0
+
+
+def test_fewer_than_eight_runs_give_no_interval():
+    # by the formula the middle half, 0.88 and 1.1, would have no spread within its instances, and the interval no width
+    found = iqm_intervals([[[0.84, 0.88], [1.1, 1.17]]], np.random.default_rng(0))
+    assert found.values[0] == pytest.approx(0.99)
+    assert np.isnan([found.low[0], found.high[0]]).all()
 
 
 def test_one_seed_gives_no_interval():

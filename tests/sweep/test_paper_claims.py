@@ -88,7 +88,7 @@ def test_less_time_is_paired_too(found: list[Claim]) -> None:
 
 def test_few_pairs_confirm_nothing_and_say_so() -> None:
     one = of(claims(results(seeds=3)), "SAPSO errs less than PF on the walk")
-    assert one.verdict == "not confirmed"
+    assert one.verdict == "undecided"
     assert "3 pairs, too few to confirm anything" in one.evidence
 
 

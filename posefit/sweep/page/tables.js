@@ -71,6 +71,7 @@ function allRows() {
   const rows = range(R.key.length).filter(k => (method === "" || R.method[k] === +method) && (instance === "" || R.instance[k] === +instance));
   const column = (title, name, shown, down) => ({ title, down, value: k => R[name][k], show: k => shown(R[name][k]) });
   table($("all-rows"), [
+    { title: "", text: true, show: k => [...watch(k), again(k)] },
     { title: "method", text: true, value: k => R.method[k], show: k => METHODS[R.method[k]] },
     { title: "settings", text: true, value: k => D.methods[R.method[k]].settings, show: k => D.methods[R.method[k]].settings || "default" },
     { title: "instance", text: true, value: k => R.instance[k], show: k => INSTANCES[R.instance[k]] },
@@ -84,8 +85,7 @@ function allRows() {
     column("ms a frame", "ms", value => number(value, 1)),
     column("evaluations a frame", "evaluations", value => given(value) ? whole(value) : "–"),
     { title: "key", text: true, value: k => R.key[k], show: k => R.key[k] },
-    { title: "", text: true, show: k => [...watch(k), again(k)] },
-  ], rows, { by: 4, name: "All runs" });
+  ], rows, { by: 5, name: "All runs" });
 }
 
 function failures() {
