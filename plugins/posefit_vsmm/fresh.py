@@ -7,7 +7,7 @@ import numpy as np
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import Array
-from posefit.silhouette.cost import BETA, areas, mismatch
+from posefit.silhouette.cost import areas, mismatch
 from posefit_vsmm.motion import MotionModel, product
 from posefit_vsmm.state import ERROR, Reliance, decode, encode, free_errors, minus, plus
 
@@ -22,8 +22,8 @@ SPREADS = np.radians([20.0, 12.0, 7.0, 4.0])  # of the draws, one a round, the l
 class Matcher:
     """Compares states with one observation."""
 
-    def __init__(self, task: Task, observation: Observation, reliance: Reliance, beta: float = BETA) -> None:
-        self._task, self._observation, self._reliance, self._beta = task, observation, reliance, beta
+    def __init__(self, task: Task, observation: Observation, reliance: Reliance) -> None:
+        self._task, self._observation, self._reliance = task, observation, reliance
         self.free = free_errors(task.body.skeleton)
         self.evaluations = 0
 
@@ -37,7 +37,7 @@ class Matcher:
             places = align(task.body, task.cameras, seen.silhouettes, poses, places)
         costs = np.mean(
             [
-                mismatch(areas(task.body, camera, silhouette, poses, places, task.threads), self._beta)
+                mismatch(areas(task.body, camera, silhouette, poses, places, task.threads))
                 for camera, silhouette in zip(task.cameras, seen.silhouettes, strict=True)
             ],
             axis=0,

@@ -127,15 +127,16 @@ def restricted(belief: Belief, models: Sequence[str], kept: Sequence[str]) -> Be
 class Contest:
     """Step 9: an old group of models against a new one, until one of them has to go.
 
-    `sequential` is Wald's test with error rates `alpha` and `beta` on the likelihood ratio since the new group came;
-    `patent` looks at the latest frame alone (Reading V12). After `longest` frames the more probable group stays.
+    `sequential` is Wald's test on the likelihood ratio since the new group came, with error rates `false_alarm`, his
+    alpha, and `miss`, his beta; `patent` looks at the latest frame alone (Reading V12). After `longest` frames the more
+    probable group stays.
     """
 
     old: Sequence[str]
     new: Sequence[str]
     test: Test = "sequential"
-    alpha: float = 0.01
-    beta: float = 0.01
+    false_alarm: float = 0.01
+    miss: float = 0.01
     longest: int = 45
     evidence: float = 0.0
     frames: int = 0
@@ -143,7 +144,7 @@ class Contest:
     def __post_init__(self) -> None:
         if self.test not in get_args(Test):
             raise ValueError(f"test must be one of {', '.join(get_args(Test))}, got {self.test!r}")
-        for name in ("alpha", "beta"):
+        for name in ("false_alarm", "miss"):
             if not 0.0 < getattr(self, name) < 0.5:
                 raise ValueError(f"{name} must be between 0 and 0.5, got {getattr(self, name)}")
         if self.longest < 1:
@@ -164,9 +165,9 @@ class Contest:
             if min(odds, ratio) < np.log(0.9):  # VSMM 9
                 return "old"
             return "new" if min(odds, ratio) > 0.0 else None
-        if self.evidence >= np.log((1.0 - self.beta) / self.alpha):
+        if self.evidence >= np.log((1.0 - self.miss) / self.false_alarm):
             return "new"
-        if self.evidence <= np.log(self.beta / (1.0 - self.alpha)):
+        if self.evidence <= np.log(self.miss / (1.0 - self.false_alarm)):
             return "old"
         if self.frames >= self.longest:
             return "new" if odds > 0.0 else "old"

@@ -39,17 +39,17 @@ def vsmm(
     dwell: int = Rules.dwell,
     new: New = "rerun",
     test: Test = "sequential",
-    alpha: float = Contest.alpha,
-    beta: float = Contest.beta,
+    false_alarm: float = Contest.false_alarm,
+    miss: float = Contest.miss,
     longest: int = Contest.longest,
 ) -> VSMM:
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
     `structure` "all" is a plain IMM over all models. `groups` is a TOML file of groups, by default the package's.
-    `shrink` is Reading V5; `smoothing`, `floor_degrees` and `dwell` are V10; `new` is V11; `test`, `alpha`, `beta` and
-    `longest` are V12. The patent's own form: smoothing=1 floor_degrees=0 dwell=0 new=patent test=patent.
+    `shrink` is Reading V5; `smoothing`, `floor_degrees` and `dwell` are V10; `new` is V11; `test`, `false_alarm`, `miss`
+    and `longest` are V12. The patent's own form: smoothing=1 floor_degrees=0 dwell=0 new=patent test=patent.
     """
     carried = library(shrink)
     topology = read_topology(Path(groups) if groups else None, carried.names)
-    contest = Contest((), (), test, alpha, beta, longest)
+    contest = Contest((), (), test, false_alarm, miss, longest)
     return VSMM(task, Settings(carried, topology, structure, Rules(smoothing, floor_degrees, dwell), new, contest))

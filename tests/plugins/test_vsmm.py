@@ -191,7 +191,8 @@ def test_a_file_of_groups_that_is_not_there_is_one_line_and_status_2(tmp_path: P
         ("structure=some", "structure must be"),
         ("new=old", "new must be"),
         ("test=coin", "test must be"),
-        ("alpha=0.7", "alpha must be between 0 and 0.5, got 0.7"),
+        ("false_alarm=0.7", "false_alarm must be between 0 and 0.5, got 0.7"),
+        ("miss=0.0", "miss must be between 0 and 0.5, got 0.0"),
         ("smoothing=0", "smoothing must be at least 1, got 0"),
         ("dwell=-1", "dwell must be 0 or more, got -1"),
         ("floor_degrees=-1.0", "floor_degrees must be 0 or more, got -1.0"),
@@ -250,7 +251,6 @@ def test_it_follows_motion_capture(cmu: Path) -> None:
         cmu / "14" / "14_06.amc", tracker="vsmm", frames=(0, 60), view_degrees=0.0, translation="aligned"
     )
     assert found.summary["iou"] > 0.55
-    assert found.summary["seconds_per_frame"] < 1.0
 
 
 def test_it_writes_what_a_track_writes(tmp_path: Path) -> None:
@@ -288,17 +288,15 @@ def test_no_motion_of_the_experiment_was_learned_from() -> None:
     assert not tested & {name for plan in PLANS.values() for name in plan.drawn}
 
 
-def test_the_report_is_whole_or_not_there(tmp_path: Path) -> None:
+def test_the_figures_are_drawn(tmp_path: Path, experiment: patent.Run) -> None:
     pytest.importorskip("matplotlib")
     from posefit.study import patent_figures
 
-    sequence = activities.sequence(0)
-    run = patent.run(patent.METHODS["vsmm"], sequence, 0)
-    names = patent_figures.draw(run, tmp_path)
+    names = patent_figures.draw(experiment, tmp_path)
+    assert names == ["figure-9-joints.png", "figure-10-probabilities.png", "figure-11-errors.png"]
     assert all((tmp_path / name).stat().st_size > 10_000 for name in names)
 
 
-@pytest.mark.slow
 def test_reproduce_prints_the_figures_as_json(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "1", "--json"])
     assert result.exit_code == 0

@@ -15,11 +15,11 @@ from posefit_vsmm.fit_motion import LAMBDA, ridge
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import Belief, Measurement, start
 from posefit_vsmm.joints import detected
-from posefit_vsmm.motion import MotionModel, library
+from posefit_vsmm.motion import library
 from posefit_vsmm.points import AT, POINTS, Figure, points_of
 from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.shown import Shown
-from posefit_vsmm.state import ERROR, HELD_ANGLES, MANIFOLD, decode, encode, minus, plus
+from posefit_vsmm.state import ERROR, HELD_ANGLES, decode, encode, minus, plus
 from posefit_vsmm.structure import FIRST, Models, Settings
 from posefit_vsmm.switching import Contest, Rules, enlarged, joined, limb_angles, restricted
 
@@ -472,5 +472,3 @@ def test_the_body_and_its_models_fit_any_frame_rate() -> None:
     whole, half = (minus(one.step(state)[0], state) for one in (slow, fast))
     assert np.allclose(whole, 2.0 * half, atol=2e-3)
     assert np.allclose(slow.noise, 2.0 * fast.noise)
-    assert isinstance(slow, MotionModel)
-    assert MANIFOLD.plus is plus
