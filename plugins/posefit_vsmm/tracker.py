@@ -46,8 +46,8 @@ def vsmm(
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
     `structure` "all" is a plain IMM over all models. `groups` is a TOML file of groups, by default the package's.
-    `shrink` is Reading V5; `smoothing`, `floor_degrees` and `dwell` are V10; `new` is V11; `test`, `false_alarm`, `miss`
-    and `longest` are V12. The patent's own form: smoothing=1 floor_degrees=0 dwell=0 new=patent test=patent.
+    `shrink` is Reading V5; `smoothing`, `floor_degrees` and `dwell` are V10; `new` is V11; `test`, `false_alarm`,
+    `miss` and `longest` are V12. The patent's own form: smoothing=1 floor_degrees=0 dwell=0 new=patent test=patent.
     """
     carried = library(shrink)
     topology = read_topology(Path(groups) if groups else None, carried.names)
