@@ -29,16 +29,16 @@ if TYPE_CHECKING:
     from posefit.fitting.tracker import SynthesisTracker as SynthesisTracker
     from posefit.fitting.tracker import Task as Task
     from posefit.fitting.tracker import Tracker as Tracker
+    from posefit.footage.segmentation import Extraction as Extraction
     from posefit.geometry.body import Body as Body
     from posefit.geometry.camera import Camera as Camera
     from posefit.geometry.skeleton import Skeleton as Skeleton
     from posefit.motion.motion import Motion as Motion
     from posefit.silhouette.mask import Silhouette as Silhouette
-    from posefit.study.run import Fit as Fit
-    from posefit.study.run import Track as Track
-    from posefit.study.run import fit as fit
-    from posefit.study.run import track as track
-    from posefit.study.segment import Extraction as Extraction
+    from posefit.tracking.run import Fit as Fit
+    from posefit.tracking.run import Track as Track
+    from posefit.tracking.run import fit as fit
+    from posefit.tracking.run import track as track
 
 __version__ = "0.1.0"
 hookimpl = HookimplMarker("posefit")
@@ -55,8 +55,8 @@ _HOMES = {
     "fitting.problem": ("PoseProblem",),
     "fitting.space": ("SearchSpace",),
     "fitting.tracker": ("Frame", "Observation", "SynthesisTracker", "Task", "Tracker"),
-    "study.run": ("Fit", "Track", "fit", "track"),
-    "study.segment": ("Extraction",),
+    "tracking.run": ("Fit", "Track", "fit", "track"),
+    "footage.segmentation": ("Extraction",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = ["__version__", "hookimpl", *_HOME]

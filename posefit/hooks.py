@@ -4,11 +4,11 @@ from typing import Any, Protocol
 
 from pluggy import HookspecMarker
 
+from posefit.entries import PROJECT
 from posefit.fitting.optimiser import NextFrame, OptimiserFactory
 from posefit.fitting.prior import PriorFactory
 from posefit.fitting.tracker import TrackerFactory
 
-PROJECT = "posefit"
 hookspec = HookspecMarker(PROJECT)
 
 # The module a factory imports when it is called, and what to install where it is absent: ("cma", "posefit[pycma]").

@@ -1,13 +1,7 @@
-"""Finds plugins and what they offer. A broken plugin costs one warning; the others work on.
-
-Environment variables, as in other plugin hosts: POSEFIT_LOAD_PLUGINS names the only ones to load beside the built-ins
-(none where it is empty), POSEFIT_BLOCK_PLUGINS those to leave out, each by plugin or distribution and separated by
-commas; POSEFIT_STRICT_PLUGINS=1 turns the warning into an error.
-"""
+"""What plugins offer, by kind and name: optimisers, priors and trackers."""
 
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -16,9 +10,8 @@ from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import Any, Literal, get_args
 
-import pluggy
-
-from posefit import hooks
+from posefit import entries, hooks
+from posefit.entries import PROJECT, Plugin
 from posefit.fitting.optimiser import NextFrame, OptimiserFactory
 from posefit.fitting.prior import PriorFactory
 from posefit.fitting.tracker import TrackerFactory
@@ -26,7 +19,6 @@ from posefit.settings import Setting, settings_of
 
 Kind = Literal["optimiser", "prior", "tracker"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 
 
@@ -64,22 +56,10 @@ class Offer:
 
 
 @dataclass(frozen=True)
-class Plugin:
-    """One entry point, and what became of it."""
-
-    name: str
-    distribution: str
-    version: str
-    state: Literal["loaded", "broken", "left out"]
-    cause: str = ""
-    offers: tuple[Offer, ...] = ()
-
-
-@dataclass(frozen=True)
 class Registry:
     """Everything that plugins registered, by kind and name."""
 
-    plugins: tuple[Plugin, ...]
+    plugins: tuple[Plugin[Offer], ...]
 
     @property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
@@ -131,72 +111,21 @@ class Registry:
 @lru_cache(maxsize=1)
 def registry() -> Registry:
     """Return what all installed plugins offer; they are loaded once a process."""
-    return load(entry_points(group=hooks.PROJECT))
+    return load(entry_points(group=PROJECT))
 
 
 def load(points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ) -> Registry:
-    """Return what the plugins behind these entry points offer.
-
-    Each plugin that cannot be imported, misspells a hook, fails inside one or takes a name that is taken is warned
-    of, with its distribution, and left out. Raises ValueError instead where POSEFIT_STRICT_PLUGINS is set.
-    """
-    plugins: list[Plugin] = []
-    for point in sorted(points, key=_built_ins_first):
-        plugin = _plugin(point, variables, [offer for before in plugins for offer in before.offers])
-        plugins.append(plugin)
-        if plugin.state == "broken":
-            message = f"plugin {plugin.name!r} of {plugin.distribution} {plugin.version} is left out: {plugin.cause}"
-            if variables.get(STRICT, "0") not in ("", "0"):
-                raise ValueError(message)
-            warnings.warn(message, stacklevel=2)
-    return Registry(tuple(plugins))
+    """Return what the plugins behind these entry points offer; see `posefit.entries.load`."""
+    return Registry(entries.load(points, hooks, _offers, _named, variables))
 
 
-def _built_ins_first(point: EntryPoint) -> tuple[bool, str]:
-    return point.dist is None or point.dist.name != hooks.PROJECT, point.name
+def _named(offer: Offer) -> str:
+    return f"{offer.kind} {offer.name!r}"
 
 
-def _plugin(point: EntryPoint, variables: Mapping[str, str], taken: Iterable[Offer]) -> Plugin:
-    distribution, version = (point.dist.name, point.dist.version) if point.dist else ("unknown", "")
-    reason = _left_out(point.name, distribution, variables)
-    if reason:
-        return Plugin(point.name, distribution, version, "left out", reason)
-    owners = {(offer.kind, offer.name): offer.distribution for offer in taken}
-    try:
-        mine = []
-        for one in _registered(point):
-            offer = Offer(*one[:3], distribution, version, **one[3])
-            key = offer.kind, offer.name
-            if key in owners:
-                raise ValueError(f"{offer.kind} {offer.name!r} is already registered by {owners[key]}")
-            owners[key] = distribution
-            mine.append(offer)
-    except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
-        return Plugin(point.name, distribution, version, "broken", f"{type(error).__name__}: {error}")
-    return Plugin(point.name, distribution, version, "loaded", offers=tuple(mine))
-
-
-def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:
-    """Return why the variables leave a plugin out, or nothing."""
-
-    def chosen(variable: str) -> bool:
-        words = {word.strip().lower() for word in variables[variable].split(",")}
-        return bool(words & {name.lower(), distribution.lower()})
-
-    if BLOCK in variables and chosen(BLOCK):
-        return f"{BLOCK} names it"
-    if LOAD in variables and distribution != hooks.PROJECT and not chosen(LOAD):
-        return f"{LOAD} does not name it"
-    return ""
-
-
-def _registered(point: EntryPoint) -> Iterator[tuple[Kind, str, Callable[..., Any], dict[str, Any]]]:
-    """Yield kind, name, factory and the rest of everything one plugin registers."""
-    manager = pluggy.PluginManager(hooks.PROJECT)
-    manager.add_hookspecs(hooks)
-    manager.register(point.load(), point.name)
-    manager.check_pending()
-    mine: list[tuple[Kind, str, Callable[..., Any], dict[str, Any]]] = []
+def _offers(relay: Any, distribution: str, version: str) -> Iterator[Offer]:
+    """Yield everything that one plugin registers."""
+    mine: list[Offer] = []
 
     def register(kind: Kind, name: str, factory: Callable[..., Any], **more: Any) -> None:
         if not isinstance(name, str) or not _NAME.fullmatch(name):
@@ -205,8 +134,8 @@ def _registered(point: EntryPoint) -> Iterator[tuple[Kind, str, Callable[..., An
             raise TypeError(f"{kind} {name!r} must be a factory that can be called, got {factory!r}")
         if more.get("next_frame", "start") not in get_args(NextFrame):
             raise ValueError(f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}")
-        mine.append((kind, name, factory, more))
+        mine.append(Offer(kind, name, factory, distribution, version, **more))
 
     for kind in KINDS:
-        getattr(manager.hook, f"posefit_register_{kind}s")(register=partial(register, kind))
+        getattr(relay, f"posefit_register_{kind}s")(register=partial(register, kind))
     yield from mine

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import error, spaces
 from numpy.typing import NDArray
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit_envs.drawing import MODES, Screen, check_mode, draw
 from posefit_envs.fit import Episode
 from posefit_envs.instance import Arguments, measured, select

@@ -7,9 +7,9 @@ import numpy as np
 from gymnasium import error
 from numpy.typing import NDArray
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.silhouette.cost import project
-from posefit.study.picture import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, side_view
+from posefit.tracking.picture import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, side_view
 from posefit_envs.search import Scenery
 
 MODES = ("rgb_array", "human")

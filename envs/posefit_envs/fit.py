@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import error, spaces
 
 from posefit import SearchSpace
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit_envs.drawing import MODES, Screen, check_mode, draw
 from posefit_envs.instance import Arguments, Instance, World, instance, measured, select
 from posefit_envs.search import Doorkeeper, Image, Outcome, look

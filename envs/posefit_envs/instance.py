@@ -9,14 +9,14 @@ import numpy as np
 from gymnasium import error
 
 from posefit import Body, Camera, Motion, Observation, SearchSpace, Silhouette, Task
+from posefit.arrays import Array
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
+from posefit.footage.source import motion_of
 from posefit.geometry.body import varied
-from posefit.geometry.rotation import Array
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
-from posefit.study.source import motion_of
 from posefit_envs.search import Scenery
 
 RESERVED = {"train": (0, 10_000), "test": (10_000, 20_000)}  # instance numbers; those of the test split are held out

@@ -9,8 +9,8 @@ from gymnasium import error, logger
 from numpy.typing import NDArray
 
 from posefit import Observation, PoseProblem, SearchSpace, Task
+from posefit.arrays import Array
 from posefit.fitting.alignment import align
-from posefit.geometry.rotation import Array
 from posefit.silhouette.cost import paint
 
 Image = NDArray[np.uint8]  # (height, width, 2 views): observed, body, observed, body, ...

@@ -8,9 +8,9 @@ import numpy as np
 from gymnasium import error
 
 from posefit import SearchSpace
+from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Follower, Prediction
-from posefit.geometry.rotation import Array
 from posefit_envs.drawing import MODES, Screen, check_mode, draw
 from posefit_envs.fit import action_shape, check_budget, spaces_of
 from posefit_envs.instance import Arguments, Instance, World, instance, measured, select

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from posefit import SearchSpace
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit_envs.batch import mask_of, seeds_of
 from posefit_envs.drawing import MODES, check_mode, draw
 from posefit_envs.fit import action_shape, check_budget, spaces_of

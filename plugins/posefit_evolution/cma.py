@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.bridge import bearable
 from posefit.fitting.check import at_least, positive
-from posefit.geometry.rotation import Array
 
 SPREAD = 0.5  # sigma_0 in an unknown place, in half-ranges of the box
 GROWTH = 2  # IPOP: each restart has a population so many times as large

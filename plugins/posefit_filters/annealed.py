@@ -6,9 +6,9 @@ J. Deutscher, I. Reid, Articulated body motion capture by stochastic search, Int
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.check import at_least, between, positive
-from posefit.geometry.rotation import Array
 from posefit_filters.weights import sharpness, systematic, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)

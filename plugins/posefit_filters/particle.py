@@ -6,9 +6,9 @@ N. Gordon, D. Salmond, A. Smith, Novel approach to nonlinear/non-Gaussian Bayesi
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.check import at_least, positive
-from posefit.geometry.rotation import Array
 from posefit_filters.weights import systematic, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from posefit.geometry.kinematics import jit
+from posefit.arrays import jit
 
 HALVINGS = 60  # ours: bisection steps; a double has 53 bits
 

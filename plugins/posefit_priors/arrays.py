@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 
 Shape = tuple[str | int, ...]
 

@@ -6,8 +6,8 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting.check import at_least, one_of
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import Shape, angles_of, load_arrays
 

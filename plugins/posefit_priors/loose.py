@@ -6,10 +6,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array, jit, writeable
 from posefit.fitting.check import at_least, positive
-from posefit.geometry.arrays import writeable
-from posefit.geometry.kinematics import jit
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
 from posefit_priors.arrays import load_arrays
 from posefit_priors.pca import CLUSTERS, PCA, QUANTILE, distance

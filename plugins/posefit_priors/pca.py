@@ -6,10 +6,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array, jit, writeable
 from posefit.fitting.check import at_least
-from posefit.geometry.arrays import writeable
-from posefit.geometry.kinematics import jit
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
 

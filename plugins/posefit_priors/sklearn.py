@@ -9,9 +9,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least
-from posefit.geometry.arrays import writeable
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
 from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, clustered, near, reach_of, recover

@@ -5,8 +5,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
-from posefit.geometry.rotation import Array
 from posefit_swarm.swarm import fly, mend, redrawable, settle
 
 FIRST_REDRAWS = 6  # ours: how many redraws are made at once at first; then all that are left

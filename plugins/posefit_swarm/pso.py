@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import REDRAWS, Space
 from posefit.fitting.check import at_least, one_of, positive
-from posefit.geometry.rotation import Array
 from posefit_swarm.flock import Flock, speed_limits
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, inertia
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.check import at_least
-from posefit.geometry.rotation import Array
 
 
 class Random:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from posefit.geometry.kinematics import jit
+from posefit.arrays import jit
 
 INERTIA = 0.9  # A; Reading S5: the paper gives none, and it must be above 0.1
 ACCELERATION = 2.0  # c1 = c2, section 3.1

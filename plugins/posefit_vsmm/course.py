@@ -7,9 +7,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.geometry.rotation import Array
 from posefit.silhouette.cost import areas, mismatch
 from posefit_vsmm.fresh import Matcher, estimated
 from posefit_vsmm.imm import Belief, Measurement, start

@@ -7,7 +7,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.geometry.rotation import Array, wrapped
+from posefit.arrays import Array
+from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit_vsmm.state import MANIFOLD, Reliance, decode
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.motion import library
 from posefit.silhouette.cost import project
 from posefit_vsmm.joints import BODY, detected

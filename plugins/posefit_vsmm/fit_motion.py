@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 from sklearn.cluster import KMeans
 from sklearn.covariance import LedoitWolf
 
-from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
+from posefit.arrays import Array
+from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, INNER, MIRROR, angle_index
 from posefit.motion import library
 from posefit.motion.amc import FPS as AMC_FPS

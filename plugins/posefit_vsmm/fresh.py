@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Observation, Task
-from posefit.geometry.rotation import Array
 from posefit.silhouette.cost import areas, mismatch
 from posefit_vsmm.motion import MotionModel, product
 from posefit_vsmm.state import ERROR, Reliance, decode, encode, free_errors, minus, plus

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 
 SIZE_LIMIT = 100_000  # bytes
 

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 
 SMALLEST = 1e-12  # what an eigenvalue of a covariance is raised to where rounding made it less
 TURNS = 10  # at most, to find the mean of several states; two or three are enough

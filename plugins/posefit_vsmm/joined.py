@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from posefit import settings as of_plugins
+from posefit.arrays import Array
 from posefit.fitting.box import Start
 from posefit.fitting.optimiser import OptimiserFactory, minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.geometry.rotation import Array
 from posefit.registry import registry
 from posefit_vsmm.course import Course, Found
 from posefit_vsmm.directions import Directions

@@ -11,7 +11,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit_vsmm.points import AT, POINTS
 from posefit_vsmm.preprocess import Lines
 

@@ -13,8 +13,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from posefit.geometry.kinematics import jit
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array, jit
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
 from posefit_vsmm.state import Reliance, free_errors

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from posefit.arrays import Array, jit
 from posefit.geometry.camera import Camera
-from posefit.geometry.kinematics import jit, place_joints
-from posefit.geometry.rotation import Array
+from posefit.geometry.kernels import place_joints
 from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, Skeleton
 from posefit_vsmm.state import ERROR, HELD, HELD_ANGLES, OTHER_ANGLES, Reliance
 

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.geometry.kinematics import jit
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array, jit
 from posefit.silhouette.mask import Mask
 
 PIECE = 0.05  # of the largest piece's area: a smaller piece is no part of a person

@@ -5,7 +5,7 @@ They are for the eye; a hidden joint is no measurement (Reading V9).
 
 import numpy as np
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 
 PUSH = 2.0  # pixels a frame squared: the deviation of a joint's acceleration
 _STEP = np.kron([[1.0, 1.0], [0.0, 1.0]], np.eye(2))

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES
 from posefit_vsmm.imm import Measurement
 from posefit_vsmm.joints import OWN, Errors, detected

@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from posefit.geometry.kinematics import jit
+from posefit.arrays import Array, jit
 from posefit.geometry.rotation import (
-    Array,
     joint_angles_from_rotation,
     root_angles_from_rotation,
     rotation_from_joint_angles,

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.geometry.skeleton import Skeleton
 from posefit_vsmm.groups import Topology
 from posefit_vsmm.imm import IMM, Belief, Measurement

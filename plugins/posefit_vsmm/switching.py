@@ -9,7 +9,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from posefit.geometry.rotation import Array, wrapped
+from posefit.arrays import Array
+from posefit.geometry.rotation import wrapped
 from posefit_vsmm.imm import Belief
 from posefit_vsmm.points import AT
 

@@ -4,11 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from posefit.geometry.arrays import writeable
+from posefit.arrays import Array, jit, writeable
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kinematics import jit
-from posefit.geometry.rotation import Array
 from posefit.silhouette.mask import Silhouette
 
 ROUNDS = 3  # which joint is outermost depends a little on where the body stands

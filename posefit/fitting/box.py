@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 
 REDRAWS = 100  # Reading S7
 MANY = 8  # ours: after the first, so many redraws are made at once

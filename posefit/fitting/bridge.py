@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
-from posefit.geometry.rotation import Array
 
 WORST = 1e15  # the largest cost that other libraries get to see: few bear nan, infinity or the square of 1e300
 PATIENCE = 5.0  # seconds to wait for a library to leave when its search is dropped

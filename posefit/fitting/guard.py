@@ -8,9 +8,9 @@ from types import FrameType
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import Optimiser
-from posefit.geometry.rotation import Array
 
 
 class BrokenRuleError(ValueError):

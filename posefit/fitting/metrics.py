@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.geometry.rotation import Array, geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
+from posefit.arrays import Array
+from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost

@@ -8,8 +8,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
-from posefit.geometry.rotation import Array
 
 
 class Optimiser(Protocol):

@@ -7,7 +7,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.geometry.skeleton import Skeleton
 
 

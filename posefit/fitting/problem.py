@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.silhouette.cost import BETA, Areas, areas, mismatch
 from posefit.silhouette.mask import Silhouette
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES
 from posefit.silhouette.cost import areas, mismatch
 

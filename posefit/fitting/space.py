@@ -6,12 +6,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array, jit, writeable
 from posefit.fitting import box
 from posefit.fitting.box import Space, Start
 from posefit.fitting.prior import Prior
-from posefit.geometry.arrays import writeable
-from posefit.geometry.kinematics import jit
-from posefit.geometry.rotation import Array, wrapped
+from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 
 Translation = Literal["known", "searched", "aligned"]  # Reading S4

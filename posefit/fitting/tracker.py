@@ -8,6 +8,7 @@ from typing import Any, Literal, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior
@@ -15,7 +16,6 @@ from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, SearchSpace, Translation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, Areas
 from posefit.silhouette.mask import Silhouette

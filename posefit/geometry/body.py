@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton
 
 # Radii as shares of the bone's length: (where the bone starts, where it ends). Ours: read off an adult's build.

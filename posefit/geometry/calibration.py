@@ -15,8 +15,8 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 
 Up = Literal["x", "y", "z"]
 LARGEST_FILE = 4_000_000  # bytes

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 
 LARGEST_SIDE = 16_384  # pixels
 FIELD_OF_VIEW = math.radians(40.0)  # across the larger side; our guess for a camera nobody described

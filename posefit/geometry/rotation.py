@@ -6,10 +6,10 @@ Angles are radians. Matrices act on column vectors: `v_parent = rotation @ v_chi
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from posefit.arrays import Array
+
 Order = Literal["YXZ", "xyz"]
 
 # Reading S3: yaw about the vertical is outermost, then pitch, then roll. With the paper's x, y, z order

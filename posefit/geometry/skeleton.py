@@ -11,9 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.geometry import kinematics
-from posefit.geometry.arrays import writeable
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array, writeable
+from posefit.geometry import kernels
 
 _TREE = """
 root        lhipjoint rhipjoint lowerback
@@ -118,9 +117,9 @@ class Skeleton:
         return free
 
     @cached_property
-    def chain(self) -> kinematics.Chain:
+    def chain(self) -> kernels.Chain:
         """The constant arrays that the kinematics kernel wants."""
-        return kinematics.chain(
+        return kernels.chain(
             np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))]), self.axes, self.offsets
         )
 
@@ -138,5 +137,5 @@ class Skeleton:
         if where.shape != (*lead, 3):
             raise ValueError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
         flat = writeable(poses.reshape(-1, ANGLES))
-        positions = kinematics.joint_positions(self.chain, flat, writeable(where.reshape(-1, 3)))
+        positions = kernels.joint_positions(self.chain, flat, writeable(where.reshape(-1, 3)))
         return np.asarray(positions).reshape(*lead, len(JOINTS), 3)

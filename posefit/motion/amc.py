@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.geometry.rotation import (
-    Array,
     joint_angles_from_rotation,
     root_angles_from_rotation,
     rotation_from_joint_angles,

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
+from posefit.arrays import Array
+from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Channels, Skeleton, angle_index
 
 INCH = 0.0254  # metres

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from posefit.arrays import Array
 from posefit.geometry.rotation import (
-    Array,
     joint_angles_from_rotation,
     root_angles_from_rotation,
     rotation_from_joint_angles,

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import least_squares
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton, angle_index
 
 PHASES = 48  # of a cycle, at which the arms are drawn

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from posefit.geometry.rotation import Array, joint_angles_from_rotation, rotation_from_joint_angles
+from posefit.arrays import Array
+from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.motion.amc import read_clip
 from posefit.motion.asf import read_asf

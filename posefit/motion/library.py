@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from posefit.geometry.rotation import Array, rotation_from_joint_angles
+from posefit.arrays import Array
+from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.motion.motion import Motion
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from posefit.geometry.rotation import Array, root_angles_from_rotation, rotation_from_root_angles
+from posefit.arrays import Array
+from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
 
 # Share of a frame within which two times count as the same one.

@@ -9,11 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.geometry.arrays import writeable
+from posefit.arrays import Array, jit, writeable
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kinematics import jit
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette import kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack

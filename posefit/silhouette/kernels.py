@@ -12,12 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 from numba.extending import intrinsic, overload
-from numpy.typing import NDArray
 
-from posefit.geometry.kinematics import jit, place_joints
-from posefit.geometry.rotation import Array
-
-Bits = NDArray[np.uint64]
+from posefit.arrays import Array, jit
+from posefit.geometry.kernels import place_joints
 
 BLOCK = 8  # rows filled at a time
 PAD = 2 * BLOCK  # rows below the image that a block may spill into

@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.silhouette.kernels import PAD, Bits
+from posefit.arrays import Bits
+from posefit.silhouette.kernels import PAD
 
 Mask = NDArray[np.bool_]  # (height, width)
 

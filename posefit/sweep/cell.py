@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import posefit
 
 if TYPE_CHECKING:
+    from posefit.arrays import Array
     from posefit.fitting.tracker import Frame
-    from posefit.geometry.rotation import Array
+    from posefit.footage.source import Scene
     from posefit.motion.motion import Motion
-    from posefit.study.source import Scene
 
 SALT = 2013  # part of the seed of every instance
 SPEED = 0.15  # how far the cadence of a built-in motion's instance is from its own at most
@@ -100,7 +100,7 @@ def run_cell(cell: Cell) -> Result:
 
     And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
     """
-    from posefit.study.run import track
+    from posefit.tracking.run import track
 
     began = time.perf_counter()
     if (planned := cell.version.partition(",")[0]) != posefit.__version__:
@@ -132,9 +132,9 @@ def scene_of(cell: Cell) -> "Scene":
     """Return what is seen in a cell; the same for all methods and seeds."""
     import numpy as np
 
+    from posefit.footage.source import motion_of, synthetic
     from posefit.motion import library
-    from posefit.study.source import motion_of, synthetic
-    from posefit.study.synthetic import Spoilt
+    from posefit.tracking.synthetic import Spoilt
 
     rng = np.random.default_rng([SALT, cell.instance])
     speed, phase, turn, start = (
@@ -216,7 +216,7 @@ def _spent(frame: "Frame") -> "Array":
 
 
 def _chosen(cell: Cell) -> dict[str, Any]:
-    from posefit.study.method import parse_settings
+    from posefit.tracking.method import parse_settings
 
     optimiser, prior, tracker = parts(cell.method)
     settings = parse_settings(settings_text(cell.settings), optimiser, prior, tracker)

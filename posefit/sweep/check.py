@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 import posefit
+from posefit.entries import PROJECT
 from posefit.fitting.space import TRANSLATIONS
-from posefit.hooks import PROJECT
+from posefit.footage.source import FPS, MOTIONS, motion_of
 from posefit.motion import library
 from posefit.registry import Kind, Offer, registry
 from posefit.settings import planned
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.study.method import parse_settings
-from posefit.study.source import FPS, MOTIONS, motion_of
 from posefit.sweep.cell import DROPPED, Cell, digest_of, parts, settings_text
+from posefit.tracking.method import parse_settings
 
 FIELDS = tuple(one.name for one in fields(Cell) if one.name not in ("files", "version"))
 LARGEST = 16_384  # pixels

@@ -12,9 +12,9 @@ from typing import Any
 from posefit.sweep.cell import run_cell, settings_text
 from posefit.sweep.drive import Tally, drive, follow
 from posefit.sweep.driver import Driver
-from posefit.sweep.engine import Engine
+from posefit.sweep.engines.engine import Engine
+from posefit.sweep.engines.limits import Limits
 from posefit.sweep.ledger import INDEX, Ledger
-from posefit.sweep.limits import Limits
 from posefit.sweep.plan import Plan
 
 DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
@@ -79,10 +79,10 @@ def engine(workers: int | None, scheduler: str | None, dask_local: int | None, l
 
     def start() -> Engine:
         if scheduler is not None or dask_local is not None:
-            from posefit.sweep.cluster import Cluster
+            from posefit.sweep.engines.cluster import Cluster
 
             return Cluster(scheduler, dask_local, limits, run_cell)
-        from posefit.sweep.processes import Processes
+        from posefit.sweep.engines.processes import Processes
 
         return Processes(workers or _cores(), limits, run_cell)
 

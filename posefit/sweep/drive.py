@@ -11,7 +11,7 @@ from typing import Any
 
 from posefit.sweep.cell import Cell
 from posefit.sweep.driver import Claim, Driver, State
-from posefit.sweep.engine import Engine, Outcome
+from posefit.sweep.engines.engine import Engine, Outcome
 
 PATIENCE = 0.2  # seconds between two looks at whether somebody wants to stop
 ELSEWHERE = 0.5  # seconds between two looks at cells that other drivers run

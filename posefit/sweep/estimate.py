@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from posefit.sweep.cell import Cell
-from posefit.sweep.engine import Engine
+from posefit.sweep.engines.engine import Engine
 
 FRAMES = (1, 4)  # of the cells that are tried
 EVALUATIONS = 400  # of a frame of them, at most

@@ -23,7 +23,7 @@ from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
 if TYPE_CHECKING:
     import pandas as pd
 
-    from posefit.geometry.rotation import Array
+    from posefit.arrays import Array
 
 INDEX = "ledger.json"
 ROWS, CLAIMS, QUARANTINE, ASIDE = FOLDERS = ("rows", "claims", "quarantine", "aside")

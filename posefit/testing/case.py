@@ -6,9 +6,9 @@ from typing import Any, cast
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import Filter, NextFrame, Optimiser
-from posefit.geometry.rotation import Array
 from posefit.settings import planned, settings_of
 from posefit.testing.results import Checklist, SkippedError, expect
 

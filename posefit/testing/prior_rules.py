@@ -12,9 +12,9 @@ from typing import Any, Literal, get_origin
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
-from posefit.geometry.rotation import Array
 from posefit.motion import library
 from posefit.settings import settings_of
 from posefit.testing.problem import training_angles

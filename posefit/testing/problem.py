@@ -4,11 +4,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.motion import library
 from posefit.registry import registry
 from posefit.silhouette.cost import project

@@ -5,8 +5,8 @@ from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.box import Start
-from posefit.geometry.rotation import Array
 from posefit.settings import settings_of
 from posefit.testing.case import REFUSALS, Case, Evaluate, check_population, checklist, needs_settings
 from posefit.testing.results import SkippedError, expect, refusal

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.testing.case import Case, checklist, same
 from posefit.testing.randomness import left_alone, seeded
 from posefit.testing.results import BrokenError, SkippedError, expect

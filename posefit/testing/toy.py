@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting import box
 from posefit.fitting.box import Space, Start
-from posefit.geometry.rotation import Array
 
 Rule = Callable[[Array], NDArray[np.bool_]]
 

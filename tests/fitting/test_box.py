@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefit import SearchSpace, Start
+from posefit.arrays import Array
 from posefit.fitting import box
-from posefit.geometry.rotation import Array
 from posefit.motion import library
 from posefit.testing.toy import Toy, anywhere, ball, shell
 from posefit_priors.pca import PCA

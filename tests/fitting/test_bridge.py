@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from posefit import minimise
+from posefit.arrays import Array
 from posefit.fitting.bridge import Bridge, Bridged, GlobalRandom, bearable
-from posefit.geometry.rotation import Array
 from posefit.testing.toy import Toy, ball, sphere
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
+from posefit.arrays import Array
 from posefit.fitting.alignment import align
-from posefit.geometry.rotation import Array
 from posefit.motion import library
 from posefit.silhouette.cost import project
 from posefit_priors.pca import PCA

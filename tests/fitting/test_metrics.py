@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from posefit.arrays import Array
 from posefit.fitting import metrics
-from posefit.geometry.rotation import Array, rotation_from_joint_angles
+from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import JOINTS, MIRROR, angle_index
 from posefit.motion import library
 

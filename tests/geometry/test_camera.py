@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posefit.arrays import Array
 from posefit.geometry.body import PROPORTIONS, Body
 from posefit.geometry.camera import MARGIN, Camera
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.motion.library import average_skeleton
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posefit.arrays import Array
 from posefit.geometry.rotation import (
-    Array,
     geodesic,
     joint_angles_from_rotation,
     root_angles_from_rotation,

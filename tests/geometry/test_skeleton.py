@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from posefit.geometry.kinematics import sines_cosines
+from posefit.arrays import Array
+from posefit.geometry.kernels import sines_cosines
 from posefit.geometry.rotation import (
-    Array,
     geodesic,
     joint_angles_from_rotation,
     root_angles_from_rotation,

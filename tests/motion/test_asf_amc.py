@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posefit.geometry.rotation import Array, geodesic, rotation_from_root_angles
+from posefit.arrays import Array
+from posefit.geometry.rotation import geodesic, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, Skeleton, angle_index
 from posefit.motion import amc, asf
 from posefit.motion.amc import read_amc, read_clip, write_amc

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.motion.bvh import read_bvh
 
 pytest.importorskip("pybvh")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, angle_index
 from posefit.motion import library
 from posefit.motion.amc import read_clip

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 import posefit
+from posefit.arrays import Array
 from posefit.cli import main
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import library
 from posefit_priors.full import Full

@@ -18,8 +18,9 @@ from posefit.motion import library
 from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit.study import activities, patent
 from posefit.testing import check_tracker
+from posefit_experiments.vsmm import activities
+from posefit_experiments.vsmm import experiment as patent
 from posefit_vsmm.course import COAST
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.joined import joined
@@ -290,7 +291,7 @@ def test_no_motion_of_the_experiment_was_learned_from() -> None:
 
 def test_the_figures_are_drawn(tmp_path: Path, experiment: patent.Run) -> None:
     pytest.importorskip("matplotlib")
-    from posefit.study import patent_figures
+    from posefit_experiments.vsmm import figures as patent_figures
 
     names = patent_figures.draw(experiment, tmp_path)
     assert names == ["figure-9-joints.png", "figure-10-probabilities.png", "figure-11-errors.png"]

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion.library import average_skeleton
 from posefit.silhouette.cost import LEAST_SHARE, add_mismatch, areas, mismatch, paint, project

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import ANGLES, PARENTS, Skeleton
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.kernels import FAR, NEAR

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.geometry.skeleton import PARENTS
 from posefit.silhouette.kernels import FAR, NEAR
 

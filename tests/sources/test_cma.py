@@ -3,7 +3,7 @@
 import numpy as np
 
 from posefit import Start
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.testing.toy import Toy, sphere
 from posefit_evolution.cma import CMAES
 

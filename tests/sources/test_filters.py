@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit import Start
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.testing.toy import Toy, ball, sphere
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle

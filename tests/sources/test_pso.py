@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit.testing.toy import Toy, sphere
 from posefit_swarm.pso import PSO, constriction
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from posefit import PoseProblem, SearchSpace, Silhouette, Start, minimise
+from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Observation, Prediction, SynthesisTracker, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array, rotation_from_root_angles
+from posefit.geometry.rotation import rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import library
 from posefit.silhouette.cost import areas, mismatch, project

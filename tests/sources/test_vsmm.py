@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit_vsmm.imm import IMM, Belief, Manifold, Measurement, positive, start, update
 
 STEP, SIGMA = 1.0, 20.0  # seconds between measurements, metres of noise in each

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import Array
 from posefit.motion import library as motions
 from posefit_vsmm.fit_motion import LAMBDA, ridge
 from posefit_vsmm.groups import read_topology

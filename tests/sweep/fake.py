@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from posefit.sweep.cell import Cell, Result, packed
-from posefit.sweep.cluster import Cluster
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.driver import Driver
-from posefit.sweep.engine import Engine
-from posefit.sweep.limits import Limits
-from posefit.sweep.processes import Processes
+from posefit.sweep.engines.cluster import Cluster
+from posefit.sweep.engines.engine import Engine
+from posefit.sweep.engines.limits import Limits
+from posefit.sweep.engines.processes import Processes
 
 STARTS = "POSEFIT_STARTS"
 SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND = 1001, 1002, 1003, 1004, 1005, 1006

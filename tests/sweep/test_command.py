@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from posefit.cli import main
 from posefit.sweep.command import described
 from posefit.sweep.ledger import Ledger
-from tests.study.test_command_line import fails, run
+from tests.cli.test_command_line import fails, run
 
 PLAN = """
 [defaults]
@@ -111,7 +111,7 @@ def test_mistakes_are_one_line_and_write_nothing(
     words: list[str], message: str, plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if "--scheduler" in words:
-        cluster = pytest.importorskip("posefit.sweep.cluster")
+        cluster = pytest.importorskip("posefit.sweep.engines.cluster")
         pytest.importorskip("distributed")
         monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     (tmp_path / "bad.toml").write_text("[defaults]\nframe = 3\n")

@@ -14,11 +14,11 @@ import pytest
 from posefit.sweep.cell import TIMES
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.driver import ATTEMPTS, Driver
-from posefit.sweep.engine import Engine, EngineError
+from posefit.sweep.engines.engine import Engine, EngineError
+from posefit.sweep.engines.limits import Limits
+from posefit.sweep.engines.processes import Processes
 from posefit.sweep.ledger import Ledger
-from posefit.sweep.limits import Limits
 from posefit.sweep.plan import Plan
-from posefit.sweep.processes import Processes
 from tests.sweep import fake
 from tests.sweep.fake import behave, cells, swept
 
@@ -32,7 +32,7 @@ def make(request: pytest.FixtureRequest) -> Make:
     if request.param == "pebble":
         return lambda run=behave, limits=SHORT: Processes(2, limits, run)
     pytest.importorskip("distributed")
-    from posefit.sweep.cluster import Cluster
+    from posefit.sweep.engines.cluster import Cluster
 
     return lambda run=behave, limits=SHORT: Cluster(workers=2, limits=limits, run=run)
 
@@ -64,7 +64,7 @@ def test_a_cell_that_was_quarantined_is_tried_again_once_its_file_is_gone(tmp_pa
 
 def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    from posefit.sweep.cluster import Cluster
+    from posefit.sweep.engines.cluster import Cluster
 
     plan = Plan.of(
         {
@@ -193,7 +193,7 @@ def served() -> Iterator[Served]:
 
 def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    from posefit.sweep.cluster import Cluster
+    from posefit.sweep.engines.cluster import Cluster
 
     address = f"tcp://127.0.0.1:{port()}"
     with pytest.raises(EngineError, match=f"scheduler must be one that answers, got {address}"):
@@ -201,7 +201,7 @@ def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp_path: Path) -> None:
-    from posefit.sweep.cluster import Cluster
+    from posefit.sweep.engines.cluster import Cluster
 
     engine = Cluster(served.address, limits=SHORT, run=behave, patience=20.0)
     assert engine.window() == 1
@@ -222,7 +222,7 @@ def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp
 
 
 def test_a_scheduler_that_comes_back_is_waited_for(served: Served, tmp_path: Path) -> None:
-    from posefit.sweep.cluster import Cluster
+    from posefit.sweep.engines.cluster import Cluster
 
     engine = Cluster(served.address, limits=SHORT, run=behave, patience=30.0)
     gone = []

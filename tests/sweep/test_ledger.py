@@ -15,7 +15,7 @@ from posefit.sweep import log
 from posefit.sweep.cell import Cell
 from posefit.sweep.drive import drive
 from posefit.sweep.driver import Claim, Driver, State
-from posefit.sweep.engine import Outcome
+from posefit.sweep.engines.engine import Outcome
 from posefit.sweep.ledger import Ledger
 from tests.sweep.fake import cells, result
 

@@ -7,14 +7,15 @@ from typing import Any
 import pytest
 
 import posefit
+from posefit.entries import Plugin
 from posefit.motion import library
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
-from posefit.registry import Offer, Plugin, Registry
-from posefit.study import method
+from posefit.registry import Offer, Registry
 from posefit.sweep import check
 from posefit.sweep.cell import Cell, digest_of, run_cell, scene_of, trace
 from posefit.sweep.plan import Plan
+from posefit.tracking import method
 from tests.testing.planted import Holds
 
 PRODUCT: dict[str, Any] = {"methods": ["sapso@pca"], "motions": ["walk"]}

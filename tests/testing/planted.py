@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from posefit import Frame, SearchSpace, Task
-from posefit.geometry.rotation import Array
+from posefit.arrays import Array
 from posefit_filters.annealed import Annealed
 from posefit_priors.pca import PCA
 

@@ -35,7 +35,7 @@ def test_it_passes_every_shipped_prior(name: str) -> None:
 
 
 def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
-    from posefit.study.method import training_angles
+    from posefit.tracking.method import training_angles
 
     make = partial(SAPSO, particles=20, iterations=task.evaluations // 20 - 1)
     return SynthesisTracker(task, PCA().fit(training_angles(task)), make, prediction=Prediction(floor=floor))

@@ -1,0 +1,111 @@
+"""The sequence that the VSMM patent was tried on, made anew: four activities before a camera, with a known truth.
+
+The patent's own recording is not public. Here the four activities are built-in motions, each in another phase, speed
+and view for every seed, that no motion model was fitted to; between them lie a few frames of blending.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Observation
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import wrapped
+from posefit.motion import library
+from posefit.motion.motion import Motion
+from posefit.silhouette.cost import project
+from posefit.silhouette.foreground import Image, mean_background, person
+from posefit.silhouette.mask import Silhouette
+
+SIZE = (320, 240)
+FPS = 30.0
+EMPTY = 100  # frames of the empty scene, for the mean background
+BLEND = 8  # frames between two activities
+DISTANCE = 4.6  # metres
+SIDEWAYS = 0.3  # radians to either side: from where the camera looks at the front
+SPEEDS = (0.9, 1.1)
+GRAIN = 4.0  # grey levels: the deviation of a pixel from frame to frame
+
+
+@dataclass(frozen=True)
+class Activity:
+    """One part of the sequence, and the motion models that it is an instance of."""
+
+    label: str
+    motion: str
+    frames: int
+    models: frozenset[str]
+
+
+ACTIVITIES = (
+    Activity("stepping on the spot", "step-b", 120, frozenset({"stiff-walk", "walk"})),
+    Activity("waving and striding", "wave-b", 130, frozenset({"walk", "arms-out"})),
+    Activity("jumping jacks", "jacks-b", 140, frozenset({"jacks"})),
+    Activity("squat", "squat-b", 60, frozenset({"squat"})),
+)
+# What a prior may learn from: no motion of the sequence.
+TRAINING = tuple(f"{kind}-a" for kind in ("walk", "step", "arms-out", "wave", "jacks", "squat", "jump", "march"))
+
+
+@dataclass(frozen=True, eq=False)
+class Sequence:
+    """What was filmed, and the truth."""
+
+    truth: Motion
+    body: Body
+    camera: Camera
+    observations: list[Observation] = field(repr=False)
+    labels: list[int]  # (T,) which activity
+
+    @property
+    def switches(self) -> list[int]:
+        """The frames in which another activity begins."""
+        return [k for k in range(1, len(self.labels)) if self.labels[k] != self.labels[k - 1]]
+
+
+def sequence(seed: int) -> Sequence:
+    """Return the sequence of a seed: masks taken from a film of it, by the mean background of the empty scene."""
+    rng = np.random.default_rng(seed)
+    parts = [
+        library.built_in(one.motion, frames=one.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random())
+        for one in ACTIVITIES
+    ]
+    poses = np.concatenate([part.poses for part in parts])
+    places = np.concatenate([part.translations * [1.0, 1.0, 0.0] for part in parts])  # striding, but on the spot
+    labels = np.repeat(np.arange(len(parts)), [len(part) for part in parts]).tolist()
+    for first in np.cumsum([len(part) for part in parts])[:-1]:
+        away, moved = wrapped(poses[first : first + BLEND] - poses[first - 1]), places[first : first + BLEND]
+        share = (np.arange(1, BLEND + 1) / (BLEND + 1))[:, None]
+        poses[first : first + BLEND] = poses[first - 1] + share * away
+        places[first : first + BLEND] = places[first - 1] + share * (moved - places[first - 1])
+    truth = Motion("patent", library.average_skeleton(), poses, places, FPS)
+    body = Body.of(truth.skeleton)
+    camera = Camera.around(np.array([0.0, 1.05, 0.0]), rng.uniform(-SIDEWAYS, SIDEWAYS), DISTANCE, SIZE)
+    empty, film = _film(truth, body, camera, rng)
+    background = mean_background(empty)
+    masks = (person(*background.classify(image), None, None) for image in film)
+    return Sequence(truth, body, camera, [Observation([Silhouette.of(one.mask)]) for one in masks], labels)
+
+
+def _film(
+    truth: Motion, body: Body, camera: Camera, rng: np.random.Generator
+) -> tuple[Iterator[Image], Iterator[Image]]:
+    """Return the frames of the empty scene, and of the person before it; a wall, and clothes of another colour."""
+    width, height = camera.width, camera.height
+    across, down = np.meshgrid(np.linspace(0.0, 1.0, width), np.linspace(0.0, 1.0, height))
+    wall = np.stack([150.0 + 40.0 * across, 160.0 - 30.0 * down, 140.0 + 20.0 * np.sin(9.0 * across)], axis=-1)
+    clothes = np.where(down[..., None] < 0.55, [60.0, 50.0, 170.0], [130.0, 60.0, 40.0])
+
+    def noisy(image: Array) -> Image:
+        grain = GRAIN * rng.standard_normal(image.shape, dtype=np.float32)
+        return np.asarray(np.clip(image + grain, 0.0, 255.0).astype(np.uint8))
+
+    def filmed() -> Iterator[Image]:
+        for pose, place in zip(truth.poses, truth.translations, strict=True):
+            mask = project(body, camera, pose, place)
+            yield noisy(np.where(mask[..., None], clothes, wall))
+
+    return (noisy(wall) for _ in range(EMPTY)), filmed()

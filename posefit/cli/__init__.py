@@ -1,0 +1,63 @@
+"""The command line. Messages and progress go to stderr, results to stdout; a mistake is one line and exit status 2.
+
+The commands stand in `following`, `sweeping` and `plugins`; plugins add others, see `posefit.commands`. What each does
+is imported when it runs.
+"""
+
+from typing import Any
+
+import click
+
+from posefit import __version__
+from posefit.cli import following, plugins, sweeping
+
+BUILT_IN = (
+    following.track,
+    following.fit,
+    following.extract,
+    sweeping.sweep,
+    sweeping.report,
+    plugins.plugins,
+    plugins.check,
+)
+
+
+class _Commands(click.Group):
+    """Knows plugins' commands, too, and turns the errors that users can make into one line on stderr."""
+
+    def list_commands(self, _context: click.Context) -> list[str]:
+        """Return the names of all commands: those of plugins come last."""
+        return [*self.commands, *_added()]
+
+    def get_command(self, _context: click.Context, name: str) -> click.Command | None:
+        """Return a command; plugins are looked at for those alone that posefit does not have itself."""
+        return self.commands.get(name) or _added().get(name)
+
+    def invoke(self, context: click.Context) -> Any:
+        """Run a command."""
+        try:
+            return super().invoke(context)
+        except click.UsageError as error:
+            click.echo(f"posefit: {' '.join(error.format_message().split())}", err=True)
+            context.exit(2)
+        except (ValueError, FileNotFoundError, PermissionError, ImportError) as error:
+            click.echo(f"posefit: {' '.join(str(error).split())}", err=True)
+            context.exit(2)
+
+
+def _added() -> dict[str, click.Command]:
+    """Return the commands of plugins."""
+    from posefit.commands import installed
+
+    added = installed(tuple(main.commands))
+    return {command.name or "": command for plugin in added for command in plugin.offers}
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="posefit")
+def main() -> None:
+    """Recover a person's 3D pose from silhouettes, by searching."""
+
+
+for _command in BUILT_IN:
+    main.add_command(_command)

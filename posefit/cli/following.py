@@ -1,0 +1,107 @@
+"""`posefit track`, `fit` and `extract`."""
+
+import json
+from typing import Any
+
+import click
+
+from posefit.cli.options import EXTRACTION, TRACK, frame_range, options
+from posefit.cli.output import progress, say
+
+
+@click.command()
+@options(TRACK)
+@click.option(
+    "--frames",
+    callback=frame_range,
+    metavar="A:B",
+    help="Only these frames: of footage as filmed, of a motion after resampling.",
+)
+def track(as_json: bool, **options: Any) -> None:
+    """Follow a person through SOURCE.
+
+    A built-in motion, an .amc or .bvh file, a folder or .npz of masks, a video; or what several cameras saw.
+    """
+    from posefit.tracking.run import track as run
+
+    result = run(progress=progress, say=say, **_arguments(options))
+    if as_json:
+        click.echo(json.dumps(result.summary))
+        return
+    from posefit.tracking.table import table
+
+    click.echo(table(result.summary))
+    if options["out"]:
+        click.echo(f"written to {options['out']}: watch overlay.mp4, look at summary.png")
+
+
+@click.command()
+@options(TRACK)
+@click.option("--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling.")
+def fit(as_json: bool, **options: Any) -> None:
+    """Find the pose in one frame of SOURCE."""
+    from posefit.tracking.run import fit as run
+
+    result = run(say=say, **_arguments(options))
+    if as_json:
+        click.echo(json.dumps({**result.summary, "pose_degrees": _degrees(result.pose)}))
+        return
+    from posefit.tracking.table import table
+
+    click.echo(table(result.summary))
+    if options["out"]:
+        click.echo(f"written to {options['out']}: look at summary.png")
+
+
+@click.command()
+@click.argument("video")
+@click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
+@click.option(
+    "--method", default="mixture", show_default=True, help="mixture, median, mean, or masks: the frames are masks."
+)
+@options(EXTRACTION)
+@click.option("--frames", callback=frame_range, metavar="A:B", help="Only these frames.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def extract(video: str, out: str, as_json: bool, frames: Any, **options: Any) -> None:
+    """Take the masks of one person out of a VIDEO before a still background."""
+    from posefit.footage.extract import extract as run
+    from posefit.footage.segmentation import Extraction
+
+    result = run(video, out, Extraction(**options), frames=frames, progress=progress)
+    for warning in result["warnings"]:
+        say(f"warning: {warning}")
+    if as_json:
+        click.echo(json.dumps(result))
+        return
+    click.echo(
+        f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border, "
+        f"{result['in_pieces']} in pieces; written to {out}: watch preview.mp4"
+    )
+
+
+def _arguments(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the keywords of `posefit.track` that options stand for.
+
+    `--set` gives the settings of optimiser, prior and tracker, as their types ask; `tracker.` also sets the tracker
+    that an optimiser and a prior are driven by.
+    """
+    from posefit.footage.segmentation import Extraction
+    from posefit.tracking.method import parse_settings
+    from posefit.tracking.run import prior_of
+
+    context = click.get_current_context()
+    for name in ("optimiser", "prior"):
+        if options["tracker"] and context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
+            raise ValueError(f"{name} must not be given beside a tracker, got {options[name]} and {options['tracker']}")
+    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
+    options["extraction"] = Extraction(method=options["extraction"], **how)
+    options["source"] = options["source"] or ("walk",)
+    options["view_degrees"] = options["view_degrees"] or None
+    prior = options["prior"] or prior_of(options["source"][0])
+    return options | parse_settings(options.pop("settings"), options["optimiser"], prior, options["tracker"])
+
+
+def _degrees(pose: Any) -> list[float]:
+    import numpy as np
+
+    return [round(float(angle), 6) for angle in np.degrees(pose)]

@@ -1,0 +1,72 @@
+"""`posefit plugins` and `posefit check`."""
+
+import json
+from typing import Any
+
+import click
+
+
+@click.group(invoke_without_command=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
+@click.pass_context
+def plugins(context: click.Context, as_json: bool) -> None:
+    """List the optimisers, priors and trackers that are installed, with their settings."""
+    if context.invoked_subcommand is not None:
+        return
+    from posefit.cli.inspection import described, listing
+    from posefit.registry import KINDS, registry
+
+    if as_json:
+        offers = registry().offers
+        click.echo(json.dumps([described(offer) for kind in KINDS for offer in offers[kind].values()]))
+        return
+    for line in listing(registry()):
+        click.echo(line)
+
+
+@plugins.command()
+@click.pass_context
+def doctor(context: click.Context) -> None:
+    """Say of every plugin whether it works, and what to do where it does not; exit status 1 where one is broken."""
+    import warnings
+
+    from posefit.cli.inspection import diagnosis
+    from posefit.commands import installed
+    from posefit.registry import registry
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the same is said below
+        lines, well = diagnosis(registry(), installed())
+    click.echo("\n".join(lines))
+    context.exit(0 if well else 1)
+
+
+@plugins.command()
+@click.argument("name")
+@click.option("--kind", default="optimiser", show_default=True, help="optimiser, prior or tracker.")
+@click.option("--out", metavar="DIR", help="The new folder; by default posefit-NAME.")
+def new(name: str, kind: Any, out: str | None) -> None:
+    """Write a small plugin to start from: it installs, works and has a test that passes."""
+    from posefit.cli.template import new as write
+
+    folder = write(name, kind, out)
+    click.echo(f"written to {folder}; next: cd {folder} && python -m pip install -e '.[test]' && python -m pytest")
+
+
+@click.command()
+@click.argument("kind", type=click.Choice(["optimiser", "prior", "tracker"]))
+@click.argument("name")
+@click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Check it with this setting.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.pass_context
+def check(context: click.Context, kind: Any, name: str, settings: tuple[str, ...], as_json: bool) -> None:
+    """Check that an installed plugin keeps the rules of its kind; exit status 1 where it breaks one."""
+    from posefit.cli.inspection import checked
+
+    report = checked(kind, name, settings)
+    if as_json:
+        results = [{"check": one.name, "outcome": one.outcome, "detail": one.detail} for one in report.results]
+        click.echo(json.dumps({"plugin": report.plugin, "summary": report.summary, "results": results}))
+    else:
+        click.echo(str(report))
+    context.exit(0 if report else 1)

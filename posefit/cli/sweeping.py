@@ -1,0 +1,62 @@
+"""`posefit sweep` and `posefit report`."""
+
+import json
+from typing import Any
+
+import click
+
+from posefit.cli.options import ENGINE, options
+from posefit.cli.output import say
+
+
+@click.command()
+@click.argument("plan")
+@click.option("--out", metavar="DIR", help="The ledger: a new folder, or one that a sweep goes on in.")
+@options(ENGINE)
+@click.option("--dry-run", is_flag=True, help="Print the cells and about how long they take, and run none.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@click.pass_context
+def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, as_json: bool, **where: Any) -> None:
+    """Run the cells of PLAN: methods, motions, views, corruptions and seeds.
+
+    PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment, and any number of
+    them may work on one DIR: the same command goes on where it was.
+    Exit status 1 where cells were quarantined after three attempts, 130 where somebody stopped it.
+    """
+    from posefit.sweep import command
+    from posefit.sweep.engines.limits import Limits
+
+    limits = Limits(where.pop("cell_seconds"), where.pop("cell_gigabytes"))
+    if dry_run:
+        found = command.preview(plan, out, limits=limits, **where)
+        if as_json:
+            click.echo(json.dumps(found))
+            return
+        for line in command.listed(found):
+            click.echo(line)
+        return
+    if out is None:
+        raise click.UsageError("--out must name a folder for the results, got none")
+    tally, status = command.sweep(plan, out, limits=limits, say=say, **where)
+    click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.told(tally, out))
+    context.exit(status)
+
+
+@click.command()
+@click.argument("ledger", metavar="DIR")
+@click.option("--out", required=True, metavar="FILE.html", help="The page; an earlier report is replaced.")
+@click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
+@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
+@click.option("--csv", metavar="FILE", help="New file of all rows.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def report(ledger: str, out: str, as_json: bool, **others: Any) -> None:
+    """Write what a sweep to DIR found as one page that any browser opens, offline.
+
+    It may be written while the sweep goes on, of the cells that are done.
+    """
+    from posefit.report.write import report as run
+    from posefit.report.write import told
+
+    found = run(ledger, out, say=say, **others)
+    for line in [json.dumps(found)] if as_json else told(found):
+        click.echo(line)

@@ -1,0 +1,108 @@
+"""Loads plugins: modules that installed packages name as entry points, each with hooks of pluggy.
+
+A plugin that cannot be imported, misspells a hook, fails inside one or takes a name that is taken is left out and
+warned of, with its distribution; the others work. Environment variables, as in other plugin hosts:
+POSEFIT_LOAD_PLUGINS names the only ones to load beside the built-ins (none where it is empty), POSEFIT_BLOCK_PLUGINS
+those to leave out, each by plugin or distribution and separated by commas; POSEFIT_STRICT_PLUGINS=1 turns the warning
+into an error.
+"""
+
+import os
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint
+from typing import Any, Generic, Literal, TypeVar
+
+import pluggy
+
+PROJECT = "posefit"
+LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Plugin(Generic[T]):
+    """One entry point, and what became of it."""
+
+    name: str
+    distribution: str
+    version: str
+    state: Literal["loaded", "broken", "left out"]
+    cause: str = ""
+    offers: tuple[T, ...] = ()
+
+
+def load(
+    points: Iterable[EntryPoint],
+    specs: Any,
+    collected: Callable[[Any, str, str], Iterable[T]],
+    named: Callable[[T], str],
+    variables: Mapping[str, str] = os.environ,
+    taken: Mapping[str, str] | None = None,
+) -> tuple[Plugin[T], ...]:
+    """Return what became of the plugins behind entry points, posefit's own first.
+
+    `specs` is the module whose hooks a plugin may have; `collected(hooks, distribution, version)` gives what a plugin
+    offers, and `named` how an error names an offer. No two offers of one name are loaded; `taken` are the names that
+    somebody has already. Raises ValueError where a plugin is broken and POSEFIT_STRICT_PLUGINS is set.
+    """
+    owners = dict(taken or {})
+    plugins: list[Plugin[T]] = []
+    for point in sorted(points, key=_built_ins_first):
+        plugin = _plugin(point, specs, collected, named, variables, owners)
+        plugins.append(plugin)
+        if plugin.state == "broken":
+            message = f"plugin {plugin.name!r} of {plugin.distribution} {plugin.version} is left out: {plugin.cause}"
+            if variables.get(STRICT, "0") not in ("", "0"):
+                raise ValueError(message)
+            warnings.warn(message, stacklevel=2)
+        owners |= {named(offer): plugin.distribution for offer in plugin.offers}
+    return tuple(plugins)
+
+
+def _plugin(
+    point: EntryPoint,
+    specs: Any,
+    collected: Callable[[Any, str, str], Iterable[T]],
+    named: Callable[[T], str],
+    variables: Mapping[str, str],
+    owners: Mapping[str, str],
+) -> Plugin[T]:
+    distribution, version = (point.dist.name, point.dist.version) if point.dist else ("unknown", "")
+    reason = _left_out(point.name, distribution, variables)
+    if reason:
+        return Plugin(point.name, distribution, version, "left out", reason)
+    mine: dict[str, T] = {}
+    try:
+        manager = pluggy.PluginManager(PROJECT)
+        manager.add_hookspecs(specs)
+        manager.register(point.load(), point.name)
+        manager.check_pending()
+        for offer in collected(manager.hook, distribution, version):
+            name = named(offer)
+            if name in owners or name in mine:
+                raise ValueError(f"{name} is already registered by {owners.get(name, distribution)}")
+            mine[name] = offer
+    except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
+        return Plugin(point.name, distribution, version, "broken", f"{type(error).__name__}: {error}")
+    return Plugin(point.name, distribution, version, "loaded", offers=tuple(mine.values()))
+
+
+def _built_ins_first(point: EntryPoint) -> tuple[bool, str]:
+    return point.dist is None or point.dist.name != PROJECT, point.name
+
+
+def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:
+    """Return why the variables leave a plugin out, or nothing."""
+
+    def chosen(variable: str) -> bool:
+        words = {word.strip().lower() for word in variables[variable].split(",")}
+        return bool(words & {name.lower(), distribution.lower()})
+
+    if BLOCK in variables and chosen(BLOCK):
+        return f"{BLOCK} names it"
+    if LOAD in variables and distribution != PROJECT and not chosen(LOAD):
+        return f"{LOAD} does not name it"
+    return ""

@@ -1,0 +1,236 @@
+"""Goes through a video and tells the person in it from the background, frame by frame."""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import cv2
+import numpy as np
+
+from posefit.footage.masks import Range, span
+from posefit.footage.video import Video
+from posefit.silhouette.foreground import (
+    SAMPLES,
+    Background,
+    Drawn,
+    Image,
+    Mixture,
+    Person,
+    mean_background,
+    median_background,
+    person,
+)
+from posefit.silhouette.mask import Mask
+
+Method = Literal["mixture", "mean", "median", "masks"]
+Box = tuple[int, int, int, int]  # x, y, width, height
+WIDTH = 640  # pixels; larger videos are scaled down to it
+LATEST = 15  # frames that a frame's area is compared with
+CHANGE = 0.5  # a frame whose area is off by more than this share is not usable
+RIVAL = 0.4  # something else that is so large, as a share of the person, may be another person
+OFTEN = 0.2  # the share of frames from which on something is worth a warning
+LOST = 0.02  # the share of a file's frames that may be missing without a word
+PERIOD = 5  # every so many frames it is looked whether the camera moved
+SMALL = 160  # pixels: the width of the pictures that are compared for it
+TILES = 3  # to a side
+MOVED = 0.008  # of the width: a camera that moved by more since the first frame is said to move
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """How the person is told from the background.
+
+    `method` is a "mixture" of Gaussians or the "median", both learned from the whole video, or the "mean" of
+    `background`: frames without a person, as A:B, or an image; the frames may also be "masks" already. `roi` x, y,
+    width, height in the video's own pixels is where the person is looked for; `ignore` is an image whose bright pixels
+    are never known, such as a tree in front. Videos wider than `width` are scaled down to it.
+    """
+
+    method: Method = "mixture"
+    background: str | None = None
+    roi: Box | None = None
+    ignore: str | Path | None = None
+    width: int = WIDTH
+
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            raise ValueError(f"extraction method must be one of {', '.join(get_args(Method))}, got {self.method!r}")
+        if not 36 <= self.width <= 8192:
+            raise ValueError(f"width must lie in 36 to 8192 pixels, got {self.width}")
+        if self.method == "mean" and self.background is None:
+            raise ValueError("background must be frames A:B or an image for the method mean, got none")
+        if self.method != "mean" and self.background is not None:
+            raise ValueError(
+                f"background must be given for the method mean only, got {self.background!r} with {self.method}"
+            )
+
+
+class Segmentation:
+    """One pass through a video; what it found is known when it has ended."""
+
+    def __init__(self, video: Video, how: Extraction, frames: Range) -> None:
+        """Check that the extraction fits the video. Raises ValueError where it does not."""
+        count = video.count()
+        self.start, self.stop = span(frames, count)
+        self._missing = max(0, video.claimed - count)
+        scale = min(1.0, how.width / video.size[0])
+        self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
+        self.rows: list[dict[str, Any]] = []
+        self.name, self._video = video.path, video
+        self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
+        self._learn = partial(_background, video, how, self.size)
+        self._model = self._learn() if how.method == "mean" else None  # what is given is checked now
+        self._shifts: list[float] = []
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    def __iter__(self) -> Iterator[tuple[Image, Person]]:
+        """Learn the background and yield each frame, scaled, with the person in it; `rows` tells what it is worth."""
+        model = self._model or self._learn()
+        latest: deque[int] = deque(maxlen=LATEST)
+        still = _Still(self.size)
+        for k, image in enumerate(self._video.frames(self.start, self.stop, self.size)):
+            if k % PERIOD == 0:
+                self._shifts.append(still.shift(image))
+            found = person(*model.classify(image), self._roi, self._ignored)
+            self.rows.append(_judged(found, self.start + k, latest))
+            yield image, found
+        if not any(row["usable"] for row in self.rows):
+            damage = f"; {self._damage}" if self._missing else ""
+            raise ValueError(
+                f"{self.name}: expected a person who moves before a still background, got none in any frame{damage}"
+            )
+
+    @property
+    def _damage(self) -> str:
+        return f"the file says that it has {self._missing} frames more than can be read: it seems to be damaged"
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should look at before he trusts the masks."""
+        said, name = [], self.name
+        if self._missing > LOST * len(self.rows):
+            said.append(f"{name}: {self._damage}")
+        seen = [row for row in self.rows if row["area"]]
+        rivals = sum(row["rival"] > RIVAL for row in seen)
+        if rivals > OFTEN * len(seen):
+            said.append(
+                f"{name}: somebody else seems to be there in {rivals} of {len(seen)} frames; the largest is followed, "
+                "--roi chooses where to look"
+            )
+        moved = sum(shift > MOVED * SMALL for shift in self._shifts)
+        if moved > OFTEN * len(self._shifts):
+            said.append(f"{name}: the camera seems to move, and silhouettes need a still one; expect poor masks")
+        return said
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """How many frames there are, and how good they are."""
+        return {
+            "frames": len(self.rows),
+            "usable": sum(bool(row["usable"]) for row in self.rows),
+            "size": list(self.size),
+            "fps": self._video.fps,
+            "touching_border": sum(bool(row["touches_border"]) for row in self.rows),
+            "in_pieces": sum(row["pieces"] > 1 for row in self.rows),
+            "warnings": self.warnings,
+        }
+
+
+class _Still:
+    """Compares pictures with the first one: how far did the camera move?"""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self._size = SMALL, max(16 * TILES, round(SMALL * size[1] / size[0]))
+        self._tile = self._size[0] // TILES, self._size[1] // TILES
+        self._window = cv2.createHanningWindow(self._tile, cv2.CV_32F)
+        self._first: Any = None
+
+    def shift(self, image: Image) -> float:
+        """Return by how many pixels of a picture `SMALL` wide an image is shifted against the first.
+
+        It is the median over tiles, of which a person who walks by covers only a few.
+        """
+        small = cv2.cvtColor(cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
+        grey = small.astype(np.float32)
+        if self._first is None:
+            self._first = grey
+        found = [
+            cv2.phaseCorrelate(before, now, self._window)[0]
+            for before, now in zip(self._tiles(self._first), self._tiles(grey), strict=True)
+        ]
+        return float(np.hypot(*np.median(found, axis=0)))
+
+    def _tiles(self, image: Any) -> list[Any]:
+        wide, tall = self._tile
+        corners = [(y * tall, x * wide) for y in range(TILES) for x in range(TILES)]
+        return [np.ascontiguousarray(image[y : y + tall, x : x + wide]) for y, x in corners]
+
+
+def _background(video: Video, how: Extraction, size: tuple[int, int]) -> Background:
+    if how.method == "mean":
+        assert how.background is not None
+        return mean_background(_given_background(video, how.background, size))
+    if how.method == "masks":
+        return Drawn()
+    if how.method == "median":
+        step = max(1, video.count() // SAMPLES)
+        return median_background(list(video.frames(0, None, size, step))[:SAMPLES])
+    return Mixture(video.frames(0, None, size))
+
+
+def _given_background(video: Video, given: str, size: tuple[int, int]) -> Iterator[Image]:
+    start, colon, stop = given.partition(":")
+    if colon and (start + stop).isdigit() and stop:
+        first, last = span((int(start or 0), int(stop)), video.count())
+        yield from video.frames(first, last, size)
+        return
+    image = cv2.imread(given)
+    if image is None:
+        raise ValueError(f"background must be frames A:B or an image, got {given!r}")
+    if (image.shape[1], image.shape[0]) != video.size:
+        came = f"{image.shape[1]}x{image.shape[0]}"
+        raise ValueError(f"{given}: background must have the video's size {video.size[0]}x{video.size[1]}, got {came}")
+    yield np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _scaled_roi(roi: Box | None, video: Video, scale: float) -> Box | None:
+    if roi is None:
+        return None
+    x, y, wide, tall = roi
+    if min(x, y) < 0 or min(wide, tall) < 1 or x + wide > video.size[0] or y + tall > video.size[1]:
+        raise ValueError(f"roi must lie within the video's {video.size[0]}x{video.size[1]} pixels, got {roi}")
+    left, top = round(x * scale), round(y * scale)
+    return left, top, max(1, round((x + wide) * scale) - left), max(1, round((y + tall) * scale) - top)
+
+
+def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
+    if path is None:
+        return None
+    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    if image is None:
+        raise ValueError(f"{path}: expected an image of what to ignore, got a file that is none")
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > 127)
+
+
+def _judged(found: Person, frame: int, latest: deque[int]) -> dict[str, Any]:
+    """Return a frame's row: usable where the person is whole and about as large as in the frames before."""
+    usual = float(np.median(latest)) if latest else float(found.area)
+    jitter = abs(found.area / usual - 1.0) if usual else 0.0
+    whole = found.area > 0 and not found.touches_border
+    usable = whole and jitter <= CHANGE
+    if whole:
+        latest.append(found.area)
+    return {
+        "frame": frame,
+        "area": found.area,
+        "jitter": round(jitter, 4),
+        "pieces": found.pieces,
+        "rival": round(found.rival, 4),
+        "touches_border": int(found.touches_border),
+        "usable": int(usable),
+    }

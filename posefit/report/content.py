@@ -1,0 +1,138 @@
+"""What `posefit report` says of a ledger, as data: what was run, who won, how sure that is, and every run."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import JOINTS, PARENTS
+from posefit.report import curves
+from posefit.report.contest import Contest, baselines, claim, contest_of, leaderboard, pairs, resamples
+from posefit.report.figures import COLOURS
+from posefit.report.gallery import gallery
+from posefit.report.runs import BASELINES, Runs
+from posefit.sweep.ledger import Ledger
+
+_DIGITS = {  # of each figure of a row, after the point
+    "error": 3,
+    **{f"skill_{name}": 3 for name in BASELINES},
+    "lost": 3,
+    "swapped": 3,
+    "mpjpe": 1,
+    "iou": 4,
+    "ms": 2,
+    "evaluations": 1,
+}
+
+
+def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str, Any]:
+    """Return everything that the page shows of a ledger's runs."""
+    contest = contest_of(runs)
+    pictures = gallery(ledger, runs, say)
+    return {
+        "header": _header(runs, contest, pictures),
+        "methods": [{"name": name, **about} for name, about in zip(runs.methods, runs.variants, strict=True)],
+        "instances": _instances(runs),
+        "joints": JOINTS,
+        "parents": PARENTS,
+        "colours": len(COLOURS),
+        **(_compared(contest) if contest is not None else {}),
+        "rows": _rows(runs),
+        "seeds": [_exact(seed) for seed in runs.seeds],
+        "heads": runs.heads,
+        "gallery": pictures,
+        "failures": runs.failures,
+    }
+
+
+def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> dict[str, Any]:
+    def all_of(name: str) -> list[str]:
+        return sorted({str(place[name]) for place in runs.places})
+
+    return {
+        "version": runs.version,
+        "versions": sorted({str(one["version"]) for one in runs.variants}),
+        "done": len(runs),
+        "failed": len(runs.failures),
+        "unfinished": runs.unfinished,
+        "motions": all_of("motion"),
+        "views": sorted({", ".join(f"{view:g}" for view in place["view_degrees"]) for place in runs.places}),
+        "corruptions": sorted(
+            {
+                ", ".join(f"{kind} {share:g}" for kind, share in sorted(place["corruption"].items())) or "none"
+                for place in runs.places
+            }
+        ),
+        "frames": all_of("frames"),
+        "translations": all_of("translation"),
+        "budgets": sorted({int(one["evaluations"]) for one in runs.variants}),
+        "seeds": [_exact(seed) for seed in runs.seeds[:50]],
+        "seed_count": len(runs.seeds),
+        "hours": float(
+            np.nansum(runs.figures["ms"] * np.array([place["frames"] for place in runs.places])[runs.instance]) / 3.6e6
+        ),
+        "shared": None if contest is None else int(contest.rows.size),
+        "shared_instances": None if contest is None else contest.rows.shape[1],
+        "shared_seeds": None if contest is None else contest.rows.shape[2],
+        "apart": [] if contest is None else [m for m in range(len(runs.methods)) if m not in contest.methods],
+        "resamples": None if contest is None else resamples(contest.rows.size),
+        "drawn": None if contest is None else _some(contest).rows.shape[1:],
+        "pictures": len(pictures["tracks"]),
+    }
+
+
+def _compared(contest: Contest) -> dict[str, Any]:
+    some = _some(contest)
+    evaluations = curves.grid(some)
+    enough = len(contest.methods) > 1 and contest.rows[0].size > 1
+    return {
+        "leaderboard": leaderboard(contest),
+        "baselines": baselines(contest),
+        "pairs": pairs(contest) if enough else None,
+        "claim": claim(contest),
+        "taking_part": contest.methods,
+        "evaluations": evaluations,
+        "convergence": [curves.shown(one) for one in curves.convergence(some, evaluations)],
+        "reached": curves.reached(some, evaluations) if len(evaluations) else [],
+        "joint_errors": [curves.shown(one) for one in curves.joint_errors(some)],
+    }
+
+
+def _some(contest: Contest) -> Contest:
+    """Return the contest that curves are drawn of: all of it, but in a sweep of very many runs."""
+    return contest.fewer(max(curves.POINTS, len(JOINTS)))
+
+
+def _instances(runs: Runs) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = [
+        {"name": name, "number": _exact(place["instance"])}
+        for name, place in zip(runs.instances, runs.places, strict=True)
+    ]
+    for name in BASELINES:
+        for one, value in zip(found, _by_instance(runs, f"baseline_{name}"), strict=True):
+            one[name] = value
+    return found
+
+
+def _exact(number: int) -> int | str:
+    """Return a number that a browser does not round: a text, where its floats would."""
+    return number if abs(number) < 2**53 else str(number)
+
+
+def _by_instance(runs: Runs, figure: str) -> Array:
+    """Return the mean of a figure on each instance (instances,), nan where no row has it."""
+    values = runs.figures[figure]
+    known = np.isfinite(values)
+    count = len(runs.instances)
+    total = np.bincount(runs.instance[known], values[known], minlength=count)
+    met = np.bincount(runs.instance[known], minlength=count)
+    return np.where(met > 0, total / np.maximum(met, 1), np.nan)
+
+
+def _rows(runs: Runs) -> dict[str, Any]:
+    """Return the columns of all rows, short enough for a page of a hundred thousand of them."""
+    columns: dict[str, Any] = {name: getattr(runs, name) for name in ("method", "instance", "head", "seed")}
+    for name, digits in _DIGITS.items():
+        columns[name] = np.round(runs.figures[name], digits)
+    return {**columns, "key": [key[:8] for key in runs.keys]}

@@ -1,0 +1,220 @@
+"""The methods of a sweep held against each other on the runs that they share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from scipy.stats import trim_mean
+
+from posefit.arrays import Array
+from posefit.report.runs import BASELINES, FIGURES, Runs
+from posefit.statistics.improvement import improvement_interval, probability_of_improvement
+from posefit.statistics.intervals import LEAST_RESAMPLES, RESAMPLES, TRIMMED, Intervals, iqm_intervals
+from posefit.statistics.pairing import paired, shared
+from posefit.statistics.ranks import friedman, wilcoxon
+
+SEED = 2013  # of every bootstrap
+WORK = 1e8  # numbers that the resamples of one study may come to
+LEAST_SEEDS = 3  # below, a probability of improvement has no interval: two seeds say too little
+LEAST_SHARE = 0.5  # of the runs of all methods but one, that are shared with it; below, it does not take part
+CLAIM = ("particle@full", "sapso@full", "sapso@pca")  # worst first, as the SAPSO paper has it
+
+
+@dataclass(frozen=True, eq=False)
+class Contest:
+    """The runs that some methods share, paired by instance and seed."""
+
+    runs: Runs
+    methods: tuple[int, ...]  # that take part
+    instances: tuple[int, ...]
+    rows: Array  # (methods, instances, seeds) which row of `runs` each is
+    left_out: int  # runs of these methods that not all of them have
+
+    def of(self, figure: str) -> Array:
+        """Return a figure of all runs (methods, instances, seeds)."""
+        return np.asarray(self.runs.figures[figure][self.rows])
+
+    def fewer(self, points: int) -> Self:
+        """Return the contest of so few seeds, or instances too, that intervals at so many points are little work.
+
+        The first seeds are kept, and every so many-th instance.
+        """
+        most = int(WORK / (LEAST_RESAMPLES * max(points, 1) * len(self.methods)))  # runs of a method
+        _, instances, seeds = self.rows.shape
+        kept = min(seeds, max(2, most // instances))
+        step = -(-instances * kept // most)
+        return replace(self, instances=self.instances[::step], rows=self.rows[:, ::step, :kept])
+
+
+def contest_of(runs: Runs) -> Contest | None:
+    """Return the contest of as many methods as share enough runs; None where no run has an error.
+
+    A method with which less than half of the runs that the others share would be left does not take part.
+    """
+    counts = np.bincount(runs.method[np.isfinite(runs.figures["error"])], minlength=len(runs.methods))
+    taking = sorted(np.flatnonzero(counts).tolist(), key=lambda m: (-counts[m], m))
+    every = _shared(runs, taking) if taking else None
+    if every is not None and every.rows[0].size >= LEAST_SHARE * counts.max():
+        return every
+    best: Contest | None = None
+    accepted: list[int] = []
+    for m in taking:
+        found = _shared(runs, [*accepted, m])
+        if found is not None and (best is None or found.rows[0].size >= LEAST_SHARE * best.rows[0].size):
+            best = found
+            accepted.append(m)
+    return best
+
+
+def _shared(runs: Runs, methods: Sequence[int]) -> Contest | None:
+    chosen = np.isin(runs.method, methods) & np.isfinite(runs.figures["error"])
+    index = {
+        (int(m), int(i), int(s)): int(k)
+        for k, m, i, s in zip(
+            np.flatnonzero(chosen), runs.method[chosen], runs.instance[chosen], runs.seed[chosen], strict=True
+        )
+    }
+    rows = sorted((str(m), i, s, float(runs.figures["error"][k])) for (m, i, s), k in index.items())
+    try:
+        kept, left_out = shared(rows)
+    except ValueError:  # they have nothing in common
+        return None
+    block = paired(kept)
+    order = np.argsort([int(name) for name in block.methods])
+    instances = [int(str(one)) for one in block.instances]
+    table = [
+        [[index[int(block.methods[m]), i, s] for s in seeds] for i, seeds in zip(instances, block.seeds, strict=True)]
+        for m in order
+    ]
+    return Contest(runs, tuple(int(block.methods[m]) for m in order), tuple(instances), np.array(table), left_out)
+
+
+def resamples(numbers: int) -> int:
+    """Return how many bootstrap resamples so many numbers may have."""
+    return int(np.clip(WORK / max(numbers, 1), LEAST_RESAMPLES, RESAMPLES))
+
+
+def intervals(values: Array) -> Intervals:
+    """Return the interquartile mean of each method's runs (methods, instances, seeds), with its interval."""
+    return iqm_intervals(values, np.random.default_rng(SEED), resamples=resamples(values.size))
+
+
+def leaderboard(contest: Contest) -> list[dict[str, Any]]:
+    """Return a row a method: each figure's interquartile mean, the error with its interval; best first.
+
+    Methods that do not take part come last, with what their own runs say. Shares of frames are plain means, for most
+    runs lose none.
+    """
+    found = []
+    runs, ends = contest.runs, intervals(contest.of("error"))
+    for m, name in enumerate(runs.methods):
+        place = contest.methods.index(m) if m in contest.methods else None
+        mine = np.flatnonzero(runs.method == m) if place is None else contest.rows[place].ravel()
+        row = {figure: middle(runs.figures[figure][mine]) for figure in FIGURES}
+        row |= {share: _mean(runs.figures[share][mine]) for share in ("lost", "swapped")}
+        low, high = (None, None) if place is None else (ends.low[place], ends.high[place])
+        found.append(
+            {
+                "method": m,
+                "name": name,
+                "runs": len(mine),
+                "failed": runs.failed[m],
+                "taking_part": place is not None,
+                "low": low,
+                "high": high,
+                **row,
+            }
+        )
+    return sorted(found, key=lambda one: (not one["taking_part"], np.inf if one["error"] is None else one["error"]))
+
+
+def baselines(contest: Contest) -> list[dict[str, Any]]:
+    """Return a row for each baseline that anybody reaches, on the same runs as the methods."""
+    rows = []
+    values = {name: _means(contest.of(f"baseline_{name}")) for name in BASELINES}
+    for name, mine in values.items():
+        row: dict[str, Any] = {"baseline": name, "error": middle(mine.ravel())}
+        for other, theirs in values.items():
+            with np.errstate(divide="ignore", invalid="ignore"):
+                skill = 1.0 - mine / theirs
+            row[f"skill_{other}"] = middle(np.where(theirs > 0.0, skill, np.nan).ravel())
+        rows.append(row)
+    return rows
+
+
+def pairs(contest: Contest) -> dict[str, Any]:
+    """Return ranks, paired tests and probabilities of improvement of a contest of at least two methods and blocks.
+
+    `wilcoxon` lists first, second, median difference in degrees, p, and p after Holm; `improvement` how probably first
+    is better than second, with its interval where that is cheap.
+    """
+    errors = contest.of("error")
+    ranking, rng = friedman(errors), np.random.default_rng(SEED)
+    better = probability_of_improvement(errors)
+    compared = wilcoxon(errors)
+    count = int(min(WORK / (errors[0].size * errors.shape[2] * len(compared)), RESAMPLES))
+    bounded = errors.shape[2] >= LEAST_SEEDS and count >= LEAST_RESAMPLES
+    listed = []
+    for one in compared:
+        ends = (np.nan, np.nan)
+        if bounded:
+            ends = improvement_interval(errors[one.first], errors[one.second], rng, resamples=count)[1:]
+        listed.append(
+            [one.first, one.second, one.difference, one.p_value, one.adjusted, better[one.first, one.second], *ends]
+        )
+    return {
+        "methods": contest.methods,
+        "blocks": errors[0].size,
+        "ranks": ranking.mean_ranks,
+        "friedman": ranking.p_value,
+        "statistic": ranking.statistic,
+        "critical_difference": ranking.critical_difference,
+        "cliques": ranking.cliques,
+        "pairs": listed,
+    }
+
+
+def claim(contest: Contest) -> dict[str, Any] | None:
+    """Return what the SAPSO paper claims of three methods, and how they did; None where one does not take part.
+
+    Each of its two steps, to the full space's SAPSO and to the compact space, has a paired test, Holm's over both: on
+    instances with their seeds, and on instances alone, each by the mean over its seeds.
+    """
+    known = [contest.runs.variants[m]["method"] for m in contest.methods]
+    if not all(name in known for name in CLAIM):
+        return None
+    chosen = [known.index(name) for name in CLAIM]
+    errors = contest.of("error")[chosen]
+    if errors[0].size < 2:
+        return None
+    steps = [(0, 1), (1, 2)]
+    by_instance = wilcoxon(errors.mean(axis=2, keepdims=True), steps)
+    return {
+        "methods": [contest.methods[m] for m in chosen],
+        "errors": [middle(one.ravel()) for one in errors],
+        "steps": [
+            {"difference": one.difference, "p": one.p_value, "adjusted": one.adjusted, "by_instance": other.adjusted}
+            for one, other in zip(wilcoxon(errors, steps), by_instance, strict=True)
+        ],
+        "blocks": errors[0].size,
+        "instances": errors.shape[1],
+    }
+
+
+def middle(values: Array) -> float | None:
+    """Return the interquartile mean of the finite values; None where there is none."""
+    finite = values[np.isfinite(values)]
+    return float(trim_mean(finite, TRIMMED)) if len(finite) else None
+
+
+def _mean(values: Array) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if len(finite) else None
+
+
+def _means(values: Array) -> Array:
+    """Return the mean over methods (instances, seeds), of those that have a value."""
+    known = np.isfinite(values)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)

@@ -1,0 +1,179 @@
+"""Runs for other people's tools: IOHprofiler's folders, and rows as CSV.
+
+IOHprofiler: Doerr et al., IOHprofiler, 2018; the layout is that of IOHexperimenter's Analyzer logger. Readers: the
+library iohinspector, the web page IOHanalyzer.
+"""
+
+import csv
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from posefit import __version__
+from posefit.files import new_file, new_folder
+from posefit.silhouette.cost import SCALE
+from posefit.statistics.profiles import Trace, trace
+
+FORMAT = "0.3.18"  # the IOHexperimenter that the layout is of
+SUITE = "posefit"
+LARGEST = 2**16 - 1  # instance or dimension that iohinspector holds
+_HEADER = "evaluations raw_y"
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run of a method on an instance of a problem."""
+
+    method: str
+    settings: Mapping[str, Any]
+    problem: str
+    dimension: int
+    instance: int
+    seed: int
+    evaluations: ArrayLike = field(repr=False)  # (k,), rising
+    costs: ArrayLike = field(repr=False)  # (k,), the best so far
+
+
+def write_iohprofiler(runs: Iterable[Run], path: str | Path) -> None:
+    """Write a new folder `path` with a folder a method and, in it, a .json and a data folder a problem.
+
+    A method with other settings is another algorithm: its settings stand in its `info` and, where one name has several,
+    are numbered in the name. Problems are numbered in the order of their names. A row is written wherever the cost
+    falls, and at a run's end. Readers tell runs apart by evaluation 1: a trace that starts later, as a population does,
+    has the highest cost there is, 100, in that row. Raises ValueError where a run is senseless or comes twice, and
+    where the folder exists or cannot be written.
+    """
+    algorithms = _grouped(runs)
+    numbers = {
+        name: k for k, name in enumerate(sorted({run.problem for runs in algorithms.values() for run in runs}), 1)
+    }
+    names = _algorithm_names(list(algorithms))
+    folders = _file_names([names[key] for key in algorithms])
+    problems = dict(zip(numbers, _file_names(list(numbers)), strict=True))
+    with new_folder(path) as folder:
+        for (key, mine), place in zip(algorithms.items(), folders, strict=True):
+            algorithm = {"name": names[key], "info": key[1]}
+            for problem in sorted({run.problem for run in mine}):
+                where = f"f{numbers[problem]}_{problems[problem]}"
+                here = [run for run in mine if run.problem == problem]
+                _write_problem(folder / place, where, numbers[problem], algorithm, here)
+
+
+def _write_problem(folder: Path, where: str, number: int, algorithm: Mapping[str, str], runs: list[Run]) -> None:
+    data = folder / f"data_{where}"
+    data.mkdir(parents=True)
+    scenarios = []
+    for dimension in sorted({run.dimension for run in runs}):
+        mine = sorted((run for run in runs if run.dimension == dimension), key=lambda run: (run.instance, run.seed))
+        name = f"IOHprofiler_f{number}_DIM{dimension}.dat"
+        with (data / name).open("w", encoding="ascii", newline="\n") as file:
+            described = []
+            for run in mine:
+                used, best = _rows(trace(run.evaluations, run.costs))
+                file.write(_HEADER + "\n")
+                file.writelines(f"{e} {y!r}\n" for e, y in zip(used, best, strict=True))
+                first = best.index(best[-1])
+                described.append(
+                    {
+                        "instance": run.instance,
+                        "evals": used[-1],
+                        "best": {"evals": used[first], "y": best[-1], "x": []},
+                        "seed": run.seed,
+                    }
+                )
+        scenarios.append({"dimension": dimension, "path": f"data_{where}/{name}", "runs": described})
+    summary = {
+        "version": FORMAT,
+        "suite": SUITE,
+        "function_id": number,
+        "function_name": runs[0].problem,
+        "maximization": False,
+        "algorithm": dict(algorithm),
+        # iohinspector evaluates what stands here as Python: nothing that a user or a plugin wrote
+        "experiment_attributes": [{"posefit": __version__}],
+        "attributes": _HEADER.split(),
+        "run_attributes": ["seed"],
+        "scenarios": scenarios,
+    }
+    (folder / f"IOHprofiler_{where}.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+
+
+def _rows(run: Trace) -> tuple[list[int], list[float]]:
+    """Return evaluations and costs from evaluation 1 on, wherever the cost falls, and at the end."""
+    used, best = run
+    if used[0] > 1.0:
+        used, best = np.append(1.0, used), np.append(max(SCALE, best[0]), best)
+    kept = np.append(True, np.diff(best) < 0.0)
+    kept[-1] = True
+    return [int(value) for value in used[kept]], [float(value) for value in best[kept]]
+
+
+def _grouped(runs: Iterable[Run]) -> dict[tuple[str, str], list[Run]]:
+    """Return the checked runs of each (method, settings as JSON), in the order of both."""
+    found: dict[tuple[str, str], list[Run]] = {}
+    seen = set()
+    for run in runs:
+        named = f"{run.method} on {run.problem}, instance {run.instance}, seed {run.seed}"
+        for name, value, least in (("dimension", run.dimension, 1), ("instance", run.instance, 0)):
+            if not least <= value <= LARGEST:
+                raise ValueError(f"{named}: {name} must lie in {least} to {LARGEST}, got {value}")
+        try:
+            used, _ = trace(run.evaluations, run.costs)
+        except ValueError as error:
+            raise ValueError(f"{named}: {error}") from None
+        if (used % 1.0).any():
+            raise ValueError(f"{named}: evaluations must be whole numbers, got {used[used % 1.0 > 0.0][0]:g}")
+        key = run.method, json.dumps(dict(run.settings), sort_keys=True, default=str)
+        one = (*key, run.problem, run.dimension, run.instance, run.seed)
+        if one in seen:
+            raise ValueError(f"runs must differ in method, settings, problem, instance or seed, got two of {named}")
+        seen.add(one)
+        found.setdefault(key, []).append(run)
+    if not found:
+        raise ValueError("runs must be at least one, got none")
+    return dict(sorted(found.items()))
+
+
+def _algorithm_names(keys: list[tuple[str, str]]) -> dict[tuple[str, str], str]:
+    same: dict[str, list[tuple[str, str]]] = {}
+    for key in keys:
+        same.setdefault(key[0], []).append(key)
+    return {
+        key: method if len(several) == 1 else f"{method} #{k}"
+        for method, several in same.items()
+        for k, key in enumerate(several, 1)
+    }
+
+
+def _file_names(names: list[str]) -> list[str]:
+    """Return names that every file system takes, no two alike, even where case does not count."""
+    found: list[str] = []
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9@+=#_-]+", "-", name).strip("-")[:80] or "unnamed"
+        taken = {one.lower() for one in found}
+        k, unique = 2, plain
+        while unique.lower() in taken:
+            k, unique = k + 1, f"{plain}-{k}"
+        found.append(unique)
+    return found
+
+
+def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
+    """Write rows as a new CSV file, in UTF-8; columns are all that any row has, in the order they are first met.
+
+    What a row lacks is left empty. Raises ValueError where there is no row, and where the file exists or cannot be
+    written.
+    """
+    found = list(rows)
+    if not found:
+        raise ValueError("rows must be at least one, got none")
+    with new_file(path) as building, building.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in found for name in row)), restval="")
+        writer.writeheader()
+        writer.writerows(found)

@@ -1,0 +1,180 @@
+"""Figures for papers, drawn by matplotlib (posefit[figures]) from what the statistics return.
+
+Each function returns a figure; `save` writes it as PNG, PDF or SVG. `methods` (m,) are names, and a method has the same
+colour in every figure that is given the same names.
+"""
+
+import importlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.files import new_file
+from posefit.statistics.intervals import Intervals
+from posefit.statistics.ranks import Ranking
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers too; without their yellow
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+STYLES = ("-", "--", ":", "-.")  # of the first seven methods, the next seven, and so on
+FORMATS = (".png", ".pdf", ".svg")
+_SIZE = (6.4, 3.6)  # inches
+# a critical-difference plot: inches a row; rows above the line, and from one bar to the next
+_ROW, _ABOVE, _BAR = 0.24, 3.1, 0.4
+
+
+def check_figure(path: str | Path) -> None:
+    """Raise ImportError without matplotlib, and ValueError where a figure of that name cannot be written."""
+    _library("figure")
+    if Path(path).suffix.lower() not in FORMATS:
+        raise ValueError(f"{path}: expected a figure that ends in {', '.join(FORMATS)}, got {Path(path).suffix!r}")
+
+
+def save(figure: "Figure", path: str | Path) -> None:
+    """Write a figure as a new file; the same figure gives the same bytes. Raises as `check_figure` does."""
+    check_figure(path)
+    kind = Path(path).suffix.lower()
+    # nothing that differs from one run to the next
+    metadata: dict[str, Any] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}[kind]
+    with new_file(path) as building, _library("").rc_context({"svg.hashsalt": "posefit"}):
+        figure.savefig(building, dpi=200, bbox_inches="tight", metadata=metadata)  # long names too
+
+
+def convergence(
+    methods: Sequence[str], evaluations: Array, curves: Sequence[Intervals], label: str = "best cost"
+) -> "Figure":
+    """Return curves over evaluations (p,), each with its band: of each method the intervals of p values."""
+    figure, axes = _figure()
+    for k, curve in enumerate(curves):
+        axes.plot(evaluations, curve.values, label=_plain(methods[k]), **_line(k))
+        axes.fill_between(evaluations, curve.low, curve.high, color=_line(k)["color"], alpha=0.18, linewidth=0)
+    _finish(axes, "evaluations", label, methods)
+    axes.set_xscale("log")
+    return figure
+
+
+def attainment(methods: Sequence[str], evaluations: Array, shares: Array) -> "Figure":
+    """Return the shares (methods, p) of runs and targets reached within evaluations (p,)."""
+    figure, axes = _figure()
+    for k, share in enumerate(shares):
+        axes.step(evaluations, share, where="post", label=_plain(methods[k]), **_line(k))
+    _finish(axes, "evaluations", "share of runs and targets reached", methods)
+    axes.set_xscale("log")
+    axes.set_ylim(-0.02, 1.02)
+    return figure
+
+
+def profile(methods: Sequence[str], levels: Array, shares: Array, label: str = "error, degrees") -> "Figure":
+    """Return the shares (methods, levels) of runs within each level."""
+    figure, axes = _figure()
+    for k, share in enumerate(shares):
+        axes.step(levels, share, where="post", label=_plain(methods[k]), **_line(k))
+    _finish(axes, label, "share of runs within", methods)
+    axes.set_ylim(-0.02, 1.02)
+    return figure
+
+
+def joint_errors(
+    methods: Sequence[str], joints: Sequence[str], errors: Sequence[Intervals], label: str = "error, mm"
+) -> "Figure":
+    """Return bars, a group a joint and in it one of each method; of each method the intervals of all joints."""
+    thick = 0.8 / len(methods)
+    figure, axes = _figure((_SIZE[0], 1.1 + len(joints) * max(0.22, 0.09 * len(methods))))
+    places = np.arange(len(joints))
+    for k, one in enumerate(errors):
+        reach = np.nan_to_num([one.values - one.low, one.high - one.values])  # one seed has no interval
+        axes.barh(
+            places + (k - (len(methods) - 1) / 2) * thick,
+            one.values,
+            thick,
+            xerr=reach,
+            label=_plain(methods[k]),
+            color=_line(k)["color"],
+            hatch=(None, "////", "....", "xxxx")[k // len(COLOURS) % 4],
+            error_kw={"elinewidth": 0.8, "ecolor": "0.25"},
+        )
+    axes.set_yticks(places, [_plain(joint) for joint in joints])
+    axes.set_ylim(len(joints) - 0.5, -0.5)
+    axes.tick_params(axis="y", length=0)
+    _finish(axes, label, "", methods)
+    axes.set_xlim(left=0.0)
+    return figure
+
+
+def critical_difference(methods: Sequence[str], ranking: Ranking) -> "Figure":
+    """Return mean ranks on a line, best to the left; bars join methods that are not told apart. Demšar, 2006."""
+    count, half = len(methods), (len(methods) + 1) // 2
+    names = 0.9 + _BAR * len(ranking.cliques)  # rows from the line to the first name
+    rows = names + half
+    figure: Figure = _library("figure").Figure(figsize=(7.2, _ROW * (_ABOVE + rows)))
+    axes = figure.add_axes((0.3, 0.0, 0.4, 1.0))
+    beyond = 0.02 * (count - 1)
+    axes.set_xlim(1.0 - beyond, count + beyond)
+    axes.set_ylim(rows, -_ABOVE)
+    axes.axis("off")
+    axes.plot([1, count], [0, 0], color="black", linewidth=1)
+    for rank in range(1, count + 1):
+        axes.plot([rank, rank], [0, -0.35], color="black", linewidth=1)
+        axes.text(rank, -0.5, str(rank), ha="center", va="bottom", fontsize=9)
+    for k, clique in enumerate(ranking.cliques):
+        low, high = ranking.mean_ranks[[clique[0], clique[-1]]]
+        height = 0.45 + _BAR * k
+        axes.plot([low - beyond / 2, high + beyond / 2], [height, height], color="black", linewidth=3.5)
+    for place, method in enumerate(np.argsort(ranking.mean_ranks, kind="stable")):
+        best = place < half  # half of the names on either side
+        rank, row = ranking.mean_ranks[method], names + (place if best else count - 1 - place)
+        line = _line(int(method)) | {"linewidth": 1}
+        axes.plot([rank, rank, axes.get_xlim()[0 if best else 1]], [0, row, row], **line)
+        axes.plot([rank], [0], marker="o", markersize=4, color=line["color"])
+        shown = [_plain(methods[method]), f"{rank:.2f}"]
+        text = "  ".join(shown if best else shown[::-1])
+        where = axes.get_yaxis_transform()
+        axes.text(-0.01 if best else 1.01, row, text, transform=where, ha="right" if best else "left", va="center")
+    _ruler(axes, ranking.critical_difference, count)
+    return figure
+
+
+def _ruler(axes: "Axes", difference: float, count: int) -> None:
+    """Draw how long the critical difference is, above the line."""
+    longer = difference > count - 1.0
+    end, y = 1.0 + min(difference, count - 1.0), 0.6 - _ABOVE
+    axes.plot([1, end], [y, y], color="black", linewidth=1.5)
+    for x in (1.0, end)[: 1 if longer else 2]:
+        axes.plot([x, x], [y - 0.15, y + 0.15], color="black", linewidth=1)
+    label = f"critical difference {difference:.2f}" + (", longer than the line" if longer else "")
+    axes.text(1, y + 0.25, label, va="top", fontsize=8)
+
+
+def _library(name: str) -> Any:
+    try:
+        return importlib.import_module(f"matplotlib.{name}" if name else "matplotlib")
+    except ImportError as error:
+        raise ImportError("figures need the library matplotlib: pip install posefit[figures]") from error
+
+
+def _figure(size: tuple[float, float] = _SIZE) -> "tuple[Figure, Axes]":
+    figure: Figure = _library("figure").Figure(figsize=size, layout="constrained")
+    axes = figure.add_subplot()
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _line(k: int) -> dict[str, Any]:
+    return {"color": COLOURS[k % len(COLOURS)], "linestyle": STYLES[k // len(COLOURS) % len(STYLES)]}
+
+
+def _plain(text: str) -> str:
+    """Return text that matplotlib does not read as mathematics."""
+    return text.replace("$", r"\$")
+
+
+def _finish(axes: "Axes", x: str, y: str, methods: Sequence[str]) -> None:
+    axes.set_xlabel(_plain(x))
+    axes.set_ylabel(_plain(y))
+    axes.figure.legend(loc="outside right upper", frameon=False, fontsize=8 if len(methods) < 20 else 6)

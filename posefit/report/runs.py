@@ -1,0 +1,230 @@
+"""The finished rows of a ledger as numbers, small enough for a hundred thousand of them."""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import JOINTS
+from posefit.report.repeat import LAST, head
+from posefit.sweep.cell import settings_text
+
+if TYPE_CHECKING:
+    from posefit.sweep.ledger import Ledger
+
+BASELINES = ("mean_pose", "persistence", "nearest")
+FIGURES = (
+    "error",  # degrees
+    *(f"skill_{name}" for name in BASELINES),
+    "lost",  # share of frames
+    "swapped",
+    "mpjpe",  # mm
+    "pa_mpjpe",
+    "iou",
+    "cost",
+    "ms",  # a frame
+    "evaluations",  # a frame
+    *(f"baseline_{name}" for name in BASELINES),  # degrees
+    "floor",
+)
+_VARIANT = ("method", "settings", "evaluations", "version")  # what a method is
+_PLACE = ("motion", "view_degrees", "corruption", "instance")  # what is always said of an instance
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """All rows. Methods are told apart by settings, budget and version, instances by everything else but the seed."""
+
+    version: str
+    methods: tuple[str, ...]  # named so that no two are alike, the lowest mean error first
+    variants: tuple[dict[str, Any], ...]  # of each method: method, settings, evaluations, version
+    instances: tuple[str, ...]  # so named too
+    places: tuple[dict[str, Any], ...]  # of each instance: the fields of a spec that make it
+    heads: tuple[str, ...]  # what commands that run rows again begin with
+    method: Array  # (n,) of each row an index, as are the next three
+    instance: Array  # (n,)
+    head: Array  # (n,)
+    seed: Array  # (n,)
+    seeds: tuple[int, ...]  # there are, rising
+    keys: tuple[str, ...]
+    figures: dict[str, Array] = field(repr=False)  # of each of FIGURES (n,), nan where a row has none
+    joint_errors: Array = field(repr=False)  # (n, 27) mm
+    traces: tuple[tuple[Array, Array], ...] = field(repr=False)  # evaluations and best costs (k,) of each row
+    failures: tuple[dict[str, Any], ...] = field(repr=False)  # cells in quarantine: name, reasons, command
+    failed: tuple[int, ...] = field(repr=False)  # how many cells of each method are in quarantine
+    unfinished: tuple[str, ...]  # methods of which every cell is in quarantine
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+
+def runs_of(ledger: "Ledger") -> Runs:
+    """Return the finished rows of a ledger, in an order that does not depend on who finished first.
+
+    Raises ValueError where there is none.
+    """
+    found = _Table()
+    for row in ledger.rows():
+        found.add(row)
+    if not found.keys:
+        raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+    return found.runs(ledger.version, ledger.quarantined())
+
+
+class _Table:
+    """Collects rows."""
+
+    def __init__(self) -> None:
+        self.variants: dict[str, int] = {}
+        self.places: dict[str, int] = {}
+        self.heads: dict[str, int] = {}
+        self.known: dict[str, tuple[int, int]] = {}  # variant and head of a spec without instance and seed
+        self.numbers: list[tuple[int, int, int]] = []
+        self.seeds: list[int] = []  # of any size, so not for an array
+        self.keys: list[str] = []
+        self.figures: list[list[float]] = []
+        self.joints: list[Array] = []
+        self.traces: list[tuple[Array, Array]] = []
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        spec = row["spec"]
+        kind = _text({name: value for name, value in spec.items() if name not in LAST})
+        if kind not in self.known:
+            variant = _index(self.variants, _variant(spec))
+            self.known[kind] = variant, _index(self.heads, head(spec))
+        variant, begun = self.known[kind]
+        place = _index(
+            self.places, _text({name: value for name, value in spec.items() if name not in (*_VARIANT, "seed")})
+        )
+        self.numbers.append((variant, place, begun))
+        self.seeds.append(spec["seed"])
+        self.keys.append(row["key"])
+        self.figures.append(_figures(row))
+        self.joints.append(np.array(row.get("joint_errors_mm") or [np.nan] * len(JOINTS), dtype=np.float32))
+        trace = row.get("trace") or {"evaluations": [], "cost": []}
+        self.traces.append((np.array(trace["evaluations"], np.float32), np.array(trace["cost"], np.float32)))
+
+    def runs(self, version: str, quarantined: Sequence[Mapping[str, Any]]) -> Runs:
+        numbers, figures = np.array(self.numbers), np.array(self.figures)
+        variants, places = ([json.loads(text) for text in table] for table in (self.variants, self.places))
+        error = np.nan_to_num(figures[:, FIGURES.index("error")], nan=np.inf)
+        means = [float(np.mean(error[numbers[:, 0] == m])) for m in range(len(variants))]
+        best = sorted(range(len(variants)), key=lambda m: (means[m], list(self.variants)[m]))
+        texts = list(self.places)
+        sorted_places = sorted(range(len(places)), key=lambda i: (_rank(places[i]), texts[i]))
+        numbers[:, 0], numbers[:, 1] = np.argsort(best)[numbers[:, 0]], np.argsort(sorted_places)[numbers[:, 1]]
+        heads = sorted(range(len(self.heads)), key=list(self.heads).__getitem__)
+        numbers[:, 2] = np.argsort(heads)[numbers[:, 2]]
+        ranks = {seed: k for k, seed in enumerate(sorted(set(self.seeds)))}
+        seeds = np.array([ranks[seed] for seed in self.seeds])
+        order = np.lexsort((seeds, numbers[:, 0], numbers[:, 1]))
+        variants, places = [variants[m] for m in best], [places[i] for i in sorted_places]
+        methods = _distinct([one["method"] for one in variants], [_variation(one) for one in variants])
+        method, instance, begun = numbers[order].T
+        lost = Counter(_variant(one["spec"]) for one in quarantined)
+        return Runs(
+            version=version,
+            methods=methods,
+            variants=tuple({**one, "settings": ", ".join(settings_text(one["settings"]))} for one in variants),
+            instances=_distinct([_place(one) for one in places], [_rest(one) for one in places]),
+            places=tuple(places),
+            heads=tuple(list(self.heads)[k] for k in heads),
+            method=method,
+            instance=instance,
+            head=begun,
+            seed=seeds[order],
+            seeds=tuple(ranks),
+            keys=tuple(self.keys[k] for k in order),
+            figures=dict(zip(FIGURES, figures[order].T, strict=True)),
+            joint_errors=np.array(self.joints)[order],
+            traces=tuple(self.traces[k] for k in order),
+            failures=tuple(_failure(one) for one in quarantined),
+            failed=tuple(lost[text] for text in (list(self.variants)[m] for m in best)),
+            unfinished=tuple(sorted({json.loads(text)["method"] for text in lost if text not in self.variants})),
+        )
+
+
+def _figures(row: Mapping[str, Any]) -> list[float]:
+    frames = row["spec"]["frames"]
+    skill, baselines = row.get("skill") or {}, row.get("baselines_degrees") or {}
+    values: dict[str, Any] = {
+        "error": (row.get("error_degrees") or {}).get("mean"),
+        "lost": row.get("lost_rate"),
+        "swapped": row.get("swap_rate"),
+        "mpjpe": row.get("mpjpe_mm"),
+        "pa_mpjpe": row.get("pa_mpjpe_mm"),
+        "iou": row.get("iou"),
+        "cost": row.get("cost"),
+        "ms": None if row.get("seconds_per_frame") is None else 1e3 * row["seconds_per_frame"],
+        "evaluations": None if row.get("evaluations_used") is None else row["evaluations_used"] / frames,
+        "floor": row.get("prior_floor_degrees"),
+        **{f"skill_{name}": skill.get(name) for name in BASELINES},
+        **{f"baseline_{name}": baselines.get(name) for name in BASELINES},
+    }
+    return [np.nan if values[name] is None else float(values[name]) for name in FIGURES]
+
+
+def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:
+    spec = lost["spec"]
+    name = f"{spec['method']} on {spec['motion']}, instance {spec['instance']}, seed {spec['seed']}"
+    tail = "".join(f"{one} = {spec[one]}\n" for one in LAST)
+    return {"name": name, "reasons": list(dict.fromkeys(lost["reasons"])), "command": head(spec) + tail + "END"}
+
+
+def _variant(spec: Mapping[str, Any]) -> str:
+    return _text({name: spec[name] for name in _VARIANT})
+
+
+def _variation(variant: Mapping[str, Any]) -> list[str]:
+    foreign = variant["version"].partition(", ")[2]
+    return [
+        *settings_text(variant["settings"]),
+        f"{variant['evaluations']} evaluations",
+        *([foreign] if foreign else []),
+    ]
+
+
+def _rank(place: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return what instances are sorted by: the undamaged before the damaged."""
+    damage = sorted(place["corruption"].items())
+    return place["motion"], place["view_degrees"], len(damage), damage, place["instance"]
+
+
+def _place(place: Mapping[str, Any]) -> str:
+    views = ", ".join(f"{view:g}" for view in place["view_degrees"])
+    damage = "".join(f", {kind} {strength:g}" for kind, strength in sorted(place["corruption"].items()))
+    return f"{place['motion']}, view {views}{damage}, instance {place['instance']}"
+
+
+def _rest(place: Mapping[str, Any]) -> list[str]:
+    return [f"{name} {_text(value)}" for name, value in place.items() if name not in _PLACE]
+
+
+def _distinct(names: Sequence[str], more: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """Return names, those that occur twice with what makes them differ."""
+    alike: dict[str, list[Sequence[str]]] = {}
+    for name, words in zip(names, more, strict=True):
+        alike.setdefault(name, []).append(words)
+    shared = {name: set(several[0]).intersection(*several[1:]) for name, several in alike.items()}
+    found = [
+        ", ".join([name, *(word for word in words if word not in shared[name])])
+        for name, words in zip(names, more, strict=True)
+    ]
+    many, met = Counter(found), Counter[str]()
+    for k, name in enumerate(found):
+        if many[name] > 1:
+            met[name] += 1
+            found[k] = f"{name} ({met[name]})"
+    return tuple(found)
+
+
+def _index(table: dict[str, int], key: str) -> int:
+    return table.setdefault(key, len(table))
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, sort_keys=True)

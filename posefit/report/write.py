@@ -1,0 +1,123 @@
+"""What `posefit report` does: a page, and where they are asked for figures, tables and files for other tools."""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from posefit.geometry.skeleton import ANGLES
+from posefit.report.content import data_of
+from posefit.report.runs import runs_of
+from posefit.report.webpage import MARK, document, plain
+from posefit.sweep.ledger import Ledger
+
+Say = Callable[[str], None]
+
+
+def report(
+    path: str,
+    out: str,
+    *,
+    figures: str | None = None,
+    iohprofiler: str | None = None,
+    csv: str | None = None,
+    say: Say,
+) -> dict[str, Any]:
+    """Write the report of a ledger to a file, and return its leaderboard, baselines and claim.
+
+    An earlier report of that name is replaced; nothing else is. `figures` is a new folder for figures (PNG, PDF) and
+    tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new file of all rows. Raises ValueError
+    where the ledger has no finished row or something cannot be written, and ImportError where figures need matplotlib:
+    before anything is written, if that can be known.
+    """
+    _check(Path(path), out, [figures, iohprofiler, csv])
+    if figures is not None:
+        from posefit.report.figures import check_figure
+
+        check_figure("any.png")
+    ledger = Ledger(path, say)
+    runs = runs_of(ledger)
+    data = data_of(ledger, runs, say)
+    _replace(Path(out), document(data))
+    if figures is not None:
+        from posefit.report.portfolio import write_portfolio
+
+        write_portfolio(runs, figures)
+    if iohprofiler is not None:
+        _write_iohprofiler(ledger, iohprofiler)
+    if csv is not None:
+        from posefit.report.export import write_csv
+        from posefit.sweep.table import flat
+
+        write_csv((flat(row) for source in (ledger.rows(), ledger.quarantined()) for row in source), csv)
+    told = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
+    return {"out": out, **dict(plain(told))}
+
+
+def told(found: dict[str, Any]) -> list[str]:
+    """Return the lines that the command prints: the leaderboard and where the page is."""
+    lines = []
+    for row in found["leaderboard"] or []:
+        ends = "" if row["low"] is None else f"{row['low']:.2f} to {row['high']:.2f}"
+        skill = "-" if row["skill_mean_pose"] is None else f"{row['skill_mean_pose']:.2f}"
+        error = "-" if row["error"] is None else f"{row['error']:.2f}"
+        lines.append(f"{row['name'][:32]:32} {error:>9} {ends:>15} {skill:>7}")
+    head = [f"{'':32} {'error deg':>9} {'95 % interval':>15} {'skill':>7}"] if lines else []
+    return [*head, *lines, f"written to {found['out']}: open it in any browser"]
+
+
+def _check(ledger: Path, out: str, others: list[str | None]) -> None:
+    target = Path(out)
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise ValueError(f"--out must be a file that ends in .html, got {out}")
+    if target.is_dir() or (target.exists() and not _is_report(target)):
+        raise ValueError(f"{out}: expected a new name or an earlier report, got something else")
+    places = [one for one in (out, *others) if one is not None]
+    for place in places:
+        if Path(place).resolve() == ledger.resolve() or places.count(place) > 1:
+            raise ValueError(f"{place}: expected a place of its own for each of what is written, got it twice")
+    for other in others:
+        if other is not None and Path(other).exists():
+            raise ValueError(f"{other}: expected a new name to write to, got one that exists")
+    for place in places:
+        if not (parent := Path(place).resolve().parent).is_dir() or not os.access(parent, os.W_OK):
+            raise ValueError(f"{place}: expected a place to write to, got one in {parent}, which is none")
+
+
+def _is_report(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(MARK)) == MARK.encode()
+
+
+def _replace(target: Path, text: str) -> None:
+    building = target.with_name(f".{target.stem}.partial{target.suffix}")
+    try:
+        building.write_text(text, encoding="utf-8", newline="\n")
+        building.replace(target)
+    except OSError as error:
+        building.unlink(missing_ok=True)
+        raise ValueError(f"{target}: expected a place to write to, got {error.strerror or error}") from error
+
+
+def _write_iohprofiler(ledger: Ledger, path: str) -> None:
+    from posefit.report.export import Run, write_iohprofiler
+
+    def runs() -> Iterator[Run]:
+        for row in ledger.rows():
+            spec, trace = row["spec"], row["trace"]
+            if not trace["evaluations"]:
+                continue
+            views = " ".join(f"{view:g}" for view in spec["view_degrees"])
+            damage = "".join(f" {kind} {share:g}" for kind, share in sorted(spec["corruption"].items()))
+            yield Run(
+                spec["method"],
+                {**spec["settings"], "evaluations": spec["evaluations"], "version": spec["version"]},
+                f"{spec['motion']} view {views}{damage} frames {spec['frames']} {spec['translation']}",
+                ANGLES if spec["translation"] == "known" else ANGLES + 3,  # of the pose, whatever a method searches
+                spec["instance"],
+                spec["seed"],
+                trace["evaluations"],
+                trace["cost"],
+            )
+
+    write_iohprofiler(runs(), path)

@@ -1,0 +1,68 @@
+"""How probably a run of one method is better than a run of another on the same instance. Agarwal et al., 2021."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
+
+from posefit.arrays import Array
+from posefit.statistics.intervals import LEVEL, RESAMPLES, check_bootstrap
+from posefit.statistics.pairing import checked
+
+
+def probability_of_improvement(errors: ArrayLike) -> Array:
+    """Return in row a, column b how probably method a has the lower error, (methods, methods).
+
+    `errors` (methods, instances, seeds). On each instance every run of one is held against every run of the other, a
+    tie counting half (Mann and Whitney's U); instances weigh the same. The diagonal is 0.5.
+    """
+    found = checked("errors", errors, ("methods", "instances", "seeds"))
+    methods, instances, seeds = found.shape
+    ordered = np.sort(found, axis=2)
+    wins = np.zeros((methods, methods))
+    for a in range(methods):
+        for b in range(a + 1, methods):
+            for i in range(instances):
+                beaten = np.searchsorted(ordered[b, i], found[a, i], side="right").sum()
+                below = np.searchsorted(ordered[b, i], found[a, i], side="left").sum()
+                wins[b, a] += (beaten + below) / 2.0
+    wins /= instances * seeds * seeds
+    np.fill_diagonal(wins, 0.5)
+    upper = np.triu_indices(methods, 1)
+    wins[upper] = 1.0 - wins.T[upper]
+    return wins
+
+
+def improvement_interval(
+    first: ArrayLike,
+    second: ArrayLike,
+    rng: np.random.Generator,
+    *,
+    resamples: int = RESAMPLES,
+    level: float = LEVEL,
+) -> tuple[float, float, float]:
+    """Return how probably `first` has the lower error than `second`, each (instances, seeds), and its interval's ends.
+
+    Seeds are resampled within each instance, the same for both, as they are paired. The percentiles are those of
+    Hesterberg, What teachers should know about the bootstrap, 2015: moved out to the t distribution and by
+    sqrt(n / (n - 1)), without which they are too narrow for few seeds n. Where a seed brings both methods the same
+    luck, its own pair is not like the others and shifts the value by the order of 1 / n. One seed gives nan for both
+    ends.
+    """
+    one = checked("first", first, ("instances", "seeds"))
+    other = checked("second", second, ("instances", "seeds"))
+    if one.shape != other.shape:
+        raise ValueError(f"second must have the shape of first, {one.shape}, got {other.shape}")
+    check_bootstrap(resamples, level)
+    instances, seeds = one.shape
+    wins = (one[:, :, None] < other[:, None, :]) + 0.5 * (one[:, :, None] == other[:, None, :])
+    value = float(wins.mean())
+    if seeds == 1:
+        return value, np.nan, np.nan
+    shares = np.zeros(resamples)
+    for i in range(instances):
+        counts = rng.multinomial(seeds, np.full(seeds, 1.0 / seeds), size=resamples).astype(np.float64)
+        shares += ((counts @ wins[i]) * counts).sum(axis=1) / (seeds * seeds * instances)
+    freedom = instances * (seeds - 1)
+    edge = float(stats.norm.cdf(np.sqrt(seeds / (seeds - 1)) * stats.t.ppf(0.5 + level / 2.0, freedom)))
+    low, high = np.quantile(shares, [1.0 - edge, edge])
+    return value, float(low), float(high)

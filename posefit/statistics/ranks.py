@@ -1,0 +1,123 @@
+"""Which of several methods is better, judged by the order of paired errors alone.
+
+A block is what methods are ranked on. With errors (methods, instances, seeds) it is an instance with a seed, and what
+is found holds for these instances. For a claim about instances like these, make each instance one block: give
+`errors.mean(axis=2, keepdims=True)`, for seeds of one instance are not independent of each other.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import stats
+
+from posefit.arrays import Array
+from posefit.statistics.pairing import checked
+
+LEVEL = 0.05  # of significance
+_SHAPE = ("methods", "instances", "seeds")
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """Mean ranks and what a critical-difference plot needs."""
+
+    mean_ranks: Array  # (methods,), 1 is best
+    statistic: float  # Friedman's, chi-squared with methods - 1 degrees of freedom
+    p_value: float  # that all methods are alike
+    critical_difference: float  # of mean ranks; Nemenyi
+    cliques: tuple[tuple[int, ...], ...]  # methods, best first, that are not told apart; each as large as it can be
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two methods by Wilcoxon's signed ranks."""
+
+    first: int
+    second: int
+    difference: float  # median of first - second, below 0 where the first is better
+    p_value: float
+    adjusted: float  # Holm's, for all comparisons made together
+
+
+def friedman(errors: ArrayLike, level: float = LEVEL) -> Ranking:
+    """Return the ranking of errors (methods, instances, seeds), ties sharing their mean rank.
+
+    Friedman's test with its correction for ties, and Nemenyi's critical difference: Demšar, Statistical comparisons
+    of classifiers over multiple data sets, 2006. Cliques mean little where `p_value` is above `level`. Raises
+    ValueError for fewer than 2 methods or 2 blocks.
+    """
+    found = checked("errors", errors, _SHAPE, (2, 1, 1))
+    _check(level)
+    blocks = found.reshape(len(found), -1).T
+    n, k = blocks.shape
+    if n < 2:
+        raise ValueError(f"blocks, instances times seeds, must be at least 2, got {n}")
+    ranks = stats.rankdata(blocks, axis=1)
+    mean = np.asarray(ranks.mean(axis=0), dtype=np.float64)
+    # Conover's form, in which ties lessen the spread of the ranks that the statistic is measured by.
+    spread = float(((ranks - (k + 1) / 2.0) ** 2).sum())
+    statistic = (k - 1) * n * n * float(((mean - (k + 1) / 2.0) ** 2).sum()) / spread if spread > 0.0 else 0.0
+    difference = nemenyi_difference(k, n, level)
+    return Ranking(mean, statistic, float(stats.chi2.sf(statistic, k - 1)), difference, _cliques(mean, difference))
+
+
+def nemenyi_difference(methods: int, blocks: int, level: float = LEVEL) -> float:
+    """Return the difference of mean ranks from which on two methods are told apart. Nemenyi; Demšar, 2006."""
+    quantile = float(stats.studentized_range.ppf(1.0 - level, methods, np.inf))
+    return quantile / math.sqrt(2.0) * math.sqrt(methods * (methods + 1) / (6.0 * blocks))
+
+
+def _cliques(mean: Array, difference: float) -> tuple[tuple[int, ...], ...]:
+    order = np.argsort(mean, kind="stable")
+    found: list[tuple[int, ...]] = []
+    last = 0
+    for start in range(len(order)):
+        end = int(np.searchsorted(mean[order], mean[order[start]] + difference, side="left"))
+        if end > last and end - start > 1:  # else it is part of the clique before
+            found.append(tuple(int(m) for m in order[start:end]))
+        last = max(last, end)
+    return tuple(found)
+
+
+def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) -> list[Comparison]:
+    """Return two-sided paired comparisons of all, or of some, pairs of methods; errors (methods, instances, seeds).
+
+    Blocks in which both are equal are ranked but count for neither (Pratt, 1959). The p-value is exact for up to 50
+    blocks without ties, as in scipy. Holm's adjustment is over the pairs compared: Holm, 1979.
+    """
+    found = checked("errors", errors, _SHAPE, (2, 1, 1))
+    chosen = list(combinations(range(len(found)), 2)) if pairs is None else list(pairs)
+    for pair in chosen:
+        if len({*pair}) != 2 or not all(0 <= m < len(found) for m in pair):
+            raise ValueError(f"pairs must be of two different methods of 0 to {len(found) - 1}, got {pair}")
+    differences = [(found[first] - found[second]).ravel() for first, second in chosen]
+    p_values = np.array([_signed_rank(one) for one in differences])
+    return [
+        Comparison(first, second, float(np.median(one)), float(p), float(adjusted))
+        for (first, second), one, p, adjusted in zip(chosen, differences, p_values, holm(p_values), strict=True)
+    ]
+
+
+def _signed_rank(differences: Array) -> float:
+    if not differences.any():
+        return 1.0
+    return float(stats.wilcoxon(differences, zero_method="pratt").pvalue)
+
+
+def holm(p_values: ArrayLike) -> Array:
+    """Return p-values (m,) adjusted so that all m may be judged at one level. Holm, 1979."""
+    found = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(found, kind="stable")
+    factors = np.arange(len(found), 0, -1)
+    adjusted = np.empty_like(found)
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(found[order] * factors))
+    return adjusted
+
+
+def _check(level: float) -> None:
+    if not 0.0 < level < 1.0:
+        raise ValueError(f"level must lie between 0 and 1, got {level}")

@@ -1,0 +1,209 @@
+"""Runs cells on a Dask cluster, through its own client."""
+
+import importlib
+import logging
+import secrets
+import threading
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from posefit.sweep.cell import Cell, run_cell
+from posefit.sweep.engines.engine import EngineError, Outcome, Run, reason_of
+from posefit.sweep.engines.limits import THREADS, Limits, limited, single_threaded
+
+PATIENCE = 30.0  # seconds to wait for a scheduler, or for workers, that are not there
+CONNECTING = 5.0  # seconds for one try
+ARRIVING = 10.0  # seconds for a result that is ready to come over
+LOOK = 1.0  # seconds between two looks at which workers there are
+
+
+@dataclass
+class _Sent:
+    """A cell on its way."""
+
+    cell: Cell
+    worker: str  # the address that it was sent to
+    began: float
+    missed: int = 0  # how often this worker was looked for in vain
+
+
+class Cluster:
+    """An engine of Dask workers: of a scheduler at an address, or, with `workers` instead, so many on this machine.
+
+    Each cell is sent to one worker that has no other. So it starts at once, no other cell dies with it, and Dask does
+    not run it again by itself. A scheduler that is not there, or has no workers, is waited for `patience` seconds;
+    after that EngineError is raised.
+    """
+
+    def __init__(
+        self,
+        scheduler: str | None = None,
+        workers: int | None = None,
+        limits: Limits | None = None,
+        run: Run = run_cell,
+        patience: float = PATIENCE,
+    ) -> None:
+        self._limits, self._run, self._patience = limits or Limits(), run, patience
+        self._distributed = _library()
+        self._local = None if workers is None else _local(self._distributed, workers)
+        self._address = scheduler if self._local is None else self._local.scheduler_address
+        self._running: dict[Any, _Sent] = {}
+        self._idle: list[str] = []
+        self._looked = 0.0
+        self._woken = threading.Event()
+        self._client: Any = None
+        try:
+            self._connect()
+        except EngineError:
+            self.close()
+            raise
+
+    def window(self) -> int:
+        """Return how many workers there are, once there are any."""
+        until = time.monotonic() + self._patience
+        self._look()
+        while not self._idle and not self._running:
+            if time.monotonic() > until:
+                raise EngineError(f"scheduler {self._address} must have workers, got none for {self._patience:g} s")
+            time.sleep(LOOK)
+            self._look()
+        return len(self._idle) + len(self._running)
+
+    def submit(self, cell: Cell) -> None:
+        """Send a cell to an idle worker."""
+        worker = self._idle.pop()
+        arguments = self._run, cell, self._limits, 0.0
+        name = f"{cell.key}-{secrets.token_hex(4)}"
+        future = self._client.submit(limited, *arguments, key=name, workers=[worker], pure=False, retries=0)
+        self._running[future] = _Sent(cell, worker, time.monotonic())
+        future.add_done_callback(self._wake)
+
+    def wait(self, seconds: float) -> list[Outcome]:
+        """Return the cells that ended."""
+        self._woken.wait(seconds if self._running else 0.0)
+        self._woken.clear()
+        if self._client.status != "running":
+            return self._lost()
+        self._look()
+        outcomes = [self._outcome(future) for future in tuple(self._running)]
+        return [outcome for outcome in outcomes if outcome is not None]
+
+    def close(self) -> None:
+        """Leave the scheduler, and end the workers of this machine."""
+        for future in self._running:
+            future.release()
+        if self._client is not None:
+            self._client.close(timeout=CONNECTING)
+        if self._local is not None:
+            self._local.close(timeout=CONNECTING)
+
+    def _outcome(self, future: Any) -> Outcome | None:
+        """Return what became of a cell, if anything has."""
+        sent = self._running[future]
+        result, reason = None, None
+        try:
+            if future.status == "finished":
+                result = future.result(timeout=ARRIVING)
+            elif future.status == "error":
+                reason = self._reason(future.exception(timeout=ARRIVING), sent)
+            elif sent.missed > 1:
+                reason = self._reason(None, sent)
+            elif future.status != "cancelled":
+                return None
+        except (TimeoutError, OSError, self._distributed.CancelledError):
+            return None  # its worker died with the result
+        except Exception as error:  # a result that cannot be read
+            reason = reason_of(error, self._limits)
+        del self._running[future]
+        future.cancel()
+        if result is not None:
+            self._idle.append(sent.worker)
+        else:
+            self._looked = 0.0  # the worker may be gone
+        return Outcome(sent.cell, result, reason)
+
+    def _reason(self, error: BaseException | None, sent: _Sent) -> str:
+        if error is not None and type(error).__name__ != "KilledWorker":
+            return reason_of(error, self._limits)
+        past = time.monotonic() - sent.began >= self._limits.seconds
+        return reason_of(TimeoutError(), self._limits) if past else "its worker died"
+
+    def _lost(self) -> list[Outcome]:
+        """Return all cells as lost with the scheduler, once there is one again."""
+        lost = [Outcome(sent.cell) for sent in self._running.values()]
+        self._running.clear()
+        self._connect()
+        return lost
+
+    def _look(self) -> None:
+        """See which workers there are, once a second."""
+        if time.monotonic() - self._looked < LOOK:
+            return
+        try:
+            present = set(self._client.nthreads())
+        except (OSError, TimeoutError, self._distributed.CancelledError):
+            return  # the next `wait` sees to it
+        for sent in self._running.values():
+            sent.missed = 0 if sent.worker in present else sent.missed + 1
+        self._idle = sorted(present - {sent.worker for sent in self._running.values()})
+        self._looked = time.monotonic()
+
+    def _connect(self) -> None:
+        until = time.monotonic() + self._patience
+        while True:
+            if self._client is not None:
+                self._client.close(timeout=CONNECTING)
+            try:
+                limit = min(CONNECTING, self._patience)
+                self._client = self._distributed.Client(self._address, timeout=limit, set_as_default=False)
+                self._client.register_plugin(_plugin(self._distributed))
+                return
+            except (OSError, ValueError, TimeoutError) as error:
+                if isinstance(error, ValueError) or time.monotonic() > until:
+                    cause = " ".join(str(error).split())
+                    raise EngineError(f"scheduler must be one that answers, got {self._address}: {cause}") from None
+                time.sleep(min(LOOK, self._patience))
+
+    def _wake(self, _: Any) -> None:
+        self._woken.set()
+
+
+def _local(distributed: Any, workers: int) -> Any:
+    """Return a cluster of worker processes on this machine, one thread each."""
+    if workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers}")
+    import dask
+
+    told = {
+        "distributed.scheduler.allowed-failures": 0,  # attempts are counted by the ledger
+        "distributed.nanny.pre-spawn-environ": dict.fromkeys(THREADS, 1),
+    }
+    with dask.config.set(told):
+        return distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=0,  # each cell has a limit of its own
+            dashboard_address=":0",
+            silence_logs=logging.CRITICAL,
+        )
+
+
+def _plugin(distributed: Any) -> Any:
+    """Return what makes each worker of a cluster, also one that comes later, run on one thread."""
+
+    class Alone(distributed.WorkerPlugin):  # type: ignore[misc]
+        name = "posefit"
+
+        def setup(self, **_: Any) -> None:
+            single_threaded()
+
+    return Alone()
+
+
+def _library() -> Any:
+    try:
+        return importlib.import_module("distributed")
+    except ImportError as error:
+        raise ImportError("Dask needs the library distributed: python -m pip install 'posefit[dask]'") from error

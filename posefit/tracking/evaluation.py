@@ -1,0 +1,146 @@
+"""What a track is worth: its errors, beside baselines that anybody can reach."""
+
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting import metrics
+from posefit.fitting.prior import Prior
+from posefit.fitting.tracker import Frame, Observation
+from posefit.footage.source import Scene
+from posefit.silhouette.cost import BETA, areas, mismatch
+
+
+def nearest(scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA) -> Array:
+    """Return the pose (66,) of least cost in frame k of joint angles (n, 63), with the true root and translation."""
+    assert scene.truth is not None
+    poses = np.column_stack([np.tile(scene.truth.poses[k, :3], (len(training), 1)), training])
+    translations = np.tile(scene.truth.translations[k], (len(poses), 1))
+    costs = np.zeros(len(poses))
+    for camera, silhouette in zip(scene.cameras, observation.silhouettes, strict=True):
+        costs += mismatch(areas(scene.body, camera, silhouette, poses, translations), beta)
+    return np.array(poses[costs.argmin()])
+
+
+class Evaluation:
+    """Collects a row a frame. Baselines have the true root and translation, which a tracker has not:
+
+    `mean_pose`, the mean of the training poses; `persistence`, the true pose of the first frame, held; `nearest`, the
+    training pose of least cost in each frame; `prior_floor`, the truth's own projection into the prior.
+    """
+
+    def __init__(self, scene: Scene, prior: Prior | None, training: Array, beta: float) -> None:
+        self._scene, self._prior, self._training, self._beta = scene, prior, training, beta
+        self._frames: list[Frame] = []
+        self._usable: list[bool] = []
+        self._ious: list[float] = []
+        self._nearest: list[Array] = []
+
+    def add(self, frame: Frame, observation: Observation) -> dict[str, float]:
+        """Return cost, IoU and, where there is a truth, the error of a frame."""
+        k = len(self._frames)
+        self._frames.append(frame)
+        self._usable.append(observation.usable)
+        known = [silhouette.known for silhouette in observation.silhouettes]  # by a camera that saw something
+        self._ious.append(float(metrics.iou(frame.areas)[known if any(known) else slice(None)].mean()))
+        row = {"cost": frame.cost, "iou": self._ious[-1]}
+        if self._scene.truth is not None:
+            truth = self._scene.truth.poses[k]
+            row["error_degrees"] = float(metrics.pose_error_degrees(truth[None], frame.pose[None])[0])
+            self._nearest.append(nearest(self._scene, self._training, k, observation, self._beta))
+        return row
+
+    def close(self) -> tuple[list[dict[str, float]], dict[str, Any]]:
+        """Return the rows of all frames and the summary's figures."""
+        frames = self._frames
+        columns: dict[str, Array] = {
+            "cost": np.array([frame.cost for frame in frames]),
+            "iou": np.array(self._ious),
+        }
+        summary: dict[str, Any] = dict.fromkeys(
+            (
+                "error_degrees",
+                "geodesic_degrees",
+                "mpjpe_mm",
+                "pa_mpjpe_mm",
+                "iou",
+                "swap_rate",
+                "lost_rate",
+                "skill",
+                "baselines_degrees",
+                "prior_floor_degrees",
+            )
+        )
+        usable = np.array(self._usable) if any(self._usable) else np.ones(len(frames), dtype=bool)
+        summary["iou"], summary["cost"] = (float(columns[name][usable].mean()) for name in ("iou", "cost"))
+        summary["held_frames"] = int(np.count_nonzero(~np.array(self._usable)))
+        columns["usable"] = np.array(self._usable, dtype=np.float64)
+        if self._scene.truth is not None:
+            columns |= self._errors(summary)
+        used, seconds = sum(frame.evaluations for frame in frames), sum(frame.seconds for frame in frames)
+        summary |= {
+            "evaluations": used,
+            "seconds_per_frame": seconds / len(frames),
+            "evaluations_per_second": used / max(seconds, 1e-9),  # a tracker of somebody else may say 0
+        }
+        if len(frames) == 1:
+            summary["history"] = frames[0].history.tolist()
+        columns["evaluations"] = np.array([frame.evaluations for frame in frames])
+        columns["seconds"] = np.array([frame.seconds for frame in frames])
+        rows = [{"frame": k, **{name: float(v[k]) for name, v in columns.items()}} for k in range(len(frames))]
+        return rows, summary
+
+    def _errors(self, summary: dict[str, Any]) -> dict[str, Array]:
+        assert self._scene.truth is not None
+        truth = self._scene.truth.poses[: len(self._frames)]
+        places = self._scene.truth.translations[: len(self._frames)]
+        poses = np.array([frame.pose for frame in self._frames])
+        skeleton = self._scene.body.skeleton
+        true_joints = skeleton.joints(truth, places)
+        joints = skeleton.joints(poses, np.array([frame.translation for frame in self._frames]))
+        errors = metrics.pose_error_degrees(truth, poses)
+        mpjpe = metrics.mpjpe_mm(true_joints, joints)
+        aligned, geodesic = metrics.pa_mpjpe_mm(true_joints, joints), metrics.geodesic_degrees(truth, poses)
+        swapped = metrics.swapped(true_joints, joints)
+        baselines = {
+            name: float(metrics.pose_error_degrees(truth, pose).mean()) for name, pose in self._baselines(truth)
+        }
+        floor = baselines.pop("prior_floor", None)
+        summary |= {
+            "error_degrees": {
+                "mean": float(metrics.mean_error(errors)),
+                "std": float(metrics.error_spread(errors)),
+                "max": float(errors.max()),
+            },
+            "geodesic_degrees": float(geodesic.mean()),
+            "free_error_degrees": float(metrics.pose_error_degrees(truth, poses, skeleton.free).mean()),
+            "mpjpe_mm": float(mpjpe.mean()),
+            "pa_mpjpe_mm": float(aligned.mean()),
+            "swap_rate": float(swapped.mean()),
+            "lost_rate": float(metrics.lost_rate(mpjpe)),
+            "skill": {name: metrics.skill(float(errors.mean()), error) for name, error in baselines.items()},
+            "baselines_degrees": baselines,
+            "prior_floor_degrees": floor,
+        }
+        return {
+            "error_degrees": errors,
+            "geodesic_degrees": geodesic,
+            "mpjpe_mm": mpjpe,
+            "pa_mpjpe_mm": aligned,
+            "swapped": swapped.astype(np.float64),
+        }
+
+    def _baselines(self, truth: Array) -> list[tuple[str, Array]]:
+        def with_root(angles: Array) -> Array:
+            return np.column_stack([truth[:, :3], np.broadcast_to(angles, (len(truth), truth.shape[1] - 3))])
+
+        baselines = [
+            ("mean_pose", with_root(self._training.mean(axis=0))),
+            ("persistence", np.tile(truth[0], (len(truth), 1))),
+            ("nearest", np.array(self._nearest)),
+        ]
+        if self._prior is not None:
+            floor = self._prior.inverse_transform(self._prior.transform(truth[:, 3:]))
+            baselines.append(("prior_floor", with_root(floor)))
+        return baselines

@@ -1,0 +1,248 @@
+"""A method, by names: an optimiser and a prior, or a tracker; with its settings checked and its plugins watched."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+
+from posefit import settings
+from posefit.arrays import Array
+from posefit.fitting.box import Space
+from posefit.fitting.guard import BrokenRuleError, Guarded
+from posefit.fitting.optimiser import NextFrame, Optimiser, OptimiserFactory
+from posefit.fitting.prior import Prior
+from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE
+from posefit.fitting.tracker import (
+    FLOOR,
+    SPREAD,
+    Frame,
+    Observation,
+    Prediction,
+    SynthesisTracker,
+    Task,
+    Tracker,
+    TrackerFactory,
+)
+from posefit.registry import Kind, Offer, registry
+from posefit.silhouette.cost import BETA
+
+ITERATIONS = 60  # C of the SAPSO paper, section 5.2
+COMPILING = 60.0  # seconds that a plugin's first calls may take longer than its limit
+
+Settings = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a user chose: names or factories, their settings, and the budget."""
+
+    optimiser: str | OptimiserFactory = "sapso"
+    prior: str | Prior = "pca"
+    tracker: str | TrackerFactory | None = None
+    optimiser_settings: Settings = field(default_factory=dict)
+    prior_settings: Settings = field(default_factory=dict)
+    tracker_settings: Settings = field(default_factory=dict)
+    particles: int | None = None
+    iterations: int | None = None
+    evaluations: int | None = None
+    ask_seconds: float | None = None
+
+    def budget(self) -> int:
+        """Return how many evaluations a frame may have: N (C + 1) where nothing else is said.
+
+        Raises ValueError where a number makes no sense, or two of them contradict each other.
+        """
+        for name in ("particles", "iterations", "evaluations"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise ValueError(f"{name} must be at least 1, got {value}")
+        if self.ask_seconds is not None and not self.ask_seconds > 0.0:
+            raise ValueError(f"ask_seconds must be above 0, got {self.ask_seconds}")
+        if self.evaluations is not None and self.iterations is not None:
+            raise ValueError("evaluations and iterations must not both be given: a budget has so many iterations")
+        return self.evaluations or (self.particles or settings.PARTICLES) * ((self.iterations or ITERATIONS) + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """A tracker that is ready, and what it is made of."""
+
+    name: str
+    tracker: Tracker
+    prior: Prior | None
+    beta: float
+    settings: dict[str, dict[str, Any]]
+    warm_up: Tracker = field(repr=False)  # the same, with time to compile
+
+
+def prepare(choice: Choice, task: Task) -> Method:
+    """Return the method that was chosen, for a task.
+
+    Raises ValueError where a name, a setting or the budget is wrong, ImportError where a library is not installed, and
+    BrokenRuleError where a plugin does not do what its kind has to.
+    """
+    if choice.tracker is not None:
+        return _tracker(choice, task)
+    offer = _offered("optimiser", choice.optimiser)
+    mine = settings.planned(offer.factory, choice.optimiser_settings, task.evaluations, choice.particles)
+    settings.check(offer.name, offer.factory, mine)
+    settings.check("tracker", _driver, choice.tracker_settings)
+    prior, learned = _prior(choice, task)
+
+    driven = dict(choice.tracker_settings)
+    beta = float(driven.pop("beta", BETA))
+    prediction = Prediction(**driven)
+
+    def tracker(limit: float | None) -> SynthesisTracker:
+        make = partial(_guarded, offer, mine, limit)
+        return SynthesisTracker(task, learned, make, offer.next_frame, prediction, beta)
+
+    patient = None if choice.ask_seconds is None else choice.ask_seconds + COMPILING
+    return Method(
+        f"{offer.name} + {prior}",
+        tracker(choice.ask_seconds),
+        learned,
+        beta,
+        {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)},
+        tracker(patient),
+    )
+
+
+def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: str | None) -> dict[str, dict[str, Any]]:
+    """Return the settings of optimiser, prior and tracker that texts such as `sapso.cooling=0.9` give.
+
+    The name before the dot is the plugin's, or its family's for `family:NAME`; `tracker` stands for what drives an
+    optimiser and a prior. Raises ValueError where a text has another form, names a plugin that is not in use, or a
+    setting that it does not know, or where a value does not fit.
+    """
+    places: dict[str, tuple[str, Callable[..., Any]]] = {}
+    if tracker is None:
+        chosen: list[tuple[Kind, str]] = [("optimiser", optimiser), ("prior", prior)]
+        places["tracker"] = "tracker", _driver
+    else:
+        chosen = [("tracker", tracker)]
+    for one, name in chosen:
+        places[name.partition(":")[0]] = one, registry().offer(one, name).factory
+    given: dict[str, dict[str, str]] = {name: {} for name in places}
+    for text in texts:
+        left, equals, value = text.partition("=")
+        name, dot, setting = left.partition(".")
+        if not (equals and dot):
+            raise ValueError(f"--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {text!r}")
+        if name not in places:
+            raise ValueError(f"--set must name one of {', '.join(places)}, which are in use here, got {text!r}")
+        given[name][setting] = value
+    parsed: dict[str, dict[str, Any]] = {}
+    for name, (kind, factory) in places.items():
+        parsed[f"{kind}_settings"] = settings.parse(name, factory, given[name])
+    return parsed
+
+
+def _driver(
+    *,
+    spread: float = SPREAD,
+    floor: float = FLOOR,
+    prediction: Literal["latest", "literal"] = "latest",
+    root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES,
+    translation_range: tuple[float, float, float] = TRANSLATION_RANGE,
+    beta: float = BETA,
+) -> None:
+    """Stand for the settings of `SynthesisTracker`."""
+
+
+def _tracker(choice: Choice, task: Task) -> Method:
+    assert choice.tracker is not None
+    offer, mine = _offered("tracker", choice.tracker), dict(choice.tracker_settings)
+    settings.check(offer.name, offer.factory, mine)
+    with _rules(offer):
+        tracker = offer.factory(task, **mine)
+    watched = _Watched(tracker, offer.label)
+    return Method(offer.name, watched, None, float(mine.get("beta", BETA)), {"tracker": mine}, watched)
+
+
+def _prior(choice: Choice, task: Task) -> tuple[str, Prior]:
+    """Return the prior's name, and the prior itself, fitted."""
+    if not isinstance(choice.prior, str):
+        return type(choice.prior).__name__, choice.prior
+    offer = registry().offer("prior", choice.prior)
+    settings.check(offer.name, offer.factory, choice.prior_settings)
+    angles = training_angles(task)
+    with _rules(offer):
+        prior: Prior = offer.factory(**choice.prior_settings).fit(angles, task.body.skeleton)
+        _check_prior(prior, angles[:3], offer)
+    return offer.name, prior
+
+
+def training_angles(task: Task) -> Array:
+    """Return the joint angles (T, 63) of all motions that may be learned from."""
+    return np.concatenate([motion.poses[:, 3:] for motion in task.training])
+
+
+def _check_prior(prior: Prior, angles: Array, offer: Offer) -> None:
+    low, high = np.asarray(prior.low), np.asarray(prior.high)
+    if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low).all() and np.isfinite(high).all()):
+        raise BrokenRuleError(
+            f"{offer.label}: low and high must be finite and of shape (m,), got {low.shape}, {high.shape}"
+        )
+    latents = np.asarray(prior.transform(angles))
+    back, feasible = prior.inverse_transform(latents), prior.feasible(latents)
+    for name, value, shape in (
+        ("transform", latents, (len(angles), len(low))),
+        ("inverse_transform", back, angles.shape),
+        ("feasible", feasible, (len(angles),)),
+    ):
+        if np.shape(value) != shape:
+            raise BrokenRuleError(f"{offer.label}: {name} must return shape {shape}, got {np.shape(value)}")
+        if not np.isfinite(value).all():
+            raise BrokenRuleError(f"{offer.label}: {name} must return finite numbers, got some that are not")
+
+
+def _guarded(offer: Offer, mine: Settings, limit: float | None, space: Space, rng: np.random.Generator) -> Optimiser:
+    with _rules(offer):
+        optimiser = offer.factory(space, rng, **mine)
+    return Guarded(optimiser, space, offer.label, limit)
+
+
+@contextmanager
+def _rules(offer: Offer) -> Iterator[None]:
+    """Pass on what a user did wrong; whatever else a plugin raises is the plugin's fault, and the error says so."""
+    try:
+        yield
+    except (ValueError, ImportError):
+        raise
+    except Exception as error:
+        raise BrokenRuleError(f"{offer.label}: it must not fail, got {type(error).__name__}: {error}") from error
+
+
+class _Watched:
+    """A tracker whose every frame is checked."""
+
+    def __init__(self, tracker: Tracker, label: str) -> None:
+        self._tracker, self._label = tracker, label
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        try:
+            for frame in self._tracker.track(observations, rng):
+                if np.shape(frame.pose) != (66,) or not np.isfinite(frame.pose).all():
+                    raise BrokenRuleError(
+                        f"{self._label}: a pose must be 66 finite angles, got shape {np.shape(frame.pose)}"
+                    )
+                if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
+                    raise BrokenRuleError(
+                        f"{self._label}: a translation must be 3 finite metres, got {frame.translation}"
+                    )
+                yield frame
+        except (BrokenRuleError, ImportError, GeneratorExit):
+            raise
+        except Exception as error:
+            raise BrokenRuleError(f"{self._label}: it must not fail, got {type(error).__name__}: {error}") from error
+
+
+def _offered(kind: Kind, chosen: str | Callable[..., Any]) -> Offer:
+    if isinstance(chosen, str):
+        return registry().offer(kind, chosen)
+    frames: NextFrame = "carry" if hasattr(chosen, "advance") else "start"
+    return Offer(kind, getattr(chosen, "__name__", type(chosen).__name__), chosen, "the caller", "", frames)

@@ -1,0 +1,238 @@
+"""The folder a track leaves behind: it appears whole under its name, or not at all.
+
+Until it is whole it stands beside its place, hidden, with every frame that was found so far. Where a track ends too
+early, because a disk is full or somebody stops it, those frames are kept, and the same track can go on from them.
+"""
+
+import csv
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from itertools import repeat
+from pathlib import Path
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from posefit.fitting.tracker import Frame
+from posefit.footage.source import Scene
+from posefit.footage.video import VideoWriter
+from posefit.geometry.skeleton import JOINTS
+from posefit.motion.motion import Motion
+from posefit.tracking.picture import Painter
+
+FILES = (
+    "poses.npz",
+    "track.amc",
+    "skeleton.asf",
+    "track.bvh",
+    "track.trc",
+    "camera.json",
+    "frames.csv",
+    "summary.json",
+    "overlay.mp4",
+    "summary.png",
+)
+_FOUND, _SPEC = "found.jsonl", "spec.json"
+_ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
+_NUMBERS = ("cost", "evaluations", "seconds")
+
+Rows = Sequence[Mapping[str, float]]
+State = dict[str, Any]
+
+
+class Output(Protocol):
+    """Where a track goes."""
+
+    work: Path  # a folder for what is needed meanwhile
+
+    def earlier(self) -> tuple[list[Frame], State | None]:
+        """Return the frames that were found before, and the state of the random generator after them."""
+        ...
+
+    def record(self, frame: Frame, state: State) -> None:
+        """Keep a frame that was found, and the state of the random generator after it."""
+        ...
+
+    def finish(self, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State) -> None:
+        """Write everything."""
+        ...
+
+
+class Nowhere:
+    """The output of a track that is not written."""
+
+    def __enter__(self) -> Self:
+        self._folder = tempfile.TemporaryDirectory(prefix="posefit-")
+        self.work = Path(self._folder.name)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._folder.cleanup()
+
+    def earlier(self) -> tuple[list[Frame], State | None]:
+        """Return that there is nothing."""
+        return [], None
+
+    def record(self, frame: Frame, state: State) -> None:
+        """Keep nothing."""
+
+    def finish(self, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State) -> None:
+        """Write nothing."""
+
+
+class OutputFolder:
+    """Writes beside the target and renames at the end. Raises ValueError where the target may not be written.
+
+    `spec` is what a track has to have in common with the one that it resumes.
+    """
+
+    def __init__(
+        self, path: str | Path, force: bool, resume: bool, spec: Mapping[str, str], say: Callable[[str], None]
+    ) -> None:
+        self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
+        if self.path.exists() and not self.path.is_dir():
+            raise ValueError(f"{self.path}: expected a folder to write to, got a file")
+        if self.path.exists() and not force:
+            raise ValueError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
+        if self.path.exists():
+            strange = sorted(entry.name for entry in self.path.iterdir() if entry.name not in FILES)
+            if strange:
+                raise ValueError(
+                    f"{self.path}: expected a folder of earlier results to replace, got one with {strange[0]}"
+                )
+        self._building = self.path.parent / f".{self.path.name}.partial"
+        self.work = self._building / "work"
+        self._recorded = 0
+        if resume:
+            self._check_same()
+
+    def _check_same(self) -> None:
+        try:
+            before = json.loads((self._building / _SPEC).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            raise ValueError(f"{self.path}: expected a track that was interrupted to resume, got none") from None
+        for name in sorted(before.keys() | self._spec.keys()):
+            if before.get(name) != self._spec.get(name):
+                expected, came = before.get(name), self._spec.get(name)
+                raise ValueError(f"{self.path}: {name} must be {expected}, as before, to resume, got {came}")
+
+    def __enter__(self) -> Self:
+        try:
+            if self._building.exists() and not self._resume:
+                shutil.rmtree(self._building)
+            shutil.rmtree(self.work, ignore_errors=True)
+            self.work.mkdir(parents=True)
+            (self._building / _SPEC).write_text(json.dumps(self._spec), encoding="utf-8")
+        except OSError as error:
+            raise ValueError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        shutil.rmtree(self.work, ignore_errors=True)
+        if kind is None:
+            for name in (_FOUND, _SPEC):
+                (self._building / name).unlink(missing_ok=True)
+            if self.path.exists():
+                old = Path(tempfile.mkdtemp(prefix=f".{self.path.name}-", dir=self.path.parent))
+                self.path.rename(old / "old")
+                self._building.rename(self.path)
+                shutil.rmtree(old)
+            else:
+                self._building.rename(self.path)
+            return
+        kept = ""
+        if self._recorded:
+            for name in FILES:
+                (self._building / name).unlink(missing_ok=True)
+            kept = f"; {self._recorded} finished frames are kept: the same command with --resume goes on from there"
+        else:
+            shutil.rmtree(self._building, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise ValueError(f"{self.path}: expected room to write to, got {error.strerror or error}{kept}") from error
+        if kept and isinstance(error, ValueError):
+            raise ValueError(f"{error}{kept}") from error
+        if kept:
+            self._say(kept[2:])
+
+    def earlier(self) -> tuple[list[Frame], State | None]:
+        """Return the frames that were found before, and the state of the random generator after them."""
+        frames: list[Frame] = []
+        whole: list[str] = []
+        state: State | None = None
+        path = self._building / _FOUND
+        for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+            try:
+                row = json.loads(line)
+                values = {name: row[name] for name in _NUMBERS}
+                values |= {name: None if row[name] is None else np.array(row[name]) for name in _ARRAYS}
+            except (ValueError, KeyError):
+                break  # the line that was being written when it ended
+            frames.append(Frame(**values))
+            state = row["state"]
+            whole.append(line)
+        if frames:
+            path.write_text("".join(f"{line}\n" for line in whole), encoding="utf-8")
+        self._recorded = len(frames)
+        return frames, state
+
+    def record(self, frame: Frame, state: State) -> None:
+        """Keep a frame that was found, and the state of the random generator after it."""
+        row: State = {name: getattr(frame, name) for name in _NUMBERS} | {"state": state}
+        for name in _ARRAYS:
+            value = getattr(frame, name)
+            row[name] = None if value is None else np.asarray(value).tolist()
+        with (self._building / _FOUND).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        self._recorded += 1
+
+    def finish(self, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State) -> None:
+        """Write everything."""
+        import cv2
+
+        folder, painter = self._building, Painter(scene)
+        _write_tables(folder, scene, estimate, frames, rows, summary)
+        filmed = scene.pictures() if scene.pictures is not None else repeat(None)
+        writer: VideoWriter | None = None
+        for frame, observation, row, picture in zip(frames, scene.observations, rows, filmed, strict=False):
+            image = painter.add(frame, observation, row, picture)
+            if writer is None:
+                writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))
+            writer.write(image)
+        assert writer is not None
+        writer.close()
+        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows)):
+            raise OSError("no room for summary.png")
+
+
+def _write_tables(
+    folder: Path, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State
+) -> None:
+    from posefit.motion.amc import write_amc
+    from posefit.motion.asf import write_asf
+    from posefit.motion.bvh import write_bvh
+    from posefit.motion.trc import write_trc
+
+    np.savez_compressed(
+        folder / "poses.npz",
+        poses=estimate.poses,
+        translations=estimate.translations,
+        fps=np.array(estimate.fps),
+        joints=np.array(JOINTS),
+        costs=np.array([frame.cost for frame in frames]),
+        radii=scene.body.radii,
+    )
+    write_asf(folder / "skeleton.asf", estimate.skeleton)
+    write_amc(folder / "track.amc", estimate)
+    write_bvh(folder / "track.bvh", estimate)
+    write_trc(folder / "track.trc", estimate)
+    (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
+    joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
+    names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
+    with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*rows[0], *names])
+        for row, points in zip(rows, joints, strict=True):
+            writer.writerow([*row.values(), *(f"{value:.6f}" for value in points.reshape(-1))])
+    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,448 @@
+"""What a user types, and what comes back: results, files, and one line for every mistake."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import posefit
+from posefit.cli import main
+from posefit.motion import library
+from posefit.motion.amc import read_clip, write_amc
+from posefit.motion.asf import write_asf
+from tests.files import arrays
+
+QUICK = ["--particles", "10", "--iterations", "4", "--size", "120x90"]
+FILES = {
+    "poses.npz",
+    "track.amc",
+    "track.bvh",
+    "track.trc",
+    "skeleton.asf",
+    "camera.json",
+    "frames.csv",
+    "summary.json",
+    "overlay.mp4",
+    "summary.png",
+}
+KEYS = {
+    "motion",
+    "method",
+    "seed",
+    "frames",
+    "error_degrees",
+    "mpjpe_mm",
+    "pa_mpjpe_mm",
+    "iou",
+    "swap_rate",
+    "lost_rate",
+    "skill",
+    "prior_floor_degrees",
+    "evaluations",
+    "seconds_per_frame",
+    "evaluations_per_second",
+}
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def fails(*words: object) -> str:
+    """Return the one line on stderr of a command that must fail with status 2 and print nothing."""
+    result = run(*words)
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    lines = [line for line in result.stderr.splitlines() if line.startswith("posefit:")]
+    assert len(lines) == 1, result.stderr
+    assert "Usage:" not in result.stderr
+    assert "Traceback" not in result.stderr
+    return lines[0]
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> tuple[Path, Path]:
+    motion = library.built_in("walk-b", frames=12, fps=120.0)
+    write_asf(tmp_path / "one.asf", motion.skeleton)
+    write_amc(tmp_path / "one.amc", motion)
+    return tmp_path / "one.asf", tmp_path / "one.amc"
+
+
+def masks(folder: Path, count: int = 3) -> Path:
+    motion = library.built_in("walk", frames=count)
+    body = posefit.Body.of(motion.skeleton)
+    camera = posefit.Camera.around(np.array([0.0, 0.9, 0.0]), 0.8, 4.0, (120, 90))
+    folder.mkdir(parents=True, exist_ok=True)
+    from posefit.silhouette.cost import project
+
+    for k, (pose, where) in enumerate(zip(motion.poses, motion.translations, strict=True)):
+        cv2.imwrite(str(folder / f"{k:04}.png"), project(body, camera, pose, where).astype(np.uint8) * 255)
+    return folder
+
+
+def test_track_prints_one_json_object_with_every_key(tmp_path: Path) -> None:
+    result = run("track", "walk", "--frames", "0:4", "--json", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert set(summary) >= KEYS
+    assert set(summary["error_degrees"]) == {"mean", "std", "max"}
+    assert set(summary["skill"]) == {"mean_pose", "persistence", "nearest"}
+    assert summary["frames"] == 4
+    assert summary["evaluations"] == 4 * 10 * 5
+    assert summary["version"] == posefit.__version__
+
+
+def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "out"
+    result = run("track", "walk", "--frames", "0:5", "--out", out, *QUICK)
+    assert result.exit_code == 0, result.stderr
+    assert {path.name for path in out.iterdir()} == FILES
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
+    assert "error deg" in result.stdout
+    assert "mean training pose" in result.stdout
+    stored = arrays(out / "poses.npz")
+    assert stored["poses"].shape == (5, 66)
+    again = read_clip(out / "skeleton.asf", out / "track.amc", fps=30.0)
+    difference = (again.poses - stored["poses"] + np.pi) % (2 * np.pi) - np.pi
+    np.testing.assert_allclose(difference, 0.0, atol=1e-8)
+    np.testing.assert_allclose(again.translations, stored["translations"], atol=1e-9)
+    with (out / "frames.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 5
+    summary = json.loads((out / "summary.json").read_text())
+    assert np.mean([float(row["error_degrees"]) for row in rows]) == pytest.approx(summary["error_degrees"]["mean"])
+    video = cv2.VideoCapture(str(out / "overlay.mp4"))
+    frames = 0
+    while video.read()[0]:
+        frames += 1
+    assert frames == 5
+    assert cv2.imread(str(out / "summary.png")).shape[1] > 600
+    assert posefit.Camera.from_json(out / "camera.json").width == 120
+
+
+def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None:
+    tracks = [
+        posefit.track("walk", frames=(0, 4), particles=40, iterations=5, seed=3, threads=threads) for threads in (1, 2)
+    ]
+    np.testing.assert_array_equal(tracks[0].motion.poses, tracks[1].motion.poses)
+    other = posefit.track("walk", frames=(0, 4), particles=40, iterations=5, seed=4)
+    assert np.abs(other.motion.poses - tracks[0].motion.poses).max() > 0.0
+
+
+def test_the_command_is_the_typed_call() -> None:
+    printed = json.loads(run("track", "walk", "--frames", "0:3", "--seed", "7", "--json", *QUICK).stdout)
+    called = posefit.track("walk", frames=(0, 3), seed=7, particles=10, iterations=4, size=(120, 90)).summary
+    for key in KEYS - {"seconds_per_frame", "evaluations_per_second"}:
+        assert printed[key] == called[key]
+
+
+def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
+    result = run("fit", "walk", "--frame", "7", "--json", "--out", tmp_path / "fit", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    printed = json.loads(result.stdout)
+    assert len(printed["pose_degrees"]) == 66
+    assert printed["frames"] == 1
+    found = posefit.fit("walk", frame=7, particles=10, iterations=4, size=(120, 90))
+    np.testing.assert_allclose(np.degrees(found.pose), printed["pose_degrees"], atol=1e-5)
+    assert found.history.shape == (5,)
+
+
+def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        result = run("track", "walk", "--frames", "0:2", "--out", "walk", "--force", "--json", *QUICK)
+        assert json.loads(result.stdout)["translation"] == "known"
+
+
+def test_one_frame_has_a_table_too() -> None:  # the pose held from the first frame has no error to compare with
+    result = run("fit", "walk", "--frame", "3", *QUICK)
+    assert result.exit_code == 0, result.output
+    assert "first true pose, held         0.00       -" in result.stdout
+
+
+def test_an_amc_is_followed_with_the_asf_beside_it(clip: tuple[Path, Path]) -> None:
+    result = run("track", clip[1], "--train", "walk-a", "--train", "walk-c", "--json", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert summary["frames"] == 3  # 12 frames at 120 Hz, at 30
+    assert summary["train"] == ["walk-a", "walk-c"]
+
+
+@pytest.mark.parametrize("mode", ["known", "searched", "aligned"])
+def test_the_translation_may_be_known_searched_or_aligned(mode: str) -> None:
+    result = run("track", "walk", "--frames", "0:3", "--translation", mode, "--json", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["translation"] == mode
+
+
+def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> None:
+    folder = masks(tmp_path / "masks")
+    stack = np.stack([cv2.imread(str(path), 0) for path in sorted(folder.iterdir())])
+    np.savez(tmp_path / "masks.npz", masks=stack > 0)
+    results = [
+        json.loads(run("track", source, "--view-degrees", "45", "--json", *QUICK).stdout)
+        for source in (folder, tmp_path / "masks.npz")
+    ]
+    assert results[0]["error_degrees"] is None
+    assert results[0]["iou"] == results[1]["iou"] > 0.5
+    assert results[0]["translation"] == "aligned"
+
+
+def test_memory_of_masks_in_a_folder_is_that_of_one(tmp_path: Path) -> None:
+    from posefit.footage.masks import LazyMasks
+
+    source = LazyMasks.of(masks(tmp_path / "masks"), (None, None))
+    assert source.stack is None
+    assert len(source) == 3
+
+
+def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("track", "walk", "--frames", "0:2", "--out", out, *QUICK).exit_code == 0
+    before = (out / "summary.json").read_text()
+    assert "expected a new folder" in fails("track", "walk", "--frames", "0:3", "--out", out, *QUICK)
+    assert (out / "summary.json").read_text() == before
+    assert run("track", "walk", "--frames", "0:3", "--out", out, "--force", *QUICK).exit_code == 0
+    assert json.loads((out / "summary.json").read_text())["frames"] == 3
+    (out / "precious.txt").write_text("mine")
+    assert "precious.txt" in fails("track", "walk", "--out", out, "--force", *QUICK)
+    assert (out / "precious.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["wlak"], "did you mean 'walk'?"),
+        (["lost.amc"], "lost.amc: expected a file, got nothing of that name"),
+        (["walk.txt"], "walk.txt: expected a file"),
+        (["walk", "--particles", "0"], "particles must be at least 1, got 0"),
+        (["walk", "--iterations", "0"], "iterations must be at least 1, got 0"),
+        (["walk", "--optimiser", "sapzo"], "optimiser must be one of"),
+        (["walk", "--prior", "pcb"], "prior must be one of"),
+        (["walk", "--size", "320"], "expected WIDTHxHEIGHT"),
+        (["walk", "--size", "0x9"], "size must be from 1x1"),
+        (["walk", "--frames", "3"], "expected A:B"),
+        (["walk", "--frames", "70:80"], "frames must choose some of the 60 frames, got 70:80"),
+        (["walk", "--fps", "0"], "fps must be a positive number, got"),
+        (["walk", "--threads", "0"], "threads must be at least 1, got 0"),
+        (["walk", "--translation", "free"], "translation must be one of known, searched, aligned, got 'free'"),
+        (["walk", "--camera", "no.json"], "no.json"),
+        (["walk-a", "--train", "walk-a"], "train must not contain the source itself, got walk-a"),
+        (["walk", "--seed", "abc"], "'abc' is not a valid integer"),
+        (["walk", "--wrong"], "No such option"),
+        (["walk", "--seed", "-1"], "seed must be 0 or more, got -1"),
+    ],
+)
+def test_a_mistake_is_one_line_and_status_2(words: list[str], message: str, tmp_path: Path) -> None:
+    assert message in fails("track", *words, "--out", tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bad_motion_files_are_refused(clip: tuple[Path, Path], tmp_path: Path) -> None:
+    asf, amc = clip
+    out = ["--out", tmp_path / "out"]
+    text = amc.read_text()
+    amc.write_text("")
+    assert "expected a file with content, got an empty one" in fails("track", amc, *out)
+    amc.write_text(text[: len(text) // 2].rpartition("\n")[0] + "\n")
+    assert f"{amc}:" in fails("track", amc, *out)
+    amc.write_text(text.replace("lfemur ", "lfemur nan ", 1).replace("\n", "\n", 1))
+    assert f"{amc}:" in fails("track", amc, *out)
+    amc.write_text(text)
+    skeleton = asf.read_text()
+    asf.write_text("\n".join(line for line in skeleton.splitlines() if "head" not in line))
+    assert str(asf) in fails("track", amc, *out)
+    asf.unlink()
+    assert "expected --asf or exactly one .asf file beside it, got 0" in fails("track", amc, *out)
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_masks_are_refused(tmp_path: Path) -> None:
+    folder, out = masks(tmp_path / "masks", 4), tmp_path / "out"
+    good = cv2.imread(str(folder / "0002.png"), 0)
+    for image, message in (
+        (np.zeros_like(good), "0002.png: expected a mask with a person before a background, got an empty one"),
+        (np.full_like(good, 255), "0002.png: expected a mask with a person before a background, got one without"),
+        (good[:, :60], "0002.png: mask must have shape (90, 120), got (90, 60)"),
+    ):
+        cv2.imwrite(str(folder / "0002.png"), image)
+        assert message in fails("track", folder, "--out", out, *QUICK)
+    (folder / "0002.png").write_bytes(b"no image")
+    assert "0002.png: expected an image" in fails("track", folder, "--out", out, *QUICK)
+    (tmp_path / "empty").mkdir()
+    assert "expected a folder with mask images" in fails("track", tmp_path / "empty")
+    np.savez(tmp_path / "a.npz", other=np.zeros(3))
+    np.savez(tmp_path / "b.npz", masks=np.zeros((3, 4)))
+    np.savez(tmp_path / "c.npz", masks=np.full((2, 9, 9), np.nan))
+    np.savez(tmp_path / "d.npz", masks=np.array([{}], dtype=object))
+    for name, message in (
+        ("a", "with the key masks"),
+        ("b", "masks must have shape (frames, height, width), got (3, 4)"),
+        ("c", "masks must be finite"),
+        ("d", "with the key masks"),
+    ):
+        assert message in fails("track", tmp_path / f"{name}.npz")
+    (tmp_path / "wide.json").write_text(posefit.Camera.around(np.zeros(3), 0.0, 4.0, (99, 90)).to_json())
+    (folder / "0002.png").unlink()
+    assert "camera 'wide' must be calibrated for 120x90, got 99x90" in fails(
+        "track", folder, "--camera", tmp_path / "wide.json"
+    )
+    assert "translation must be searched or aligned" in fails("track", folder, "--translation", "known")
+    assert not out.exists()
+
+
+def test_plugins_are_listed() -> None:
+    assert {(row["kind"], row["name"]) for row in json.loads(run("plugins", "--json").stdout)} >= {
+        ("optimiser", "sapso"),
+        ("optimiser", "random"),
+        ("prior", "pca"),
+    }
+    assert "sapso" in run("plugins").stdout
+
+
+def test_plugins_say_where_they_come_from_and_what_can_be_set() -> None:
+    rows = {row["name"]: row for row in json.loads(run("plugins", "--json").stdout)}
+    sapso = rows["sapso"]
+    assert sapso["distribution"] == "posefit"
+    assert sapso["version"] == posefit.__version__
+    assert sapso["next_frame"] == "start"
+    assert {"name": "cooling", "type": "float", "default": 0.95} in sapso["settings"]
+    assert {"name": "cool", "type": "iteration | acceptance", "default": "iteration"} in sapso["settings"]
+    text = run("plugins").stdout
+    assert "optimiser sapso (posefit" in text
+    assert "cooling: float = 0.95" in " ".join(text.split())
+    assert all(len(line) <= 120 for line in text.splitlines())
+    assert all(row["summary"] for row in rows.values())
+
+
+def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = run("plugins", "doctor")
+    assert result.exit_code == 0
+    assert "offers optimiser sapso, optimiser pso, optimiser random" in result.stdout
+    from posefit import registry
+
+    broken = registry.Plugin("bad", "posefit-bad", "1.0", "broken", "ImportError: no module named 'lost'")
+    found = registry.Registry((*registry.registry().plugins, broken))
+    monkeypatch.setattr(registry, "registry", lambda: found)
+    result = run("plugins", "doctor")
+    assert result.exit_code == 1
+    assert "broken    bad (posefit-bad 1.0): ImportError: no module named 'lost'" in result.stdout
+
+
+def test_check_reports_every_rule_and_how_many_ran() -> None:
+    result = run("check", "optimiser", "random")
+    assert result.exit_code == 0, result.output
+    assert "29 checks ran, 0 failed, 5 skipped" in result.stdout
+    assert "it is the baseline itself" in result.stdout
+    report = json.loads(run("check", "prior", "pca", "--set", "components=4", "--json").stdout)
+    assert {"check": "ranges", "outcome": "passed", "detail": "4 latents"} in report["results"]
+    assert "optimiser must be one of" in fails("check", "optimiser", "nothing")
+    assert "a setting of pca must be one of" in fails("check", "prior", "pca", "--set", "colour=red")
+    assert "--set must be SETTING=VALUE" in fails("check", "prior", "pca", "--set", "colour")
+
+
+@pytest.mark.parametrize("kind", ["optimiser", "prior", "tracker"])
+def test_a_new_plugin_installs_offline_and_passes_its_own_test(kind: str, tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    result = run("plugins", "new", "my-own", "--kind", kind, "--out", folder)
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in folder.iterdir()} == {
+        "pyproject.toml",
+        "README.md",
+        "posefit_my_own.py",
+        "test_my_own.py",
+    }
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation"]
+    subprocess.run([*pip, "--target", str(tmp_path / "site"), str(folder)], check=True, capture_output=True)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
+    environment.pop("POSEFIT_LOAD_PLUGINS", None)
+    tests = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_my_own.py"],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert tests.returncode == 0, tests.stdout
+    assert "passed" in tests.stdout
+    used = subprocess.run(
+        [sys.executable, "-m", "posefit", "track", "walk", f"--{kind}", "my-own", "--frames", "0:3", "--json"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert used.returncode == 0, used.stderr
+    assert "my-own" in json.loads(used.stdout)["method"]
+
+
+def test_a_new_plugin_replaces_nothing(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    assert "expected a new folder, got one that exists" in fails("plugins", "new", "a", "--out", tmp_path / "mine")
+    assert list(tmp_path.iterdir()) == [tmp_path / "mine"]
+    assert "name must be small letters" in fails("plugins", "new", "9 lives", "--out", tmp_path / "x")
+    known = fails("plugins", "new", "sapso", "--out", tmp_path / "x")
+    assert "name must be a new one, got 'sapso', which posefit registers already" in known
+    assert "kind must be one of optimiser, prior, tracker, got 'camera'" in fails(
+        "plugins", "new", "a", "--kind", "camera", "--out", tmp_path / "x"
+    )
+    assert not (tmp_path / "x").exists()
+
+
+def test_settings_are_given_by_plugin_and_name() -> None:
+    result = run(
+        "track", "walk", "--frames", "0:2", "--json", *QUICK, "--set", "sapso.cooling=0.5", "--set", "pca.components=4",
+        "--set", "tracker.floor=0.1", "--set", "tracker.root_range_degrees=30,10,10",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    settings = json.loads(result.stdout)["settings"]
+    assert settings["optimiser"]["cooling"] == 0.5
+    assert settings["prior"] == {"components": 4}
+    assert settings["tracker"] == {"floor": 0.1, "root_range_degrees": [30, 10, 10]}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sapso", "--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
+        ("sapso=3", "--set must be NAME.SETTING=VALUE"),
+        ("pso.phi=4.2", "--set must name one of tracker, sapso, pca, which are in use here, got 'pso.phi=4.2'"),
+        ("sapso.coling=1", "did you mean 'cooling'"),
+        ("sapso.cooling=cold", "sapso.cooling must be float, got 'cold'"),
+        ("sapso.cooling=2", "cooling must lie in 0 to 1, got 2"),
+        ("sapso.cool=never", "sapso.cool must be iteration | acceptance, got 'never'"),
+        ("tracker.floor=0", "floor must be above 0, got 0"),
+    ],
+)
+def test_a_setting_that_makes_no_sense_is_one_line(text: str, message: str) -> None:
+    assert message in fails("track", "walk", "--frames", "0:2", *QUICK, "--set", text)
+
+
+def test_evaluations_are_the_same_for_every_method() -> None:
+    used = {}
+    for name in ("sapso", "annealed", "cma"):
+        result = run(
+            "track", "walk", "--frames", "0:2", "--size", "120x90", "--evaluations", 400, "--optimiser", name, "--json"
+        )
+        summary = json.loads(result.stdout)
+        used[name] = summary["evaluations"]
+        assert summary["evaluations_per_frame"] == 400
+    assert used == {"sapso": 800, "annealed": 800, "cma": 800}
+    text = run("track", "walk", "--frames", "0:2", "--size", "120x90", "--evaluations", 415).stdout
+    assert "400 of 415 evaluations" in text
+
+
+def test_help_loads_nothing_heavy() -> None:
+    script = (
+        "import sys; from posefit.cli import main; main(['--help'], standalone_mode=False);"
+        "print([m for m in ('numba', 'scipy', 'cv2', 'sklearn', 'numpy') if m in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines()[-1] == "[]"

@@ -1,0 +1,281 @@
+"""Masks from video: synthetic ones with a known person, and a real one where it is at hand."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import posefit
+from posefit.cli import main
+from posefit.footage.extract import extract
+from posefit.footage.masks import LazyMasks
+from posefit.footage.segmentation import Extraction
+from posefit.silhouette.foreground import Still, mean_background, median_background, person
+from tests.files import arrays
+from tests.footage.conftest import EMPTY, FRAMES, SIZE, truth
+
+
+def iou(first: Any, second: Any) -> float:
+    return float((first & second).sum() / max((first | second).sum(), 1))
+
+
+@pytest.mark.parametrize(("method", "background"), [("mixture", None), ("median", None), ("mean", f"0:{EMPTY}")])
+def test_each_method_finds_the_person(
+    filmed: tuple[Path, list[Any]], tmp_path: Path, method: Any, background: Any
+) -> None:
+    path, masks = filmed
+    result = extract(path, tmp_path / "out", Extraction(method, background), frames=(EMPTY, None))
+    assert result["frames"] == FRAMES
+    assert result["usable"] > 0.8 * FRAMES
+    stored = arrays(tmp_path / "out" / "masks.npz")
+    assert stored["masks"].shape == stored["valid"].shape == (FRAMES, SIZE[1], SIZE[0])
+    assert stored["fps"] == 25.0
+    overlaps = [iou(a > 0, b) for a, b, ok in zip(stored["masks"], masks[EMPTY:], stored["usable"], strict=True) if ok]
+    assert np.mean(overlaps) > 0.8  # a person of 900 pixels: half a pixel all along the edge costs 0.15
+    assert {one.name for one in (tmp_path / "out").iterdir()} == {"masks.npz", "preview.mp4", "quality.csv"}
+    with (tmp_path / "out" / "quality.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["frame"]) for row in rows] == list(range(EMPTY, EMPTY + FRAMES))
+    assert sum(int(row["usable"]) for row in rows) == result["usable"]
+
+
+def test_a_video_of_masks_is_taken_as_it_is(tmp_path: Path) -> None:
+    masks = truth()[8:20]
+    writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"FFV1"), 25.0, SIZE)
+    for mask in masks:
+        writer.write(255 * mask.astype(np.uint8)[..., None].repeat(3, axis=2))
+    writer.release()
+    result = extract(tmp_path / "a.avi", tmp_path / "out", Extraction("masks"))
+    assert result["usable"] == 12
+    stored = arrays(tmp_path / "out" / "masks.npz")
+    assert np.mean([iou(a > 0, b) for a, b in zip(stored["masks"], masks, strict=True)]) > 0.95
+    assert stored["valid"].all()
+
+
+def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
+    filmed: tuple[Path, list[Any]], tmp_path: Path
+) -> None:
+    path, _ = filmed
+    hidden = np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)
+    hidden[:, 70:80] = 255
+    cv2.imwrite(str(tmp_path / "tree.png"), hidden)
+    extract(path, tmp_path / "out", Extraction(ignore=tmp_path / "tree.png"), frames=(EMPTY + 5, EMPTY + 40))
+    masks = LazyMasks.of(tmp_path / "out" / "masks.npz", (None, None))
+    silhouette = masks.silhouette(15)
+    assert not silhouette.valid[:, 70:80].any()
+    assert not silhouette.mask[:, 70:80].any()
+    result = posefit.track(tmp_path / "out" / "masks.npz", frames=(5, 9), view_degrees=90, evaluations=400)
+    assert result.summary["iou"] > 0.4
+
+
+def test_frames_without_a_whole_person_are_not_usable(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    path, _ = filmed
+    extract(path, tmp_path / "out", Extraction("mean", f"0:{EMPTY}"), frames=(0, EMPTY + 20))
+    usable = arrays(tmp_path / "out" / "masks.npz")["usable"]
+    assert not usable[: EMPTY - 1].any()
+    assert usable[EMPTY + 8 :].mean() > 0.8
+
+
+def test_the_person_is_looked_for_where_roi_says(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    path, masks = filmed
+    extract(path, tmp_path / "out", Extraction(roi=(0, 0, 80, 120)), frames=(EMPTY, None))
+    found = arrays(tmp_path / "out" / "masks.npz")["masks"]
+    assert found[:, :, 81:].sum() == 0
+    assert found[:, :, :80].any()
+    assert any(mask[:, 81:].any() for mask in masks)
+
+
+# the pieces
+
+
+def test_a_mean_background_is_the_mean_and_its_spread() -> None:
+    images = [np.full((2, 3, 3), value, dtype=np.uint8) for value in (10, 20, 30)]
+    still = mean_background(iter(images))
+    np.testing.assert_allclose(still.middle, 20.0)
+    np.testing.assert_allclose(still.spread, np.sqrt(200.0 / 3.0), rtol=1e-6)
+    with pytest.raises(ValueError, match="at least one frame"):
+        mean_background([])
+
+
+def test_a_median_background_does_not_see_who_walks_by() -> None:
+    images = [np.full((4, 4, 3), 100, dtype=np.uint8) for _ in range(9)]
+    images[2][:] = 0
+    images[5][:] = 255
+    np.testing.assert_allclose(median_background(images).middle, 100.0)
+    with pytest.raises(ValueError, match="at least one frame"):
+        median_background(np.zeros((0, 2, 2, 3), dtype=np.uint8))
+
+
+def test_a_shadow_is_darker_but_has_the_grounds_colour() -> None:
+    still = Still(np.full((1, 4, 3), (80.0, 120.0, 160.0), dtype=np.float32), np.zeros((1, 4), dtype=np.float32))
+    # the ground; its shadow at 60 %; another colour; far darker than any shadow
+    image = np.array([[[80, 120, 160], [48, 72, 96], [160, 60, 40], [8, 12, 16]]], dtype=np.uint8)
+    foreground, shadow = still.classify(image)
+    assert foreground.tolist() == [[False, False, True, True]]
+    assert shadow.tolist() == [[False, True, False, False]]
+
+
+def test_the_largest_person_is_taken_with_the_pieces_near_it_and_small_holes_filled() -> None:
+    seen = np.zeros((250, 250), dtype=bool)
+    seen[50:200, 100:140] = True  # the person
+    seen[100:106, 115:121] = False  # a small hole in it
+    seen[204:225, 100:140] = True  # feet, 4 rows apart
+    seen[50:120, 220:240] = True  # somebody smaller, far off
+    seen[5, 5] = True  # a speck
+    found = person(seen, np.zeros_like(seen), None, None)
+    assert found.mask[103, 118]
+    assert found.mask[210, 120]
+    assert not found.mask[:, 215:].any()
+    assert not found.mask[5, 5]
+    assert found.pieces >= 2
+    assert not found.touches_border
+    assert person(seen, np.zeros_like(seen), (210, 0, 40, 250), None).mask[60, 230]
+    nobody = person(np.zeros_like(seen), np.zeros_like(seen), None, None)
+    assert (nobody.area, nobody.pieces, nobody.touches_border) == (0, 0, False)
+    seen[50:200, 0:100] = True
+    assert person(seen, np.zeros_like(seen), None, None).touches_border
+
+
+# the command and its mistakes
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def test_the_command_prints_what_it_found(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    result = run("extract", filmed[0], "--out", tmp_path / "out", "--frames", "20:40", "--json")
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert summary["frames"] == 20
+    assert summary["size"] == [160, 120]
+    again = run(
+        "extract", filmed[0], "--out", tmp_path / "two", "--frames", "20:40", "--width", "80", "--roi", "0,0,160,120"
+    )
+    assert "20 frames" in again.stdout
+    assert arrays(tmp_path / "two" / "masks.npz")["masks"].shape == (20, 60, 80)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--method", "magic"], "extraction method must be one of mixture, mean, median, masks, got 'magic'"),
+        (["--method", "mean"], "background must be frames A:B or an image for the method mean, got none"),
+        (["--background", "0:5"], "background must be given for the method mean only, got '0:5' with mixture"),
+        (
+            ["--method", "mean", "--background", "nothing.png"],
+            "background must be frames A:B or an image, got 'nothing.png'",
+        ),
+        (["--method", "mean", "--background", "90:99"], "frames must choose some of the 60 frames, got 90:99"),
+        (["--frames", "90:"], "frames must choose some of the 60 frames, got 90:"),
+        (["--roi", "1,2,3"], "expected X,Y,WIDTH,HEIGHT in pixels"),
+        (["--roi", "100,0,100,100"], "roi must lie within the video's 160x120 pixels"),
+        (["--ignore", "nothing.png"], "nothing.png: expected an image of what to ignore"),
+        (["--width", "3"], "width must lie in 36 to 8192 pixels, got 3"),
+        (
+            ["--frames", "0:8", "--method", "mean", "--background", "0:12"],
+            "expected a person who moves before a still background",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(
+    filmed: tuple[Path, list[Any]], tmp_path: Path, words: list[str], message: str
+) -> None:
+    result = run("extract", filmed[0], "--out", tmp_path / "out", *words)
+    assert result.exit_code == 2, result.output
+    lines = [line for line in result.stderr.splitlines() if line.startswith("posefit:")]
+    assert len(lines) == 1
+    assert message in lines[0]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
+    (tmp_path / "text.mp4").write_text("no video")
+    (tmp_path / "empty.mp4").write_bytes(b"")
+    for name, message in (
+        ("missing.mp4", "expected a video file, got nothing of that name"),
+        ("text.mp4", "expected a video that OpenCV can read"),
+        ("empty.mp4", "expected a video that OpenCV can read"),
+    ):
+        result = run("extract", tmp_path / name, "--out", tmp_path / "out")
+        assert result.exit_code == 2
+        assert message in result.stderr
+    (tmp_path / "out").mkdir()
+    result = run("extract", tmp_path / "text.mp4", "--out", tmp_path / "out")
+    assert "expected a new folder, got one that exists" in result.stderr
+
+
+def test_a_real_walk_is_seen_from_its_first_step_to_its_last(tmp_path: Path) -> None:
+    video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
+    if not video.is_file():
+        pytest.skip(f"no video at {video}")
+    result = extract(video, tmp_path / "out", Extraction(roi=(0, 420, 1520, 532)), frames=(65, 165))
+    assert result["usable"] > 80
+    stored = arrays(tmp_path / "out" / "masks.npz")
+    middles = [
+        np.flatnonzero(mask.any(axis=0)).mean()
+        for mask, ok in zip(stored["masks"], stored["usable"], strict=True)
+        if ok
+    ]
+    assert middles[-1] < middles[0] - 200  # she walks from right to left
+    assert np.corrcoef(middles, np.arange(len(middles)))[0, 1] < -0.98
+
+
+# tracking what is only partly usable
+
+
+def stored_masks(path: Path, **more: Any) -> Path:
+    masks = np.stack(truth()[10:22]).astype(np.uint8)
+    np.savez(path, **{"masks": masks, **more})
+    return path
+
+
+def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
+    usable = np.ones(12, dtype=bool)
+    usable[[0, 5, 6]] = False
+    masks = np.stack(truth()[10:22]).astype(np.uint8)
+    masks[6] = 0  # nobody at all
+    path = stored_masks(tmp_path / "a.npz", masks=masks, usable=usable)
+    result = posefit.track(path, view_degrees=90, evaluations=400, out=tmp_path / "out")
+    assert result.summary["frames"] == 12
+    assert result.summary["held_frames"] == 3
+    assert result.summary["evaluations"] == 9 * 400
+    assert [row["usable"] for row in result.frames] == usable.astype(float).tolist()
+    poses = result.motion.poses
+    np.testing.assert_array_equal(poses[5], poses[4])
+    np.testing.assert_array_equal(poses[6], poses[4])
+    assert (poses[7] != poses[6]).any()
+    assert result.summary["iou"] == pytest.approx(
+        np.mean([row["iou"] for row, ok in zip(result.frames, usable, strict=True) if ok])
+    )
+    text = run("track", path, "--view-degrees", "90", "--evaluations", "400").stdout
+    assert "3 frames show too little of the person: the pose is held, not searched" in text
+
+
+def test_a_filter_goes_on_after_a_frame_that_was_held(tmp_path: Path) -> None:
+    usable = np.arange(12) != 4
+    path = stored_masks(tmp_path / "a.npz", usable=usable)
+    summary = posefit.track(path, optimiser="annealed", view_degrees=90, evaluations=400).summary
+    assert summary["evaluations"] == 11 * 400
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (
+            {"valid": np.ones((12, 5, 5), dtype=np.uint8)},
+            r"valid must have the masks' shape \(12, 120, 160\), got \(12, 5, 5\)",
+        ),
+        ({"usable": np.ones(5, dtype=bool)}, r"usable must be 12 booleans, got \(5,\) bool"),
+        ({"usable": np.ones(12)}, r"usable must be 12 booleans, got \(12,\) float64"),
+        ({"usable": np.zeros(12, dtype=bool)}, "expected a frame that is usable, got none from 0 to 12"),
+    ],
+)
+def test_masks_that_contradict_themselves_are_named(tmp_path: Path, more: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        posefit.track(stored_masks(tmp_path / "a.npz", **more))

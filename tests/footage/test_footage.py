@@ -1,0 +1,377 @@
+"""Video and masks of real cameras: calibrations, several views, restarts, what is written, and what is resumed."""
+
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import posefit
+from posefit.cli import main
+from posefit.fitting import metrics
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.footage.extract import extract
+from posefit.footage.masks import LazyMasks, Straight, Views
+from posefit.footage.segmentation import Extraction
+from posefit.geometry.rotation import wrapped
+from posefit.motion import library
+from posefit.motion.amc import read_clip
+from posefit.motion.bvh import read_bvh
+from posefit.registry import registry
+from tests.files import arrays
+from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, truth, walk
+
+QUICK: dict[str, Any] = {"evaluations": 400, "restarts": 2, "body_frames": 0, "frames": (EMPTY + 6, EMPTY + 30)}
+BRIEF = ["--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--frames", f"{EMPTY + 6}:{EMPTY + 14}"]
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def tracked(filmed: tuple[Path, list[Any]], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, posefit.Track]:
+    out = tmp_path_factory.mktemp("tracked") / "out"
+    settings = {**QUICK, "body_frames": 12, "restarts": 4, "evaluations": 1000}
+    return out, posefit.track(filmed[0], out=out, height=1.7, **settings)
+
+
+def test_a_video_is_tracked_from_nothing_but_its_frames(tracked: tuple[Path, posefit.Track]) -> None:
+    _, result = tracked
+    assert result.summary["frames"] == 24
+    assert result.summary["method"] == "sapso + loose"
+    assert result.summary["fps"] == 25.0
+    assert result.summary["translation"] == "aligned"
+    assert result.summary["iou"] > 0.75  # masks of 900 pixels
+    assert result.summary["body"]["stature"] == pytest.approx(1.7)
+    assert set(result.summary["body"]["factors"]) == set(result.summary["body"]["spread"])
+    # seen from the person's left, so he walks to the left of the image, and faces there
+    joints = result.motion.translations
+    assert joints[-1, 0] < joints[0, 0] - 0.5
+    assert np.abs(wrapped(result.motion.poses[:, 0] + np.pi / 2)).mean() < np.radians(45.0)
+
+
+def test_what_is_written_opens_elsewhere(tracked: tuple[Path, posefit.Track]) -> None:
+    out, result = tracked
+    with (out / "frames.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    joints = result.motion.skeleton.joints(result.motion.poses, result.motion.translations)
+    assert float(rows[3]["lfoot_y"]) == pytest.approx(
+        joints[3, posefit.geometry.skeleton.JOINTS.index("lfoot"), 1], abs=1e-5
+    )
+    clip = read_clip(out / "skeleton.asf", out / "track.amc", fps=25.0)
+    np.testing.assert_allclose(clip.skeleton.joints(clip.poses, clip.translations), joints, atol=1e-6)
+    bvh = read_bvh(out / "track.bvh")
+    assert bvh.fps == pytest.approx(25.0)
+    np.testing.assert_allclose(bvh.skeleton.joints(bvh.poses, bvh.translations), joints, atol=1e-5)
+    lines = (out / "track.trc").read_text().splitlines()
+    assert lines[2].split("\t")[:5] == ["25", "25", "24", "27", "m"]
+    assert lines[3].split("\t")[:3] == ["Frame#", "Time", "root"]
+    np.testing.assert_allclose(np.array(lines[6].split("\t"), dtype=float)[2:], joints[0].ravel(), atol=1e-5)
+    video = cv2.VideoCapture(str(out / "overlay.mp4"))
+    assert round(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 24
+    video.release()
+    assert arrays(out / "poses.npz")["radii"].shape == (26, 2)
+
+
+def toml(path: Path, *cameras: posefit.Camera) -> Path:
+    text = ""
+    for k, one in enumerate(cameras):
+        turned = cv2.Rodrigues(one.rotation)[0].ravel().tolist()
+        centre = one.centre - 0.5
+        matrix = [[one.focal[0], 0.0, centre[0]], [0.0, one.focal[1], centre[1]], [0.0, 0.0, 1.0]]
+        text += f"[cam{k}]\nsize = [{one.width}, {one.height}]\nmatrix = {np.array(matrix).tolist()}\n"
+        text += f"distortions = [0.0, 0.0, 0.0, 0.0]\nrotation = {turned}\ntranslation = {one.translation.tolist()}\n"
+    path.write_text(text)
+    return path
+
+
+def test_two_calibrated_cameras_find_the_person_where_he_is(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
+    for name, azimuth in (("a.npz", np.pi / 2), ("b.npz", 0.6)):
+        np.savez(tmp_path / name, masks=np.stack(truth(azimuth)[6:30]).astype(np.uint8))
+    seen = [tmp_path / "a.npz", tmp_path / "b.npz"]
+    result = posefit.track(seen, camera=calibration, up="y", prior="pca", **{**QUICK, "frames": (None, None)})
+    assert result.summary["views"] == 2
+    motion = walk().frames(6, 30)
+    away = np.linalg.norm(result.motion.translations - motion.translations, axis=1)
+    assert np.median(away) < 0.03  # metres
+    joints = [motion.skeleton.joints(one.poses, one.translations) for one in (motion, result.motion)]
+    assert np.median(metrics.mpjpe_mm(*joints)) < 50.0
+    assert metrics.swap_rate(*joints) < 0.2
+    other = film(tmp_path / "front.avi", [NOBODY] * EMPTY + truth(0.6))
+    filmed_twice = posefit.track([filmed[0], other], camera=calibration, up="y", **QUICK)
+    assert filmed_twice.summary["views"] == 2
+    assert filmed_twice.summary["iou"] > 0.4
+
+
+AVERAGE = posefit.Body.of(library.average_skeleton())
+
+
+def line(body: posefit.Body) -> SearchSpace:
+    prior = registry().prior("pca")().fit(walk().poses[:, 3:], body.skeleton)
+    return SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
+
+
+def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path: Path) -> None:
+    side, front = (np.stack(truth(azimuth)[8:14]).astype(np.uint8) for azimuth in (np.pi / 2, 0.6))
+    usable = np.array([True, True, False, True, True, True])
+    np.savez(tmp_path / "a.npz", masks=side, usable=usable)
+    np.savez(tmp_path / "b.npz", masks=front)
+    views = Views([LazyMasks.of(tmp_path / name, (None, None)) for name in ("a.npz", "b.npz")])
+    assert [views[k].usable for k in range(6)] == [True] * 6
+    assert not views[2].silhouettes[0].valid.any()
+    assert views[2].silhouettes[1].valid.all()
+    assert views[3].silhouettes[0].valid.all()
+    calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
+    sources = [tmp_path / "a.npz", tmp_path / "b.npz"]
+    result = posefit.track(sources, camera=calibration, up="y", evaluations=200, restarts=1, body_frames=0)
+    assert result.summary["held_frames"] == 0
+    blind = PoseProblem(AVERAGE, [camera(np.pi / 2), camera(0.6)], views[2].silhouettes, line(AVERAGE))
+    alone = PoseProblem(AVERAGE, [camera(0.6)], views[2].silhouettes[1:], line(AVERAGE))
+    pose, place = walk().poses[10:11], walk().translations[10:11]
+    np.testing.assert_array_equal(blind.cost(pose, place), alone.cost(pose, place))
+
+
+def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path: Path) -> None:
+    from posefit.geometry.calibration import read_calibrations, upright
+
+    path = toml(tmp_path / "bent.toml", camera(np.pi / 2))
+    path.write_text(path.read_text().replace("[0.0, 0.0, 0.0, 0.0]", "[0.8, 0.0, 0.0, 0.0]"))
+    (one,) = read_calibrations(path)
+    straight = truth()[20]
+    # what the lens makes of it: each bent pixel looks up its straight place
+    y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]].astype(np.float64)
+    bent = np.stack([x, y], axis=-1).reshape(-1, 1, 2)
+    undone = cv2.undistortPoints(bent, one.matrix, one.distortion, P=one.matrix).reshape(SIZE[1], SIZE[0], 2)
+    seen = cv2.remap(straight.astype(np.uint8), undone.astype(np.float32), None, cv2.INTER_NEAREST)
+    np.savez(tmp_path / "a.npz", masks=seen[None])
+    masks = Straight(LazyMasks.of(tmp_path / "a.npz", (None, None)), one.maps(SIZE))
+    found = masks.silhouette(0)
+    both = (found.mask & straight).sum() / (found.mask | straight).sum()
+    without = ((seen > 0) & straight).sum() / ((seen > 0) | straight).sum()
+    assert both > 0.93 > without
+    assert not found.valid.all()
+    assert one.camera(SIZE, upright([one])).width == SIZE[0]
+
+
+def test_several_synthetic_cameras_see_one_motion() -> None:
+    result = posefit.track("walk", view_degrees=[0, 90], frames=(0, 4), evaluations=400)
+    assert result.summary["views"] == 2
+    assert result.summary["view_degrees"] == [0, 90]
+
+
+# what was found stays
+
+
+class StopError(Exception):
+    """Somebody pulled the plug."""
+
+
+def stopping(after: int, error: BaseException) -> Any:
+    def progress(frames: Iterator[Any], count: int) -> Iterator[Any]:
+        for k, frame in enumerate(frames):
+            yield frame
+            if count == 20 and k + 1 == after:
+                raise error
+
+    return progress
+
+
+@pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
+def test_a_track_goes_on_where_it_ended(tmp_path: Path, optimiser: str) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8), usable=np.arange(20) != 11)
+    settings: dict[str, Any] = {"evaluations": 400, "restarts": 1, "body_frames": 0, "optimiser": optimiser}
+    whole = posefit.track(path, out=tmp_path / "whole", **settings)
+    said: list[str] = []
+    with pytest.raises(StopError):
+        posefit.track(path, out=tmp_path / "out", progress=stopping(11, StopError()), say=said.append, **settings)
+    assert not (tmp_path / "out").exists()
+    assert "11 finished frames are kept: the same command with --resume goes on from there" in said
+    again = posefit.track(path, out=tmp_path / "out", resume=True, say=said.append, **settings)
+    assert "going on from frame 11 of 20" in said
+    assert {one.name for one in (tmp_path / "out").iterdir()} == {one.name for one in (tmp_path / "whole").iterdir()}
+    assert not (tmp_path / ".out.partial").exists()
+    np.testing.assert_array_equal(again.motion.poses[:12], whole.motion.poses[:12])  # frame 11 is held
+    if optimiser == "sapso":  # a filter's particles are not kept: it goes on around the last pose
+        np.testing.assert_array_equal(again.motion.poses, whole.motion.poses)
+        np.testing.assert_array_equal(again.motion.translations, whole.motion.translations)
+
+
+def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8))
+    settings: dict[str, Any] = {"evaluations": 200, "restarts": 1, "body_frames": 0, "out": tmp_path / "out"}
+    with pytest.raises(ValueError, match="expected a track that was interrupted to resume, got none"):
+        posefit.track(path, resume=True, **settings)
+    with pytest.raises(ValueError, match="resume must be given with out"):
+        posefit.track(path, resume=True)
+    with pytest.raises(ValueError, match="bad luck; 5 finished frames are kept"):
+        posefit.track(path, progress=stopping(5, ValueError("bad luck")), **settings)
+    with pytest.raises(ValueError, match="seed must be 0, as before, to resume, got 1"):
+        posefit.track(path, resume=True, seed=1, **settings)
+    # a line that was half written does not count
+    found = tmp_path / ".out.partial" / "found.jsonl"
+    found.write_text(found.read_text()[:-40])
+    said: list[str] = []
+    posefit.track(path, resume=True, say=said.append, **settings)
+    assert "going on from frame 4 of 20" in said
+
+
+def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", masks=np.stack(truth()[10:30]).astype(np.uint8))
+    script = (
+        "import resource, sys\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (24_000, 24_000))\n"
+        "from posefit.cli import main\n"
+        f"sys.exit(main(['track', {str(tmp_path / 'a.npz')!r}, '--out', {str(tmp_path / 'out')!r}, '--evaluations', "
+        "'200', '--restarts', '0', '--body-frames', '0']))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    lines = [line for line in done.stderr.splitlines() if line.startswith("posefit:")]
+    assert done.returncode == 2, done.stderr
+    assert len(lines) == 1
+    assert "expected room to write to, got File too large" in lines[0]
+    assert "finished frames are kept" in lines[0]
+    assert not (tmp_path / "out").exists()
+    again = run(
+        "track", tmp_path / "a.npz", "--out", tmp_path / "out", "--evaluations", "200", "--restarts", "0",
+        "--body-frames", "0", "--resume",
+    )  # fmt: skip
+    assert again.exit_code == 0, again.stderr
+    assert "going on from frame" in again.stderr
+
+
+# warnings and mistakes
+
+
+def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:
+    masks = [NOBODY] * EMPTY + truth()
+    crowd = [mask | np.roll(mask, SIZE[0] // 2, axis=1) for mask in masks]  # somebody alike, half the picture away
+    found = extract(film(tmp_path / "crowd.avi", crowd), tmp_path / "one")
+    assert any("somebody else seems to be there" in warning and "--roi" in warning for warning in found["warnings"])
+    capture = cv2.VideoCapture(str(film(tmp_path / "still.avi", masks)))
+    writer = cv2.VideoWriter(str(tmp_path / "moving.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    for k in range(len(masks)):
+        writer.write(np.roll(capture.read()[1], k, axis=1))
+    writer.release()
+    capture.release()
+    found = extract(tmp_path / "moving.avi", tmp_path / "two")
+    assert any("the camera seems to move" in warning for warning in found["warnings"])
+    assert extract(tmp_path / "still.avi", tmp_path / "three")["warnings"] == []
+
+
+def test_a_video_that_changes_its_size_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = film(tmp_path / "a.avi", [NOBODY] * EMPTY + truth())
+    whole = cv2.VideoCapture.read
+
+    class Changing:
+        def __init__(self, *words: Any) -> None:
+            self._capture, self._count = cv2_capture(*words), 0
+
+        def read(self) -> Any:
+            self._count += 1
+            read, image = whole(self._capture)
+            return read, image if image is None or self._count < 20 else image[:60]
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._capture, name)
+
+    cv2_capture = cv2.VideoCapture
+    monkeypatch.setattr(cv2, "VideoCapture", Changing)
+    result = run("track", path, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "expected frames of 160x120, got 160x60 in frame 19" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["VIDEO", "VIDEO"], "camera must be given for each of several views, 2, got none"),
+        (["VIDEO", "walk"], "sources must be of one kind, got motion and video"),
+        (["walk", "run"], "source must be one motion, or views of one person, got 2 motions"),
+        (["VIDEO", "--camera", "LARGE"], "camera 'large' must be calibrated for 160x120, got 320x240"),
+        (["VIDEO", "--camera", "TWO"], "camera must be given for each view, 1, got 2"),
+        (["VIDEO", "--camera", "nothing.toml"], "nothing.toml: expected a calibration file, got nothing"),
+        (["VIDEO", "--height", "17"], "height must lie in 0.3 to 2.8 metres, got 17.0"),
+        (["walk", "--height", "1.7"], "height must be given for footage only"),
+        (["VIDEO", "--restarts", "-1"], "restarts must be 0 or more, got -1"),
+        (["VIDEO", "--body-frames", "-1"], "body_frames must be 0 or more, got -1"),
+        (["VIDEO", "--view-degrees", "0", "--view-degrees", "90"], "view_degrees must be one for footage"),
+        (
+            ["VIDEO", "--extraction", "magic"],
+            "extraction method must be one of mixture, mean, median, masks, got 'magic'",
+        ),
+        (["VIDEO", "--translation", "known"], "translation must be searched or aligned where only masks are given"),
+        (["VIDEO", "--first-pose", "given"], "first_pose must be searched where only masks are given"),
+        (["VIDEO", "--train", "wlak"], "got 'wlak'; did you mean 'walk'?"),
+        (["VIDEO", "--frames", "0:5"], "expected a person who moves before a still background, got none in any frame"),
+        (["missing.mp4"], "missing.mp4: expected a video file, got nothing of that name"),
+        (["TEXT"], "expected a video that OpenCV can read"),
+    ],
+)
+def test_a_mistake_with_footage_is_one_line_and_leaves_nothing(
+    filmed: tuple[Path, list[Any]], tmp_path: Path, words: list[str], message: str
+) -> None:
+    inputs = tmp_path / "in"
+    inputs.mkdir()
+    large = posefit.Camera.around(np.zeros(3), 0.0, 4.0, (320, 240))
+    (inputs / "large.json").write_text(large.to_json())
+    (inputs / "text.mp4").write_text("no video")
+    stand = {
+        "VIDEO": filmed[0],
+        "LARGE": inputs / "large.json",
+        "TWO": toml(inputs / "two.toml", camera(0.0), camera(1.0)),
+        "TEXT": inputs / "text.mp4",
+    }
+    result = run("track", *(stand.get(word, word) for word in words), "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    lines = [line for line in result.stderr.splitlines() if line.startswith("posefit:")]
+    assert len(lines) == 1
+    assert message in lines[0]
+    assert [one.name for one in tmp_path.iterdir()] == ["in"]
+
+
+def test_a_recording_for_the_viewer_holds_body_and_masks(tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="needs posefit[viewer]")
+    path = tmp_path / "walk.rrd"
+    posefit.track("walk", frames=(0, 3), evaluations=200, rerun=path)
+    assert path.stat().st_size > 5_000
+    with pytest.raises(ValueError, match="expected a new file for the recording, got one that exists"):
+        posefit.track("walk", frames=(0, 3), evaluations=200, rerun=path)
+
+
+def test_a_real_walk_is_followed_from_a_camera_file(tmp_path: Path) -> None:
+    video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
+    if not video.is_file():
+        pytest.skip(f"no video at {video}")
+    from posefit_experiments.real import measure
+
+    found = measure(video, (0, 420, 1520, 532), (55, 166), 0)
+    assert found["usable"] >= 105
+    assert found["iou_masks"] >= 0.80
+    assert found["lowest_iou_masks"] > 0.6  # nowhere lost
+    assert found["travel_seen"] == found["travel_fitted"] == "left"
+    assert found["facing_its_way"] > 0.8
+    assert found["steps_a_second_fitted"] == pytest.approx(found["steps_a_second_seen"], rel=0.1)
+
+
+def test_frames_are_found_as_masks_too(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    extract(filmed[0], tmp_path / "seen", Extraction(), frames=(EMPTY + 6, EMPTY + 14))
+    from_masks = run("track", tmp_path / "seen" / "masks.npz", *BRIEF[:-2], "--json")
+    from_video = run("track", filmed[0], *BRIEF, "--json")
+    assert from_masks.exit_code == from_video.exit_code == 0, from_masks.stderr + from_video.stderr
+    first, second = (json.loads(one.stdout) for one in (from_masks, from_video))
+    assert first["iou"] == second["iou"]
+    assert first["frames"] == second["frames"] == 8
+    assert first["fps"] == second["fps"] == 25.0  # the file of masks states it

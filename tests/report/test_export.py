@@ -1,0 +1,201 @@
+"""IOHprofiler folders, opened by iohinspector, and CSV."""
+
+import csv
+import json
+from pathlib import Path
+
+import iohinspector
+import numpy as np
+import pytest
+
+from posefit.report import export
+from posefit.report.export import Run, write_csv, write_iohprofiler
+
+
+def run(method="sapso@pca", settings=None, problem="walk", dimension=9, instance=0, seed=0, evaluations=(1, 40, 80), costs=(90.0, 5.0, 2.5)):  # fmt: skip
+    return Run(method, settings or {}, problem, dimension, instance, seed, evaluations, costs)
+
+
+def sweep():
+    """Return runs of three algorithms on two problems, three instances and two seeds, from random costs."""
+    rng = np.random.default_rng(0)
+    for method, settings in (("sapso@pca", {}), ("nevergrad:NGOpt@full", {}), ("sapso@pca", {"cooling": 0.9})):
+        for problem, dimension in (("walk, view 45", 9), ("jacks/holes", 12)):
+            for instance in (2, 0, 1):
+                for seed in (1, 0):
+                    used = np.cumsum(rng.integers(1, 50, 20))
+                    yield Run(
+                        method,
+                        settings,
+                        problem,
+                        dimension,
+                        instance,
+                        seed,
+                        used,
+                        np.sort(rng.uniform(0, 99, 20))[::-1],
+                    )
+
+
+def opened(folder):
+    manager = iohinspector.DataManager()
+    manager.add_folder(str(folder))
+    return manager
+
+
+def test_iohinspector_opens_every_run(tmp_path):
+    write_iohprofiler(sweep(), tmp_path / "ioh")
+    overview = opened(tmp_path / "ioh").overview
+    assert len(overview) == 3 * 2 * 3 * 2
+    assert set(overview["algorithm_name"]) == {"sapso@pca #1", "sapso@pca #2", "nevergrad:NGOpt@full"}
+    assert set(overview["algorithm_info"]) == {"{}", '{"cooling": 0.9}'}
+    assert set(zip(overview["function_name"], overview["function_id"], overview["dimension"], strict=True)) == {
+        ("jacks/holes", 1, 12),
+        ("walk, view 45", 2, 9),
+    }
+    assert sorted(set(overview["instance"])) == [0, 1, 2]
+    expected = sorted((float(one.costs[-1]), int(one.evaluations[-1])) for one in sweep())
+    assert sorted(zip(overview["best_y"], overview["evals"], strict=True)) == expected
+
+
+def test_iohinspector_reads_every_cost_to_the_last_bit(tmp_path):
+    write_iohprofiler(sweep(), tmp_path / "ioh")
+    manager = opened(tmp_path / "ioh")
+    data = manager.load(monotonic=False)
+    last = manager.overview["data_id", "best_y"].to_dict(as_series=False)
+    key = dict(zip(last["best_y"], last["data_id"], strict=True))
+    for one in sweep():
+        rows = data.filter(data["data_id"] == key[float(one.costs[-1])])
+        used, costs = list(one.evaluations), list(one.costs)
+        if used[0] > 1:
+            used, costs = [1, *used], [100.0, *costs]
+        assert rows["evaluations"].to_list() == used
+        assert rows["raw_y"].to_list() == costs
+
+
+def test_iohinspectors_expected_running_time_is_ours(tmp_path):
+    from iohinspector.metrics.fixed_target import aggregate_running_time
+
+    from posefit.statistics.profiles import expected_running_time, hits, trace
+
+    runs = [run(seed=k, evaluations=(1, 40, 80), costs=(90.0, 20.0, last)) for k, last in enumerate((4.0, 9.0, 16.0))]
+    write_iohprofiler(runs, tmp_path / "ioh")
+    data = opened(tmp_path / "ioh").load(include_meta_data=True)
+    table = aggregate_running_time(data, f_min=5.0, f_max=50.0, scale_f_log=False)
+    targets = table["raw_y"].to_numpy()
+    ours = expected_running_time([hits(trace(one.evaluations, one.costs), targets) for one in runs], [80] * 3)
+    between = (targets > 4.0) & ~np.isin(targets, [9.0, 16.0, 20.0])
+    assert np.allclose(table["ERT"][between], ours[between])
+
+
+def test_the_files_are_where_iohprofiler_has_them(tmp_path):
+    write_iohprofiler([run(seed=3)], tmp_path / "ioh")
+    assert sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()) == [
+        "ioh/sapso@pca/IOHprofiler_f1_walk.json",
+        "ioh/sapso@pca/data_f1_walk/IOHprofiler_f1_DIM9.dat",
+    ]
+    summary = json.loads((tmp_path / "ioh/sapso@pca/IOHprofiler_f1_walk.json").read_text())
+    version = summary.pop("version"), summary.pop("experiment_attributes")
+    assert version == (export.FORMAT, [{"posefit": export.__version__}])
+    assert summary == {
+        "suite": "posefit",
+        "function_id": 1,
+        "function_name": "walk",
+        "maximization": False,
+        "algorithm": {"name": "sapso@pca", "info": "{}"},
+        "attributes": ["evaluations", "raw_y"],
+        "run_attributes": ["seed"],
+        "scenarios": [
+            {
+                "dimension": 9,
+                "path": "data_f1_walk/IOHprofiler_f1_DIM9.dat",
+                "runs": [{"instance": 0, "evals": 80, "best": {"evals": 80, "y": 2.5, "x": []}, "seed": 3}],
+            }
+        ],
+    }
+
+
+def test_rows_stand_where_the_cost_falls_and_at_the_end(tmp_path):
+    write_iohprofiler(
+        [
+            run(evaluations=(1, 2, 3, 4, 5), costs=(9.0, 9.0, 7.0, 7.0, 7.0)),
+            run(instance=1, evaluations=(40, 80), costs=(9.0, 9.0)),
+            run(instance=2, evaluations=(40,), costs=(120.0,)),
+        ],
+        tmp_path / "ioh",
+    )
+    text = next(tmp_path.rglob("*.dat")).read_text()
+    assert text.split("evaluations raw_y\n") == [
+        "",
+        "1 9.0\n3 7.0\n5 7.0\n",
+        "1 100.0\n40 9.0\n80 9.0\n",
+        "1 120.0\n40 120.0\n",
+    ]
+    runs = json.loads(next(tmp_path.rglob("*.json")).read_text())["scenarios"][0]["runs"]
+    assert [(one["evals"], one["best"]["evals"], one["best"]["y"]) for one in runs] == [
+        (5, 3, 7.0),
+        (80, 40, 9.0),
+        (40, 1, 120.0),
+    ]
+
+
+def test_one_method_and_problem_in_two_dimensions_are_two_scenarios(tmp_path):
+    write_iohprofiler([run(), run(dimension=12, costs=(8.0, 3.0, 1.0))], tmp_path / "ioh")
+    overview = opened(tmp_path / "ioh").overview
+    assert sorted(zip(overview["dimension"], overview["best_y"], strict=True)) == [(9, 2.5), (12, 1.0)]
+
+
+def test_hostile_names_stay_in_their_folder_and_are_not_run_by_a_reader(tmp_path):
+    trap = tmp_path / "trap"
+    wicked = f"__import__('pathlib').Path({str(trap)!r}).touch()"
+    names = ["../../out", "/etc", "..", "", "CON:", 'a"b\nc', "Ä ß", "a/b", "a?b", "A?B", "x" * 300, wicked]
+    write_iohprofiler([run(method=name, problem=name, settings={wicked: wicked}) for name in names], tmp_path / "ioh")
+    assert [path.name for path in tmp_path.iterdir()] == ["ioh"]
+    overview = opened(tmp_path / "ioh").overview
+    assert sorted(overview["algorithm_name"]) == sorted(overview["function_name"]) == sorted(names)
+    folders = [path.name for path in (tmp_path / "ioh").iterdir()]
+    assert len({name.lower() for name in folders}) == len(names)
+    assert not trap.exists()
+
+
+@pytest.mark.parametrize(
+    ("runs", "message"),
+    [
+        ([], "runs must be at least one, got none"),
+        ([run(), run()], "runs must differ in method, settings, .* got two of sapso@pca on walk, instance 0, seed 0"),
+        ([run(dimension=0)], "sapso@pca on walk, instance 0, seed 0: dimension must lie in 1 to 65535, got 0"),
+        ([run(instance=70000)], "seed 0: instance must lie in 0 to 65535, got 70000"),
+        ([run(costs=(1.0, 2.0, 3.0))], "seed 0: costs must be the best so far and never rise, got 1, 2, 3"),
+        ([run(costs=(np.nan, 2.0, 1.0))], "seed 0: costs must be finite, got 1 that are not"),
+        ([run(evaluations=(1, 2.5, 3))], "seed 0: evaluations must be whole numbers, got 2.5"),
+    ],
+)
+def test_senseless_runs_are_refused_and_nothing_is_written(tmp_path, runs, message):
+    with pytest.raises(ValueError, match=message):
+        write_iohprofiler(runs, tmp_path / "ioh")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_exists_is_kept(tmp_path):
+    with pytest.raises(ValueError, match="expected a new name to write to, got one that exists"):
+        write_iohprofiler([run()], tmp_path)
+
+
+def test_csv_is_read_back_with_what_would_break_it(tmp_path):
+    rows = [{"method": 'a,"b"\nc', "error": 0.1 + 0.2}, {"method": "Ä", "lost": None, "error": 1}]
+    write_csv(rows, tmp_path / "rows.csv")
+    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
+        found = list(csv.DictReader(file))
+    assert found == [
+        {"method": 'a,"b"\nc', "error": "0.30000000000000004", "lost": ""},
+        {"method": "Ä", "error": "1", "lost": ""},
+    ]
+
+
+def test_csv_without_rows_or_over_a_file_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="rows must be at least one, got none"):
+        write_csv([], tmp_path / "rows.csv")
+    assert list(tmp_path.iterdir()) == []
+    Path(tmp_path / "rows.csv").write_text("mine")
+    with pytest.raises(ValueError, match="rows.csv: expected a new name to write to, got one that exists"):
+        write_csv([{"a": 1}], tmp_path / "rows.csv")
+    assert (tmp_path / "rows.csv").read_text() == "mine"

@@ -1,0 +1,74 @@
+"""The command that a report gives for a row brings back that row."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from posefit.report.repeat import command
+from posefit.sweep.cell import TIMES, run_cell
+from posefit.sweep.check import cell_of
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.plan import Plan
+from tests.sweep.fake import cells
+
+SMALL: dict[str, Any] = {"frames": 2, "size": [80, 60], "evaluations": 80}
+SPECS: list[dict[str, Any]] = [
+    {"method": "sapso@pca", "motion": "walk", "settings": {"sapso": {"cooling": 0.9}}, "instance": 3, "seed": 4},
+    {"method": "random@full", "motion": "run", "settings": {"full.limits": "training"}, "view_degrees": [0, 90.5]},
+    {"method": "cma@pca", "motion": "walk-a", "corruption": {"holes": 0.3, "dropped": 0.1}, "train": ["walk", "run"]},
+    {"method": "sapso@pca", "motion": "walk", "settings": {"tracker.root_range_degrees": "40,10,10"}, "seed": 1},
+]
+
+
+def plan_in(text: str) -> dict[str, Any]:
+    """Return the tables that a command gives to posefit."""
+    first, *lines, last = text.split("\n")
+    assert (first, last) == ("posefit sweep - --out rerun <<'END'", "END")
+    return tomllib.loads("\n".join(lines))
+
+
+@pytest.mark.parametrize("spec", SPECS)
+def test_the_command_asks_for_the_very_cell(spec: dict[str, Any]) -> None:
+    cell = cell_of(SMALL | spec)
+    assert [one.key for one in Plan.of(plan_in(command(cell.spec)))] == [cell.key]
+
+
+def test_the_command_brings_back_the_row(tmp_path: Path) -> None:
+    bash, posefit = shutil.which("bash"), Path(sys.executable).with_name("posefit")
+    if bash is None or not posefit.exists():
+        pytest.skip("needs a shell and the command posefit beside Python")
+    cell = cell_of(SMALL | SPECS[0])
+    path = os.pathsep.join([str(posefit.parent), os.environ["PATH"]])
+    subprocess.run(
+        [bash, "-c", command(cell.spec)],
+        cwd=tmp_path,
+        env={**os.environ, "PATH": path},
+        check=True,
+        capture_output=True,
+    )
+    (row,) = Ledger(tmp_path / "rerun").rows()
+    expected = run_cell(cell).row
+    for name in TIMES:
+        row.pop(name), expected.pop(name)
+    row.pop("joints")
+    assert row == expected
+
+
+@pytest.mark.parametrize(
+    "name", ['a"b', "END", "a\nEND\nrm -rf /", "$(id) `id` 'x' \\", "\x7f\x85\u2028</script>", "é漢"]
+)
+def test_nothing_in_a_name_ends_the_plan_or_reaches_the_shell(name: str) -> None:
+    cell = replace(cells(1)[0], motion=name, train=(name,), settings={f"sapso.{name}": name}, corruption={name: 0.5})
+    (found,) = plan_in(command(cell.spec))["cells"]
+    assert found["motion"] == name
+    assert found["train"] == [name]
+    assert found["settings"] == {f"sapso.{name}": name}
+    assert found["corruption"] == {name: 0.5}
+    assert "END" not in command(cell.spec).split("\n")[1:-1]

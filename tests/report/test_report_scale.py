@@ -1,0 +1,57 @@
+"""A ledger of 100,000 rows is reported in seconds, in little memory, on a page that a browser still takes."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.report.gallery import LARGEST
+from posefit.sweep.cell import Result
+from tests.report.browser import ledger, result, row_of
+from tests.sweep.fake import cells
+
+ROOT = Path(__file__).parents[2]
+METHODS = 10
+REPORT = """
+import json, sys, time
+from posefit.report.write import report
+began = time.perf_counter()
+done = report(sys.argv[1], sys.argv[2], say=print)["header"]["done"]
+taken = time.perf_counter() - began
+status = dict(line.split(":", 1) for line in open("/proc/self/status"))
+print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))
+"""
+
+
+def rows(instances: int, seeds: int) -> Iterator[Result]:
+    """Yield results as large as those of real cells; of one picture, whatever the row."""
+    first, rng = replace(cells(1)[0], frames=60), np.random.default_rng(0)
+    picture = result(first, 1.0).joints
+    for m in range(METHODS):
+        for i in range(instances):
+            for s, error in enumerate(rng.gamma(2.0, 1.0, seeds).tolist()):
+                cost = [float(f"{20.0 / k + error:.6g}") for k in range(1, 62)]
+                trace: dict[str, Any] = {"evaluations": list(range(40, 2480, 40)), "cost": cost}
+                cell = replace(first, method=f"m{m}@pca", instance=i, seed=s)
+                yield Result(row_of(cell, error, trace=trace), picture)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads the memory it took from /proc")
+@pytest.mark.parametrize(("instances", "seeds"), [(100, 100), (5000, 2)])
+def test_100_000_rows_are_reported_in_30_seconds_and_2_gigabytes(tmp_path: Path, instances: int, seeds: int) -> None:
+    made = ledger(tmp_path / "ledger", rows(instances, seeds))
+    words = [sys.executable, "-c", REPORT, str(made), str(tmp_path / "report.html")]
+    told = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    done, taken, peak = json.loads(told.splitlines()[-1])
+    size = (tmp_path / "report.html").stat().st_size
+    print(f"{done} rows in {taken:.1f} s, {peak / 1e9:.2f} GB, a page of {size / 1e6:.1f} MB")
+    assert done == METHODS * instances * seeds
+    assert taken < 30.0
+    assert peak < 2e9
+    assert size < LARGEST + 100 * done

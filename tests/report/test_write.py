@@ -1,0 +1,183 @@
+"""What `posefit report` writes and prints, and one line for every mistake."""
+
+import csv
+import html.parser
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.report.content import data_of
+from posefit.report.runs import runs_of
+from posefit.report.webpage import MARK, embedded, plain
+from posefit.sweep.ledger import Ledger
+from tests.cli.test_command_line import fails, run
+from tests.report.browser import ledger, result
+from tests.sweep.fake import cells
+
+FIRST = cells(1)[0]
+LOST = replace(FIRST, seed=9)
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """Return a ledger of two methods on two instances with two seeds, and one failure."""
+    found = [
+        result(replace(FIRST, method=m, instance=i, seed=s, frames=4), error + 0.1 * i + 0.02 * s)
+        for m, error in (("random@pca", 2.0), ("sapso@pca", 1.0))
+        for i in range(2)
+        for s in range(2)
+    ]
+    return ledger(tmp_path / "results", found, [(LOST, ["its process died", "its process died"])])
+
+
+class Page(html.parser.HTMLParser):
+    """Collects the data of a page, and everything in it that would be fetched."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.tags: list[str] = []
+        self._scripts: list[str] = []
+        self.feed(path.read_text(encoding="utf-8"))
+        self.data: dict[str, Any] = json.loads(self._scripts[0])
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.links += [value or "" for name, value in attrs if name in ("src", "href", "action")]
+
+    def handle_data(self, data: str) -> None:
+        if self.tags and self.tags[-1] == "script" and data.strip():
+            self._scripts.append(data)
+
+
+def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    done = run("report", results, "--out", out)
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == f"written to {out}: open it in any browser"
+    assert [line.split()[:2] for line in done.stdout.splitlines()[1:-1]] == [
+        ["sapso@pca", "1.06"],
+        ["random@pca", "2.06"],
+    ]
+    page = Page(out)
+    assert page.links
+    assert all(link.startswith("#") for link in page.links)
+    assert not {"link", "img", "iframe", "object"} & set(page.tags)
+    assert page.data["header"]["done"] == 8
+    assert page.data["failures"][0]["reasons"] == ["its process died"]
+    assert len(page.data["gallery"]["tracks"]) == 8
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
+
+
+def test_the_same_ledger_gives_the_same_bytes_and_replaces_an_earlier_report(results: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    run("report", results, "--out", out)
+    first = out.read_bytes()
+    out.write_text(MARK + "of another day")
+    assert run("report", results, "--out", out).exit_code == 0
+    assert out.read_bytes() == first
+
+
+def test_json_is_the_leaderboard(results: Path, tmp_path: Path) -> None:
+    found = json.loads(run("report", results, "--out", tmp_path / "report.html", "--json").stdout)
+    assert [row["name"] for row in found["leaderboard"]] == ["sapso@pca", "random@pca"]
+    assert found["leaderboard"][0]["skill_mean_pose"] == pytest.approx(1.0 - 1.06 / 4.0)
+    assert {row["baseline"] for row in found["baselines"]} == {"mean_pose", "persistence", "nearest"}
+    assert found["header"]["failed"] == 1
+
+
+def test_figures_tables_rows_and_iohprofiler_on_demand(results: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    places = {name: tmp_path / name for name in ("figures", "iohprofiler", "rows.csv")}
+    words = [
+        word for name, place in places.items() for word in (f"--{name.split('.')[0]}".replace("rows", "csv"), place)
+    ]
+    done = run("report", results, "--out", tmp_path / "report.html", *words)
+    assert done.exit_code == 0, done.stderr
+    names = ("attainment", "convergence", "critical-difference", "joints", "profile")
+    drawn = {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
+    assert {path.name for path in places["figures"].iterdir()} == drawn | {"leaderboard.tex", "leaderboard.csv"}
+    assert "sapso@pca & 1.06" in (places["figures"] / "leaderboard.tex").read_text()
+    with places["rows.csv"].open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 8 + 1
+    assert {row["status"] for row in rows} == {"done", "quarantined"}
+    assert sorted(path.name for path in places["iohprofiler"].iterdir()) == ["random@pca", "sapso@pca"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["NONE", "--out", "OUT.html"], "expected a ledger, a folder that posefit sweep wrote, got none"),
+        (["EMPTY", "--out", "OUT.html"], "expected a ledger with finished rows, got one with none"),
+        (["RESULTS"], "Missing option '--out'"),
+        (["RESULTS", "--out", "OUT.txt"], "--out must be a file that ends in .html, got "),
+        (["RESULTS", "--out", "OTHER.html"], "expected a new name or an earlier report, got something else"),
+        (["RESULTS", "--out", "DIR.html"], "expected a new name or an earlier report, got something else"),
+        (["RESULTS", "--out", "none/OUT.html"], "expected a place to write to, got one in "),
+        (["RESULTS", "--out", "OUT.html", "--csv", "OTHER.html"], "expected a new name to write to, got one that exists"),
+        (["RESULTS", "--out", "OUT.html", "--figures", "RESULTS"], "expected a place of its own for each"),
+        (["RESULTS", "--out", "OUT.html", "--csv", "OUT.html"], "expected a place of its own for each"),
+        (["RESULTS", "--out", "OUT.html", "--iohprofiler", "none/OUT"], "expected a place to write to, got one in "),
+    ],
+)  # fmt: skip
+def test_mistakes_are_one_line_and_write_nothing(words: list[str], message: str, results: Path, tmp_path: Path) -> None:
+    ledger(tmp_path / "EMPTY", [])
+    (tmp_path / "OTHER.html").write_text("<p>mine</p>")
+    (tmp_path / "DIR.html").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    places = [word if word.startswith("--") else tmp_path / word.replace("RESULTS", "results") for word in words]
+    assert message in fails("report", *places)
+    assert sorted(tmp_path.rglob("*")) == before
+    assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
+
+
+def test_only_figures_need_a_library_beyond_the_core(results: Path, tmp_path: Path) -> None:
+    code = """
+import sys
+for name in ("matplotlib", "pandas", "distributed", "iohinspector", "playwright"):
+    sys.modules[name] = None
+from posefit.cli import main
+main(sys.argv[1:])
+"""
+    words = [sys.executable, "-W", "error", "-c", code, "report", str(results), "--out"]
+    done = subprocess.run([*words, str(tmp_path / "a.html")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    words += [str(tmp_path / "b.html"), "--figures", str(tmp_path / "figures")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "posefit[figures]" in done.stderr
+    assert not (tmp_path / "b.html").exists()
+
+
+def test_a_damaged_picture_is_left_out_and_said(results: Path) -> None:
+    (joints,) = (results / "rows").glob("*.joints")
+    data = bytearray(joints.read_bytes())
+    data[10] ^= 255
+    joints.write_bytes(bytes(data))
+    said: list[str] = []
+    book = Ledger(results)
+    found = data_of(book, runs_of(book), said.append)
+    assert len(found["gallery"]["tracks"]) == 7
+    assert len(said) == 1
+    assert "must be whole, got damaged ones; this run has no picture" in said[0]
+
+
+@pytest.mark.parametrize("text", ["</script>", "<!--", "]]>", "&lt;", "\u2028\u2029", '"\\', "\U0001f600é"])
+def test_embedded_data_cannot_leave_its_element(text: str) -> None:
+    found = embedded({text: [text, float("nan"), float("inf"), 1.23456789]})
+    assert not set("<>&\u2028\u2029") & set(found)
+    assert json.loads(found) == {text: [text, None, None, 1.2346]}
+
+
+def test_numbers_are_plain() -> None:
+    assert plain({"a": np.arange(2), "b": np.array([0.5, np.nan]), "c": (np.int64(2**60), True, None)}) == {
+        "a": [0, 1], "b": [0.5, None], "c": [2**60, True, None],
+    }  # fmt: skip

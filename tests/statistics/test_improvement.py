@@ -1,0 +1,57 @@
+"""How probably one method is better than another."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from posefit.statistics.improvement import improvement_interval, probability_of_improvement
+
+
+def test_improvement_by_hand_with_a_tie():
+    # 1 and 3 against 2 and 3: better in (1, 2), (1, 3), worse in (3, 2), equal in (3, 3)
+    found = probability_of_improvement([[[1.0, 3.0]], [[2.0, 3.0]]])
+    assert found.tolist() == [[0.5, 0.625], [0.375, 0.5]]
+
+
+def test_improvement_is_mann_whitneys_u_averaged_over_instances():
+    errors = np.random.default_rng(0).integers(0, 9, (3, 4, 6)).astype(float)
+    found = probability_of_improvement(errors)
+    for a in range(3):
+        for b in range(3):
+            u = [stats.mannwhitneyu(errors[b, i], errors[a, i]).statistic / 36 for i in range(4)]
+            assert found[a, b] == pytest.approx(np.mean(u))
+
+
+def test_instances_are_never_held_against_each_other():
+    # the first method is better on both instances, though its runs on the second are worse than all on the first
+    assert probability_of_improvement([[[1.0, 1.0], [8.0, 8.0]], [[2.0, 2.0], [9.0, 9.0]]])[0, 1] == 1.0
+
+
+def test_the_interval_has_the_same_value_and_holds_it():
+    errors = np.random.default_rng(0).gamma(2.0, size=(2, 5, 8)) * np.array([1.0, 1.3])[:, None, None]
+    value, low, high = improvement_interval(*errors, np.random.default_rng(1))
+    assert value == pytest.approx(probability_of_improvement(errors)[0, 1])
+    assert 0.0 <= low < value < high <= 1.0
+
+
+def test_intervals_hold_the_truth_in_93_to_98_percent_of_1000_studies():
+    # normal runs, the second method worse by d: P = Phi(d / sqrt(2)) on each of eight instances
+    rng, worse = np.random.default_rng(6), np.linspace(0.0, 1.2, 8)[:, None]
+    truth, held = stats.norm.cdf(worse / np.sqrt(2.0)).mean(), 0
+    for _ in range(1000):
+        _, low, high = improvement_interval(
+            rng.normal(size=(8, 10)), rng.normal(size=(8, 10)) + worse, rng, resamples=500
+        )
+        held += low <= truth <= high
+    assert 0.93 <= held / 1000 <= 0.98
+
+
+def test_one_seed_gives_no_interval():
+    value, low, high = improvement_interval([[1.0], [1.0]], [[2.0], [0.0]], np.random.default_rng(0))
+    assert value == 0.5
+    assert np.isnan([low, high]).all()
+
+
+def test_different_shapes_are_refused():
+    with pytest.raises(ValueError, match=r"second must have the shape of first, \(1, 2\), got \(1, 1\)"):
+        improvement_interval([[1.0, 2.0]], [[1.0]], np.random.default_rng(0))

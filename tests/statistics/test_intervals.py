@@ -1,0 +1,129 @@
+"""The interquartile mean and its interval: does it hold the truth as often as it says?"""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from posefit.statistics import intervals
+from posefit.statistics.intervals import iqm, iqm_intervals
+from tests.statistics.studies import DRAWS, INSTANCES, studies, truth
+
+COUNT = 1000
+
+
+def coverage(kind: str, seeds: int, count: int = COUNT) -> float:
+    """Return the share of studies whose interval holds the truth."""
+    true, rng = truth(kind), np.random.default_rng(12)
+    held = 0
+    for errors in studies(kind, seeds, count, rng):
+        found = iqm_intervals(errors, rng, resamples=1000)
+        held += found.low[0] <= true <= found.high[0]
+    return held / count
+
+
+def test_intervals_hold_the_truth_in_93_to_97_percent_of_1000_studies():
+    assert 0.93 <= coverage("with lost runs", 10) <= 0.97
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seeds", [5, 10, 20])
+@pytest.mark.parametrize("kind", DRAWS)
+def test_intervals_hold_the_truth_whatever_the_noise_and_the_number_of_seeds(kind, seeds):
+    share = coverage(kind, seeds, 3 * COUNT)  # so that chance moves the share by 0.4 % only
+    print(f"{kind}, {seeds} seeds: {100 * share:.1f} %")
+    assert 0.93 <= share <= 0.97
+
+
+def test_plain_percentiles_would_be_too_narrow_for_five_seeds():
+    true, rng = truth("normal"), np.random.default_rng(3)
+    strata, held = np.arange(INSTANCES)[:, None], 0
+    for errors in studies("normal", 5, COUNT, rng):
+        drawn = errors[0][strata, rng.integers(5, size=(500, INSTANCES, 5))]
+        low, high = np.quantile(stats.trim_mean(drawn.reshape(500, -1), 0.25, axis=1), [0.025, 0.975])
+        held += low <= true <= high
+    assert held / COUNT < 0.92
+
+
+def test_iqm_is_the_mean_of_the_middle_half():
+    # eight runs: two at either end are left out, and 3, 4, 5, 9 are not
+    assert iqm([[[100.0, 5.0, 1.0, 4.0], [3.0, 9.0, 50.0, 2.0]]])[0] == 5.25
+
+
+def test_iqm_is_scipys_trimmed_mean():
+    errors = np.random.default_rng(0).gamma(2.0, size=(3, 5, 7))
+    assert np.allclose(iqm(errors), [stats.trim_mean(runs.ravel(), 0.25) for runs in errors])
+
+
+def test_the_standard_error_is_scipys_of_a_trimmed_mean_for_one_instance():
+    runs = np.random.default_rng(5).normal(size=(1, 1, 40))
+    mean, error = intervals._estimate(runs)
+    assert mean[0] == pytest.approx(stats.trim_mean(runs.ravel(), 0.25))
+    assert error[0] == pytest.approx(stats.mstats.trimmed_stde(runs.ravel(), (0.25, 0.25), (True, True)), rel=1e-6)
+
+
+def test_the_interval_is_near_that_of_students_t_for_many_normal_runs():
+    runs = np.random.default_rng(1).normal(size=(1, 10, 200))
+    found = iqm_intervals(runs, np.random.default_rng(2))
+    mean, error = intervals._estimate(runs)
+    assert found.low[0] == pytest.approx(mean[0] - 1.96 * error[0], abs=0.1 * error[0])
+    assert found.high[0] == pytest.approx(mean[0] + 1.96 * error[0], abs=0.1 * error[0])
+
+
+def test_instances_do_not_widen_the_interval_for_being_different():
+    noise = np.random.default_rng(1).normal(size=(1, 8, 10))
+    apart = noise + 1000.0 * np.arange(8)[:, None]
+    found = iqm_intervals(apart, np.random.default_rng(2))
+    # the middle four of eight instances, told apart with certainty
+    assert found.values[0] == pytest.approx(apart[0, 2:6].mean())
+    assert found.high[0] - found.low[0] < 1.0
+
+
+def test_the_same_generator_gives_the_same_interval_whatever_other_methods_there_are():
+    errors = np.random.default_rng(0).gamma(2.0, size=(3, 4, 6))
+    both, alone = (iqm_intervals(part, np.random.default_rng(7)) for part in (errors, errors[1:2]))
+    assert (both.low[1], both.high[1]) == (alone.low[0], alone.high[0])
+
+
+def test_a_method_without_chance_has_an_interval_of_no_width():
+    found = iqm_intervals(np.full((1, 3, 4), 0.1), np.random.default_rng(0))
+    assert found.low[0] == found.values[0] == found.high[0] == pytest.approx(0.1)
+
+
+def test_few_runs_give_a_finite_interval_within_the_runs():
+    found = iqm_intervals([[[1.0, 2.0, 1.5, 3.0, 2.5, 1.0, 2.0, 8.0]]], np.random.default_rng(0))
+    assert found.values[0] == 2.0  # the mean of 1.5, 2, 2, 2.5
+    assert 1.0 <= found.low[0] < 2.0 < found.high[0] <= 8.0
+
+
+def test_fewer_than_eight_runs_give_no_interval():
+    # by the formula the middle half, 0.88 and 1.1, would have no spread within its instances, and the interval no width
+    found = iqm_intervals([[[0.84, 0.88], [1.1, 1.17]]], np.random.default_rng(0))
+    assert found.values[0] == pytest.approx(0.99)
+    assert np.isnan([found.low[0], found.high[0]]).all()
+
+
+def test_one_seed_gives_no_interval():
+    found = iqm_intervals([[[1.0], [3.0]]], np.random.default_rng(0))
+    assert found.values[0] == 2.0
+    assert np.isnan([found.low[0], found.high[0]]).all()
+
+
+def test_a_higher_level_gives_a_wider_interval():
+    errors = np.random.default_rng(0).gamma(2.0, size=(1, 6, 6))
+    wide, narrow = (iqm_intervals(errors, np.random.default_rng(1), level=level) for level in (0.99, 0.8))
+    assert wide.low[0] < narrow.low[0] < narrow.high[0] < wide.high[0]
+
+
+@pytest.mark.parametrize(
+    ("errors", "settings", "message"),
+    [
+        (np.ones((2, 3)), {}, r"errors must have shape \(methods, instances, seeds\), got \(2, 3\)"),
+        (np.ones((2, 0, 3)), {}, r"errors must have shape \(methods, instances, seeds\), got \(2, 0, 3\)"),
+        ([[[1.0, np.nan]]], {}, "errors must be finite, got 1 that are not"),
+        (np.ones((1, 2, 2)), {"resamples": 99}, "resamples must be at least 100, got 99"),
+        (np.ones((1, 2, 2)), {"level": 95}, "level must lie between 0 and 1, got 95"),
+    ],
+)
+def test_what_makes_no_interval_is_refused(errors, settings, message):
+    with pytest.raises(ValueError, match=message):
+        iqm_intervals(errors, np.random.default_rng(0), **settings)

@@ -1,0 +1,172 @@
+"""Friedman, Nemenyi, Wilcoxon and Holm against scipy, scikit-posthocs, published tables and sums by hand."""
+
+import numpy as np
+import pytest
+import scikit_posthocs
+from scipy import stats
+from statsmodels.stats.multitest import multipletests
+
+from posefit.statistics.ranks import _cliques, friedman, holm, nemenyi_difference, wilcoxon
+
+# Hollander and Wolfe, Nonparametric statistical methods, 1973, page 140: rounding first base in three ways (R's
+# example of friedman.test quotes them, with a chi-squared of 11.1429 and a p-value of 0.003805)
+FIRST_BASE = np.array(
+    [
+        [5.40, 5.50, 5.55], [5.85, 5.70, 5.75], [5.20, 5.60, 5.50], [5.55, 5.50, 5.40], [5.90, 5.85, 5.70],
+        [5.45, 5.55, 5.60], [5.40, 5.40, 5.35], [5.45, 5.50, 5.35], [5.25, 5.15, 5.00], [5.85, 5.80, 5.70],
+        [5.25, 5.20, 5.10], [5.65, 5.55, 5.45], [5.60, 5.35, 5.45], [5.05, 5.00, 4.95], [5.50, 5.50, 5.40],
+        [5.45, 5.55, 5.50], [5.55, 5.55, 5.35], [5.45, 5.50, 5.55], [5.50, 5.45, 5.25], [5.65, 5.60, 5.40],
+        [5.70, 5.65, 5.55], [6.30, 6.30, 6.25],
+    ]
+)  # fmt: skip
+
+
+def block(runners):
+    """Return rows of blocks as errors (methods, blocks, 1)."""
+    return np.asarray(runners, dtype=float).T[:, :, None]
+
+
+def tied(methods, blocks, seed):
+    """Return errors (methods, blocks, 2) with many ties."""
+    return np.random.default_rng(seed).integers(0, 4, (methods, blocks, 2)) + 0.9 * np.arange(methods)[:, None, None]
+
+
+def test_friedman_of_a_textbook_example():
+    found = friedman(block(FIRST_BASE))
+    assert found.statistic == pytest.approx(11.1429, abs=5e-5)
+    assert found.p_value == pytest.approx(0.003805, abs=5e-7)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_friedman_is_scipys_with_ties(seed):
+    errors = np.random.default_rng(seed).integers(0, 4, (5, 6, 2)).astype(float)
+    expected = stats.friedmanchisquare(*errors.reshape(5, -1))
+    found = friedman(errors)
+    assert (found.statistic, found.p_value) == (pytest.approx(expected.statistic), pytest.approx(expected.pvalue))
+
+
+def test_mean_ranks_by_hand_with_a_tie():
+    # ranks 1, 2.5, 2.5 and 1, 2, 3
+    found = friedman(block([[1.0, 5.0, 5.0], [2.0, 3.0, 4.0]]))
+    assert found.mean_ranks.tolist() == [1.0, 2.25, 2.75]
+
+
+def test_methods_that_are_always_equal_are_one_clique():
+    found = friedman(np.ones((3, 4, 2)))
+    assert (found.statistic, found.p_value, found.cliques) == (0.0, 1.0, ((0, 1, 2),))
+
+
+@pytest.mark.parametrize(("methods", "quantile"), [(2, 1.960), (3, 2.343), (4, 2.569), (5, 2.728), (10, 3.164)])
+def test_the_critical_difference_has_the_quantiles_of_demsars_table_5a(methods, quantile):
+    blocks = 30
+    expected = quantile * (methods * (methods + 1) / (6 * blocks)) ** 0.5
+    assert nemenyi_difference(methods, blocks) == pytest.approx(expected, rel=3e-4)
+
+
+def test_the_critical_difference_of_demsars_example():
+    # 3.2.4: four classifiers on 14 data sets, CD = 2.569 sqrt(4 * 5 / (6 * 14)) = 1.25
+    assert nemenyi_difference(4, 14) == pytest.approx(1.25, abs=0.005)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_methods_are_told_apart_where_scikit_posthocs_does(seed):
+    errors = tied(5, 12, seed)
+    expected = scikit_posthocs.posthoc_nemenyi_friedman(errors.reshape(5, -1).T).to_numpy()
+    found = friedman(errors)
+    apart = np.abs(np.subtract.outer(found.mean_ranks, found.mean_ranks)) >= found.critical_difference
+    assert np.array_equal(apart, expected <= 0.05)
+    assert apart.any()
+
+
+def test_cliques_are_as_large_as_they_can_be_and_none_is_part_of_another():
+    # 1 and 2 are alike, 2 to 3.4 too, 9 is alone
+    assert _cliques(np.array([2.0, 9.0, 1.0, 3.4, 2.9]), 1.5) == ((2, 0), (0, 4, 3))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_cliques_are_those_of_a_slow_twin(seed):
+    mean = np.random.default_rng(seed).uniform(1.0, 8.0, 8)
+    alike = [
+        {int(m) for m in np.flatnonzero((mean >= low) & (mean < low + 1.5))} for low in mean
+    ]  # all that start at one method
+    expected = {frozenset(one) for one in alike if len(one) > 1 and not any(one < other for other in alike)}
+    assert {frozenset(one) for one in _cliques(mean, 1.5)} == expected
+
+
+def test_a_critical_difference_is_one_from_which_on_methods_are_told_apart():
+    assert _cliques(np.array([1.0, 2.5]), 1.5) == ()
+
+
+def test_wilcoxon_by_hand():
+    # differences -1 to -5: the signed rank is 0, as extreme as it gets, 2 / 2**5
+    (found,) = wilcoxon(block([[1.0, 2.0], [2.0, 4.0], [3.0, 6.0], [4.0, 8.0], [5.0, 10.0]]))
+    assert (found.first, found.second, found.difference) == (0, 1, -3.0)
+    assert found.p_value == found.adjusted == pytest.approx(0.0625)
+
+
+def test_wilcoxon_is_scipys_and_its_adjustment_holms():
+    errors = np.random.default_rng(0).gamma(2.0, size=(4, 3, 5)) * np.array([1.0, 1.2, 2.0, 3.0])[:, None, None]
+    found = wilcoxon(errors)
+    assert [(one.first, one.second) for one in found] == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+    p_values = [stats.wilcoxon(errors[a].ravel(), errors[b].ravel()).pvalue for a in range(4) for b in range(a + 1, 4)]
+    assert [one.p_value for one in found] == pytest.approx(p_values)
+    assert [one.adjusted for one in found] == pytest.approx(holm(p_values).tolist())
+
+
+def test_only_the_pairs_asked_for_are_adjusted_for():
+    errors = np.random.default_rng(0).gamma(2.0, size=(4, 3, 5))
+    every = {(one.first, one.second): one.p_value for one in wilcoxon(errors)}
+    some = wilcoxon(errors, [(0, 3), (2, 3)])
+    assert [one.p_value for one in some] == [every[0, 3], every[2, 3]]
+    assert [one.adjusted for one in some] == holm([every[0, 3], every[2, 3]]).tolist()
+
+
+def test_methods_that_are_always_equal_are_not_told_apart():
+    (found,) = wilcoxon(np.ones((2, 3, 3)))
+    assert (found.difference, found.p_value) == (0.0, 1.0)
+
+
+def test_blocks_without_a_difference_speak_against_one():
+    some = np.zeros((2, 20, 1))
+    some[1, :6, 0] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    (found,), (without,) = wilcoxon(some), wilcoxon(some[:, :6])
+    assert found.difference == 0.0
+    assert found.p_value != without.p_value
+
+
+def test_holm_by_hand():
+    # sorted 0.005, 0.01, 0.03, 0.04 times 4, 3, 2, 1 = 0.02, 0.03, 0.06, 0.04, which may not fall: 0.06
+    assert holm([0.01, 0.04, 0.03, 0.005]).tolist() == pytest.approx([0.03, 0.06, 0.06, 0.02])
+
+
+def test_holm_is_that_of_statsmodels():
+    p_values = np.random.default_rng(0).beta(0.3, 2.0, 40)
+    assert np.allclose(holm(p_values), multipletests(p_values, method="holm")[1])
+
+
+def test_an_instance_is_one_block_where_its_seeds_are_averaged():
+    errors = np.random.default_rng(0).gamma(2.0, size=(3, 4, 50))
+    assert friedman(errors.mean(axis=2, keepdims=True)).critical_difference == nemenyi_difference(3, 4)
+    assert friedman(errors).critical_difference == nemenyi_difference(3, 200)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: friedman(np.ones((1, 2, 2))), r"errors must have shape .*, at least \(2, 1, 1\), got \(1, 2, 2\)"),
+        (lambda: friedman(np.ones((3, 1, 1))), "blocks, instances times seeds, must be at least 2, got 1"),
+        (lambda: friedman(np.full((3, 2, 2), np.nan)), "errors must be finite, got 12 that are not"),
+        (lambda: friedman(np.ones((3, 2, 2)), 5.0), "level must lie between 0 and 1, got 5.0"),
+        (
+            lambda: wilcoxon(np.ones((2, 2, 2)), [(0, 2)]),
+            r"pairs must be of two different methods of 0 to 1, got \(0, 2",
+        ),
+        (
+            lambda: wilcoxon(np.ones((2, 2, 2)), [(1, 1)]),
+            r"pairs must be of two different methods of 0 to 1, got \(1, 1",
+        ),
+    ],
+)
+def test_what_cannot_be_ranked_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

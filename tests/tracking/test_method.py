@@ -1,0 +1,231 @@
+"""A method is chosen by names: equal budgets, settings, and what happens where a plugin breaks a rule."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit import registry as registry_package
+from posefit.entries import Plugin
+from posefit.fitting.guard import BrokenRuleError
+from posefit.registry import Offer, Registry, registry
+from posefit.tracking import method
+from tests.testing import planted
+
+QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 200}
+
+
+@pytest.mark.parametrize("name", ["sapso", "pso", "particle", "annealed", "cma", "random"])
+def test_every_method_gets_the_same_number_of_evaluations_and_says_how_many_it_used(name: str) -> None:
+    for budget in (200, 437):
+        summary = posefit.track("walk", optimiser=name, **{**QUICK, "evaluations": budget}).summary
+        assert summary["evaluations_per_frame"] == budget
+        used = summary["evaluations"] / summary["frames"]
+        assert 0.85 * budget < used <= budget
+
+
+def test_a_budget_is_particles_times_iterations_and_one_where_nothing_else_is_said() -> None:
+    assert method.Choice().budget() == 2440
+    assert method.Choice(particles=10, iterations=4).budget() == 50
+    assert method.Choice(particles=10, evaluations=300).budget() == 300
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"evaluations": 0}, "evaluations must be at least 1, got 0"),
+        ({"evaluations": 100, "iterations": 4}, "evaluations and iterations must not both be given"),
+        ({"evaluations": 30}, "evaluations must hold one population of 40, got 30"),
+        ({"ask_seconds": 0.0}, "ask_seconds must be above 0, got 0.0"),
+        ({"view_degrees": float("nan")}, "view_degrees must be a finite number, got nan"),
+        ({"fps": 0.0}, "fps must be a positive number, got 0.0"),
+        ({"fps": float("inf")}, "fps must be a positive number, got inf"),
+        ({"optimiser": "sapzo"}, "did you mean 'sapso'"),
+        ({"prior": "pcb"}, "prior must be one of full, loose, pca, sklearn, union, got 'pcb'; did you mean 'pca'"),
+        ({"tracker": "vsmn"}, "tracker must be one of sapso.vsmm, vsmm, got 'vsmn'; did you mean 'vsmm'"),
+        ({"first_pose": "mine"}, "first_pose must be one of searched, given, got 'mine'"),
+        ({"optimiser_settings": {"coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),
+        ({"prior_settings": {"components": "six"}}, "pca.components must be float, got 'six'"),
+        ({"tracker_settings": {"flor": 1.0}}, "a setting of tracker must be one of .*did you mean 'floor'"),
+    ],
+)
+def test_mistakes_are_named(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        posefit.track("walk", **{**QUICK, **({"evaluations": None} if "iterations" in settings else {}), **settings})
+
+
+def test_a_filter_carries_its_particles_and_the_others_are_built_anew(monkeypatch: Any) -> None:
+    built: list[str] = []
+    for name in ("particle", "sapso", "random"):
+        offer = registry().offer("optimiser", name)
+
+        def make(space: Any, rng: Any, offer: Offer = offer, **settings: Any) -> Any:
+            built.append("anywhere" if space.start is None else "start")
+            return offer.factory(space, rng, **settings)
+
+        make.__signature__ = __import__("inspect").signature(offer.factory)  # type: ignore[attr-defined]
+        counted = replace(offer, factory=make)
+        found = Registry((Plugin("test", "test", "1", "loaded", offers=(counted, registry().offer("prior", "pca"))),))
+        monkeypatch.setattr(method, "registry", lambda found=found: found)
+        built.clear()
+        posefit.track("walk", optimiser=name, **QUICK)
+        first = "anywhere"  # of the track to warm up, and of the track itself
+        assert (
+            built
+            == {
+                "particle": [first, first],
+                "sapso": [first, first, "start", "start"],
+                "random": [first, first, "anywhere", "anywhere"],
+            }[name]
+        )
+
+
+@pytest.fixture
+def installed(monkeypatch: Any) -> Iterator[Any]:
+    """Let plugins of the tests pass for installed ones."""
+
+    def install(kind: Any, factory: Any, **more: Any) -> None:
+        mine = Offer(kind, "bad", factory, "posefit-bad", "1.0", **more)
+        rest = tuple(offer for plugin in registry().plugins for offer in plugin.offers)
+        found = Registry((Plugin("bad", "posefit-bad", "1.0", "loaded", offers=(mine, *rest)),))
+        monkeypatch.setattr(method, "registry", lambda: found)
+
+    yield install
+    assert registry_package.registry() is registry()
+
+
+class RaisesInTheMiddle(planted.Sound):
+    def tell(self, proposals: Any, costs: Any) -> None:
+        super().tell(proposals, costs)
+        if self.width < 0.4:
+            raise IndexError("list index out of range")
+
+
+class NeverReturns(planted.Sound):
+    def tell(self, proposals: Any, costs: Any) -> None:
+        super().tell(proposals, costs)
+        while True:
+            self.width = 0.5
+
+
+class FailsToBuild(planted.Sound):
+    def __init__(self, space: Any, rng: Any) -> None:
+        raise KeyError("config")
+
+
+@pytest.mark.parametrize(
+    ("factory", "rule"),
+    [
+        (planted.AsksOneRow, r"ask must return an array of shape \(n, 9\), got shape \(9,\)"),
+        (planted.LeavesTheBox, r"ask must return proposals in \[-1, 1\], got -?[0-9.]+"),
+        (planted.SpreadsNan, None),
+        (RaisesInTheMiddle, "tell must not fail, got IndexError: list index out of range"),
+        (NeverReturns, "tell must return within 0.3 s, and did not"),
+        (FailsToBuild, "it must not fail, got KeyError: 'config'"),
+    ],
+)
+def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
+    factory: Any, rule: str | None, installed: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr(method, "COMPILING", 0.0)
+    installed("optimiser", factory)
+    settings = {**QUICK, "ask_seconds": 0.3}
+    if rule is not None:
+        with pytest.raises(BrokenRuleError, match=f"^optimiser 'bad' of posefit-bad 1.0: {rule}$"):
+            posefit.track("walk", optimiser="bad", **settings)
+    assert posefit.track("walk", **settings).summary["frames"] == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "rule"),
+    [
+        ({"low": np.zeros((2, 3))}, r"low and high must be finite and of shape \(m,\), got \(2, 3\), \(6,\)"),
+        (
+            {"inverse_transform": lambda latents: np.zeros((len(latents), 60))},
+            r"inverse_transform must return shape \(3, 63\), got \(3, 60\)",
+        ),
+        (
+            {"inverse_transform": lambda latents: np.full((len(latents), 63), np.nan)},
+            "inverse_transform must return finite numbers",
+        ),
+        ({"feasible": lambda latents: True}, r"feasible must return shape \(3,\), got \(\)"),
+        ({"transform": lambda angles: 1 / 0}, "it must not fail, got ZeroDivisionError"),
+    ],
+)
+def test_a_broken_prior_is_named(change: dict[str, Any], rule: str, installed: Any) -> None:
+    class Bad(planted.PCA):
+        def fit(self, angles: Any, skeleton: Any = None) -> Any:
+            super().fit(angles)
+            vars(self).update(change)
+            return self
+
+    installed("prior", Bad)
+    with pytest.raises(BrokenRuleError, match=f"prior 'bad' of posefit-bad 1.0: {rule}"):
+        posefit.track("walk", prior="bad", **QUICK)
+
+
+def test_a_tracker_is_reached_by_name(installed: Any) -> None:
+    installed("tracker", planted.Holds)
+    summary = posefit.track("walk", tracker="bad", **QUICK).summary
+    assert summary["method"] == "bad"
+    assert summary["prior_floor_degrees"] is None
+    assert summary["skill"]["mean_pose"] is not None
+    installed("optimiser", planted.Sound)
+
+
+class BadFrames(planted.Holds):
+    def frame(self, observation: Any) -> Any:
+        return replace(super().frame(observation), pose=np.zeros(60))
+
+
+class FailingTracker(planted.Holds):
+    def frame(self, observation: Any) -> Any:
+        raise OSError("no file")
+
+
+@pytest.mark.parametrize(
+    ("factory", "rule"),
+    [
+        (BadFrames, r"a pose must be 66 finite angles, got shape \(60,\)"),
+        (FailingTracker, "it must not fail, got OSError: no file"),
+    ],
+)
+def test_a_broken_tracker_is_named(factory: Any, rule: str, installed: Any) -> None:
+    installed("tracker", factory)
+    with pytest.raises(BrokenRuleError, match=f"tracker 'bad' of posefit-bad 1.0: {rule}"):
+        posefit.track("walk", tracker="bad", **QUICK)
+
+
+def test_a_given_first_pose_starts_the_first_frame_around_it() -> None:
+    first = {
+        kind: posefit.track("walk-a", prior="full", first_pose=kind, **QUICK).frames[0]
+        for kind in ("searched", "given")
+    }
+    assert first["given"]["error_degrees"] < 0.5 * first["searched"]["error_degrees"]
+    assert first["given"]["error_degrees"] < 6.0
+
+
+@pytest.mark.parametrize("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])
+def test_every_prior_can_be_searched(prior: str) -> None:
+    summary = posefit.track("walk", prior=prior, **QUICK).summary
+    assert summary["method"] == f"sapso + {prior}"
+    assert summary["iou"] > 0.4
+
+
+def test_a_scene_is_followed_as_it_is() -> None:
+    from posefit.footage.source import synthetic
+    from posefit.motion import library
+
+    motion = library.built_in("walk", frames=3)
+    seen = synthetic(motion, [45.0], (120, 90), [], (None, None))
+    result = posefit.track(seen, train=library.other_styles("walk"), evaluations=200)
+    by_name = posefit.track(motion, train=library.other_styles("walk"), evaluations=200, size=(120, 90))
+    np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
+    assert [frame.cost for frame in result.found] == [row["cost"] for row in result.frames]
+    with pytest.raises(ValueError, match="a scene must be followed as it is, got Viewing"):
+        posefit.track(seen, fps=20.0)
+    with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth nobody knows"):
+        posefit.track(replace(seen, truth=None))
