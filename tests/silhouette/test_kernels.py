@@ -194,7 +194,7 @@ def test_a_forked_child_can_use_threads_too(body: Body, camera: Camera) -> None:
     # a daemon: a child that waits for ever fails this test and does not hold up the end of the run
     child = context.Process(target=_in_a_child, args=(body, camera, mask, poses, queue), daemon=True)
     child.start()
-    np.testing.assert_array_equal(queue.get(timeout=30), here)
+    np.testing.assert_array_equal(queue.get(timeout=600), here)
     child.join(30)
     assert child.exitcode == 0
 
