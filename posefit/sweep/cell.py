@@ -15,8 +15,10 @@ import posefit
 if TYPE_CHECKING:
     from posefit.arrays import Array
     from posefit.fitting.tracker import Frame
-    from posefit.footage.source import Scene
+    from posefit.footage.scene import Scene
     from posefit.motion.motion import Motion
+    from posefit.tracking.method import Choice
+    from posefit.tracking.opening import Opening
 
 SALT = 2013  # part of the seed of every instance
 SPEED = 0.15  # how far the cadence of a built-in motion's instance is from its own at most
@@ -24,23 +26,7 @@ VIEW_DEGREES = 10.0  # how far the cameras of an instance are turned at most
 POINTS = 64  # of an anytime trace at most
 TIMES = ("seconds", "seconds_per_frame")  # what two runs of a cell do not have in common
 DROPPED = "dropped"  # the corruption that takes whole frames away, a share of them
-_MEASURED = (
-    "error_degrees",
-    "geodesic_degrees",
-    "free_error_degrees",
-    "mpjpe_mm",
-    "pa_mpjpe_mm",
-    "iou",
-    "cost",
-    "swap_rate",
-    "lost_rate",
-    "held_frames",
-    "skill",
-    "baselines_degrees",
-    "prior_floor_degrees",
-    "seconds_per_frame",
-    "warnings",
-)
+UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
 
 
 @dataclass(frozen=True)
@@ -100,7 +86,10 @@ def run_cell(cell: Cell) -> Result:
 
     And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
     """
-    from posefit.tracking.run import track
+
+    from posefit.footage.source import motion_of
+    from posefit.tracking.measures import MEASURES
+    from posefit.tracking.run import follow
 
     began = time.perf_counter()
     if (planned := cell.version.partition(",")[0]) != posefit.__version__:
@@ -108,15 +97,18 @@ def run_cell(cell: Cell) -> Result:
     for path, digest in cell.files.items():
         if (found := digest_of(path)) != digest:
             raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
-    result = track(scene_of(cell), train=cell.train, seed=cell.seed, **_chosen(cell))
+    scene = scene_of(cell)
+    training = [motion_of(one, None, scene.fps) for one in cell.train]
+    result = follow(scene, training, choice=_choice(cell), opening=_opening(cell), seed=cell.seed)
     truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
-    errors = _joint_errors_mm(truth, estimate)
+    errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
     row = {
         "key": cell.key,
         "spec": cell.spec,
         "status": "done",
-        **{name: result.summary[name] for name in _MEASURED},
-        "evaluations_used": result.summary["evaluations"],
+        **{name: measured[name] for name in MEASURES if name not in UNLIKE},
+        "warnings": result.summary["warnings"],
+        "evaluations_used": result.measures.evaluations,
         "joint_errors_mm": [round(float(error), 3) for error in errors],
         "trace": trace(result.found),
         "seconds": time.perf_counter() - began,
@@ -132,7 +124,8 @@ def scene_of(cell: Cell) -> "Scene":
     """Return what is seen in a cell; the same for all methods and seeds."""
     import numpy as np
 
-    from posefit.footage.source import motion_of, synthetic
+    from posefit.footage.scene import synthetic
+    from posefit.footage.source import motion_of
     from posefit.motion import library
     from posefit.tracking.synthetic import Spoilt
 
@@ -215,14 +208,20 @@ def _spent(frame: "Frame") -> "Array":
     return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
 
 
-def _chosen(cell: Cell) -> dict[str, Any]:
-    from posefit.tracking.method import parse_settings
+def _choice(cell: Cell) -> "Choice":
+    from posefit.tracking.method import Choice, parse_settings
 
     optimiser, prior, tracker = parts(cell.method)
-    settings = parse_settings(settings_text(cell.settings), optimiser, prior, tracker)
-    named = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
-    told = {name: getattr(cell, name) for name in ("evaluations", "translation", "first_pose")}
-    return {**named, **told, **settings}
+    settings: dict[str, Any] = dict(parse_settings(settings_text(cell.settings), optimiser, prior, tracker))
+    named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
+    return Choice(evaluations=cell.evaluations, **named, **settings)
+
+
+def _opening(cell: Cell) -> "Opening":
+    from posefit.tracking.opening import Opening
+
+    told: dict[str, Any] = {name: getattr(cell, name) for name in ("translation", "first_pose")}
+    return Opening(**told)
 
 
 def _joints(motion: "Motion | None") -> "Array":

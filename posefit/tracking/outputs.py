@@ -16,10 +16,11 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from posefit.fitting.tracker import Frame
-from posefit.footage.source import Scene
+from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion.motion import Motion
+from posefit.tracking.identity import Told, difference
 from posefit.tracking.picture import Painter
 
 FILES = (
@@ -89,7 +90,7 @@ class OutputFolder:
     """
 
     def __init__(
-        self, path: str | Path, force: bool, resume: bool, spec: Mapping[str, str], say: Callable[[str], None]
+        self, path: str | Path, force: bool, resume: bool, spec: Mapping[str, Told], say: Callable[[str], None]
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
         if self.path.exists() and not self.path.is_dir():
@@ -113,10 +114,8 @@ class OutputFolder:
             before = json.loads((self._building / _SPEC).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             raise ValueError(f"{self.path}: expected a track that was interrupted to resume, got none") from None
-        for name in sorted(before.keys() | self._spec.keys()):
-            if before.get(name) != self._spec.get(name):
-                expected, came = before.get(name), self._spec.get(name)
-                raise ValueError(f"{self.path}: {name} must be {expected}, as before, to resume, got {came}")
+        if (other := difference(before, self._spec)) is not None:
+            raise ValueError(f"{self.path}: {other}")
 
     def __enter__(self) -> Self:
         try:
@@ -124,7 +123,8 @@ class OutputFolder:
                 shutil.rmtree(self._building)
             shutil.rmtree(self.work, ignore_errors=True)
             self.work.mkdir(parents=True)
-            (self._building / _SPEC).write_text(json.dumps(self._spec), encoding="utf-8")
+            told = {name: one.as_json() for name, one in self._spec.items()}
+            (self._building / _SPEC).write_text(json.dumps(told), encoding="utf-8")
         except OSError as error:
             raise ValueError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
         return self
