@@ -11,13 +11,13 @@ aside/               damaged lines that were found; their cells are run again
 import io
 import json
 import os
-import secrets
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import posefit
+from posefit.files import appear
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
 
 if TYPE_CHECKING:
@@ -150,19 +150,6 @@ def create(path: Path) -> None:
             f"{path}: expected a ledger of posefit {posefit.__version__}, got one of {version}; its rows are kept "
             "apart: choose another folder"
         )
-
-
-def appear(path: Path, content: Any) -> bool:
-    """Write a JSON file that appears whole, and only where there is none of its name; return whether it did."""
-    temporary = path.parent / f".{path.name}.{secrets.token_hex(8)}"
-    try:
-        temporary.write_text(json.dumps(content), encoding="utf-8")
-        os.link(temporary, path)
-    except FileExistsError:
-        return False
-    finally:
-        temporary.unlink(missing_ok=True)
-    return True
 
 
 def _version(path: Path) -> str:
