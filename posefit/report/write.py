@@ -51,7 +51,7 @@ def report(
         from posefit.report.export import write_csv
         from posefit.sweep.table import flat
 
-        write_csv((flat(row) for source in (ledger.rows(), ledger.quarantined()) for row in source), csv)
+        write_csv(map(flat, ledger.all_rows()), csv)
     told = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
     return {"out": out, **dict(plain(told))}
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import posefit
 from posefit.files import appear
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
+from posefit.sweep.table import frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,6 +88,11 @@ class Ledger:
         row: dict[str, Any] = json.loads(found[1])
         return row
 
+    def all_rows(self) -> Iterator[dict[str, Any]]:
+        """Yield every finished row, and then the cells in quarantine."""
+        yield from self.rows()
+        yield from self.quarantined()
+
     def joints(self, key: str) -> dict[str, "Array"]:
         """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
         import numpy as np
@@ -110,9 +116,7 @@ class Ledger:
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
-        from posefit.sweep.table import frame
-
-        return frame(self)
+        return frame(self.all_rows())
 
     def _logs(self) -> list[str]:
         return sorted(entry.name for entry in os.scandir(self.path / ROWS) if entry.name.endswith(SUFFIX))
