@@ -1,12 +1,11 @@
 """A new plugin to start from: a small package that installs, works and has a test that passes."""
 
 import re
-import shutil
-import tempfile
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 
+from posefit.files import new_folder
 from posefit.registry import KINDS, Kind, registry
 
 
@@ -34,19 +33,13 @@ def new(name: str, kind: Kind, folder: str | Path | None = None) -> Path:
     if target.exists():
         raise ValueError(f"{target}: expected a new folder, got one that exists")
     target.parent.mkdir(parents=True, exist_ok=True)
-    building = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        for template, name in (
+    with new_folder(target) as building:
+        for template, written in (
             ("pyproject.toml", "pyproject.toml"),
             ("README.md", "README.md"),
             (f"{kind}.py", f"posefit_{module}.py"),
             ("test.py", f"test_{module}.py"),
         ):
             text = (files("posefit") / "templates" / f"{template}.txt").read_text(encoding="utf-8")
-            (building / name).write_text(Template(text).substitute(words), encoding="utf-8")
-        building.chmod(0o755)
-        building.rename(target)
-    except BaseException:
-        shutil.rmtree(building, ignore_errors=True)
-        raise
+            (building / written).write_text(Template(text).substitute(words), encoding="utf-8")
     return target

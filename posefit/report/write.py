@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from posefit.files import replaceable, replaced_file
 from posefit.geometry.skeleton import ANGLES
 from posefit.report.content import data_of
 from posefit.report.runs import runs_of
@@ -38,7 +39,8 @@ def report(
     ledger = Ledger(path, say)
     runs = runs_of(ledger)
     data = data_of(ledger, runs, say)
-    _replace(Path(out), document(data))
+    with replaced_file(out, MARK.encode()) as building:
+        building.write_text(document(data), encoding="utf-8", newline="\n")
     if figures is not None:
         from posefit.report.portfolio import write_portfolio
 
@@ -49,7 +51,7 @@ def report(
         from posefit.report.export import write_csv
         from posefit.sweep.table import flat
 
-        write_csv((flat(row) for source in (ledger.rows(), ledger.quarantined()) for row in source), csv)
+        write_csv(map(flat, ledger.all_rows()), csv)
     told = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
     return {"out": out, **dict(plain(told))}
 
@@ -70,7 +72,7 @@ def _check(ledger: Path, out: str, others: list[str | None]) -> None:
     target = Path(out)
     if target.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"--out must be a file that ends in .html, got {out}")
-    if target.is_dir() or (target.exists() and not _is_report(target)):
+    if not replaceable(target, MARK.encode()):
         raise ValueError(f"{out}: expected a new name or an earlier report, got something else")
     places = [one for one in (out, *others) if one is not None]
     for place in places:
@@ -82,21 +84,6 @@ def _check(ledger: Path, out: str, others: list[str | None]) -> None:
     for place in places:
         if not (parent := Path(place).resolve().parent).is_dir() or not os.access(parent, os.W_OK):
             raise ValueError(f"{place}: expected a place to write to, got one in {parent}, which is none")
-
-
-def _is_report(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(MARK)) == MARK.encode()
-
-
-def _replace(target: Path, text: str) -> None:
-    building = target.with_name(f".{target.stem}.partial{target.suffix}")
-    try:
-        building.write_text(text, encoding="utf-8", newline="\n")
-        building.replace(target)
-    except OSError as error:
-        building.unlink(missing_ok=True)
-        raise ValueError(f"{target}: expected a place to write to, got {error.strerror or error}") from error
 
 
 def _write_iohprofiler(ledger: Ledger, path: str) -> None:

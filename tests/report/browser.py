@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit.files import appear
 from posefit.sweep.cell import Cell, Result, packed
 from posefit.sweep.driver import Driver
-from posefit.sweep.ledger import QUARANTINE, ROWS, appear
+from posefit.sweep.ledger import QUARANTINE, ROWS
 from posefit.sweep.log import Writer
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
