@@ -28,7 +28,9 @@ def new(name: str, kind: Kind | Literal["command"], folder: str | Path | None = 
     if name in (known := _taken(kind, own)):
         raise ValueError(f"name must be a new one, got {name!r}, which {known[name]} registers already")
     module = name.replace("-", "_")
-    try_it = f"posefit {name}" if kind == COMMAND else f"posefit check {kind} {name}\nposefit track walk --{kind} {name}"
+    usage = [f"posefit {name}"]
+    if kind != COMMAND:
+        usage = [f"posefit check {kind} {name}", f"posefit track walk --{kind} {name}"]
     words = {
         "name": name,
         "kind": kind,
@@ -36,9 +38,7 @@ def new(name: str, kind: Kind | Literal["command"], folder: str | Path | None = 
         "dashed": name.replace("_", "-"),
         "class_name": "".join(part.capitalize() for part in module.split("_")),
         "group": f'"{GROUP}"' if kind == COMMAND else PROJECT,
-        "usage": try_it,
-        if kind == COMMAND
-        else f"posefit check {kind} {name}\nposefit track walk --{kind} {name}",
+        "usage": "\n".join(usage),
     }
     target = Path(folder or f"posefit-{words['dashed']}")
     if target.exists():
