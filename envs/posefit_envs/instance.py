@@ -219,7 +219,7 @@ def _truth(name: str, frames: int, rng: np.random.Generator) -> Motion:
     return motion.frames(start, start + frames)
 
 
-def measured(truth: Motion, frame: int, poses: Array) -> Array:
+def errors_in_degrees(truth: Motion, frame: int, poses: Array) -> Array:
     """Return the error (n,) in degrees of poses (n, 66) in a frame. SAPSO (8)."""
     from posefit.fitting.metrics import pose_error_degrees
 

@@ -88,14 +88,14 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Result:
+class Measurement:
     """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
 
     row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
     joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres
 
 
-def run_cell(cell: Cell) -> Result:
+def run_cell(cell: Cell) -> Measurement:
     """Return what following the cell's motion by its method measures. Raises ValueError where a file has changed.
 
     And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
@@ -108,7 +108,7 @@ def run_cell(cell: Cell) -> Result:
     for path, digest in cell.files.items():
         if (found := digest_of(path)) != digest:
             raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
-    result = track(scene_of(cell), train=cell.train, seed=cell.seed, **_chosen(cell))
+    result = track(cell_scene(cell), train=cell.train, seed=cell.seed, **_chosen(cell))
     truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
     errors = _joint_errors_mm(truth, estimate)
     row = {
@@ -118,17 +118,17 @@ def run_cell(cell: Cell) -> Result:
         **{name: result.summary[name] for name in _MEASURED},
         "evaluations_used": result.summary["evaluations"],
         "joint_errors_mm": [round(float(error), 3) for error in errors],
-        "trace": trace(result.found),
+        "trace": anytime_trace(result.found),
         "seconds": time.perf_counter() - began,
     }
     try:
         json.dumps(row, allow_nan=False)
     except ValueError:
         raise ValueError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
-    return Result(row, packed(estimate=estimate, truth=truth))
+    return Measurement(row, packed_joints(estimate=estimate, truth=truth))
 
 
-def scene_of(cell: Cell) -> "Scene":
+def cell_scene(cell: Cell) -> "Scene":
     """Return what is seen in a cell; the same for all methods and seeds."""
     import numpy as np
 
@@ -181,7 +181,7 @@ def settings_text(settings: Mapping[str, Any]) -> list[str]:
     return [f"{name}={setting_text(value)}" for name, value in settings.items()]
 
 
-def trace(found: "list[Frame]") -> dict[str, list[float]]:
+def anytime_trace(found: "list[Frame]") -> dict[str, list[float]]:
     """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
 
     A frame that spent fewer keeps its last cost; frames that were held do not count. There are at most 64 points.
@@ -238,7 +238,7 @@ def _joint_errors_mm(truth: "Array", estimate: "Array") -> "Array":
     return np.asarray(1e3 * np.linalg.norm(difference, axis=-1).mean(axis=0))
 
 
-def packed(**arrays: "Array") -> bytes:
+def packed_joints(**arrays: "Array") -> bytes:
     """Return arrays in metres as an .npz, float32."""
     import numpy as np
 
