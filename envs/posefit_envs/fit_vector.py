@@ -144,12 +144,8 @@ class FitVectorEnv(VectorEnv[Image, Any, Array]):
     def _errors(self, outcome: Evaluated) -> Array:
         if self._alike:
             return errors_in_degrees(self._episodes[0].instance.truth, 0, outcome.poses)
-        return np.array(
-            [
-                errors_in_degrees(one.instance.truth, 0, outcome.poses[i : i + 1])[0]
-                for i, one in enumerate(self._episodes)
-            ]
-        )
+        truths = [one.instance.truth for one in self._episodes]
+        return np.array([errors_in_degrees(truth, 0, outcome.poses[i : i + 1])[0] for i, truth in enumerate(truths)])
 
     def _generator(self, i: int) -> np.random.Generator:
         mine = self._generators[i]

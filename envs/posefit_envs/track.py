@@ -53,7 +53,8 @@ class TrackEnv(gym.Env[Image, Any]):
     As in `Fit-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `target_cost` and `max_evaluations`.
 
     ## Version History
-    - v0: first version.
+    - v0: first version. In posefit 0.2 instances changed: number n is now the motion, speed, phase and view of instance n
+      of a sweep, and 0 the motion as it is; results of earlier ones cannot be compared with those.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 30}  # noqa: RUF012, as Gymnasium has it

@@ -34,9 +34,11 @@ def doctor(context: click.Context) -> None:
     from posefit.commands import installed
     from posefit.registry import registry
 
+    root = context.find_root().command
+    own = tuple(root.commands) if isinstance(root, click.Group) else ()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the same is said below
-        lines, well = diagnosis(registry(), installed())
+        lines, well = diagnosis(registry(), installed(own))
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 

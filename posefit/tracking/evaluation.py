@@ -8,7 +8,7 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.source import Scene
+from posefit.footage.scene import Scene
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.tracking.measures import Measures, Spread
 

@@ -1,7 +1,7 @@
 """The figures that say what a track is worth, each defined once: its name, label, unit, digits and meaning.
 
-`Measures` are those of a whole track: summary.json, `--json`, the rows of a sweep, its CSV and the report's columns have
-them under these names. `FRAME` are the columns of frames.csv, one value a frame. Where nobody knows the truth, a
+`Measures` are those of a whole track: summary.json, `--json`, the rows of a sweep, its CSV and the report's columns
+have them under these names. `FRAME` are the columns of frames.csv, one value a frame. Where nobody knows the truth, a
 figure that needs it is None.
 """
 
@@ -37,8 +37,8 @@ class Measure:
         return " ".join(word for word in (self.label, self.number(value), self.unit) if word)
 
 
-def _figure(label: str, unit: str, digits: int, meaning: str, factor: float = 1.0) -> Any:
-    return field(metadata={"measure": (label, unit, digits, meaning, factor)})
+def _about(label: str, unit: str, digits: int, meaning: str, factor: float = 1.0) -> dict[str, Any]:
+    return {"measure": (label, unit, digits, meaning, factor)}
 
 
 @dataclass(frozen=True)
@@ -54,46 +54,66 @@ class Spread:
 class Measures:
     """What one track is worth. Baselines and skill are by the names of `BASELINES`."""
 
-    error_degrees: Spread | None = _figure(
-        "error",
-        "degrees",
-        2,
-        "absolute difference of the 66 angles from the true ones, the mean over angles: its mean over the frames, "
-        "standard deviation and maximum. SAPSO (8)-(10)",
+    error_degrees: Spread | None = field(
+        metadata=_about(
+            "error",
+            "degrees",
+            2,
+            "absolute difference of the 66 angles from the true ones, the mean over angles: its mean over the frames, "
+            "standard deviation and maximum. SAPSO (8)-(10)",
+        )
     )
-    geodesic_degrees: float | None = _figure(
-        "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
+    geodesic_degrees: float | None = field(
+        metadata=_about(
+            "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
+        )
     )
-    free_error_degrees: float | None = _figure(
-        "error of free angles", "degrees", 2, "the error over those angles alone that the skeleton lets move"
+    free_error_degrees: float | None = field(
+        metadata=_about(
+            "error of free angles", "degrees", 2, "the error over those angles alone that the skeleton lets move"
+        )
     )
-    mpjpe_mm: float | None = _figure(
-        "MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point"
+    mpjpe_mm: float | None = field(
+        metadata=_about("MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point")
     )
-    pa_mpjpe_mm: float | None = _figure(
-        "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)"
+    pa_mpjpe_mm: float | None = field(
+        metadata=_about("PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)")
     )
-    iou: float = _figure(
-        "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
+    iou: float = field(
+        metadata=_about(
+            "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
+        )
     )
-    cost: float = _figure("cost", "", 2, "silhouette mismatch of the poses found, 0 to 100. SAPSO (4)")
-    swap_rate: float | None = _figure(
-        "left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored", 100.0
+    cost: float = field(metadata=_about("cost", "", 2, "silhouette mismatch of the poses found, 0 to 100. SAPSO (4)"))
+    swap_rate: float | None = field(
+        metadata=_about("left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored", 100.0)
     )
-    lost_rate: float | None = _figure("lost", "%", 0, "share of frames with an MPJPE above 150 mm", 100.0)
-    held_frames: int = _figure("held", "frames", 0, "frames that show too little: the pose is held, not searched")
-    skill: Mapping[str, float | None] | None = _figure(
-        "skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline"
+    lost_rate: float | None = field(
+        metadata=_about("lost", "%", 0, "share of frames with an MPJPE above 150 mm", 100.0)
     )
-    baselines_degrees: Mapping[str, float] | None = _figure(
-        "baselines", "degrees", 2, "errors of what anybody reaches, given the true root and translation"
+    held_frames: int = field(
+        metadata=_about("held", "frames", 0, "frames that show too little: the pose is held, not searched")
     )
-    prior_floor_degrees: float | None = _figure(
-        "floor of the prior", "degrees", 2, "error of the truth's own projection into the prior and back"
+    skill: Mapping[str, float | None] | None = field(
+        metadata=_about("skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline")
     )
-    seconds_per_frame: float = _figure("time", "ms a frame", 1, "wall time a frame", 1e3)
-    evaluations: int = _figure("evaluations", "", 0, "poses whose cost was computed, in all frames together")
-    evaluations_per_second: float = _figure("speed", "poses a second", 0, "evaluations over the time they took")
+    baselines_degrees: Mapping[str, float] | None = field(
+        metadata=_about(
+            "baselines", "degrees", 2, "errors of what anybody reaches, given the true root and translation"
+        )
+    )
+    prior_floor_degrees: float | None = field(
+        metadata=_about(
+            "floor of the prior", "degrees", 2, "error of the truth's own projection into the prior and back"
+        )
+    )
+    seconds_per_frame: float = field(metadata=_about("time", "ms a frame", 1, "wall time a frame", 1e3))
+    evaluations: int = field(
+        metadata=_about("evaluations", "", 0, "poses whose cost was computed, in all frames together")
+    )
+    evaluations_per_second: float = field(
+        metadata=_about("speed", "poses a second", 0, "evaluations over the time they took")
+    )
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures by name, as JSON holds them."""
