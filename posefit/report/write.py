@@ -15,7 +15,7 @@ from posefit.sweep.ledger import Ledger
 Say = Callable[[str], None]
 
 
-def report(
+def write_report(
     path: str,
     out: str,
     *,
@@ -52,11 +52,11 @@ def report(
         from posefit.sweep.table import flat
 
         write_csv(map(flat, ledger.all_rows()), csv)
-    told = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
-    return {"out": out, **dict(plain(told))}
+    said = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
+    return {"out": out, **dict(plain(said))}
 
 
-def told(found: dict[str, Any]) -> list[str]:
+def leaderboard_lines(found: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: the leaderboard and where the page is."""
     lines = []
     for row in found["leaderboard"] or []:
@@ -87,16 +87,16 @@ def _check(ledger: Path, out: str, others: list[str | None]) -> None:
 
 
 def _write_iohprofiler(ledger: Ledger, path: str) -> None:
-    from posefit.report.export import Run, write_iohprofiler
+    from posefit.report.export import LoggedRun, write_iohprofiler
 
-    def runs() -> Iterator[Run]:
+    def runs() -> Iterator[LoggedRun]:
         for row in ledger.rows():
             spec, trace = row["spec"], row["trace"]
             if not trace["evaluations"]:
                 continue
             views = " ".join(f"{view:g}" for view in spec["view_degrees"])
             damage = "".join(f" {kind} {share:g}" for kind, share in sorted(spec["corruption"].items()))
-            yield Run(
+            yield LoggedRun(
                 spec["method"],
                 {**spec["settings"], "evaluations": spec["evaluations"], "version": spec["version"]},
                 f"{spec['motion']} view {views}{damage} frames {spec['frames']} {spec['translation']}",

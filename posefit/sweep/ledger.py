@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import posefit
 from posefit.files import appear
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
-from posefit.sweep.table import frame
+from posefit.sweep.table import dataframe
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,7 +116,7 @@ class Ledger:
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
-        return frame(self.all_rows())
+        return dataframe(self.all_rows())
 
     def _logs(self) -> list[str]:
         return sorted(entry.name for entry in os.scandir(self.path / ROWS) if entry.name.endswith(SUFFIX))

@@ -21,7 +21,7 @@ ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings
 _TEXTS = ("key", "version", "status", "reason", "method", "motion", "train", "settings", "view_degrees", "corruption")
 
 
-def frame(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
+def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
     try:
         pandas = importlib.import_module("pandas")
