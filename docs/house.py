@@ -196,15 +196,24 @@ def svg(graph: Graph) -> str:
     return "\n".join([*lines, "</svg>"]) + "\n"
 
 
-def main(arguments: list[str]) -> int:
-    """Write the drawing and return the exit status."""
+def drawing() -> str:
+    """Return the drawing of the house as it is. Raises ValueError naming a circle where there is one."""
     graph = imports()
     if found := circle(graph):
-        print(f"boxes must not import each other in a circle, got {' -> '.join(found)}", file=sys.stderr)
-        return 1
+        raise ValueError(f"boxes must not import each other in a circle, got {' -> '.join(found)}")
+    return svg(graph)
+
+
+def main(arguments: list[str]) -> int:
+    """Write the drawing and return the exit status."""
     path = Path(arguments[0]) if arguments else HERE / "generated" / "house.svg"
+    try:
+        text = drawing()
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 1
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(svg(graph), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     print(f"written to {path}")
     return 0
 
