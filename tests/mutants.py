@@ -41,21 +41,21 @@ MUTANTS = (
         "Wald's two error rates are swapped",
         "plugins/posefit_vsmm/switching.py",
         (
-            ("np.log((1.0 - self.miss) / self.false_alarm)", "np.log((1.0 - self.false_alarm) / self.miss)"),
-            ("np.log(self.miss / (1.0 - self.false_alarm))", "np.log(self.false_alarm / (1.0 - self.miss))"),
+            ("np.log((1.0 - how.miss) / how.false_alarm)", "np.log((1.0 - how.false_alarm) / how.miss)"),
+            ("np.log(how.miss / (1.0 - how.false_alarm))", "np.log(how.false_alarm / (1.0 - how.miss))"),
         ),
         "tests/sources/test_vsmm_steps.py::test_the_sequential_tests_two_error_rates_are_walds",
     ),
     Mutant(
         "the mean of several turns is sought in one step instead of ten",
-        "plugins/posefit_vsmm/imm.py",
+        "plugins/posefit_imm/filter.py",
         (("\nTURNS = 10 ", "\nTURNS = 1 "),),
         "tests/sources/test_vsmm.py::test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance",
     ),
     Mutant(
         "the joint tracker's yaw and pitch ranges are permuted",
-        "plugins/posefit_vsmm/joined.py",
-        (("[[4, 3, 5]]", "[[3, 4, 5]]"),),
+        "plugins/posefit_vsmm/joined/tracker.py",
+        (("[[*YAW_PITCH_ROLL]]", "[[*YAW_PITCH_ROLL]][[1, 0, 2]]"),),
         "tests/plugins/test_vsmm.py::test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it",
     ),
     Mutant(

@@ -23,11 +23,12 @@ from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
 from posefit_experiments.vsmm import activities
 from posefit_experiments.vsmm import experiment as patent
+from posefit_imm import PLACED
 from posefit_vsmm.course import COAST
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.joined import Search, joined
+from posefit_vsmm.joined.tracker import Search, joined
 from posefit_vsmm.motion import library as library_of_models
-from posefit_vsmm.state import MANIFOLD, decode, encode
+from posefit_vsmm.state import decode, encode
 from posefit_vsmm.tracker import vsmm
 
 SIZE = (200, 240)
@@ -88,7 +89,7 @@ def test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it
     spread = np.diag(np.concatenate([np.full(3, 1e-4), deviations**2, np.full(27, 1e-4)]))
     state = encode(np.zeros((1, 66)), np.zeros((1, 3)))[0]
     for axis, angle in enumerate(("pitch", "yaw", "roll")):
-        turned, _ = decode(MANIFOLD.plus(state, 0.1 * np.eye(33)[3 + axis])[None], reliance)
+        turned, _ = decode(PLACED.plus(state, 0.1 * np.eye(33)[3 + axis])[None], reliance)
         assert turned[0, :3].argmax() == ("yaw", "pitch", "roll").index(angle)
     spaces: list[SearchSpace] = []
 
@@ -306,15 +307,15 @@ def test_the_experiment_is_about_as_good_as_the_patents(experiment: patent.Run) 
 
 
 def test_no_motion_of_the_experiment_was_learned_from() -> None:
-    from posefit_vsmm.fit_motion import PLANS
+    from posefit_vsmm.fit.motion import TEACHINGS
 
     tested = {one.motion for one in activities.ACTIVITIES}
     stored = json.loads((Path(library.__file__).parent / "library.json").read_text(encoding="utf-8"))["motions"]
     sources = {stored[name]["source"] for name in tested}
-    parts = {(clip.path.split("/")[1], clip.start) for plan in PLANS.values() for clip in plan.fitted}
+    parts = {(clip.path.split("/")[1], clip.start) for teaching in TEACHINGS.values() for clip in teaching.fitted}
     assert not sources & {name for name, _ in parts}
     assert not tested & set(activities.TRAINING)
-    assert not tested & {name for plan in PLANS.values() for name in plan.drawn}
+    assert not tested & {name for teaching in TEACHINGS.values() for name in teaching.drawn}
 
 
 def test_the_figures_are_drawn(tmp_path: Path, experiment: patent.Run) -> None:

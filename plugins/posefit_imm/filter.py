@@ -1,0 +1,186 @@
+"""The interacting multiple-model filter: several motion models at once, each as probable as its predictions are good.
+
+A state is an array, and an error of a state is a vector that `Manifold` adds to it and takes out of it: for a vector
+these are + and -, for unit quaternions a rotation (Reading V4); a filter of this kind is called an error-state Kalman
+filter. Everything is computed with logarithms of likelihoods, so that a residual of any size leaves probabilities that
+sum to 1 (Reading V13).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from posefit.arrays import Array
+
+SMALLEST = 1e-12  # what an eigenvalue of a covariance is raised to where rounding made it less
+TURNS = 10  # at most, to find the mean of several states; two or three are enough
+
+
+class Model(Protocol):
+    """How a state goes on to the next frame."""
+
+    def predict(self, state: Array, covariance: Array) -> tuple[Array, Array]:
+        """Return the state one frame later, and the covariance (e, e) of its error."""
+        ...
+
+
+@dataclass(frozen=True)
+class Manifold:
+    """Where states live: `plus(state, error)` moves a state by an error (e,), `minus(a, b)` leads from b to a."""
+
+    plus: Callable[[Array, Array], Array] = np.add
+    minus: Callable[[Array, Array], Array] = np.subtract
+
+    def mean(self, states: Array, weights: Array) -> Array:
+        """Return the weighted mean of states (r, n): where the errors to all of them balance."""
+        middle: Array = states[int(weights.argmax())]
+        for _ in range(TURNS):
+            errors = np.array([self.minus(state, middle) for state in states])
+            away = weights @ errors
+            middle = self.plus(middle, away)
+            if np.abs(away).max() < 1e-12:
+                break
+        return middle
+
+    def spread(self, states: Array, covariances: Array, weights: Array, middle: Array) -> Array:
+        """Return the covariance (e, e) around `middle` of a mixture of states (r, n) with covariances (r, e, e)."""
+        errors = np.array([self.minus(state, middle) for state in states])
+        return np.asarray(np.einsum("r,rij->ij", weights, covariances + errors[:, :, None] * errors[:, None, :]))
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What the filter holds: a state and a covariance for every model, and how probable each model is."""
+
+    states: Array = field(repr=False)  # (r, n)
+    covariances: Array = field(repr=False)  # (r, e, e)
+    log_probabilities: Array  # (r,)
+    log_likelihoods: Array  # (r,) of the latest measurement
+    repairs: int = 0  # covariances that had lost their positive definiteness, and were repaired
+
+    @property
+    def probabilities(self) -> Array:
+        """How probable each model is (r,); they sum to 1."""
+        return np.exp(self.log_probabilities)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What was measured, as one state would see it; no rows where nothing was."""
+
+    residual: Array  # (m,) measured minus expected
+    jacobian: Array  # (m, e) of what is expected, by the error of the state
+    covariance: Array  # (m, m) of the noise
+    log_likelihood: float = 0.0  # of the state itself, by what cannot be written as a residual
+
+
+def start(state: Array, covariance: Array, models: int) -> Belief:
+    """Return the belief that knows a state and holds all models equally probable."""
+    return Belief(
+        np.tile(state, (models, 1)),
+        np.tile(covariance, (models, 1, 1)),
+        np.full(models, -np.log(models)),
+        np.zeros(models),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class IMM:
+    """One cycle after the other over models that change into each other: the states of a Markov chain.
+
+    Row i of `transition` (r, r) holds how probable each model is after model i.
+    """
+
+    models: Sequence[Model]
+    transition: Array
+    manifold: Manifold = Manifold()
+
+    def __post_init__(self) -> None:
+        count, matrix = len(self.models), np.asarray(self.transition, dtype=np.float64)
+        if matrix.shape != (count, count):
+            raise ValueError(f"transition must have shape {(count, count)}, a row a model, got {matrix.shape}")
+        if not ((matrix >= 0.0).all() and np.allclose(matrix.sum(axis=1), 1.0)):
+            raise ValueError(f"transition must hold probabilities whose rows sum to 1, got {matrix.tolist()}")
+
+    def cycle(self, belief: Belief, measure: Callable[[Array], Measurement]) -> Belief:
+        """Return the belief one frame later; `measure` says what was measured against what a state expects."""
+        mixed = self.mixed(belief)
+        repairs = mixed.repairs
+        states, covariances, likelihoods = [], [], []
+        for model, state, covariance in zip(self.models, mixed.states, mixed.covariances, strict=True):
+            predicted, spread = model.predict(state, covariance)  # VSMM 6.3a
+            updated, left, likelihood = update(predicted, spread, measure(predicted), self.manifold)
+            left, repaired = positive(left)
+            states.append(updated)
+            covariances.append(left)
+            likelihoods.append(likelihood)
+            repairs += repaired
+        found = np.array(likelihoods)
+        joint = found + mixed.log_probabilities  # VSMM 6.4
+        return Belief(np.array(states), np.array(covariances), joint - np.logaddexp.reduce(joint), found, repairs)
+
+    def mixed(self, belief: Belief) -> Belief:
+        """Return what each model starts its cycle from, and the probabilities c_j that it is the one.
+
+        A model that no other changes into starts from its own state.
+        """
+        with np.errstate(divide="ignore"):
+            steps = np.log(np.asarray(self.transition, dtype=np.float64)) + belief.log_probabilities[:, None]
+        after = np.logaddexp.reduce(steps, axis=0)  # log c_j
+        states, covariances, repairs = [], [], belief.repairs
+        for j, total in enumerate(after):
+            weights = np.exp(steps[:, j] - total) if np.isfinite(total) else np.eye(len(after))[j]  # VSMM 6.2a
+            middle = self.manifold.mean(belief.states, weights)
+            spread, repaired = positive(self.manifold.spread(belief.states, belief.covariances, weights, middle))
+            states.append(middle)  # VSMM 6.2b
+            covariances.append(spread)
+            repairs += repaired
+        return Belief(np.array(states), np.array(covariances), after, belief.log_likelihoods, repairs)
+
+    def updated(self, belief: Belief, measure: Callable[[Array], Measurement]) -> Belief:
+        """Return the belief after one more measurement of the same frame; the models' probabilities stay."""
+        states, covariances, repairs = [], [], belief.repairs
+        for state, covariance in zip(belief.states, belief.covariances, strict=True):
+            moved, left, _ = update(state, covariance, measure(state), self.manifold)
+            left, repaired = positive(left)
+            states.append(moved)
+            covariances.append(left)
+            repairs += repaired
+        return replace(belief, states=np.array(states), covariances=np.array(covariances), repairs=repairs)
+
+    def fused(self, belief: Belief) -> tuple[Array, Array]:
+        """Return the one state and covariance that stand for all models. VSMM step 6."""
+        middle = self.manifold.mean(belief.states, belief.probabilities)  # VSMM 6.5
+        return middle, self.manifold.spread(belief.states, belief.covariances, belief.probabilities, middle)
+
+
+def update(state: Array, covariance: Array, seen: Measurement, manifold: Manifold) -> tuple[Array, Array, float]:
+    """Return state and covariance after a measurement, and the log of its likelihood; as they were without one."""
+    if not len(seen.residual):
+        return state, covariance, seen.log_likelihood
+    jacobian, noise = seen.jacobian, seen.covariance
+    innovation = jacobian @ covariance @ jacobian.T + noise  # VSMM 6.3b
+    factor = cho_factor(innovation, lower=True)
+    size = 2.0 * float(np.log(np.diag(factor[0])).sum())
+    # the squared Mahalanobis distance of the residual, also called the normalised innovation squared (NIS)
+    distance = float(seen.residual @ cho_solve(factor, seen.residual))
+    likelihood = -0.5 * (distance + size + len(seen.residual) * float(np.log(2.0 * np.pi)))  # VSMM 6.3c
+    gain = cho_solve(factor, jacobian @ covariance).T  # VSMM 6.3d
+    keep = np.eye(len(covariance)) - gain @ jacobian
+    left = keep @ covariance @ keep.T + gain @ noise @ gain.T  # Joseph's form, which stays symmetric
+    return manifold.plus(state, gain @ seen.residual), left, likelihood + seen.log_likelihood
+
+
+def positive(covariance: Array) -> tuple[Array, int]:
+    """Return a covariance, made symmetric and its eigenvalues positive, and whether they had to be: 1 or 0."""
+    symmetric = 0.5 * (covariance + covariance.T)
+    try:
+        np.linalg.cholesky(symmetric)  # an eighth of the time of the eigenvalues
+        return symmetric, 0
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(symmetric)
+    raised = np.maximum(values, max(SMALLEST, SMALLEST * float(values[-1])))
+    return np.asarray((vectors * raised) @ vectors.T), 1

@@ -1,0 +1,148 @@
+"""Where the 17 points are in a silhouette, by the rules of VSMM step 2, and how far off such rules are.
+
+Distances are counted in legs (hip to ankle, as seen at the person's depth), so that neither the size of the image nor
+that of the person matters.
+"""
+
+import json
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.resources import files
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit_vsmm.detection.preprocess import Lines
+from posefit_vsmm.points import AT, POINTS
+
+BODY = ("torso", "left clavicle", "right clavicle", "left shoulder", "right shoulder", "left hip", "right hip")
+_TORSO = np.array([AT[name] for name in BODY])
+OWN = np.array([name not in BODY for name in POINTS])  # (17,) what is found in the image, and not carried along
+_TIPS = np.array([AT[name] for name in ("head", "left hand", "right hand", "left foot", "right foot")])
+_RINGS = np.array([0.8, 1.0, 1.2])  # radii of the head
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """The points that one camera saw."""
+
+    points: Array  # (17, 2) pixels; where confidence is 0, what was expected
+    confidence: Array  # (17,) 0 to 1; 0 is not seen
+    spare: int = 0  # end points that belong to none of them
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """How far the rules are off, measured by `fit/joints.py` on silhouettes whose truth is known. Reading V7."""
+
+    bias: Array = field(repr=False)  # (17, 2) legs, detected less true
+    deviation: Array = field(repr=False)  # (17, 2) legs, around the bias
+
+
+@lru_cache(maxsize=1)
+def errors() -> Errors:
+    """Return the errors that the package carries."""
+    stored = json.loads((files("posefit_vsmm.detection") / "joints.json").read_text(encoding="utf-8"))
+    bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
+    return Errors(bias, deviation)
+
+
+def detected(lines: Lines, expected: Array, gates: Array, leg: float, head: float, bias: Array) -> Detection:
+    """Return the points of a silhouette near where they are expected (17, 2).
+
+    What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg
+    and of the head's radius in pixels; `bias` (17, 2) in legs is taken out.
+    """
+    points, confidence = expected.copy(), np.zeros(len(POINTS))
+
+    def found(name: str, place: Array, sure: float) -> None:
+        points[AT[name]], confidence[AT[name]] = place, sure
+
+    def near(name: str, place: Array) -> float:
+        away = float(np.linalg.norm(place - expected[AT[name]]) / gates[AT[name]])
+        return max(0.0, 1.0 - away * away)
+
+    found("root", lines.centroid, 1.0)  # VSMM 2.2
+    middle = _head(lines, expected[AT["head"]], head, gates[AT["head"]])
+    if middle is not None:
+        found("head", *middle)
+    tips, spare = _tips(lines, expected, gates)
+    for tip, place in tips:  # VSMM 2.4
+        found(POINTS[tip], place, near(POINTS[tip], place))
+    points -= bias * leg * (confidence > 0.0)[:, None]
+    anchor = points[AT["root"]] - expected[AT["root"]]
+    points[_TORSO] = expected[_TORSO] + anchor  # VSMM 2.3
+    confidence[_TORSO] = 1.0
+    for side in ("left", "right"):
+        if (elbow := _elbow(lines, points, confidence, expected, side, gates)) is not None:
+            found(f"{side} elbow", elbow - bias[AT[f"{side} elbow"]] * leg, near(f"{side} elbow", elbow))
+    for side, knee in _knees(lines, points, confidence, expected, gates).items():
+        found(f"{side} knee", knee - bias[AT[f"{side} knee"]] * leg, near(f"{side} knee", knee))
+    return Detection(points, confidence, spare)
+
+
+def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Array, float] | None:
+    """Return the middle of the head and its confidence: how much of the ring around it is contour."""
+    along = lines.skeleton[np.linalg.norm(lines.skeleton - expected, axis=1) < gate]
+    around = lines.contour[np.linalg.norm(lines.contour - expected, axis=1) < gate + 1.5 * radius]
+    if not len(along) or not len(around):
+        return None
+    away = np.linalg.norm(along[:, None] - around[None], axis=2)
+    rings = np.abs(away[..., None] - _RINGS * radius) < 0.1 * radius + 0.5
+    caught = rings.sum(axis=1).max(axis=1)  # VSMM 2.1
+    best = np.flatnonzero(caught == caught.max())
+    chosen = along[best[np.linalg.norm(along[best] - expected, axis=1).argmin()]]
+    return chosen, float(min(1.0, caught.max() / (np.pi * radius)))
+
+
+def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, Array]], int]:
+    """Return which end points are hands and feet, and how many are nobody's: the assignment of least distance.
+
+    Distances are counted in gates; the head takes part, since the skeleton line ends in it too.
+    """
+    if not len(lines.ends):
+        return [], 0
+    away = np.linalg.norm(expected[_TIPS][:, None] - lines.ends[None], axis=2)
+    from scipy.optimize import linear_sum_assignment  # half a second to import
+
+    share = away / gates[_TIPS][:, None]
+    who, which = linear_sum_assignment(np.minimum(share, 1.0))
+    pairs = [(int(_TIPS[a]), lines.ends[b]) for a, b in zip(who, which, strict=True) if share[a, b] < 1.0]
+    return [pair for pair in pairs if pair[0] != AT["head"]], len(lines.ends) - len(pairs)
+
+
+def _elbow(lines: Lines, points: Array, confidence: Array, expected: Array, side: str, gates: Array) -> Array | None:
+    """Return the point of the skeleton line that is as far from the hand as from the shoulder."""
+    if not confidence[AT[f"{side} hand"]]:
+        return None
+    hand, shoulder = points[AT[f"{side} hand"]], points[AT[f"{side} shoulder"]]
+    line = lines.skeleton
+    uneven = np.abs(np.linalg.norm(line - hand, axis=1) - np.linalg.norm(line - shoulder, axis=1))  # VSMM 2.6
+    away = np.linalg.norm(line - expected[AT[f"{side} elbow"]], axis=1)
+    even = (uneven < 1.5) & (away < gates[AT[f"{side} elbow"]])
+    return np.asarray(line[even][away[even].argmin()]) if even.any() else None
+
+
+def _knees(lines: Lines, points: Array, confidence: Array, expected: Array, gates: Array) -> dict[str, Array]:
+    """Return where the parallel to the line between the feet, through the middle of the legs, crosses the skeleton."""
+    feet = points[[AT["left foot"], AT["right foot"]]]
+    below = lines.pixels[lines.pixels[:, 1] > points[AT["root"], 1]]
+    if not (confidence[AT["left foot"]] and confidence[AT["right foot"]]) or not len(below):
+        return {}
+    way = feet[1] - feet[0]
+    length = float(np.linalg.norm(way))
+    if length < 1.0:
+        return {}
+    across = np.array([-way[1], way[0]]) / length
+    off = np.abs((lines.skeleton - below.mean(axis=0)) @ across)  # VSMM 2.5
+    crossings = lines.skeleton[off < 1.0]
+    if not len(crossings):
+        return {}
+    found = {}
+    for side in ("left", "right"):
+        away = np.linalg.norm(crossings - expected[AT[f"{side} knee"]], axis=1)
+        if away.min() < gates[AT[f"{side} knee"]]:
+            found[side] = crossings[away.argmin()]
+    if len(found) == 2 and np.linalg.norm(found["left"] - found["right"]) < 2.0:
+        return {}  # one crossing is not two knees
+    return found

@@ -1,0 +1,82 @@
+"""Measures how far the rules of joint detection are off: `python -m posefit_vsmm.fit.joints`. VSMM step 2, Reading V7.
+
+The rules look at silhouettes of built-in motions from all sides, whose truth is known, and expect every point about
+where it is. Left and right share their errors, and no point is biased to one side. What is farther off than OUTLIER is
+another point taken for it; it is counted, printed and left out.
+"""
+
+import json
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.motion import library
+from posefit.silhouette.cost import project
+from posefit_vsmm.detection import joints
+from posefit_vsmm.detection.joints import BODY, detected
+from posefit_vsmm.detection.preprocess import lines_of
+from posefit_vsmm.motion import leg_of
+from posefit_vsmm.points import POINTS, points_of
+from posefit_vsmm.sight import NARROWEST, head_radius
+
+MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a")
+AZIMUTHS = np.radians([0.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0])
+DISTANCE = 4.4  # metres
+SIZE = (320, 240)
+OFF = 0.05  # legs: how far from the truth a point is expected, as after a good prediction
+OUTLIER = 0.16  # legs
+CIRCULAR = 0.25  # legs: the deviation granted to points that are only carried along with the root (Reading V8)
+
+
+def measured(rng: np.random.Generator) -> dict[str, list[Array]]:
+    """Return the errors (2,) in legs of each point where it was detected."""
+    found: dict[str, list[Array]] = {name: [] for name in POINTS}
+    for name, azimuth in product(MOTIONS, AZIMUTHS):
+        motion = library.built_in(name)
+        body = Body.of(motion.skeleton)
+        leg = leg_of(motion.skeleton)
+        camera = Camera.around(np.array([0.0, 0.95, 0.0]), motion.poses[0, 0] + azimuth, DISTANCE, SIZE)
+        scale = camera.focal[0] / DISTANCE
+        for pose, place in zip(motion.poses[::2], motion.translations[::2] * [1.0, 1.0, 0.0], strict=True):
+            lines = lines_of(project(body, camera, pose, place))
+            true, _ = camera.project(points_of(motion.skeleton.joints(pose[None], place[None])[0]))
+            expected = true + rng.normal(0.0, OFF * leg * scale, true.shape)
+            assert lines is not None
+            gates = np.full(len(POINTS), NARROWEST * leg * scale)
+            seen = detected(lines, expected, gates, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2)))
+            for k, one in enumerate(POINTS):
+                if seen.confidence[k] > 0.0:
+                    found[one].append((seen.points[k] - true[k]) / (leg * scale))
+    return found
+
+
+def main() -> None:
+    """Write joints.json beside the rules."""
+    found = measured(np.random.default_rng(0))
+    frames = len(found["root"])
+    stored: dict[str, dict[str, Any]] = {}
+    for name in dict.fromkeys(one.removeprefix("left ").removeprefix("right ") for one in POINTS):
+        sides = [one for one in POINTS if one.split()[-1] == name]
+        errors = np.concatenate([np.array(found[one]).reshape(-1, 2) for one in sides])
+        middle = np.array([0.0, np.median(errors[:, 1])])
+        kept = errors[np.linalg.norm(errors - middle, axis=1) < OUTLIER]
+        bias = np.array([0.0, kept[:, 1].mean()])
+        spread = np.sqrt(((kept - bias) ** 2).mean(axis=0))
+        if sides[0] in BODY:
+            bias, spread = np.zeros(2), np.full(2, CIRCULAR)
+        print(
+            f"{name:10s} seen {len(errors) / (frames * len(sides)):.2f} outliers {1 - len(kept) / len(errors):.2f} "
+            f"bias {bias[1]:+.3f} deviation {spread[0]:.3f} {spread[1]:.3f} legs"
+        )
+        stored |= {one: {"bias": bias.round(4).tolist(), "deviation": spread.round(4).tolist()} for one in sides}
+    text = json.dumps({"points": {name: stored[name] for name in POINTS}}, indent=1)
+    Path(joints.__file__).with_name("joints.json").write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

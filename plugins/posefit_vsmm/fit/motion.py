@@ -1,0 +1,241 @@
+"""Fits the motion models to CMU clips: `python -m posefit_vsmm.fit.motion CMU_DIR`. VSMM step 3, Readings V4 to V6.
+
+Ridge regression of how the quaternions go on to the next frame; what is stored are its coefficients, the covariance of
+what it leaves, and means of similar poses, no recorded frame. Every clip is also used mirrored. Printed, and stored
+beside each model, are its errors one and ten frames ahead on clips that were not used, against standing still.
+"""
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from sklearn.cluster import KMeans
+from sklearn.covariance import LedoitWolf
+
+from posefit.arrays import Array
+from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
+from posefit.geometry.skeleton import ANGLES, INNER, MIRROR, angle_index
+from posefit.motion import library
+from posefit.motion.amc import FPS as AMC_FPS
+from posefit.motion.amc import read_clip
+from posefit.motion.motion import Motion
+from posefit_imm.kernels import minus
+from posefit_vsmm import motion as models
+from posefit_vsmm.motion import FPS, MotionModel, headed, leg_of
+from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode
+
+ORIGIN = (
+    "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "The database was created with funding from NSF EIA-0196217."
+)
+LAMBDA = 0.15
+FADING = 0.07  # share of its way from the mean pose that a joint loses in a frame where nothing else is learned
+DRAWN = 400  # frames of a built-in motion
+POSES = 24  # typical poses of a model
+LEAST = (0.002, np.radians(0.3))  # legs and radians: the least deviation a frame that any coordinate is granted
+AHEAD = 10  # frames
+# of the whole body's quaternion and each bone's: the one of the other side
+OTHER_SIDE = [0, *(1 + HELD.index(MIRROR[joint]) for joint in HELD)]
+
+
+class Clip(NamedTuple):
+    """A clip, or a part of it."""
+
+    path: str
+    start: int = 0
+    stop: int | None = None
+
+
+class Teaching(NamedTuple):
+    """What a model is fitted to, and what it is judged by: another person's clip, or a part kept apart."""
+
+    fitted: tuple[Clip, ...]
+    kept: Clip
+    drawn: tuple[str, ...] = ()  # built-in motions: no clip of ours shows somebody who walks with arms held out
+
+
+TEACHINGS = {
+    "stiff-walk": Teaching((Clip("17/17_03", 0, 330),), Clip("17/17_03", 340)),
+    "walk": Teaching((Clip("02/02_01"), Clip("05/05_01"), Clip("16/16_15")), Clip("16/16_17", 0, 250)),
+    "arms-out": Teaching((Clip("49/49_18", 0, 820),), Clip("49/49_18", 830), ("arms-out-a",)),
+    "jacks": Teaching((Clip("13/13_29", 0, 456),), Clip("14/14_06", 0, 420)),
+    "jump": Teaching((Clip("16/16_03"), Clip("49/49_02")), Clip("16/16_01")),
+    "squat": Teaching((Clip("13/13_29", 3792, 4584),), Clip("14/14_06", 1008, 1572)),
+}
+
+
+class Recorded(NamedTuple):
+    """States (n, 43), their translations in legs, with the angles (n, 66) and the frame rate."""
+
+    states: Array
+    angles: Array
+    fps: float
+
+
+def recorded(root: Path, clip: Clip) -> Recorded:
+    """Return what a clip holds."""
+    folder, name = clip.path.split("/")
+    motion = read_clip(root / folder / f"{folder}.asf", root / folder / f"{name}.amc")
+    return moving(motion.frames(clip.start, clip.stop or len(motion)))
+
+
+def moving(motion: Motion) -> Recorded:
+    """Return what a motion holds."""
+    states = encode(motion.poses, motion.translations)
+    states[:, :3] /= leg_of(motion.skeleton)
+    return Recorded(states, motion.poses, motion.fps)
+
+
+def mirrored(states: Array) -> Array:
+    """Return states (n, 43) of the mirror image, left for right."""
+    other = states.copy()
+    other[:, 0] *= -1.0
+    quaternions = states[:, 3:].reshape(len(states), -1, 4)[:, OTHER_SIDE]
+    quaternions[:, :, 2:] *= -1.0
+    other[:, 3:] = quaternions.reshape(len(states), -1)
+    return other
+
+
+def pairs(clip: Recorded) -> tuple[Array, Array]:
+    """Return states (n, 43) and what they are a frame later at 30 a second, in the heading's frame, root at 0."""
+    step = round(clip.fps / FPS)  # Reading V6: all pairs of a recording so far apart
+    before, after = [], []
+    for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
+        back, here = headed(first[3:].reshape(-1, 4))
+        turn = Rotation.from_quat(back, scalar_first=True).inv()
+        there = second[3:].reshape(-1, 4).copy()
+        there[0] = (turn * Rotation.from_quat(there[0], scalar_first=True)).as_quat(scalar_first=True)
+        there *= np.where(np.einsum("ij,ij->i", here, there)[:, None] < 0.0, -1.0, 1.0)  # Reading V4
+        before.append(np.concatenate([np.zeros(3), here.ravel()]))
+        after.append(np.concatenate([turn.apply(second[:3] - first[:3]), there.ravel()]))
+    return np.array(before), np.array(after)
+
+
+def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
+    """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Reading V5.
+
+    The penalty is 0.15 a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
+    """
+    inputs = before[:, 3:]
+    middle = inputs.mean(axis=0)
+    unit = np.sqrt(inputs.var(axis=0).sum() / (len(inputs[0]) / 4))
+    scaled = (inputs - middle) / unit
+    wanted = after - before - inputs @ target.T
+    wanted[:, [0, 2]] = 0.0  # nobody's way over the ground is predicted: who steps on the spot walks, too
+    mean = wanted.mean(axis=0)
+    normal = scaled.T @ scaled + LAMBDA * len(scaled) * np.eye(scaled.shape[1])  # VSMM 3
+    matrix = np.linalg.solve(normal, scaled.T @ (wanted - mean)).T / unit
+    return matrix + target, mean - matrix @ middle
+
+
+def noise(model: MotionModel, before: Array, after: Array) -> Array:
+    """Return the covariance (33, 33) of what the model leaves, shrunk as Ledoit and Wolf propose. Reading V7."""
+    left = np.array([minus(b, model.step(a)[0]) for a, b in zip(before, after, strict=True)])
+    least = np.repeat(LEAST, [3, ERROR - 3])
+    scale = np.maximum(np.sqrt((left**2).mean(axis=0)), least)
+    found = LedoitWolf(assume_centered=True).fit(left / scale).covariance_
+    found[np.diag_indices(ERROR)] = np.maximum(np.diag(found), 1.0)
+    return np.asarray(found * np.outer(scale, scale))
+
+
+def typical(before: Array) -> Array:
+    """Return the means (24, 40) of similar poses."""
+    middles = KMeans(POSES, n_init=4, random_state=0).fit(before[:, 3:]).cluster_centers_.reshape(POSES, -1, 4)
+    return np.asarray((middles / np.linalg.norm(middles, axis=2, keepdims=True)).reshape(POSES, -1))
+
+
+def ahead(model: MotionModel, clip: Recorded, frames: int) -> tuple[float, float]:
+    """Return the mean error in degrees over the quaternions of a model so many frames ahead, and of standing still."""
+    step = round(clip.fps / FPS) * frames
+    errors, still = [], []
+    for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
+        state = first
+        for _ in range(frames):
+            state = model.step(state)[0]
+        errors.append(minus(second, state))
+        still.append(minus(second, first))
+    return _mean_degrees(errors), _mean_degrees(still)
+
+
+def _mean_degrees(errors: list[Array]) -> float:
+    turns = np.array(errors)[:, 3:].reshape(-1, 3)
+    return float(np.degrees(np.linalg.norm(turns, axis=1).mean()))
+
+
+def relied(clips: list[Recorded]) -> dict[str, Any]:
+    """Return how the angles of the other joints follow the nine rotations: ridge regression over all clips."""
+    inputs, wanted = [], []
+    for clip in clips:
+        for states, angles in ((clip.states, clip.angles), (mirrored(clip.states), mirrored_angles(clip.angles))):
+            quaternions = states[::4, 7:].reshape(-1, 4)
+            inputs.append(Rotation.from_quat(quaternions, scalar_first=True).as_rotvec().reshape(-1, 3 * len(BONES)))
+            wanted.append(angles[::4, OTHER_ANGLES])
+    x, y = np.concatenate(inputs), np.concatenate(wanted)
+    middle, mean = x.mean(axis=0), y.mean(axis=0)
+    normal = (x - middle).T @ (x - middle) + 0.05 * len(x) * np.eye(x.shape[1])
+    matrix = np.linalg.solve(normal, (x - middle).T @ (y - mean)).T
+    return {"matrix": rounded(matrix), "offset": rounded(mean - matrix @ middle)}
+
+
+def mirrored_angles(poses: Array) -> Array:
+    """Return the poses (n, 66) of the mirror image, left for right."""
+    flip = np.diag([-1.0, 1.0, 1.0])
+    other = np.zeros((len(poses), ANGLES))
+    for joint in INNER:
+        here, there = angle_index(joint), angle_index(MIRROR[joint])
+        turned = flip @ rotation_from_joint_angles(poses[:, there : there + 3]) @ flip
+        other[:, here : here + 3] = joint_angles_from_rotation(turned)
+    return other
+
+
+def rounded(values: Array) -> Any:
+    """Return nested lists of numbers of five significant digits."""
+    return [float(f"{v:.5g}") for v in values] if values.ndim == 1 else [rounded(row) for row in values]
+
+
+def main(root: Path) -> None:
+    """Write models.json beside the models. Raises ValueError where a clip it needs is missing."""
+    stored: dict[str, Any] = {}
+    every: list[Recorded] = []
+    identity = np.vstack([np.zeros((3, STATE - 3)), np.eye(STATE - 3)])
+    for clip in (clip for teaching in TEACHINGS.values() for clip in (*teaching.fitted, teaching.kept)):
+        if not (root / f"{clip.path}.amc").is_file():
+            raise ValueError(f"CMU_DIR must hold {clip.path}.amc, got {root} without it")
+    for name, teaching in TEACHINGS.items():
+        clips = [recorded(root, clip) for clip in teaching.fitted]
+        clips += [moving(library.built_in(one, frames=DRAWN, fps=AMC_FPS)) for one in teaching.drawn]
+        kept = recorded(root, teaching.kept)
+        every += clips
+        sides = [pairs(one._replace(states=s)) for one in clips for s in (one.states, mirrored(one.states))]
+        before, after = (np.concatenate(part) for part in zip(*sides, strict=True))
+        typicals = typical(before)
+        found: dict[str, Any] = {}
+        report: dict[str, float] = {}
+        for shrink, target in (("identity", -FADING * identity), ("zero", -identity)):
+            matrix, offset = ridge(before, after, target)
+            model = MotionModel(name, matrix, offset, np.eye(ERROR), typicals)
+            covariance = noise(model, before, after)
+            found[shrink] = {"matrix": rounded(matrix), "offset": rounded(offset), "noise": rounded(covariance)}
+            for frames in (1, AHEAD):
+                error, still = ahead(model, kept, frames)
+                report |= {f"{shrink}_{frames}": round(error, 2), f"still_{frames}": round(still, 2)}
+        print(name, len(before), report)
+        stored[name] = {**found, "poses": rounded(typicals), "report": report}
+    target_file = Path(models.__file__).with_name("models.json")
+    text = json.dumps({"origin": ORIGIN, "models": stored, "reliance": relied(every)}, separators=(",", ":"))
+    target_file.write_text(text + "\n", encoding="utf-8")
+    print(f"{target_file.name}: {len(text)} bytes")
+
+
+if __name__ == "__main__":
+    folders = sys.argv[1:] or [folder for folder in [os.environ.get("POSEFIT_CMU")] if folder]
+    if len(folders) != 1:
+        sys.exit("usage: python -m posefit_vsmm.fit.motion CMU_DIR")
+    try:
+        main(Path(folders[0]))
+    except ValueError as error:
+        sys.exit(str(error))

@@ -1,0 +1,131 @@
+"""Motion models and a swarm joined: the models say where the search starts, and learn what it finds.
+
+Every model's own prediction is drawn, and its silhouette cost enters the model's likelihood. The filter's mean and
+covariance replace SAPSO (6) and (7): the search looks around the mean, along the directions in which the covariance is
+largest, as far as it is large; and a proposal costs what its silhouette costs and how far it is from the mean.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from posefit import settings as of_plugins
+from posefit.arrays import Array
+from posefit.fitting.box import Start
+from posefit.fitting.optimiser import OptimiserFactory, minimise
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.registry import registry
+from posefit_imm import PLACED, Measurement
+from posefit_vsmm.course import Course, Found
+from posefit_vsmm.fresh import Matcher
+from posefit_vsmm.groups import read_topology
+from posefit_vsmm.joined.directions import Directions
+from posefit_vsmm.motion import library
+from posefit_vsmm.state import ERROR, FIRST_BONE, YAW_PITCH_ROLL, Reliance, decode, encode, free_errors
+from posefit_vsmm.structure import Switching
+from posefit_vsmm.switching import Rules, SequentialTest
+
+LEAST = np.repeat([0.02, np.radians(4.0)], [3, ERROR - 3])  # metres and radians: deviations added to the filter's
+LEAST_BUDGET = 80  # evaluations; with fewer, the filter's own pose is as good
+REACH = 3.5  # deviations to either side
+ROOT_LEAST = np.radians([6.0, 4.0, 4.0])  # deviations of yaw, pitch and roll, at the least
+# How far what a search finds is off, as one silhouette lets it be: metres across, up and along the depth, then radians
+# of the whole body and of the bones
+FOUND = np.repeat([0.03, 0.03, 0.08, np.radians(6.0), np.radians(9.0)], [1, 1, 1, 3, ERROR - FIRST_BONE])
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A search around what the filter holds."""
+
+    task: Task
+    reliance: Reliance
+    factory: OptimiserFactory = field(repr=False)
+    dimensions: int
+    weight: float  # of a silhouette's cost in a model's log-likelihood
+
+    def likelihood(self, state: Array, observation: Observation) -> float:
+        """Return the log-likelihood of a predicted state (43,): its silhouette's cost, weighed."""
+        costs, _ = Matcher(self.task, observation, self.reliance).costs(state[None])
+        return -self.weight * float(costs[0])
+
+    def find(
+        self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator
+    ) -> Found | None:
+        """Return the best state around one (43,) with covariance (33, 33), and what it tells the filter."""
+        if budget < LEAST_BUDGET:
+            return None
+        poses, places = decode(state[None], self.reliance)
+        around = spread + np.diag((LEAST * free_errors(self.task.body.skeleton)) ** 2)
+        prior = Directions.of(state, around, self.reliance, self.dimensions, REACH)
+        root = np.maximum(np.sqrt(np.diag(around)[[*YAW_PITCH_ROLL]]), ROOT_LEAST)
+        space = SearchSpace(prior, poses[0, :3], REACH * root, places[0], self.task.translation)
+        start = np.full(space.dimensions, 1.0 / REACH)
+        space = space.around(space.centre, Start(np.zeros(space.dimensions), start, np.zeros(space.dimensions)))
+        if observation.translation is not None:
+            space = space.around(space.centre, space.start, observation.translation)
+        doubt = 0.5 * REACH**2 / self.weight  # of a proposal at the box's border
+        problem = PoseProblem(
+            self.task.body, self.task.cameras, observation.silhouettes, space, threads=self.task.threads
+        )
+        optimiser = self.factory(space, rng, **of_plugins.planned(self.factory, {}, budget))
+
+        def posterior(proposals: Array) -> Array:  # in units of cost, less a constant
+            return np.asarray(problem.evaluate(proposals) + doubt * (proposals**2).sum(axis=1))
+
+        best = minimise(posterior, optimiser, budget)
+        pose, place = problem.decode(best.proposal[None])
+        found = encode(pose, place)[0]
+
+        def measure(one: Array) -> Measurement:
+            return Measurement(PLACED.minus(found, one), np.eye(ERROR), np.diag(FOUND**2))
+
+        return Found(pose[0], best.evaluations, measure)
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """Follows a person with a `Course` whose every frame ends in a search."""
+
+    task: Task
+    switching: Switching = field(repr=False)
+    search: Search = field(repr=False)
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a `Frame` for each observation; its `details` are those of the filter."""
+        course = Course(self.task, self.switching, rng, self.search)
+        for observation in observations:
+            yield course.frame(observation)
+
+
+def joined(
+    task: Task,
+    *,
+    optimiser: str = "sapso",
+    dimensions: int = 16,
+    weight: float = 0.25,
+    groups: str = "",
+) -> Joined:
+    """The motion models of `vsmm` predict where a swarm starts, and learn from what it finds.
+
+    Settings:
+        optimiser: name of any registered one, with its own defaults.
+        dimensions: directions that it searches beside the root, 1 or more; those in which the filter is least sure.
+        weight: of a prediction's silhouette cost, 0 to 100, in its model's log-likelihood; above 0. Ours.
+        groups: path of a TOML file of groups and neighbours; "" is the package's own. VSMM step 4, Reading V1.
+    """
+    if dimensions < 1:
+        raise ValueError(f"dimensions must be at least 1, got {dimensions}")
+    if not weight > 0.0:
+        raise ValueError(f"weight must be above 0, got {weight}")
+    carried = library("identity")
+    topology = read_topology(Path(groups) if groups else None, carried.names)
+    switching = Switching(
+        library=carried, topology=topology, structure="variable", rules=Rules(), new="rerun", test=SequentialTest()
+    )
+    search = Search(task, carried.reliance, registry().optimiser(optimiser), dimensions, weight)
+    return Joined(task, switching, search)
