@@ -105,6 +105,7 @@ def test_a_run_that_is_interrupted_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_folder_holds_report_and_figures(written: tuple[Path, Result], told: dict[str, Any]) -> None:
     out, result = written
     assert result.exit_code == 0, result.stderr
@@ -158,6 +159,7 @@ def test_every_claim_of_the_paper_has_a_verdict_on_one_line(told: dict[str, Any]
     assert all("too few to confirm anything" in one["evidence"] for one in tested)
 
 
+@pytest.mark.slow
 def test_json_is_one_object_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("posefit_experiments.sapso.experiment.QUICK", TINY)
     result = run("--quick", "--seeds", 1, "--json")

@@ -351,6 +351,7 @@ def test_a_recording_for_the_viewer_holds_body_and_masks(tmp_path: Path) -> None
         posefit.track("walk", frames=(0, 3), evaluations=200, rerun=path)
 
 
+@pytest.mark.slow
 def test_a_real_walk_is_followed_from_a_camera_file(tmp_path: Path) -> None:
     video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
     if not video.is_file():

@@ -18,7 +18,7 @@ from tests.sweep.fake import LIMITS, STARTS, cells, starts
 
 ROOT = Path(__file__).parents[2]
 CELLS, WORKER_KILLS, DRIVER_KILLS = 300, 5, 2
-ENGINES = ["pebble", "dask"]
+ENGINES = ["pebble", pytest.param("dask", marks=pytest.mark.slow)]
 
 
 @contextmanager
@@ -56,6 +56,7 @@ def claimed(folder: Path) -> set[str]:
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for left-over processes in /proc")
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.slow
 def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: str, tmp_path: Path) -> None:
     if engine == "dask":
         pytest.importorskip("distributed")

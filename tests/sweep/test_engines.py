@@ -27,7 +27,7 @@ PATIENCE = 300.0  # seconds for workers to come; these tests mean something else
 Make = Callable[..., Engine]
 
 
-@pytest.fixture(params=["pebble", "dask"])
+@pytest.fixture(params=["pebble", pytest.param("dask", marks=pytest.mark.slow)])
 def make(request: pytest.FixtureRequest) -> Make:
     """Return what makes an engine of two workers."""
     if request.param == "pebble":
@@ -38,6 +38,7 @@ def make(request: pytest.FixtureRequest) -> Make:
     return lambda run=behave, limits=LIMITS: Cluster(workers=2, limits=limits, run=run, patience=PATIENCE)
 
 
+@pytest.mark.slow
 def test_poisoned_cells_are_quarantined_with_their_reasons_and_all_others_finish(make: Make, tmp_path: Path) -> None:
     poisons = [fake.SEGFAULT, fake.HOG, fake.RAISE]
     bad = [replace(cells(1)[0], frames=poison) for poison in poisons]
@@ -70,6 +71,7 @@ def test_a_cell_that_was_quarantined_is_tried_again_once_its_file_is_gone(tmp_pa
     assert swept(tmp_path / "ledger", bad, Processes(1, LIMITS, behave)).failed == 3
 
 
+@pytest.mark.slow
 def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     from posefit.sweep.engines.cluster import Cluster
@@ -213,6 +215,7 @@ def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
         Cluster(address, run=behave, patience=1.0)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp_path: Path) -> None:
     from posefit.sweep.engines.cluster import Cluster
 
@@ -234,6 +237,7 @@ def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp
     assert swept(tmp_path / "ledger", cells(20), Processes(2, LIMITS, behave)).done == 20
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_comes_back_is_waited_for(served: Served, tmp_path: Path) -> None:
     from posefit.sweep.engines.cluster import Cluster
 

@@ -16,7 +16,7 @@ SHIPPED = ("sapso", "pso", "random", "particle", "annealed", "cma", "scipy", "sc
 ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna")
 
 
-@pytest.mark.parametrize("name", SHIPPED + ADAPTERS)
+@pytest.mark.parametrize("name", [*SHIPPED, *(pytest.param(name, marks=pytest.mark.slow) for name in ADAPTERS)])
 def test_it_passes_every_shipped_optimiser(name: str) -> None:
     offer = registry().offer("optimiser", name)
     result = check_optimiser(offer.factory, next_frame=offer.next_frame)
@@ -27,7 +27,11 @@ def test_it_passes_every_shipped_optimiser(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["pca", "loose", "full", "union", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA"]
+    "name",
+    [
+        *("pca", "loose", "full", "union", "sklearn"),
+        *(pytest.param(f"sklearn:{name}", marks=pytest.mark.slow) for name in ("FactorAnalysis", "FastICA")),
+    ],
 )
 def test_it_passes_every_shipped_prior(name: str) -> None:
     result = check_prior(registry().offer("prior", name).factory)

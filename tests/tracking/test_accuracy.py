@@ -30,6 +30,7 @@ def test_walking_is_followed_within_1_9_degrees(cmu: Path, view: float) -> None:
         assert summary["lost_rate"] == 0.0
 
 
+@pytest.mark.slow
 def test_a_side_view_is_followed_or_its_loss_is_reported(cmu: Path) -> None:  # Reading S15
     for summary in summaries(cmu, 90.0, range(5)):
         good = summary["error_degrees"]["mean"] <= 1.9
