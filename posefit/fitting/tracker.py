@@ -80,26 +80,39 @@ class Tracker(Protocol):
 TrackerFactory = Callable[..., Tracker]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Prediction:
-    """Where the next frame's pose is sought, and where the search starts. SAPSO (6), (7).
+    """Where the next frame's pose is sought, where the search starts, and how its cost is weighed. SAPSO (4), (6), (7).
 
-    Readings: `spread` and `floor` (S5), `prediction` from the "latest" step or the "literal" one before it (S12).
+    These are the settings of `SynthesisTracker`, named `tracker` on the command line.
+
+    Settings:
+        spread (k): standard deviations of the first population, as multiples of the predicted step; 0 or more.
+            Reading S5.
+        floor: the least standard deviation, in half-ranges of the box; above 0. Reading S5.
+        prediction: v_pred is the "latest" step between two frames, or the "literal" one before it. Reading S12.
+        root_range_degrees: how far yaw, pitch and roll are searched to either side. Ours.
+        translation_range: metres along x, y and z, to either side, where the translation is searched. Ours.
+        beta (beta): weight of what the body misses of the silhouette against what it spills, 0 to 1. SAPSO (4).
     """
 
-    root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
-    translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     spread: float = SPREAD
     floor: float = FLOOR
     prediction: Literal["latest", "literal"] = "latest"
+    root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
+    translation_range: tuple[float, float, float] = TRANSLATION_RANGE
+    beta: float = BETA
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "beta", float(self.beta))  # an int would cost another compilation
         if not self.floor > 0.0:
             raise ValueError(f"floor must be above 0, got {self.floor}")
         if not self.spread >= 0.0:
             raise ValueError(f"spread must be 0 or more, got {self.spread}")
         if self.prediction not in ("latest", "literal"):
             raise ValueError(f"prediction must be one of latest, literal, got {self.prediction!r}")
+        if not 0.0 <= self.beta <= 1.0:
+            raise ValueError(f"beta must lie in 0 to 1, got {self.beta}")
 
 
 class Follower:
@@ -164,7 +177,8 @@ class Follower:
 class SynthesisTracker:
     """Follows a person by a search a frame, started around a prediction. SAPSO section 4.
 
-    `make` builds an optimiser from a space and a generator; `next_frame` says what becomes of it in the next frame.
+    `make` builds an optimiser from a space and a generator; `next_frame` says what becomes of it in the next frame;
+    `prediction` holds the settings.
     """
 
     task: Task
@@ -172,7 +186,6 @@ class SynthesisTracker:
     make: Callable[[Space, np.random.Generator], Optimiser]
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)
-    beta: float = BETA
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
@@ -187,8 +200,9 @@ class SynthesisTracker:
                 yield latest
                 continue
             optimiser = self._ready(optimiser, space, rng)
+            beta = self.prediction.beta
             problem = PoseProblem(
-                task.body, task.cameras, observation.silhouettes, space, beta=self.beta, threads=task.threads
+                task.body, task.cameras, observation.silhouettes, space, beta=beta, threads=task.threads
             )
             best = minimise(problem.evaluate, optimiser, task.evaluations)
             follower.commit(best.proposal)
@@ -202,7 +216,8 @@ class SynthesisTracker:
             poses, places = latest.pose[None], latest.translation[None]
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
-        problem = PoseProblem(self.task.body, self.task.cameras, observation.silhouettes, space, beta=self.beta)
+        task, beta = self.task, self.prediction.beta
+        problem = PoseProblem(task.body, task.cameras, observation.silhouettes, space, beta=beta)
         counts = problem.areas(poses, places)
         areas = np.stack([one[0] for one in counts])
         return Frame(poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0))

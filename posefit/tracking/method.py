@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,7 @@ from posefit.fitting.box import Space
 from posefit.fitting.guard import BrokenRuleError, Guarded
 from posefit.fitting.optimiser import NextFrame, Optimiser, OptimiserFactory
 from posefit.fitting.prior import Prior
-from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE
 from posefit.fitting.tracker import (
-    FLOOR,
-    SPREAD,
     Frame,
     Observation,
     Prediction,
@@ -89,23 +86,21 @@ def prepare(choice: Choice, task: Task) -> Method:
     offer = _offered("optimiser", choice.optimiser)
     mine = settings.planned(offer.factory, choice.optimiser_settings, task.evaluations, choice.particles)
     settings.check(offer.name, offer.factory, mine)
-    settings.check("tracker", _driver, choice.tracker_settings)
+    settings.check("tracker", Prediction, choice.tracker_settings)
     prior, learned = _prior(choice, task)
 
-    driven = dict(choice.tracker_settings)
-    beta = float(driven.pop("beta", BETA))
-    prediction = Prediction(**driven)
+    prediction = Prediction(**choice.tracker_settings)
 
     def tracker(limit: float | None) -> SynthesisTracker:
         make = partial(_guarded, offer, mine, limit)
-        return SynthesisTracker(task, learned, make, offer.next_frame, prediction, beta)
+        return SynthesisTracker(task, learned, make, offer.next_frame, prediction)
 
     patient = None if choice.ask_seconds is None else choice.ask_seconds + COMPILING
     return Method(
         f"{offer.name} + {prior}",
         tracker(choice.ask_seconds),
         learned,
-        beta,
+        prediction.beta,
         {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)},
         tracker(patient),
     )
@@ -121,7 +116,7 @@ def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: st
     places: dict[str, tuple[str, Callable[..., Any]]] = {}
     if tracker is None:
         chosen: list[tuple[Kind, str]] = [("optimiser", optimiser), ("prior", prior)]
-        places["tracker"] = "tracker", _driver
+        places["tracker"] = "tracker", Prediction
     else:
         chosen = [("tracker", tracker)]
     for one, name in chosen:
@@ -139,18 +134,6 @@ def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: st
     for name, (kind, factory) in places.items():
         parsed[f"{kind}_settings"] = settings.parse(name, factory, given[name])
     return parsed
-
-
-def _driver(
-    *,
-    spread: float = SPREAD,
-    floor: float = FLOOR,
-    prediction: Literal["latest", "literal"] = "latest",
-    root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES,
-    translation_range: tuple[float, float, float] = TRANSLATION_RANGE,
-    beta: float = BETA,
-) -> None:
-    """Stand for the settings of `SynthesisTracker`."""
 
 
 def _tracker(choice: Choice, task: Task) -> Method:

@@ -302,7 +302,9 @@ def settled(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool,
     position, costs = np.array([[0.1]]), np.array([2.0])
     best, best_costs, accepted = np.array([[0.5]]), np.array([1.5]), np.empty(1, dtype=bool)
     moved = np.array([[0.7]])
-    kernels.settle(moved, np.array([cost]), np.array([chance]), temperature, position, costs, best, best_costs, accepted)
+    kernels.settle(
+        moved, np.array([cost]), np.array([chance]), temperature, position, costs, best, best_costs, accepted
+    )
     return bool(accepted[0]), float(position[0, 0]), float(best[0, 0])
 
 
