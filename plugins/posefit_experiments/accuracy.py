@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.tracking.run import track
+from posefit.tracking.front import track
 
 SEEDS = range(5)
 VIEWS = (0.0, 45.0, 90.0)

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from posefit.footage.source import synthetic
+from posefit.footage.scene import synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import library
-from posefit.tracking.method import Choice
+from posefit.tracking.method import Choice, prepare
 from posefit.tracking.opening import BODY_FRAMES, built, following
 from posefit.tracking.synthetic import SIZE, task_of
 
@@ -59,7 +59,7 @@ def study(motion: str = "walk-b") -> None:
             shape = built(
                 task,
                 scene.observations,
-                following(choice),
+                following(prepare(choice, task)),
                 BODY_FRAMES,
                 height,
                 seed,

@@ -26,7 +26,7 @@ Curve = Mapping[str, list[list[dict[str, float]]]]  # kind: for every strength, 
 
 def curves(optimiser: str = "sapso", prior: str = "pca") -> tuple[Curve, float]:
     """Return what every kind and strength of damage leaves of a track, and the mean pose's error in degrees."""
-    scene, choice = scene_of(MOTION, [VIEW]), Choice(optimiser, prior)
+    scene, choice = scene_of(MOTION, [VIEW]), Choice(optimiser=optimiser, prior=prior)
     found: dict[str, list[list[dict[str, float]]]] = {}
     for kind in KINDS:
         found[kind] = []

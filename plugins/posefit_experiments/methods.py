@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from posefit.tracking.run import track
+from posefit.tracking.front import track
 
 OPTIMISERS = ("particle", "annealed", "pso", "sapso", "cma")
 PRIORS: dict[str, tuple[str, dict[str, Any]]] = {

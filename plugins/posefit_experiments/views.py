@@ -6,8 +6,8 @@ The first pose is searched several times, as it is for footage.
 import numpy as np
 
 from posefit.fitting.tracker import Frame, Task
-from posefit.footage.source import Scene
-from posefit.tracking.method import Choice
+from posefit.footage.scene import Scene
+from posefit.tracking.method import Choice, prepare
 from posefit.tracking.opening import RESTARTS, begun, following
 from posefit.tracking.synthetic import followed, mean_error, measured, scene_of, task_of
 
@@ -36,7 +36,7 @@ def compare() -> None:
 
 
 def _track(task: Task, choice: Choice, scene: Scene, seed: int) -> list[Frame]:
-    begin = begun(task, scene.observations, following(choice), RESTARTS, seed)
+    begin = begun(task, scene.observations, following(prepare(choice, task)), RESTARTS, seed)
     return followed(begin, choice, scene.observations, seed)
 
 

@@ -82,18 +82,15 @@ TrackerFactory = Callable[..., Tracker]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Prediction:
-    """Where the next frame's pose is sought, where the search starts, and how its cost is weighed. SAPSO (4), (6), (7).
-
-    These are the settings of `SynthesisTracker`, named `tracker` on the command line.
+    """Where the next frame's pose is sought, where the search starts, and what a pose costs. SAPSO (4), (6), (7).
 
     Settings:
-        spread (k): standard deviations of the first population, as multiples of the predicted step; 0 or more.
-            Reading S5.
-        floor: the least standard deviation, in half-ranges of the box; above 0. Reading S5.
-        prediction: v_pred is the "latest" step between two frames, or the "literal" one before it. Reading S12.
-        root_range_degrees: how far yaw, pitch and roll are searched to either side. Ours.
-        translation_range: metres along x, y and z, to either side, where the translation is searched. Ours.
-        beta (beta): weight of what the body misses of the silhouette against what it spills, 0 to 1. SAPSO (4).
+        spread (k): standard deviations of the start, as multiples of the predicted step, 0 or more. Reading S5.
+        floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Reading S5.
+        prediction (v_pred): the "latest" step, or the "literal" one before it. Reading S12.
+        root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
+        translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
+        beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
     """
 
     spread: float = SPREAD
@@ -104,7 +101,7 @@ class Prediction:
     beta: float = BETA
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "beta", float(self.beta))  # an int would cost another compilation
+        object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
         if not self.floor > 0.0:
             raise ValueError(f"floor must be above 0, got {self.floor}")
         if not self.spread >= 0.0:
@@ -177,8 +174,7 @@ class Follower:
 class SynthesisTracker:
     """Follows a person by a search a frame, started around a prediction. SAPSO section 4.
 
-    `make` builds an optimiser from a space and a generator; `next_frame` says what becomes of it in the next frame;
-    `prediction` holds the settings.
+    `make` builds an optimiser from a space and a generator; `next_frame` says what becomes of it in the next frame.
     """
 
     task: Task
@@ -200,9 +196,8 @@ class SynthesisTracker:
                 yield latest
                 continue
             optimiser = self._ready(optimiser, space, rng)
-            beta = self.prediction.beta
             problem = PoseProblem(
-                task.body, task.cameras, observation.silhouettes, space, beta=beta, threads=task.threads
+                task.body, task.cameras, observation.silhouettes, space, beta=self.prediction.beta, threads=task.threads
             )
             best = minimise(problem.evaluate, optimiser, task.evaluations)
             follower.commit(best.proposal)
@@ -216,8 +211,9 @@ class SynthesisTracker:
             poses, places = latest.pose[None], latest.translation[None]
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
-        task, beta = self.task, self.prediction.beta
-        problem = PoseProblem(task.body, task.cameras, observation.silhouettes, space, beta=beta)
+        problem = PoseProblem(
+            self.task.body, self.task.cameras, observation.silhouettes, space, beta=self.prediction.beta
+        )
         counts = problem.areas(poses, places)
         areas = np.stack([one[0] for one in counts])
         return Frame(poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.footage.source import Scene, synthetic
+from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
 from posefit.motion import library
 from posefit.silhouette.corruption import corrupted
@@ -72,7 +72,7 @@ def measured(scene: Scene, frames: Sequence[Frame]) -> dict[str, float]:
 
 def followed(task: Task, choice: Choice, observations: Sequence[Observation], seed: int) -> list[Frame]:
     """Return the frames of a track."""
-    return list(prepare(choice, task).tracker.track(observations, np.random.default_rng(seed)))
+    return list(prepare(choice, task).tracker(task).track(observations, np.random.default_rng(seed)))
 
 
 def mean_error(scene: Scene, task: Task) -> float:

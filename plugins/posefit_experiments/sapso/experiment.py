@@ -14,12 +14,12 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
-from posefit.footage.source import Scene, synthetic
+from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.rotation import wrapped
 from posefit.registry import registry
 from posefit.tracking.evaluation import nearest
+from posefit.tracking.front import track
 from posefit.tracking.method import ITERATIONS
-from posefit.tracking.run import track
 from posefit.tracking.synthetic import SIZE
 from posefit_experiments.sapso.motions import Case
 from posefit_experiments.sapso.numbers import FRAMES

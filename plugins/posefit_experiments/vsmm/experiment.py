@@ -23,8 +23,8 @@ METHODS: dict[str, Choice] = {
     "imm_all_six": Choice(tracker="vsmm", tracker_settings={"structure": "all"}),
 }
 SEARCHES: dict[str, Choice] = {
-    "sapso_loose": Choice("sapso", "loose"),
-    "sapso_pca": Choice("sapso", "pca"),
+    "sapso_loose": Choice(optimiser="sapso", prior="loose"),
+    "sapso_pca": Choice(optimiser="sapso", prior="pca"),
     "sapso_vsmm": Choice(tracker="sapso+vsmm"),
 }
 ELBOW, HAND = JOINTS.index("rhumerus"), JOINTS.index("rwrist")  # the joints that end in elbow and hand
@@ -52,7 +52,7 @@ def run(choice: Choice, seen: activities.Sequence, seed: int) -> Run:
         [library.built_in(one) for one in TRAINING],
     )
     with threadpool_limits(1):
-        frames = list(prepare(choice, task).tracker.track(seen.observations, np.random.default_rng(seed)))
+        frames = list(prepare(choice, task).tracker(task).track(seen.observations, np.random.default_rng(seed)))
     return Run(seen, frames, {**errors(seen, frames), **switching(seen, frames)})
 
 

@@ -6,10 +6,10 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from posefit.sweep.cell import Cell, Result
+from posefit.sweep.cell import Cell, Measurement
 from posefit.sweep.engines.limits import Limits
 
-Run = Callable[[Cell], Result]
+Run = Callable[[Cell], Measurement]
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Outcome:
     """What became of a cell: a result, or the reason why there is none. With neither it was lost by no fault of its."""
 
     cell: Cell
-    result: Result | None = field(default=None, repr=False)
+    result: Measurement | None = field(default=None, repr=False)
     reason: str | None = None
 
 

@@ -6,7 +6,7 @@ from concurrent.futures.process import BrokenProcessPool
 
 from pebble import ProcessExpired, ProcessPool
 
-from posefit.sweep.cell import Cell, Result, run_cell
+from posefit.sweep.cell import Cell, Measurement, run_cell
 from posefit.sweep.engines.engine import Outcome, Run, reason_of
 from posefit.sweep.engines.limits import Limits, alone, limited
 
@@ -22,7 +22,7 @@ class Processes:
             raise ValueError(f"workers must be at least 1, got {workers}")
         self._limits, self._run = limits or Limits(), run
         self._idle = [_pool() for _ in range(workers)]
-        self._running: dict[Future[Result], tuple[Cell, ProcessPool]] = {}
+        self._running: dict[Future[Measurement], tuple[Cell, ProcessPool]] = {}
         self._workers = workers
 
     def window(self) -> int:
@@ -53,7 +53,7 @@ class Processes:
         for pool in pools:
             pool.join()
 
-    def _outcome(self, future: Future[Result]) -> Outcome:
+    def _outcome(self, future: Future[Measurement]) -> Outcome:
         cell, pool = self._running.pop(future)
         error = future.exception()
         if isinstance(error, ProcessExpired | BrokenProcessPool):
