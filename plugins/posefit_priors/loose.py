@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least, positive
-from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
+from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index, both
 from posefit_priors.arrays import load_arrays
 from posefit_priors.kernels import near_and_bearable, recover_loose
 from posefit_priors.pca import CLUSTERS, PCA, QUANTILE
@@ -59,7 +59,7 @@ class Loose:
         least, most = angles.min(axis=0), angles.max(axis=0)
         chosen, reach = [], []
         for bones, reached in zip((ARMS, LEGS), self._reach, strict=True):
-            for name in (side + bone for bone in bones for side in "lr"):
+            for name in (name for bone in bones for name in both(bone)):
                 first = angle_index(JOINTS.index(name)) - 3
                 moving = [i for i in range(first, first + 3) if most[i] > least[i]]
                 chosen += moving
