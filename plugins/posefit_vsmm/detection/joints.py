@@ -40,7 +40,7 @@ class Errors:
 
 
 @lru_cache(maxsize=1)
-def errors() -> Errors:
+def rule_errors() -> Errors:
     """Return the errors that the package carries."""
     stored = json.loads((files("posefit_vsmm.detection") / "joints.json").read_text(encoding="utf-8"))
     bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
