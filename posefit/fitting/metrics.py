@@ -57,7 +57,10 @@ def mpjpe_mm(truth: Array, joints: Array) -> Array:
 
 
 def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
-    """Return the mean distance (T,) of the joints in millimetres after the best rotation, scale and translation."""
+    """Return the mean distance (T,) of the joints in millimetres after the best rotation, scale and translation.
+
+    That is Procrustes alignment, frame by frame.
+    """
     truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
     target = truth - truth.mean(axis=1, keepdims=True)
     source = joints - joints.mean(axis=1, keepdims=True)

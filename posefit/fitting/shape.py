@@ -89,7 +89,7 @@ def fit_shape(
 
     `follow` tracks the observations with a body. With a `height` in metres the person stands so tall; one camera alone
     does not see how large somebody is. Where poses are `aligned`, so are those of every body that is tried. `spread`
-    comes from `resamples` fits to frames drawn with replacement.
+    is bootstrapped: it comes from `resamples` fits to frames drawn with replacement.
     """
     factors = np.ones(len(NAMES))
     base = body

@@ -98,7 +98,8 @@ def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Ar
 def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, Array]], int]:
     """Return which end points are hands and feet, and how many are nobody's: the assignment of least distance.
 
-    Distances are counted in gates; the head takes part, since the skeleton line ends in it too.
+    It is a linear sum assignment, as the Hungarian algorithm solves it. Distances are counted in gates; the head takes
+    part, since the skeleton line ends in it too.
     """
     if not len(lines.ends):
         return [], 0
