@@ -15,6 +15,7 @@ from posefit.hooks import RegisterOptimiser
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `cma`."""
     from posefit_evolution.cma import CMAES
 
     register("cma", CMAES)

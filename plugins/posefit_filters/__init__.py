@@ -17,6 +17,7 @@ from posefit.hooks import RegisterOptimiser
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `particle` and `annealed`."""
     from posefit_filters.annealed import Annealed
     from posefit_filters.particle import Particle
 

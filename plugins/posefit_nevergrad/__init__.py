@@ -68,4 +68,5 @@ def _run(
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `nevergrad:NAME`."""
     register("nevergrad", nevergrad, needs=("nevergrad", "posefit[nevergrad]"))

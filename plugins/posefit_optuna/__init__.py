@@ -61,4 +61,5 @@ def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, o
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `optuna:SAMPLER`."""
     register("optuna", optuna, needs=("optuna", "posefit[optuna]"))

@@ -20,6 +20,7 @@ from posefit.hooks import RegisterPrior
 
 @hookimpl
 def posefit_register_priors(register: RegisterPrior) -> None:
+    """Offer `pca`, `loose`, `full`, `union` and `sklearn:NAME`."""
     from posefit_priors.full import Full
     from posefit_priors.loose import Loose
     from posefit_priors.pca import PCA

@@ -52,4 +52,5 @@ def _evolve(population: int, spread: float, space: Space, rng: np.random.Generat
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `pycma`."""
     register("pycma", pycma, needs=("cma", "posefit[pycma]"))

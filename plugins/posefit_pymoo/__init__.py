@@ -55,4 +55,5 @@ def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, o
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `pymoo:NAME`."""
     register("pymoo", pymoo, needs=("pymoo", "posefit[pymoo]"))

@@ -68,4 +68,5 @@ def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> Non
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `scipy:NAME`."""
     register("scipy", scipy)

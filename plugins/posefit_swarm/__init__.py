@@ -19,6 +19,7 @@ from posefit.hooks import RegisterOptimiser
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `sapso`, `pso` and `random`."""
     from posefit_swarm.pso import PSO
     from posefit_swarm.random import Random
     from posefit_swarm.sapso import SAPSO

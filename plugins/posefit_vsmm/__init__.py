@@ -25,6 +25,7 @@ from posefit.hooks import RegisterTracker
 
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
+    """Offer `vsmm` and `sapso+vsmm`."""
     from posefit_vsmm.joined.tracker import joined
     from posefit_vsmm.tracker import vsmm
 
