@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from posefit.geometry.skeleton import Skeleton as Skeleton
     from posefit.motion.motion import Motion as Motion
     from posefit.silhouette.mask import Silhouette as Silhouette
-    from posefit.tracking.run import Fit as Fit
+    from posefit.tracking.front import Fit as Fit
+    from posefit.tracking.front import fit as fit
+    from posefit.tracking.front import track as track
     from posefit.tracking.run import Track as Track
-    from posefit.tracking.run import fit as fit
-    from posefit.tracking.run import track as track
 
 __version__ = "0.1.0"
 hookimpl = HookimplMarker("posefit")
@@ -55,7 +55,8 @@ _HOMES = {
     "fitting.problem": ("PoseProblem",),
     "fitting.space": ("SearchSpace",),
     "fitting.tracker": ("Frame", "Observation", "SynthesisTracker", "Task", "Tracker"),
-    "tracking.run": ("Fit", "Track", "fit", "track"),
+    "tracking.front": ("Fit", "fit", "track"),
+    "tracking.run": ("Track",),
     "footage.segmentation": ("Extraction",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -1,11 +1,15 @@
 """What is written appears whole or not at all."""
 
 import errno
+import json
 import os
+from threading import Barrier, Thread
 
 import pytest
 
-from posefit.files import new_file, new_folder
+from posefit.files import appear, new_file, new_folder, replaceable, replaced_file
+
+MARK = b"<!-- ours -->"
 
 
 def test_a_folder_appears_when_it_is_whole(tmp_path):
@@ -73,9 +77,136 @@ def test_a_place_that_is_not_there_is_one_line(tmp_path, opened):
             fail()
 
 
-def test_what_a_killed_run_left_is_not_in_the_way(tmp_path):
+def test_what_a_killed_run_left_is_neither_in_the_way_nor_removed(tmp_path):
     (tmp_path / ".out.partial").mkdir()
     (tmp_path / ".out.partial" / "old").write_text("old")
     with new_folder(tmp_path / "out") as folder:
         (folder / "new").write_text("new")
     assert [one.name for one in (tmp_path / "out").iterdir()] == ["new"]
+    assert (tmp_path / ".out.partial" / "old").read_text() == "old"
+
+
+def planted(folder):
+    """Return somebody's file, to which links lead from every name that could once be guessed."""
+    theirs = folder / "theirs"
+    theirs.write_text("theirs")
+    for name in (".out.partial", ".out.partial.html", ".out.html.partial", ".out.html"):
+        (folder / name).symlink_to(theirs)
+    return theirs
+
+
+@pytest.mark.parametrize("opened", [new_file, lambda path: replaced_file(path, MARK)], ids=["new", "replaced"])
+@pytest.mark.parametrize("fails", [False, True])
+def test_no_link_is_followed_and_none_removed(tmp_path, opened, fails):
+    theirs = planted(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    try:
+        with opened(tmp_path / "out.html") as building:
+            assert not building.is_symlink()
+            building.write_text("mine")
+            if fails:
+                raise RuntimeError
+    except RuntimeError:
+        pass
+    assert theirs.read_text() == "theirs"
+    assert sorted(tmp_path.iterdir()) == sorted([*before, *([] if fails else [tmp_path / "out.html"])])
+    assert all((tmp_path / name).is_symlink() for name in (".out.partial", ".out.html"))
+
+
+@pytest.mark.parametrize("opened", [new_folder, new_file, lambda path: replaced_file(path, MARK)])
+def test_a_link_at_the_name_itself_is_something_that_exists(tmp_path, opened):
+    (tmp_path / "theirs").write_bytes(MARK)
+    (tmp_path / "out").symlink_to(tmp_path / "theirs")
+    (tmp_path / "dangling").symlink_to(tmp_path / "nothing")
+    for name in ("out", "dangling"):
+        with pytest.raises(ValueError, match="expected a new name"), opened(tmp_path / name):
+            pass
+    assert not (tmp_path / "nothing").exists()
+
+
+@pytest.mark.parametrize("opened", [new_folder, new_file])
+def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, opened):
+    def write(path, text):
+        (path / "a" if path.is_dir() else path).write_text(text)
+
+    def both():
+        with opened(tmp_path / "out") as late:
+            write(late, "late")
+            with opened(tmp_path / "out") as early:
+                assert early != late
+                write(early, "early")
+
+    with pytest.raises(ValueError, match="out: expected a new name to write to, got one that exists"):
+        both()
+    found = tmp_path / "out"
+    assert (found / "a" if found.is_dir() else found).read_text() == "early"
+    assert list(tmp_path.iterdir()) == [found]
+
+
+def test_a_new_file_needs_no_hard_links(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", refuse)
+    with new_file(tmp_path / "out") as building:
+        building.write_text("a")
+    assert (tmp_path / "out").read_text() == "a"
+    with pytest.raises(ValueError, match="got one that exists"), new_file(tmp_path / "late") as building:
+        (tmp_path / "late").write_text("early")
+    assert (tmp_path / "late").read_text() == "early"
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["late", "out"]
+
+
+def test_only_a_file_that_carries_the_mark_is_replaced(tmp_path):
+    path = tmp_path / "out.html"
+    for text in (b"one", b"two"):
+        with replaced_file(path, MARK) as building:
+            building.write_bytes(MARK + text)
+    assert path.read_bytes() == MARK + b"two"
+    assert replaceable(path, MARK)
+    assert not replaceable(tmp_path, MARK)
+    path.write_text("a letter")
+    wanted = r"out.html: expected a new name or an earlier file of this kind"
+    with pytest.raises(ValueError, match=wanted), replaced_file(path, MARK):
+        pass
+    assert path.read_text() == "a letter"
+
+
+def test_what_was_there_stays_where_its_replacement_fails(tmp_path):
+    path = tmp_path / "out.html"
+    path.write_bytes(MARK)
+
+    def fail():
+        with replaced_file(path, MARK) as building:
+            building.write_text("half")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(ValueError, match="got No space left on device"):
+        fail()
+    assert path.read_bytes() == MARK
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_of_many_that_make_a_file_appear_exactly_one_did(tmp_path):
+    start, did = Barrier(8), []
+
+    def work(k):
+        start.wait()
+        for name in range(50):
+            if appear(tmp_path / str(name), {"by": k}):
+                did.append((name, k))
+
+    threads = [Thread(target=work, args=(k,)) for k in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(name for name, _ in did) == list(range(50))
+    assert all(json.loads((tmp_path / str(name)).read_text()) == {"by": k} for name, k in did)
+    assert len(list(tmp_path.iterdir())) == 50
+
+
+def test_bytes_appear_as_they_are(tmp_path):
+    assert appear(tmp_path / "a", b"\x00\x01")
+    assert not appear(tmp_path / "a", b"other")
+    assert (tmp_path / "a").read_bytes() == b"\x00\x01"

@@ -21,15 +21,15 @@ __all__ = list(_HOME)
 
 register(
     id="posefit/Fit-v0",
-    entry_point="posefit_envs.fit:Fit",
-    vector_entry_point="posefit_envs.fit_vector:FitVector",
+    entry_point="posefit_envs.fit:FitEnv",
+    vector_entry_point="posefit_envs.fit_vector:FitVectorEnv",
 )
 register(
     id="posefit/Track-v0",
-    entry_point="posefit_envs.track:Track",
-    vector_entry_point="posefit_envs.track_vector:TrackVector",
+    entry_point="posefit_envs.track:TrackEnv",
+    vector_entry_point="posefit_envs.track_vector:TrackVectorEnv",
 )
-register(id="posefit/Configure-v0", entry_point="posefit_envs.configure:Configure")
+register(id="posefit/Configure-v0", entry_point="posefit_envs.configure:ConfigureEnv")
 
 
 def __getattr__(name: str) -> Any:

@@ -8,9 +8,9 @@ from gymnasium import error, spaces
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit_envs.drawing import MODES, Screen, check_mode, draw
+from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import Episode
-from posefit_envs.instance import Arguments, measured, select
+from posefit_envs.instance import Arguments, errors_in_degrees, select
 from posefit_envs.search import Doorkeeper
 from posefit_swarm.flock import Flock, speed_limits
 
@@ -23,7 +23,7 @@ SPREAD = (0.0, 0.3)  # the third: standard deviations in half-ranges of the box
 State = NDArray[np.float32]
 
 
-class Configure(gym.Env[State, Any]):
+class ConfigureEnv(gym.Env[State, Any]):
     """
     ## Description
     A swarm searches for the pose in one silhouette. Each step is one iteration of the swarm, and the action sets how it
@@ -70,7 +70,8 @@ class Configure(gym.Env[State, Any]):
     As in `Fit-v0`, with `particles=40` and `iterations=60` instead of `target_cost` and `max_evaluations`.
 
     ## Version History
-    - v0: first version.
+    - v0: first version. In posefit 0.2 instances changed: number n is now the motion, speed, phase and view of instance n
+      of a sweep, and 0 the motion as it is; results of earlier ones cannot be compared with those.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
@@ -131,7 +132,7 @@ class Configure(gym.Env[State, Any]):
         search = self._current()
         poses, places = search.problem.decode(search.leader[None])
         label = f"best {search.best:.1f}, {search.used} evaluations"
-        picture = draw(search.episode.scenery, poses[0], places[0], label)
+        picture = portray(search.episode.scenery, poses[0], places[0], label)
         return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
 
     def close(self) -> None:
@@ -195,6 +196,6 @@ class _Search:
         return {
             "best_cost": self.best,
             "evaluations": self.used,
-            "error_degrees": float(measured(self.episode.instance.truth, 0, poses)[0]),
+            "error_degrees": float(errors_in_degrees(self.episode.instance.truth, 0, poses)[0]),
             "instance": self.episode.instance.number,
         }

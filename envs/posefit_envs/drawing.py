@@ -25,7 +25,7 @@ def check_mode(mode: str | None) -> None:
         raise error.UnsupportedMode(f"render_mode must be one of {', '.join(MODES)}, got {mode!r}")
 
 
-def draw(scenery: Scenery, pose: Array | None, translation: Array | None, label: str) -> Picture:
+def portray(scenery: Scenery, pose: Array | None, translation: Array | None, label: str) -> Picture:
     """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side."""
     panels = []
     for camera, silhouette in zip(scenery.task.cameras, scenery.observation.silhouettes, strict=True):

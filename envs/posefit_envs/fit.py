@@ -8,15 +8,15 @@ from gymnasium import error, spaces
 
 from posefit import SearchSpace
 from posefit.arrays import Array
-from posefit_envs.drawing import MODES, Screen, check_mode, draw
-from posefit_envs.instance import Arguments, Instance, World, instance, measured, select
-from posefit_envs.search import Doorkeeper, Image, Outcome, look
+from posefit_envs.drawing import MODES, Screen, check_mode, portray
+from posefit_envs.instance import Arguments, Instance, World, errors_in_degrees, instance, select
+from posefit_envs.search import Doorkeeper, Evaluated, Image, look
 
 MAX_EVALUATIONS = 200
 TARGET_COST = 2.0
 
 
-class Fit(gym.Env[Image, Any]):
+class FitEnv(gym.Env[Image, Any]):
     """
     ## Description
     A person was seen as a silhouette. Each step proposes a pose; its body is projected, and what does not overlap with
@@ -68,7 +68,8 @@ class Fit(gym.Env[Image, Any]):
     - `target_cost=2.0`, `max_evaluations=200`.
 
     ## Version History
-    - v0: first version.
+    - v0: first version. In posefit 0.2 instances changed: number n is now the motion, speed, phase and view of instance n
+      of a sweep, and 0 the motion as it is; results of earlier ones cannot be compared with those.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
@@ -127,7 +128,7 @@ class Fit(gym.Env[Image, Any]):
         if self.render_mode is None:
             return None
         episode = self._current()
-        picture = draw(episode.scenery, episode.pose, episode.translation, episode.label)
+        picture = portray(episode.scenery, episode.pose, episode.translation, episode.label)
         return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
 
     def close(self) -> None:
@@ -152,7 +153,7 @@ class Episode:
         self.pose: Array | None = None
         self.translation: Array | None = None
 
-    def take(self, outcome: Outcome, row: int) -> dict[str, Any]:
+    def take(self, outcome: Evaluated, row: int) -> dict[str, Any]:
         """Remember a proposal's outcome and return its information."""
         self.cost = float(outcome.costs[row])
         self.best_cost = min(self.best_cost, self.cost)
@@ -162,7 +163,7 @@ class Episode:
             "cost": self.cost,
             "best_cost": self.best_cost,
             "evaluations": self.evaluations,
-            "error_degrees": float(measured(self.instance.truth, 0, self.pose[None])[0]),
+            "error_degrees": float(errors_in_degrees(self.instance.truth, 0, self.pose[None])[0]),
             "areas": outcome.areas[row].copy(),
             "instance": self.instance.number,
         }

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from posefit import PoseProblem, SearchSpace
 from posefit.arrays import Array
 from posefit_envs.batch import mask_of, seeds_of
-from posefit_envs.drawing import MODES, check_mode, draw
+from posefit_envs.drawing import MODES, check_mode, portray
 from posefit_envs.fit import MAX_EVALUATIONS, TARGET_COST, Episode, action_shape, check_budget, spaces_of
-from posefit_envs.instance import Arguments, measured, select
-from posefit_envs.search import Doorkeeper, Image, Outcome, distinct, look
+from posefit_envs.instance import Arguments, errors_in_degrees, select
+from posefit_envs.search import Doorkeeper, Evaluated, Image, distinct, look
 
 Infos = dict[str, Any]
 
 
-class FitVector(VectorEnv[Image, Any, Array]):
-    """`num_envs` environments as `posefit_envs.fit.Fit`, with the same arguments.
+class FitVectorEnv(VectorEnv[Image, Any, Array]):
+    """`num_envs` environments as `posefit_envs.fit.FitEnv`, with the same arguments.
 
     Environments that fit the same instance, as all do where `instance` is given, are one call of the kernel. Seeded
     with s, environment i does what a single one does that is seeded with s + i. The one after an episode's last step
@@ -106,7 +106,7 @@ class FitVector(VectorEnv[Image, Any, Array]):
         self._alike = self._one_instance()
         return self._answer(outcome, stepping, pictures)
 
-    def _look(self, proposals: Array, rows: list[int], pictures: Image) -> Outcome:
+    def _look(self, proposals: Array, rows: list[int], pictures: Image) -> Evaluated:
         """Return the outcomes of some rows, in their order, one kernel call an instance; write their pictures."""
         n, views = self.num_envs, len(self.world.view_degrees)
         poses, places = np.zeros((n, 66)), np.zeros((n, 3))
@@ -116,10 +116,10 @@ class FitVector(VectorEnv[Image, Any, Array]):
             part = look(first.scenery, first.space, proposals[group])
             poses[group], places[group], costs[group] = part.poses, part.translations, part.costs
             areas[group], pictures[group] = part.areas, part.pictures
-        return Outcome(poses, places, costs, areas, pictures)
+        return Evaluated(poses, places, costs, areas, pictures)
 
     def _answer(
-        self, outcome: Outcome, stepping: NDArray[np.bool_], pictures: Image
+        self, outcome: Evaluated, stepping: NDArray[np.bool_], pictures: Image
     ) -> tuple[Image, Array, NDArray[np.bool_], NDArray[np.bool_], Infos]:
         self._used += stepping
         np.minimum(self._best, outcome.costs, out=self._best, where=stepping)
@@ -141,12 +141,11 @@ class FitVector(VectorEnv[Image, Any, Array]):
         infos |= self._numbers(np.ones(self.num_envs, dtype=bool))
         return pictures, np.where(stepping, -outcome.costs, 0.0), terminated, truncated, infos
 
-    def _errors(self, outcome: Outcome) -> Array:
+    def _errors(self, outcome: Evaluated) -> Array:
         if self._alike:
-            return measured(self._episodes[0].instance.truth, 0, outcome.poses)
-        return np.array(
-            [measured(one.instance.truth, 0, outcome.poses[i : i + 1])[0] for i, one in enumerate(self._episodes)]
-        )
+            return errors_in_degrees(self._episodes[0].instance.truth, 0, outcome.poses)
+        truths = [one.instance.truth for one in self._episodes]
+        return np.array([errors_in_degrees(truth, 0, outcome.poses[i : i + 1])[0] for i, truth in enumerate(truths)])
 
     def _generator(self, i: int) -> np.random.Generator:
         mine = self._generators[i]
@@ -177,9 +176,9 @@ class FitVector(VectorEnv[Image, Any, Array]):
         for i, episode in enumerate(self._current()):
             if self._used[i]:
                 label = f"cost {self._last.costs[i]:.1f}, best {self._best[i]:.1f}, {self._used[i]} evaluations"
-                shown.append(draw(episode.scenery, self._last.poses[i], self._last.translations[i], label))
+                shown.append(portray(episode.scenery, self._last.poses[i], self._last.translations[i], label))
             else:
-                shown.append(draw(episode.scenery, None, None, episode.label))
+                shown.append(portray(episode.scenery, None, None, episode.label))
         return tuple(shown)
 
     def _current(self) -> list[Episode]:

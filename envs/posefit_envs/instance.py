@@ -1,4 +1,7 @@
-"""Instances, numbered as in other benchmarks: a number and an environment's arguments are a person and what is seen."""
+"""Instances, numbered as in other benchmarks: a number and an environment's arguments are a person and what is seen.
+
+The motion, its speed and phase, and from where it is seen, are those of a sweep's instance of that number.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,6 +15,7 @@ from posefit import Body, Camera, Motion, Observation, SearchSpace, Silhouette, 
 from posefit.arrays import Array
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
+from posefit.footage.instance import motion_of_instance, variation
 from posefit.footage.source import motion_of
 from posefit.geometry.body import varied
 from posefit.registry import registry
@@ -20,11 +24,10 @@ from posefit.silhouette.cost import project
 from posefit_envs.search import Scenery
 
 RESERVED = {"train": (0, 10_000), "test": (10_000, 20_000)}  # instance numbers; those of the test split are held out
-SALT = 2012  # part of every instance's seed
+SALT = 2012  # part of the seed of what is drawn here for an instance, beside what `posefit.footage.instance` says
 FPS = 30.0
 SIZE = (64, 48)  # pixels
 YAW_DEGREES = 20.0  # how far the middle of the searched yaw is from the truth at most
-SPEED = 0.15  # how far the cadence of a built-in motion is from its own at most
 DISTANCE, HEIGHT = 3.5, 0.9  # metres from camera to person; of the camera above the ground
 
 Views = float | Sequence[float]
@@ -187,13 +190,13 @@ class Instance:
 @lru_cache(maxsize=64)
 def instance(setting: World, number: int, frames: int, evaluations: int) -> Instance:
     """Return an instance: the same person, pose and silhouettes for the same number and arguments, everywhere."""
-    rng = np.random.default_rng([SALT, number])
-    truth = _truth(setting.motion, frames, rng)
+    truth = _truth(setting.motion, number, frames)
+    rng = np.random.default_rng([SALT, number])  # of noise, yaw and build alone: what is seen is a sweep's instance
     body, facing = setting.body, float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
     middle[1] = HEIGHT
     reach = DISTANCE + 0.5 * float(np.ptp(truth.translations[:, [0, 2]], axis=0).max())
-    azimuths = [facing + np.radians(view) for view in setting.view_degrees]
+    azimuths = [facing + np.radians(view) for view in variation(number).views(setting.view_degrees)]
     cameras = [Camera.around(middle, azimuth, reach, setting.size) for azimuth in azimuths]
     noise = dict(setting.noise)
     seen = []
@@ -206,20 +209,16 @@ def instance(setting: World, number: int, frames: int, evaluations: int) -> Inst
     return Instance(number, task, truth, seen)
 
 
-def _truth(name: str, frames: int, rng: np.random.Generator) -> Motion:
+def _truth(name: str, number: int, frames: int) -> Motion:
     from posefit.motion import library
 
-    if name in library.names():
-        speed = 1.0 + float(rng.uniform(-SPEED, SPEED))
-        return library.built_in(name, frames=frames, fps=FPS, speed=speed, phase=float(rng.uniform()))
-    motion = _source(name)
-    if frames > len(motion):
-        raise error.Error(f"frames must be at most {len(motion)}, the length of {name}, got {frames}")
-    start = int(rng.integers(len(motion) - frames + 1))
-    return motion.frames(start, start + frames)
+    try:
+        return motion_of_instance(name if name in library.names() else _source(name), number, frames=frames, fps=FPS)
+    except ValueError as mistake:  # a file that is too short
+        raise error.Error(str(mistake)) from None
 
 
-def measured(truth: Motion, frame: int, poses: Array) -> Array:
+def errors_in_degrees(truth: Motion, frame: int, poses: Array) -> Array:
     """Return the error (n,) in degrees of poses (n, 66) in a frame. SAPSO (8)."""
     from posefit.fitting.metrics import pose_error_degrees
 

@@ -41,7 +41,7 @@ class Scenery:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class Evaluated:
     """What proposals came to, a row each."""
 
     poses: Array  # (n, 66)
@@ -51,13 +51,13 @@ class Outcome:
     pictures: Image  # (n, height, width, 2 views)
 
 
-def look(scenery: Scenery, space: SearchSpace, proposals: Array) -> Outcome:
+def look(scenery: Scenery, space: SearchSpace, proposals: Array) -> Evaluated:
     """Return what proposals (n, d) of one space come to."""
     poses, translations = space.decode(proposals)
     return look_at(scenery, scenery.problem(space), poses, translations)
 
 
-def look_at(scenery: Scenery, problem: PoseProblem, poses: Array, translations: Array) -> Outcome:
+def look_at(scenery: Scenery, problem: PoseProblem, poses: Array, translations: Array) -> Evaluated:
     """Return what poses (n, 66), not aligned yet, come to."""
     task, silhouettes = scenery.task, scenery.observation.silhouettes
     if problem.space.translation == "aligned":
@@ -68,7 +68,7 @@ def look_at(scenery: Scenery, problem: PoseProblem, poses: Array, translations: 
         paint(task.body, camera, silhouette, poses, translations, pixels[..., k], BODY)
         for k, (camera, silhouette) in enumerate(zip(task.cameras, silhouettes, strict=True))
     ]
-    return Outcome(poses, translations, problem.combined(counts), np.stack(counts, axis=1), pixels.view(np.uint8))
+    return Evaluated(poses, translations, problem.combined(counts), np.stack(counts, axis=1), pixels.view(np.uint8))
 
 
 class Doorkeeper:

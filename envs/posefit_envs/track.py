@@ -11,16 +11,16 @@ from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Follower, Prediction
-from posefit_envs.drawing import MODES, Screen, check_mode, draw
+from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import action_shape, check_budget, spaces_of
-from posefit_envs.instance import Arguments, Instance, World, instance, measured, select
-from posefit_envs.search import Doorkeeper, Image, Outcome, Scenery, look, look_at
+from posefit_envs.instance import Arguments, Instance, World, errors_in_degrees, instance, select
+from posefit_envs.search import Doorkeeper, Evaluated, Image, Scenery, look, look_at
 
 FRAMES = 20
 EVALUATIONS = 100  # a frame
 
 
-class Track(gym.Env[Image, Any]):
+class TrackEnv(gym.Env[Image, Any]):
     """
     ## Description
     A person walks by, seen as a silhouette a frame. For each frame some poses may be proposed; the best of them is
@@ -53,7 +53,8 @@ class Track(gym.Env[Image, Any]):
     As in `Fit-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `target_cost` and `max_evaluations`.
 
     ## Version History
-    - v0: first version.
+    - v0: first version. In posefit 0.2 instances changed: number n is now the motion, speed, phase and view of instance n
+      of a sweep, and 0 the motion as it is; results of earlier ones cannot be compared with those.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 30}  # noqa: RUF012, as Gymnasium has it
@@ -77,7 +78,7 @@ class Track(gym.Env[Image, Any]):
         self.action_space, self.observation_space = spaces_of(self.world)  # type: ignore[assignment]
         self._shape = action_shape(self.world)
         self._door = Doorkeeper(self._shape[0])
-        self._course: Course | None = None
+        self._course: TrackEpisode | None = None
         self._screen = Screen(self.metadata["render_fps"])
 
     @property
@@ -89,7 +90,7 @@ class Track(gym.Env[Image, Any]):
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        self._course = Course(self.world, number, self._frames, self._most)
+        self._course = TrackEpisode(self.world, number, self._frames, self._most)
         if self.render_mode == "human":
             self.render()
         return self._course.scenery.picture, {"instance": number, "frame": 0}
@@ -111,20 +112,20 @@ class Track(gym.Env[Image, Any]):
         if self.render_mode is None:
             return None
         course = self._current()
-        picture = draw(course.scenery, course.pose, course.place, course.label)
+        picture = portray(course.scenery, course.pose, course.place, course.label)
         return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
 
     def close(self) -> None:
         """Close the window, if there is one."""
         self._screen.close()
 
-    def _current(self) -> "Course":
+    def _current(self) -> "TrackEpisode":
         if self._course is None:
             raise error.ResetNeeded("reset must come before anything else")
         return self._course
 
 
-class Course:
+class TrackEpisode:
     """The state of one sequence that is followed."""
 
     def __init__(self, world: World, number: int, frames: int, evaluations: int) -> None:
@@ -143,7 +144,7 @@ class Course:
         self.best_cost, self.evaluations = np.inf, 0
         self._best: tuple[Array, Array, Array] | None = None
 
-    def take(self, proposal: Array, outcome: Outcome, row: int) -> tuple[Image, dict[str, Any]]:
+    def take(self, proposal: Array, outcome: Evaluated, row: int) -> tuple[Image, dict[str, Any]]:
         """Remember a proposal's outcome; return the picture to observe and the information."""
         self.cost = float(outcome.costs[row])
         self.pose, self.place = outcome.poses[row], outcome.translations[row]
@@ -154,7 +155,7 @@ class Course:
             "cost": self.cost,
             "best_cost": self.best_cost,
             "evaluations": self.evaluations,
-            "error_degrees": float(measured(self.instance.truth, self.frame, self.pose[None])[0]),
+            "error_degrees": float(errors_in_degrees(self.instance.truth, self.frame, self.pose[None])[0]),
             "areas": outcome.areas[row].copy(),
             "instance": self.instance.number,
         }
@@ -179,7 +180,7 @@ class Course:
             "committed_frame": frame,
             "committed_cost": self.best_cost,
             "committed_pose": self.pose.copy(),
-            "committed_error_degrees": float(measured(truth, frame, self.pose[None])[0]),
+            "committed_error_degrees": float(errors_in_degrees(truth, frame, self.pose[None])[0]),
             "committed_mpjpe_mm": float(metrics.mpjpe_mm(theirs, ours)[0]),
         }
         self._follower.commit(proposal)

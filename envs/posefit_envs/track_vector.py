@@ -12,17 +12,17 @@ from gymnasium.vector.utils import batch_space
 from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit_envs.batch import mask_of, seeds_of
-from posefit_envs.drawing import MODES, check_mode, draw
+from posefit_envs.drawing import MODES, check_mode, portray
 from posefit_envs.fit import action_shape, check_budget, spaces_of
 from posefit_envs.instance import Arguments, select
 from posefit_envs.search import Doorkeeper, Image, distinct, look_at
-from posefit_envs.track import EVALUATIONS, FRAMES, Course
+from posefit_envs.track import EVALUATIONS, FRAMES, TrackEpisode
 
 Infos = dict[str, Any]
 
 
-class TrackVector(VectorEnv[Image, Any, Array]):
-    """`num_envs` environments as `posefit_envs.track.Track`, with the same arguments.
+class TrackVectorEnv(VectorEnv[Image, Any, Array]):
+    """`num_envs` environments as `posefit_envs.track.TrackEnv`, with the same arguments.
 
     Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an episode's last
     one resets, as `AutoresetMode.NEXT_STEP` says.
@@ -62,7 +62,7 @@ class TrackVector(VectorEnv[Image, Any, Array]):
         self._shape = (num_envs, *action_shape(self.world))
         self._door = Doorkeeper(self._shape[1])
         self._generators: list[np.random.Generator | None] = [None] * num_envs
-        self._courses: list[Course] = []
+        self._courses: list[TrackEpisode] = []
         self._steps, self._ended = np.zeros(num_envs, dtype=np.int64), np.zeros(num_envs, dtype=bool)
 
     @property
@@ -119,7 +119,7 @@ class TrackVector(VectorEnv[Image, Any, Array]):
 
     def _begin(self, i: int, options: Mapping[str, Any] | None) -> dict[str, Any]:
         number = self._selection.number(options, lambda: self._generator(i))
-        self._courses[i] = Course(self.world, number, self._frames, self._most)
+        self._courses[i] = TrackEpisode(self.world, number, self._frames, self._most)
         self._steps[i], self._ended[i] = 0, False
         return {"instance": number, "frame": 0}
 
@@ -127,9 +127,9 @@ class TrackVector(VectorEnv[Image, Any, Array]):
         """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
         if self.render_mode is None:
             return None
-        return tuple(draw(one.scenery, one.pose, one.place, one.label) for one in self._current())
+        return tuple(portray(one.scenery, one.pose, one.place, one.label) for one in self._current())
 
-    def _current(self) -> list[Course]:
+    def _current(self) -> list[TrackEpisode]:
         if not self._courses:
             raise error.ResetNeeded("reset must come before anything else")
         return self._courses

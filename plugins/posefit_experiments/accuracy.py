@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from posefit.sweep.plan import Plan
+from posefit.tracking.measures import BASELINES
 from posefit_experiments.clips import clip_path
 from posefit_experiments.grid import Say, check_seeds, rows
 
@@ -14,7 +15,6 @@ SEEDS = 5
 VIEWS = (0.0, 45.0, 90.0)
 FRAMES = 60  # at 30 fps
 WALKS = (("16/16_17", ("16/16_15",)), ("16/16_15", ("02/02_01", "05/05_01")))  # the clip, and what it is trained on
-BASELINES = ("mean_pose", "persistence", "nearest")
 HEADER = (
     "| trained on | test | view | error median | error max | mean pose | first pose held | best training pose "
     "| prior's floor | MPJPE mm | PA-MPJPE mm | IoU | swapped % | lost % |"

@@ -14,11 +14,11 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.space import Translation
-from posefit.footage.source import Rendered, synthetic
+from posefit.footage.scene import Rendered, synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import library
-from posefit.tracking.method import Choice
+from posefit.tracking.method import Choice, prepare
 from posefit.tracking.opening import BODY_FRAMES, built, following
 from posefit_experiments.grid import Progress, each
 from posefit_experiments.known import SIZE, known_task
@@ -92,7 +92,7 @@ def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[floa
     height = true.stature if setup.stature else None
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
     task = known_task(scene, choice, start, setup.translation)
-    shape = built(task, scene.observations, following(choice), BODY_FRAMES, height, seed)
+    shape = built(task, scene.observations, following(prepare(choice, task)), BODY_FRAMES, height, seed)
     if shape is None:
         raise ValueError(f"motion must have frames enough to fit a build to, got {motion}")
     return _off(shape.body, true), _off(start, true)

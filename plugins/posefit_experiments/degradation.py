@@ -31,7 +31,7 @@ def degradation(
 ) -> dict[str, Any]:
     """Return what every kind and strength of damage leaves of a track, and the mean pose's error in degrees."""
     check_seeds(seeds)
-    choice = Choice(optimiser, prior)
+    choice = Choice(optimiser=optimiser, prior=prior)
     keys = list(product(KINDS, STRENGTHS, range(seeds)))
     found = each({key: partial(_errors, choice, *key) for key in keys}, workers, progress)
     scene = known_scene(MOTION, [VIEW])

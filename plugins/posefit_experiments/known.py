@@ -7,7 +7,7 @@ import numpy as np
 from posefit.fitting import metrics
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.footage.source import Scene, synthetic
+from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
 from posefit.motion import library
 from posefit.motion.motion import Motion
@@ -30,7 +30,7 @@ def known_task(scene: Scene, choice: Choice, body: Body, translation: Translatio
 
 def follow_known(task: Task, choice: Choice, observations: Sequence[Observation], seed: int) -> list[Frame]:
     """Return the frames of a track."""
-    return list(prepare(choice, task).tracker.track(observations, np.random.default_rng(seed)))
+    return list(prepare(choice, task).tracker(task).track(observations, np.random.default_rng(seed)))
 
 
 def known_errors(scene: Scene, frames: Sequence[Frame]) -> dict[str, float]:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from posefit.footage.source import FPS, motion_of
+from posefit.footage.masks import FPS
+from posefit.footage.source import motion_of
 from posefit.sweep.plan import Plan
 from posefit_experiments.clips import clip_path
 from posefit_experiments.grid import Say, check_seeds, rows

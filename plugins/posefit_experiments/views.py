@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.tracking.method import Choice
+from posefit.tracking.method import Choice, prepare
 from posefit.tracking.opening import RESTARTS, begun, following
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.known import follow_known, known_errors, known_scene, known_task, mean_pose_degrees
@@ -33,7 +33,7 @@ def views(seeds: int, workers: int | None, progress: Progress | None = None) -> 
 def _errors(motion: str, views_degrees: Sequence[float], seed: int) -> dict[str, float]:
     scene = known_scene(motion, views_degrees)
     task = known_task(scene, CHOICE, scene.body, "aligned")
-    begin = begun(task, scene.observations, following(CHOICE), RESTARTS, seed)
+    begin = begun(task, scene.observations, following(prepare(CHOICE, task)), RESTARTS, seed)
     return known_errors(scene, follow_known(begin, CHOICE, scene.observations, seed))
 
 

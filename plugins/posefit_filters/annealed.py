@@ -9,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.check import at_least, between, positive
-from posefit_filters.weights import sharpness, systematic, weigh
+from posefit_filters.kernels import sharpness, systematic, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10

@@ -6,11 +6,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, jit, writeable
+from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least, positive
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
 from posefit_priors.arrays import load_arrays
-from posefit_priors.pca import CLUSTERS, PCA, QUANTILE, distance
+from posefit_priors.kernels import near_and_bearable, recover_loose
+from posefit_priors.pca import CLUSTERS, PCA, QUANTILE
 
 COMPONENTS = 12
 ARMS_DEGREES = 45.0
@@ -19,35 +20,6 @@ SLACK = 1.5  # how many times as far as chi a pose may be from the nearest clust
 ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
 ROUNDING = 1e-9  # radians by which a joint may pass its limit
 _SHAPES = {"loose": ("k",), "angles_low": ("k",), "angles_high": ("k",), "low": ("d",), "high": ("d",)}
-
-
-@jit
-def recover_loose(latents, components, mean, loose, angles):
-    """Write the joint angles (n, 63) of latents (n, m + k): m components, k loose angles."""
-    m = components.shape[0]
-    for i in range(latents.shape[0]):
-        for j in range(mean.size):
-            angles[i, j] = mean[j]
-        for k in range(m):
-            for j in range(mean.size):
-                angles[i, j] += latents[i, k] * components[k, j]
-        for k in range(loose.size):
-            angles[i, loose[k]] += latents[i, m + k]
-
-
-@jit
-def _bearable(latents, components, mean, loose, low, high, centres, reach):
-    """Return which latents (n, m + k) are near a cluster and bend no loose joint too far."""
-    m = components.shape[0]
-    allowed = np.empty(latents.shape[0], np.bool_)
-    for i in range(latents.shape[0]):
-        allowed[i] = distance(centres, latents[i, :m]) < reach[()]
-        for k in range(loose.size):
-            angle = mean[loose[k]] + latents[i, m + k]
-            for c in range(m):
-                angle += latents[i, c] * components[c, loose[k]]
-            allowed[i] &= (angle >= low[k]) & (angle <= high[k])
-    return allowed
 
 
 class Loose:
@@ -122,7 +94,7 @@ class Loose:
         """Return which latents (n, d) the components allow and the joint limits too (n,)."""
         pca = self._pca
         return np.asarray(
-            _bearable(
+            near_and_bearable(
                 writeable(latents),
                 pca.components,
                 pca.mean,

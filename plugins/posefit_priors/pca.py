@@ -6,10 +6,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, jit, writeable
+from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.kernels import distance, near, recover
 
 COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
@@ -122,36 +123,6 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
     share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
     kept = int(components) if components >= 1 else int(np.searchsorted(share.cumsum(), components)) + 1
     return directions[:kept].copy(), share[:kept].copy()
-
-
-@jit
-def recover(latents, components, mean, angles):
-    for i in range(latents.shape[0]):
-        for j in range(mean.size):
-            angles[i, j] = mean[j]
-        for k in range(components.shape[0]):
-            for j in range(mean.size):
-                angles[i, j] += latents[i, k] * components[k, j]  # SAPSO 2.1.3 recovery
-
-
-@jit
-def distance(centres, latent):
-    """Return D: the mean absolute difference of a latent pose (m,) from the nearest centre."""
-    nearest = np.inf
-    for c in range(centres.shape[0]):
-        total = 0.0
-        for j in range(centres.shape[1]):
-            total += abs(centres[c, j] - latent[j])
-        nearest = min(nearest, total / centres.shape[1])
-    return nearest
-
-
-@jit
-def near(centres, latents, reach):
-    within = np.empty(latents.shape[0], np.bool_)
-    for i in range(latents.shape[0]):
-        within[i] = distance(centres, latents[i]) < reach[()]  # SAPSO 2.2 constraint 2
-    return within
 
 
 def reach_of(centres: Array, latents: Array, quantile: float) -> Array:

@@ -12,11 +12,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, jit, writeable
+from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least, positive
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
-from posefit_priors.pca import check_components, clustered, principal, recover
+from posefit_priors.kernels import mahalanobis, recover
+from posefit_priors.pca import check_components, clustered, principal
 
 COMPONENTS = 0.95  # share of the variance, as the paper asks of its own spaces
 CLUSTERS = 12
@@ -88,7 +89,7 @@ class Union:
         covariances = np.array([np.cov(one.T, bias=True).reshape(whole.shape) for one in shapes])
         covariances += self._breadth * whole + 1e-12 * np.eye(len(whole))
         self.whitening = np.linalg.inv(np.linalg.cholesky(covariances))
-        distances = _distances(self.centres, self.whitening, writeable(latents))
+        distances = mahalanobis(self.centres, self.whitening, writeable(latents))
         self.reach = np.array(np.quantile(distances, self._quantile))
         return self
 
@@ -104,7 +105,7 @@ class Union:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) lie within reach of a cluster (n,)."""
-        return np.asarray(_distances(self.centres, self.whitening, writeable(latents)) <= self.reach)
+        return np.asarray(mahalanobis(self.centres, self.whitening, writeable(latents)) <= self.reach)
 
     def save(self, path: str | Path) -> None:
         """Write the learned space to an .npz file."""
@@ -118,22 +119,3 @@ class Union:
         for name, value in arrays.items():
             setattr(prior, name, value)
         return prior
-
-
-@jit
-def _distances(centres, whitening, latents):
-    """Return the Mahalanobis distance (n,) of latents (n, m) from the cluster that is nearest by it."""
-    m = centres.shape[1]
-    nearest = np.full(latents.shape[0], np.inf)
-    for i in range(latents.shape[0]):
-        for c in range(centres.shape[0]):
-            total = 0.0
-            for j in range(m):
-                part = 0.0
-                for k in range(j + 1):
-                    part += whitening[c, j, k] * (latents[i, k] - centres[c, k])
-                total += part * part
-                if total > nearest[i]:
-                    break
-            nearest[i] = min(nearest[i], total)
-    return np.sqrt(nearest)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space
-from posefit_swarm.swarm import fly, mend, redrawable, settle
+from posefit_swarm.kernels import fly, mend, redrawable, settle
 
 FIRST_REDRAWS = 6  # ours: how many redraws are made at once at first; then all that are left
 
@@ -67,7 +67,7 @@ class Flock:
         stopped[broken] = True
         left, many = self._redraws, FIRST_REDRAWS
         # what no draw could bring back into the box need not be drawn again
-        broken = redrawable(broken, *pull)  # type: ignore[call-arg]
+        broken = redrawable(broken, *pull)
         while left > 0 and len(broken):
             many = min(left, many)
             flown, moved = self._attempt(np.repeat(broken, many), pull)
@@ -102,7 +102,7 @@ class Flock:
         else:
             rand = self._rng.random((2, *shape))
         flown, moved = np.empty(shape), np.empty(shape)
-        fly(rows, rand, *pull, flown, moved)  # type: ignore[call-arg]
+        fly(rows, rand, *pull, flown, moved)
         return flown, moved
 
 

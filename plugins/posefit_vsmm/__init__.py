@@ -9,7 +9,7 @@ from posefit.hooks import RegisterTracker
 
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
-    from posefit_vsmm.joined import joined
+    from posefit_vsmm.joined.tracker import joined
     from posefit_vsmm.tracker import vsmm
 
     register("vsmm", vsmm)

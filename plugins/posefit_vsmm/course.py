@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, final
 
 import numpy as np
 
@@ -11,16 +11,16 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import areas, mismatch
+from posefit_imm import Belief, Measurement, start
+from posefit_vsmm.detection.joints import errors
+from posefit_vsmm.detection.preprocess import Lines, lines_of
+from posefit_vsmm.detection.shown import Shown
 from posefit_vsmm.fresh import Matcher, estimated
-from posefit_vsmm.imm import Belief, Measurement, start
-from posefit_vsmm.joints import errors
 from posefit_vsmm.motion import STIFF
-from posefit_vsmm.points import AT, Figure
-from posefit_vsmm.preprocess import Lines, lines_of
-from posefit_vsmm.shown import Shown
-from posefit_vsmm.sight import Seen, Sight
-from posefit_vsmm.state import ERROR, decode, free_errors
-from posefit_vsmm.structure import Measure, Models, Settings
+from posefit_vsmm.points import AT
+from posefit_vsmm.sight import Figure, Seen, Sight
+from posefit_vsmm.state import ERROR, bone_errors, decode, free_errors
+from posefit_vsmm.structure import Measure, Models, Switching
 
 COAST = 15  # frames that the models go on alone when nothing is seen; then the track is lost
 LOST = 0.35  # IoU: below it, for so many frames, the track is lost
@@ -28,8 +28,13 @@ LOST_FRAMES = 8
 UNSURE = np.repeat([0.05, np.radians(15.0)], [3, ERROR - 3])  # metres and radians: deviations of a fresh estimation
 ASTRAY = 2  # frames: a limb that is not where it is sought, while an end point is nobody's, is sought all around
 ASTRAY_SPREAD = np.radians(15.0)  # deviation that each of its joints then gains a frame
-# which of the nine quaternions a limb's end depends on
-_LIMBS = {"left hand": (4, 5), "right hand": (6, 7), "left foot": (0, 1), "right foot": (2, 3)}
+# the bones whose turns a limb's end depends on
+_LIMBS = {
+    "left hand": ("lhumerus", "lradius"),
+    "right hand": ("rhumerus", "rradius"),
+    "left foot": ("lfemur", "ltibia"),
+    "right foot": ("rfemur", "rtibia"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +60,15 @@ class Searcher(Protocol):
         ...
 
 
+@final
 class Course:
     """One track, as far as it has come; with a `searcher`, every frame ends in a search."""
 
     def __init__(
-        self, task: Task, settings: Settings, rng: np.random.Generator, searcher: Searcher | None = None
+        self, task: Task, switching: Switching, rng: np.random.Generator, searcher: Searcher | None = None
     ) -> None:
-        self._task, self._reliance, self._rng, self._searcher = task, settings.library.reliance, rng, searcher
-        self._models = Models(settings, task.body.skeleton, task.fps)
+        self._task, self._reliance, self._rng, self._searcher = task, switching.library.reliance, rng, searcher
+        self._models = Models(switching, task.body.skeleton, task.fps)
         self._sight = Sight(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), errors())
         self._free = np.maximum(free_errors(task.body.skeleton), STIFF)
         self._latest: Frame | None = task.before[-1] if task.before else None
@@ -147,12 +153,12 @@ class Course:
         """Return the variances (33,) to add for limbs whose ends are not found though an end point is nobody's."""
         extra = np.zeros(ERROR)
         spare = any(one.spare for one in seen if one is not None)
-        for limb, joints in _LIMBS.items():
+        for limb, bones in _LIMBS.items():
             found = any(one.confidence[AT[limb]] > 0.0 for one in seen if one is not None)
             self._astray[limb] = self._astray[limb] + 1 if spare and not found else 0
             if self._astray[limb] >= ASTRAY:
-                for k in joints:
-                    extra[6 + 3 * k : 9 + 3 * k] = ASTRAY_SPREAD**2
+                for bone in bones:
+                    extra[bone_errors(bone)] = ASTRAY_SPREAD**2
         return np.asarray(extra * self._free**2)
 
     def _joints(self, seen: Sequence[Seen | None], expected: Array) -> dict[str, Any]:

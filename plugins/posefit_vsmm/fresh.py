@@ -8,8 +8,9 @@ from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.silhouette.cost import areas, mismatch
-from posefit_vsmm.motion import MotionModel, product
-from posefit_vsmm.state import ERROR, Reliance, decode, encode, free_errors, minus, plus
+from posefit_imm.kernels import minus, plus, product
+from posefit_vsmm.motion import MotionModel
+from posefit_vsmm.state import ERROR, Reliance, decode, encode, free_errors
 
 NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # yaws that are tried where one is about known
 ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)

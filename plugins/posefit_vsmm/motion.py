@@ -2,7 +2,7 @@
 
 A model is X_{k+1} = F X_k + W_k in a frame that turns with the body: its vertical axis is the world's, its heading the
 body's, its origin the root, so that it does not matter where somebody walks to. Lengths are counted in legs. The
-models were fitted by `fit_motion.py`, which says how good they are.
+models were fitted by `fit/motion.py`, which says how good they are.
 """
 
 import json
@@ -13,9 +13,11 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from posefit.arrays import Array, jit
+from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
+from posefit_imm.kernels import product
+from posefit_vsmm import kernels
 from posefit_vsmm.state import Reliance, free_errors
 
 FPS = 30.0  # the rate that the models were fitted at (Reading V6)
@@ -25,7 +27,7 @@ Shrink = Literal["identity", "zero"]  # what ridge regression draws F towards (R
 
 @dataclass(frozen=True, eq=False)
 class MotionModel:
-    """One model, for a body and a frame rate; a `posefit_vsmm.imm.Model`."""
+    """One model, for a body and a frame rate; a `posefit_imm.Model`."""
 
     name: str
     matrix: Array = field(repr=False)  # (43, 40) F less the identity, of the quaternions
@@ -42,7 +44,7 @@ class MotionModel:
 
     def step(self, state: Array) -> tuple[Array, Array]:
         """Return the state (43,) one frame later, and the Jacobian (33, 33) of its error by the error before."""
-        moved, jacobian = _step(self.matrix, self.offset, self.share, self.leg, state)
+        moved, jacobian = kernels.step(self.matrix, self.offset, self.share, self.leg, state)
         return moved, jacobian
 
     def nearest(self, state: Array) -> Array:
@@ -108,86 +110,5 @@ def headed(quaternions: Array) -> tuple[Array, Array]:
 
     The heading is the part of the first one that turns about the vertical.
     """
-    back, found, _ = _headed(quaternions)
+    back, found, _ = kernels.headed(quaternions)
     return back, found
-
-
-@jit
-def product(first, second):
-    """Return the product (4,) of two quaternions (4,)."""
-    a, b, c, d = first
-    e, f, g, h = second
-    return np.array(
-        [
-            a * e - b * f - c * g - d * h,
-            a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f,
-            a * h + b * g - c * f + d * e,
-        ]
-    )
-
-
-@jit
-def _headed(quaternions):
-    back = np.array([quaternions[0, 0], 0.0, quaternions[0, 2], 0.0])
-    size = np.sqrt(back[0] ** 2 + back[2] ** 2)
-    if size > 1e-9:
-        back /= size
-    else:
-        back[0], back[2] = 1.0, 0.0
-    found, signs = quaternions.copy(), np.ones(len(quaternions))
-    found[0] = product(np.array([back[0], 0.0, -back[2], 0.0]), found[0])
-    for j in range(len(found)):
-        if found[j, 0] < 0.0:
-            signs[j] = -1.0
-            found[j] *= -1.0
-    return back, found, signs
-
-
-@jit
-def _tangents(quaternions):
-    """Return the change (4 n, 3 n) of quaternions (n, 4) by small rotations on their right."""
-    n = len(quaternions)
-    change = np.zeros((4 * n, 3 * n))
-    for j in range(n):
-        w, x, y, z = 0.5 * quaternions[j]
-        r, c = 4 * j, 3 * j
-        change[r, c], change[r, c + 1], change[r, c + 2] = -x, -y, -z
-        change[r + 1, c], change[r + 1, c + 1], change[r + 1, c + 2] = w, -z, y
-        change[r + 2, c], change[r + 2, c + 1], change[r + 2, c + 2] = z, w, -x
-        change[r + 3, c], change[r + 3, c + 1], change[r + 3, c + 2] = -y, x, w
-    return change
-
-
-@jit
-def _step(matrix, offset, share, leg, state):
-    back, before, signs = _headed(state[3:].copy().reshape(-1, 4))
-    change = share * (matrix @ before.ravel() + offset)
-    n = len(before)
-    sine, cosine = 2.0 * back[0] * back[2], back[0] ** 2 - back[2] ** 2
-    turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
-    after = before + change[3:].copy().reshape(n, 4)
-    sizes = np.empty(n)
-    for j in range(n):
-        sizes[j] = np.sqrt((after[j] ** 2).sum())
-        after[j] /= sizes[j]
-    moved = np.empty(state.size)
-    gone = leg * (turn @ change[:3].copy())
-    moved[:3] = state[:3] + gone
-    for j in range(n):
-        moved[3 + 4 * j : 7 + 4 * j] = signs[j] * (product(back, after[0]) if j == 0 else after[j])
-    w, x, _, z = before[0]
-    by_heading = np.array([z / w, 1.0, -x / w])  # how the heading turns with an error of the whole body
-    flow = _tangents(before)
-    flow[:4, :3] -= 0.5 * np.outer(np.array([0.0, z, w, -x]), by_heading)  # what is headed has no part of it
-    change_flow = share * (matrix @ flow)  # (43, 30)
-    flow += change_flow[3:]
-    for j in range(n):
-        flow[4 * j : 4 * j + 4] /= sizes[j]
-    w, x, y, z = after[0]
-    flow[:4, :3] += 0.5 * np.outer(np.array([-y, z, w, -x]), by_heading)
-    jacobian = np.eye(3 + 3 * n)
-    jacobian[:3, 3:] = leg * (turn @ change_flow[:3].copy())
-    jacobian[:3, 3:6] += np.outer(np.array([gone[2], 0.0, -gone[0]]), by_heading)
-    jacobian[3:, 3:] = 4.0 * (_tangents(after).T.copy() @ flow)
-    return moved, jacobian

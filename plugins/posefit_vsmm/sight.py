@@ -1,4 +1,9 @@
-"""What cameras measure of a state: the rules' joints, against where the state's points are seen. VSMM 6.1."""
+"""What cameras measure of a state: the rules' joints, against where the state's points are seen. VSMM 6.1.
+
+How far off a detected joint is, is counted in the standard deviations of its prediction and its detection together:
+the squared Mahalanobis distance, known as the normalised innovation squared (NIS). A validation gate on it decides
+which detections are believed, and its mean over a frame says how surprising that frame was.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -8,17 +13,18 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import BONES
-from posefit_vsmm.imm import Measurement
-from posefit_vsmm.joints import OWN, Errors, detected
+from posefit.geometry.skeleton import BONES, Skeleton
+from posefit_imm import Measurement
+from posefit_vsmm.detection.joints import OWN, Errors, detected
+from posefit_vsmm.detection.preprocess import Lines
+from posefit_vsmm.kernels import points_and_jacobian
 from posefit_vsmm.motion import leg_of
-from posefit_vsmm.points import NEAREST, Figure
-from posefit_vsmm.preprocess import Lines
-from posefit_vsmm.state import ERROR
+from posefit_vsmm.state import ERROR, Reliance
 
+NEAREST = 0.05  # metres: what is nearer to the camera than that is taken to be so far away
 NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected
 DEVIATIONS = 3.0  # between these, so many standard deviations
-SURPRISE = 16.0  # squared standard deviations in the image: what is farther off is not believed
+SURPRISE = 16.0  # the Mahalanobis gate, squared standard deviations in the image: what is farther off is not believed
 LEAST = 0.05  # confidence that is counted as such
 KNOWN = 0.002  # metres: the deviation of a translation that is known
 
@@ -29,6 +35,30 @@ def head_radius(body: Body) -> float:
 
 
 @dataclass(frozen=True, eq=False)
+class Figure:
+    """A skeleton as its states move it."""
+
+    skeleton: Skeleton
+    reliance: Reliance = field(repr=False)
+
+    def points(self, state: Array) -> tuple[Array, Array]:
+        """Return the points (17, 3) in metres of a state (43,), and their Jacobian (17, 3, 33) by its error."""
+        found, jacobian = points_and_jacobian(self.skeleton.chain, state, self.reliance.matrix, self.reliance.offset)
+        return found, jacobian
+
+    def seen(self, camera: Camera, state: Array) -> tuple[Array, Array]:
+        """Return where a camera sees the points (17, 2) of a state, in pixels, and their Jacobian (17, 2, 33)."""
+        points, jacobian = self.points(state)
+        inside = points @ camera.rotation.T + camera.translation
+        depths = np.maximum(inside[:, 2], NEAREST)
+        pixels = inside[:, :2] / depths[:, None] * camera.focal + camera.centre
+        moving = camera.rotation @ jacobian  # (17, 3, 33)
+        ratio = (inside[:, :2] / depths[:, None])[:, :, None]
+        by_error = camera.focal[None, :, None] / depths[:, None, None] * (moving[:, :2] - ratio * moving[:, 2:])
+        return pixels, by_error
+
+
+@dataclass(frozen=True, eq=False)
 class Seen:
     """What one camera measured."""
 
@@ -36,7 +66,8 @@ class Seen:
     confidence: Array  # (17,); 0 is hidden
     variances: Array = field(repr=False)  # (17, 2) square pixels
     spare: int  # end points of the skeleton line that belong to none of them
-    surprise: float  # mean squared standard deviations of the points that the rules found by themselves
+    # mean squared standard deviations a coordinate (NIS / 2) of the points that the rules found by themselves
+    surprise: float
 
 
 @dataclass(frozen=True, eq=False)

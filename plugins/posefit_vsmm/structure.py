@@ -1,19 +1,18 @@
 """Which models are in force, cycle by cycle: the variable structure. VSMM steps 5 to 9."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, get_args
+from typing import Literal, final, get_args
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import Skeleton
+from posefit_imm import IMM, PLACED, Belief, Measurement
 from posefit_vsmm.groups import Topology
-from posefit_vsmm.imm import IMM, Belief, Measurement
 from posefit_vsmm.motion import Library
-from posefit_vsmm.state import MANIFOLD
-from posefit_vsmm.switching import Contest, New, Rules, enlarged, joined, restricted
+from posefit_vsmm.switching import New, Rivalry, Rules, SequentialTest, enlarged, enlarged_literally, restricted
 
 FIRST = 10  # cycles over all models before a group is chosen
 RECENT = 5  # frames: where the median of their surprise is larger than SURPRISED, the group is chosen anew
@@ -23,8 +22,8 @@ Structure = Literal["variable", "all"]
 Measure = Callable[[Array], Measurement]
 
 
-@dataclass(frozen=True, eq=False)
-class Settings:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Switching:
     """The models, their groups and how they switch."""
 
     library: Library
@@ -32,7 +31,7 @@ class Settings:
     structure: Structure
     rules: Rules
     new: New
-    contest: Contest  # a blank one
+    test: SequentialTest
 
     def __post_init__(self) -> None:
         for name, choices in (("structure", Structure), ("new", New)):
@@ -40,13 +39,14 @@ class Settings:
                 raise ValueError(f"{name} must be one of {', '.join(get_args(choices))}, got {getattr(self, name)!r}")
 
 
+@final
 class Models:
     """The models in force; at first all of them."""
 
-    def __init__(self, settings: Settings, skeleton: Skeleton, fps: float) -> None:
-        self._how, self._topology, self.groups = settings, settings.topology, settings.topology.groups
+    def __init__(self, how: Switching, skeleton: Skeleton, fps: float) -> None:
+        self._how, self._topology, self.groups = how, how.topology, how.topology.groups
         self.every = self._topology.union(self._topology.groups)
-        self.known = {name: settings.library.models[name].fitted_to(skeleton, fps) for name in self.every}
+        self.known = {name: how.library.models[name].fitted_to(skeleton, fps) for name in self.every}
         self._made = lru_cache(self._make)
         self.restart()
 
@@ -55,13 +55,13 @@ class Models:
         self.active = self.every
         self.group: str | None = None
         self.newcomer: str | None = None
-        self._contest = self._how.contest
+        self._rivalry: Rivalry | None = None  # of the group and the newcomer
         self._cycles = self._rested = 0
         self._drawn: list[Array] = []
         self._surprises: list[float] = []
 
     def _make(self, names: tuple[str, ...]) -> IMM:
-        return IMM([self.known[name] for name in names], self._topology.transition(names), MANIFOLD)
+        return IMM([self.known[name] for name in names], self._topology.transition(names), PLACED)
 
     @property
     def imm(self) -> IMM:
@@ -80,8 +80,8 @@ class Models:
             if self._cycles < FIRST:
                 return after
             return self._keep(self._topology.most_probable(self.active, after.probabilities), after)  # VSMM 5
-        if self.newcomer is not None:
-            decision = self._contest.decide(after, self.active)
+        if self.newcomer is not None and self._rivalry is not None:
+            decision = self._rivalry.decide(after, self.active)
             if decision is None:
                 return after
             return self._keep(self.newcomer if decision == "new" else self.group, after)
@@ -110,18 +110,19 @@ class Models:
             return after
         old, imm = self.active, self.imm
         self.newcomer, self.active = names[asked], self._topology.union((self.group, names[asked]))  # VSMM 8.4
-        self._contest = replace(self._how.contest, old=groups[self.group], new=groups[self.newcomer])
+        self._rivalry = Rivalry(self._how.test, old=groups[self.group], new=groups[self.newcomer])
         if self._how.new == "rerun":
             state, spread = imm.fused(before)
             return self.imm.cycle(enlarged(before, old, self.active, state, spread), measure)
         state, _ = imm.fused(after)
         new = [self.known[name] for name in self.active if name not in old]
         starts = {model.name: model.nearest(state) for model in new}
-        return joined(after, old, self.active, starts, {model.name: model.noise for model in new})
+        return enlarged_literally(after, old, self.active, starts, {model.name: model.noise for model in new})
 
     def _keep(self, group: str, belief: Belief) -> Belief:
         """Let one group alone go on."""
         kept: Sequence[str] = self._topology.groups[group]
         left = restricted(belief, self.active, kept)
         self.active, self.group, self.newcomer, self._rested = tuple(kept), group, None, 0
+        self._rivalry = None
         return left

@@ -5,13 +5,13 @@ Groups are numbered as in their file: the rules speak of the first, the second a
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, final, get_args
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
-from posefit_vsmm.imm import Belief
+from posefit_imm import Belief
 from posefit_vsmm.points import AT
 
 _LIMBS = np.array(
@@ -30,7 +30,7 @@ New = Literal["rerun", "patent"]
 Test = Literal["sequential", "patent"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Rules:
     """Step 7. Reading V10: `smoothing` frames a mean, changes below `floor_degrees` a frame, and `dwell` frames.
 
@@ -91,7 +91,7 @@ def enlarged(belief: Belief, old: Sequence[str], union: Sequence[str], fused: Ar
     )
 
 
-def joined(
+def enlarged_literally(
     belief: Belief, old: Sequence[str], union: Sequence[str], poses: dict[str, Array], noise: dict[str, Array]
 ) -> Belief:
     """Return a belief over more models as the patent has it: the new ones start from their own best pose."""
@@ -124,23 +124,19 @@ def restricted(belief: Belief, models: Sequence[str], kept: Sequence[str]) -> Be
     )
 
 
-@dataclass
-class Contest:
-    """Step 9: an old group of models against a new one, until one of them has to go.
+@dataclass(frozen=True, kw_only=True)
+class SequentialTest:
+    """How step 9 decides between an old group of models and a new one.
 
-    `sequential` is Wald's test on the likelihood ratio since the new group came, with error rates `false_alarm`, his
-    alpha, and `miss`, his beta; `patent` looks at the latest frame alone (Reading V12). After `longest` frames the more
-    probable group stays.
+    `sequential` is Wald's sequential probability ratio test on the likelihoods since the new group came, with error
+    rates `false_alarm`, his alpha, and `miss`, his beta; `patent` looks at the latest frame alone (Reading V12). After
+    `longest` frames the more probable group stays.
     """
 
-    old: Sequence[str]
-    new: Sequence[str]
     test: Test = "sequential"
     false_alarm: float = 0.01
     miss: float = 0.01
     longest: int = 45
-    evidence: float = 0.0
-    frames: int = 0
 
     def __post_init__(self) -> None:
         if self.test not in get_args(Test):
@@ -151,25 +147,36 @@ class Contest:
         if self.longest < 1:
             raise ValueError(f"longest must be at least 1, got {self.longest}")
 
+
+@final
+class Rivalry:
+    """An old group of models against a new one, as far as it has come, until one of them has to go."""
+
+    def __init__(self, how: SequentialTest, *, old: Sequence[str], new: Sequence[str]) -> None:
+        self._how, self._old, self._new = how, old, new
+        self._evidence = 0.0  # log of the likelihood ratio, new to old
+        self._frames = 0
+
     def decide(self, belief: Belief, models: Sequence[str]) -> Literal["old", "new"] | None:
         """Return which group stays, after a cycle over both; None while both do."""
-        old, new = ([models.index(name) for name in group] for group in (self.old, self.new))
+        how = self._how
+        old, new = ([models.index(name) for name in group] for group in (self._old, self._new))
         after = belief.log_probabilities
         before = after - belief.log_likelihoods
         odds = float(np.logaddexp.reduce(after[new]) - np.logaddexp.reduce(after[old]))
         ratio = odds - float(
             np.logaddexp.reduce(before[new]) - np.logaddexp.reduce(before[old])
         )  # of the groups' likelihoods
-        self.frames += 1
-        self.evidence += ratio
-        if self.test == "patent":
+        self._frames += 1
+        self._evidence += ratio
+        if how.test == "patent":
             if min(odds, ratio) < np.log(0.9):  # VSMM 9
                 return "old"
             return "new" if min(odds, ratio) > 0.0 else None
-        if self.evidence >= np.log((1.0 - self.miss) / self.false_alarm):
+        if self._evidence >= np.log((1.0 - how.miss) / how.false_alarm):
             return "new"
-        if self.evidence <= np.log(self.miss / (1.0 - self.false_alarm)):
+        if self._evidence <= np.log(how.miss / (1.0 - how.false_alarm)):
             return "old"
-        if self.frames >= self.longest:
+        if self._frames >= how.longest:
             return "new" if odds > 0.0 else "old"
         return None

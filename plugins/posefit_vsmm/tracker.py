@@ -10,8 +10,8 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit_vsmm.course import Course
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.motion import Shrink, library
-from posefit_vsmm.structure import Settings, Structure
-from posefit_vsmm.switching import Contest, New, Rules, Test
+from posefit_vsmm.structure import Structure, Switching
+from posefit_vsmm.switching import New, Rules, SequentialTest, Test
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,11 +19,11 @@ class VSMM:
     """Follows a person by the joints that rules find in a silhouette, with the motion models of one group at a time."""
 
     task: Task
-    settings: Settings = field(repr=False)
+    switching: Switching = field(repr=False)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; its `details` tell models, probabilities, group and joints."""
-        course = Course(self.task, self.settings, rng)
+        course = Course(self.task, self.switching, rng)
         for observation in observations:
             yield course.frame(observation)
 
@@ -39,17 +39,35 @@ def vsmm(
     dwell: int = Rules.dwell,
     new: New = "rerun",
     test: Test = "sequential",
-    false_alarm: float = Contest.false_alarm,
-    miss: float = Contest.miss,
-    longest: int = Contest.longest,
+    false_alarm: float = SequentialTest.false_alarm,
+    miss: float = SequentialTest.miss,
+    longest: int = SequentialTest.longest,
 ) -> VSMM:
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
-    `structure` "all" is a plain IMM over all models. `groups` is a TOML file of groups, by default the package's.
-    `shrink` is Reading V5; `smoothing`, `floor_degrees` and `dwell` are V10; `new` is V11; `test`, `false_alarm`,
-    `miss` and `longest` are V12. The patent's own form: smoothing=1 floor_degrees=0 dwell=0 new=patent test=patent.
+    The patent's own form: smoothing=1 floor_degrees=0 dwell=0 new=patent test=patent.
+
+    Settings:
+        structure: "variable", one group at a time and two while it changes; "all" models always, a plain IMM.
+        groups: path of a TOML file of groups and neighbours; "" is the package's own. Step 4, Reading V1.
+        shrink: what ridge regression drew the models' F towards, "identity" or "zero". Reading V5.
+        smoothing: frames over which changes of angles are averaged, 1 or more. Reading V10; 1 in the patent.
+        floor_degrees: a change below it is none, degrees a frame, 0 or more. Reading V10; 0 in the patent.
+        dwell: frames that a group stays at least, 0 or more. Reading V10; 0 in the patent.
+        new: how a new group's models start: "rerun" of the cycle over all, or as the "patent" has it. Reading V11.
+        test: which group has to go: Wald's "sequential" probability ratio test, or the "patent"'s. Reading V12.
+        false_alarm (alpha): share of wrong groups that the sequential test keeps, between 0 and 0.5. Reading V12.
+        miss (beta): share of right groups that the sequential test drops, between 0 and 0.5. Reading V12.
+        longest: frames after which the more probable group stays, 1 or more. Reading V12.
     """
     carried = library(shrink)
     topology = read_topology(Path(groups) if groups else None, carried.names)
-    contest = Contest((), (), test, false_alarm, miss, longest)
-    return VSMM(task, Settings(carried, topology, structure, Rules(smoothing, floor_degrees, dwell), new, contest))
+    switching = Switching(
+        library=carried,
+        topology=topology,
+        structure=structure,
+        rules=Rules(smoothing=smoothing, floor_degrees=floor_degrees, dwell=dwell),
+        new=new,
+        test=SequentialTest(test=test, false_alarm=false_alarm, miss=miss, longest=longest),
+    )
+    return VSMM(task, switching)

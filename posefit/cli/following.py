@@ -22,7 +22,7 @@ def track(as_json: bool, **options: Any) -> None:
 
     A built-in motion, an .amc or .bvh file, a folder or .npz of masks, a video; or what several cameras saw.
     """
-    from posefit.tracking.run import track as run
+    from posefit.tracking.front import track as run
 
     result = run(progress=progress, say=say, **_arguments(options))
     if as_json:
@@ -40,7 +40,7 @@ def track(as_json: bool, **options: Any) -> None:
 @click.option("--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling.")
 def fit(as_json: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE."""
-    from posefit.tracking.run import fit as run
+    from posefit.tracking.front import fit as run
 
     result = run(say=say, **_arguments(options))
     if as_json:
@@ -86,8 +86,8 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     that an optimiser and a prior are driven by.
     """
     from posefit.footage.segmentation import Extraction
+    from posefit.tracking.front import prior_of
     from posefit.tracking.method import parse_settings
-    from posefit.tracking.run import prior_of
 
     context = click.get_current_context()
     for name in ("optimiser", "prior"):

@@ -36,20 +36,21 @@ def doctor(context: click.Context) -> None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the same is said below
-        lines, well = diagnosis(registry(), installed())
+        lines, well = diagnosis(registry(), installed(_own(context)))
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 
 
 @plugins.command()
 @click.argument("name")
-@click.option("--kind", default="optimiser", show_default=True, help="optimiser, prior or tracker.")
+@click.option("--kind", default="optimiser", show_default=True, help="optimiser, prior, tracker or command.")
 @click.option("--out", metavar="DIR", help="The new folder; by default posefit-NAME.")
-def new(name: str, kind: Any, out: str | None) -> None:
+@click.pass_context
+def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> None:
     """Write a small plugin to start from: it installs, works and has a test that passes."""
     from posefit.cli.template import new as write
 
-    folder = write(name, kind, out)
+    folder = write(name, kind, out, _own(context))
     click.echo(f"written to {folder}; next: cd {folder} && python -m pip install -e '.[test]' && python -m pytest")
 
 
@@ -70,3 +71,9 @@ def check(context: click.Context, kind: Any, name: str, settings: tuple[str, ...
     else:
         click.echo(str(report))
     context.exit(0 if report else 1)
+
+
+def _own(context: click.Context) -> tuple[str, ...]:
+    """Return the names of posefit's own commands."""
+    root = context.find_root().command
+    return tuple(root.commands) if isinstance(root, click.Group) else ()

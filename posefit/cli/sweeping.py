@@ -32,13 +32,13 @@ def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, 
         if as_json:
             click.echo(json.dumps(found))
             return
-        for line in command.listed(found):
+        for line in command.preview_lines(found):
             click.echo(line)
         return
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
-    tally, status = command.sweep(plan, out, limits=limits, say=say, **where)
-    click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.told(tally, out))
+    tally, status = command.run_plan(plan, out, limits=limits, say=say, **where)
+    click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
     context.exit(status)
 
 
@@ -54,9 +54,8 @@ def report(ledger: str, out: str, as_json: bool, **others: Any) -> None:
 
     It may be written while the sweep goes on, of the cells that are done.
     """
-    from posefit.report.write import report as run
-    from posefit.report.write import told
+    from posefit.report.write import leaderboard_lines, write_report
 
-    found = run(ledger, out, say=say, **others)
-    for line in [json.dumps(found)] if as_json else told(found):
+    found = write_report(ledger, out, say=say, **others)
+    for line in [json.dumps(found)] if as_json else leaderboard_lines(found):
         click.echo(line)

@@ -1,52 +1,64 @@
 """A new plugin to start from: a small package that installs, works and has a test that passes."""
 
 import re
-import shutil
-import tempfile
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from typing import Literal
 
+from posefit.commands import GROUP, installed
+from posefit.entries import PROJECT
+from posefit.files import new_folder
 from posefit.registry import KINDS, Kind, registry
 
+COMMAND: Literal["command"] = "command"  # a kind of plugin that registers no method
 
-def new(name: str, kind: Kind, folder: str | Path | None = None) -> Path:
+
+def new(name: str, kind: Kind | Literal["command"], folder: str | Path | None = None, own: Sequence[str] = ()) -> Path:
     """Return the new folder with a small installable plugin, `posefit-NAME` unless another is given.
 
-    Raises ValueError where the name cannot be a plugin's, or the folder is there already.
+    `own` are the names of posefit's own commands, which a new one cannot have. Raises ValueError where the name cannot
+    be a plugin's, or the folder is there already.
     """
-    if kind not in KINDS:
-        raise ValueError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
+    if kind not in (*KINDS, COMMAND):
+        raise ValueError(f"kind must be one of {', '.join((*KINDS, COMMAND))}, got {kind!r}")
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise ValueError(f"name must be small letters, digits, - and _, and begin with a letter, got {name!r}")
-    if name in (known := registry().offers[kind]):
-        raise ValueError(f"name must be a new one, got {name!r}, which {known[name].distribution} registers already")
+    if name in (known := _taken(kind, own)):
+        raise ValueError(f"name must be a new one, got {name!r}, which {known[name]} registers already")
     module = name.replace("-", "_")
+    usage = [f"posefit {name}"]
+    if kind != COMMAND:
+        usage = [f"posefit check {kind} {name}", f"posefit track walk --{kind} {name}"]
     words = {
         "name": name,
         "kind": kind,
         "module": module,
         "dashed": name.replace("_", "-"),
         "class_name": "".join(part.capitalize() for part in module.split("_")),
-        "option": f"{kind} {name}",
+        "group": f'"{GROUP}"' if kind == COMMAND else PROJECT,
+        "usage": "\n".join(usage),
     }
     target = Path(folder or f"posefit-{words['dashed']}")
     if target.exists():
         raise ValueError(f"{target}: expected a new folder, got one that exists")
     target.parent.mkdir(parents=True, exist_ok=True)
-    building = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        for template, name in (
+    with new_folder(target) as building:
+        for template, written in (
             ("pyproject.toml", "pyproject.toml"),
             ("README.md", "README.md"),
             (f"{kind}.py", f"posefit_{module}.py"),
-            ("test.py", f"test_{module}.py"),
+            (f"{COMMAND if kind == COMMAND else 'kit'}_test.py", f"test_{module}.py"),
         ):
             text = (files("posefit") / "templates" / f"{template}.txt").read_text(encoding="utf-8")
-            (building / name).write_text(Template(text).substitute(words), encoding="utf-8")
-        building.chmod(0o755)
-        building.rename(target)
-    except BaseException:
-        shutil.rmtree(building, ignore_errors=True)
-        raise
+            (building / written).write_text(Template(text).substitute(words), encoding="utf-8")
     return target
+
+
+def _taken(kind: Kind | Literal["command"], own: Sequence[str]) -> dict[str, str]:
+    """Return the names that a new plugin cannot have, each with the distribution that has it."""
+    if kind != "command":
+        return {offer.name: offer.distribution for offer in registry().offers[kind].values()}
+    theirs = {str(one.name): plugin.distribution for plugin in installed(tuple(own)) for one in plugin.offers}
+    return dict.fromkeys(own, PROJECT) | theirs

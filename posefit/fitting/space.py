@@ -6,9 +6,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, jit, writeable
+from posefit.arrays import Array, writeable
 from posefit.fitting import box
 from posefit.fitting.box import Space, Start
+from posefit.fitting.kernels import decode, within
 from posefit.fitting.prior import Prior
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
@@ -88,7 +89,7 @@ class SearchSpace:
         n, first = len(proposals), self.dimensions - len(self.prior.low)
         poses, translations = np.empty((n, ANGLES)), np.empty((n, 3))
         latents = np.empty((n, self.dimensions - first))
-        if not _decode(proposals, self.centre, self.half, self.anchor, first, poses, translations, latents):
+        if not decode(proposals, self.centre, self.half, self.anchor, first, poses, translations, latents):
             raise ValueError("proposals must be finite, got nan or infinity")
         poses[:, 3:] = self.prior.inverse_transform(latents)
         return poses, translations
@@ -96,7 +97,7 @@ class SearchSpace:
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, d) lie in the box and mean a pose to the prior (n,). SAPSO 2.2."""
         proposals = writeable(proposals)
-        inside, latents = _inside(proposals, self.centre, self.half, self.dimensions - len(self.prior.low))
+        inside, latents = within(proposals, self.centre, self.half, self.dimensions - len(self.prior.low))
         return np.asarray(inside & self.prior.feasible(latents))
 
     def wrap(self, proposals: Array) -> Array:
@@ -124,31 +125,3 @@ class SearchSpace:
     def moved(self, proposals: Array, origin: Space) -> Array:
         """Return the proposals (n, d), the nearest in the box, that mean here what these mean in `origin`."""
         return self.proposals(origin.centre + origin.half * proposals)
-
-
-@jit
-def _decode(proposals, centre, half, anchor, first, poses, translations, latents):
-    """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite."""
-    total = 0.0
-    for i in range(proposals.shape[0]):
-        for j in range(3):
-            poses[i, j] = centre[j] + half[j] * proposals[i, j]
-            translations[i, j] = centre[3 + j] + half[3 + j] * proposals[i, 3 + j] if first > 3 else anchor[j]
-            total += poses[i, j] + translations[i, j]
-        for j in range(latents.shape[1]):
-            latents[i, j] = centre[first + j] + half[first + j] * proposals[i, first + j]
-            total += latents[i, j]
-    return np.isfinite(total)
-
-
-@jit
-def _inside(proposals, centre, half, first):
-    """Return which proposals (n, d) lie in the box, and the latents of all."""
-    n, d = proposals.shape
-    inside, latents = np.ones(n, np.bool_), np.empty((n, d - first))
-    for i in range(n):
-        for j in range(d):
-            inside[i] &= abs(proposals[i, j]) <= 1.0
-        for j in range(first, d):
-            latents[i, j - first] = centre[j] + half[j] * proposals[i, j]
-    return inside, latents

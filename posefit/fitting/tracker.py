@@ -80,18 +80,25 @@ class Tracker(Protocol):
 TrackerFactory = Callable[..., Tracker]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Prediction:
-    """Where the next frame's pose is sought, and where the search starts. SAPSO (6), (7).
+    """Where the next frame's pose is sought, where the search starts, and what a pose costs. SAPSO (4), (6), (7).
 
-    Readings: `spread` and `floor` (S5), `prediction` from the "latest" step or the "literal" one before it (S12).
+    Settings:
+        spread (k): standard deviations of the start, as multiples of the predicted step. Reading S5.
+        floor: the least they are, in half-ranges of the box, so that a still subject keeps some. Reading S5.
+        prediction: from the "latest" step, or the "literal" one before it. Reading S12.
+        root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones.
+        translation_range: metres that are searched to either side of the last place, where it is searched.
+        beta: what a missed pixel counts, and 1 - beta a spilt one. SAPSO (4).
     """
 
-    root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
-    translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     spread: float = SPREAD
     floor: float = FLOOR
     prediction: Literal["latest", "literal"] = "latest"
+    root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
+    translation_range: tuple[float, float, float] = TRANSLATION_RANGE
+    beta: float = BETA
 
     def __post_init__(self) -> None:
         if not self.floor > 0.0:
@@ -172,7 +179,6 @@ class SynthesisTracker:
     make: Callable[[Space, np.random.Generator], Optimiser]
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)
-    beta: float = BETA
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
@@ -188,7 +194,7 @@ class SynthesisTracker:
                 continue
             optimiser = self._ready(optimiser, space, rng)
             problem = PoseProblem(
-                task.body, task.cameras, observation.silhouettes, space, beta=self.beta, threads=task.threads
+                task.body, task.cameras, observation.silhouettes, space, beta=self.prediction.beta, threads=task.threads
             )
             best = minimise(problem.evaluate, optimiser, task.evaluations)
             follower.commit(best.proposal)
@@ -202,7 +208,9 @@ class SynthesisTracker:
             poses, places = latest.pose[None], latest.translation[None]
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
-        problem = PoseProblem(self.task.body, self.task.cameras, observation.silhouettes, space, beta=self.beta)
+        problem = PoseProblem(
+            self.task.body, self.task.cameras, observation.silhouettes, space, beta=self.prediction.beta
+        )
         counts = problem.areas(poses, places)
         areas = np.stack([one[0] for one in counts])
         return Frame(poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from posefit.fitting.tracker import Observation
 from posefit.silhouette.mask import Mask, Silhouette
 
+FPS = 30.0  # of motions and masks, where nobody says
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 BITE = 2_000_000_000  # bytes; the largest .npz of masks that is read
 Range = tuple[int | None, int | None]

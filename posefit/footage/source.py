@@ -1,78 +1,132 @@
-"""Turns the name of a source into motions, masks and cameras: a built-in motion, a capture file, masks or video."""
+"""What a user names, a motion or what one camera or several saw, becomes a scene, once."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from posefit.arrays import Array
-from posefit.fitting.tracker import Observation
-from posefit.footage.masks import IMAGES, Range, Views, existing, span
+from posefit.footage.cameras import Seen, calibrated, combined, masks_of, video_of
+from posefit.footage.masks import FPS, IMAGES, Range, existing
+from posefit.footage.scene import Scene, synthetic
+from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.video import Video
 from posefit.geometry.body import Body
+from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
+from posefit.listening import QUIET, Listener
+from posefit.motion import library
 from posefit.motion.motion import Motion
-from posefit.silhouette.cost import project
-from posefit.silhouette.foreground import Image
-from posefit.silhouette.mask import Silhouette
 
-VIEW_DEGREES = 45.0  # where the camera of a synthetic sequence stands when nobody says: 0 is in front, 90 to the side
-FPS = 30.0  # of motions and masks, where nobody says
 MOTIONS = (".amc", ".bvh")
 NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".asf", ".json", ".csv", ".txt")
+HEIGHTS = (0.3, 2.8)  # metres that a person may stand
 Kind = Literal["motion", "masks", "video"]
+Source = str | Path | Motion
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """Everything a tracker needs to know of a source."""
+@dataclass(frozen=True, kw_only=True)
+class Viewing:
+    """How a source is looked at.
 
-    name: str
-    body: Body
-    cameras: Sequence[Camera]
-    fps: float
-    count: int
-    yaw: float | None  # radians: about where the person faces at first
-    anchor: Array  # (3,) metres: about where the root is at first
-    truth: Motion | None
-    observations: Sequence[Observation] = field(repr=False)
-    # yields the frames that the first camera filmed, of its size; None where nobody filmed
-    pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
+    `cameras`, or calibration files, one a view; `view_degrees` from where, where no camera says; the `size` of
+    rendered pictures; the rate `fps` of motions and masks, by default 30 or what a file of masks states; which
+    `frames`. For real footage: its `extraction`, how tall the person stands in metres (`height`), and which axis of
+    the calibration's world points up (`up`).
+    """
+
+    asf: str | Path | None = None
+    cameras: Sequence[Camera | str | Path] = ()
+    view_degrees: Sequence[float] = ()
+    size: tuple[int, int] = (320, 240)
+    fps: float | None = None
+    frames: Range = (None, None)
+    extraction: Extraction = field(default_factory=Extraction)
+    height: float | None = None
+    up: Up | None = None
+
+    def __post_init__(self) -> None:
+        for degrees in self.view_degrees:
+            if not np.isfinite(degrees):
+                raise ValueError(f"view_degrees must be a finite number, got {degrees}")
+        if self.fps is not None and not (np.isfinite(self.fps) and self.fps > 0.0):
+            raise ValueError(f"fps must be a positive number, got {self.fps}")
+        if min(self.size) < 1 or max(self.size) > 16_384:
+            raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {self.size[0]}x{self.size[1]}")
+        if self.height is not None and not HEIGHTS[0] <= self.height <= HEIGHTS[1]:
+            raise ValueError(f"height must lie in {HEIGHTS[0]} to {HEIGHTS[1]} metres, got {self.height}")
 
 
-def motion_of(source: str | Path | Motion, asf: str | Path | None, fps: float) -> Motion:
-    """Return the motion a source names, at `fps`: a built-in motion's name, an .amc file or a .bvh file.
+def scene_of(sources: Sequence[Source], viewing: Viewing, work: Path, listener: Listener = QUIET) -> Scene:
+    """Return the scene of a source, or of what several cameras saw at the same times.
 
-    The .asf of an .amc is `asf`, or the only one beside it.
+    Masks of videos are written to the folder `work`. Raises ValueError where something does not fit.
+    """
+    kinds = {kind_of(source) for source in sources}
+    if len(kinds) > 1:
+        raise ValueError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
+    if kinds == {"motion"}:
+        return _known(sources, viewing)
+    if len(viewing.view_degrees) > 1:
+        raise ValueError(f"view_degrees must be one for footage, of its first camera, got {len(viewing.view_degrees)}")
+    paths = [Path(source) for source in sources if not isinstance(source, Motion)]
+    if kinds == {"video"}:
+        seen = _filmed(paths, viewing, work, listener)
+    else:
+        calibrated(viewing.cameras, [None] * len(paths))
+        seen = [masks_of(path, viewing.fps, viewing.frames) for path in paths]
+    facing = viewing.view_degrees[0] if viewing.view_degrees else None
+    return combined(seen, paths[0].stem, _body(viewing), viewing.cameras, facing, viewing.up)
+
+
+def _known(sources: Sequence[Source], viewing: Viewing) -> Scene:
+    """Return the scene of a motion, which cameras see that stand where they are told."""
+    if len(sources) > 1:
+        raise ValueError(f"source must be one motion, or views of one person, got {len(sources)} motions")
+    if viewing.height is not None:
+        raise ValueError(f"height must be given for footage only, a motion knows its own, got {viewing.height}")
+    cameras = [camera for one in viewing.cameras for camera in _cameras(one, viewing)]
+    motion = motion_of(sources[0], viewing.asf, viewing.fps or FPS)
+    return synthetic(motion, viewing.view_degrees, viewing.size, cameras, viewing.frames)
+
+
+def clip_of(source: Source, asf: str | Path | None = None) -> Callable[[float], Motion]:
+    """Return what gives the motion that a source names at any rate: a built-in motion, or an .amc or .bvh file.
+
+    A file is read once, now; the .asf of an .amc is `asf`, or the only one beside it. Raises ValueError where there is
+    no such motion.
     """
     if isinstance(source, Motion):
-        return source.resampled(fps)
-    from posefit.motion import library
-
+        return source.resampled
     if source in library.names():
-        return library.built_in(str(source), fps=fps)
+        return partial(_built_in, str(source))
     path = Path(source)
     if path.suffix.lower() == ".amc":
         from posefit.motion.amc import read_clip
 
-        return read_clip(_skeleton_file(path, asf), existing(path)).resampled(fps)
+        return read_clip(_skeleton_file(path, asf), existing(path)).resampled
     if path.suffix.lower() == ".bvh":
         from posefit.motion.bvh import read_bvh
 
-        return read_bvh(existing(path)).resampled(fps)
+        return read_bvh(existing(path)).resampled
     if path.exists() or path.suffix:
         existing(path)
         raise ValueError(
             f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}"
         )
-    return library.built_in(str(source), fps=fps)
+    library.built_in(str(source))  # raises: there is none of that name
+    return partial(_built_in, str(source))
 
 
-def kind_of(source: str | Path | Motion) -> Kind:
+def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:
+    """Return the motion that a source names, at `fps`; see `clip_of`."""
+    return clip_of(source, asf)(fps)
+
+
+def kind_of(source: Source) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video."""
-    from posefit.motion import library
-
     if isinstance(source, Motion) or source in library.names():
         return "motion"
     path = Path(source)
@@ -81,103 +135,44 @@ def kind_of(source: str | Path | Motion) -> Kind:
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
 
 
-def synthetic(
-    motion: Motion,
-    views_degrees: Sequence[float],
-    size: tuple[int, int],
-    cameras: Sequence[Camera],
-    frames: Range,
-) -> Scene:
-    """Return the sequence that cameras see of a motion; masks are drawn frame by frame as they are needed.
-
-    Without cameras there is one at each of `views_degrees`, which frames the whole motion.
-    """
-    body = Body.of(motion.skeleton)
-    motion = motion.frames(*span(frames, len(motion)))
-    if not cameras:
-        joints = motion.skeleton.joints(motion.poses, motion.translations).reshape(-1, 3)
-        radii = np.tile(body.joint_radii(), len(motion))
-        azimuths = motion.poses[0, 0] + np.radians(views_degrees or [VIEW_DEGREES])
-        cameras = [Camera.framing(joints, radii, float(azimuth), size) for azimuth in azimuths]
-    observations = Rendered(motion, body, cameras)
-    for k in (0, len(motion) - 1):
-        if not all(silhouette.mask.any() for silhouette in observations[k].silhouettes):
-            raise ValueError(f"camera must see the person, got an empty mask in frame {k}")
-    return Scene(
-        motion.name,
-        body,
-        cameras,
-        motion.fps,
-        len(motion),
-        float(motion.poses[0, 0]),
-        motion.translations[0],
-        motion,
-        observations,
-    )
+def _filmed(
+    paths: Sequence[Path],
+    viewing: Viewing,
+    work: Path,
+    listener: Listener,
+) -> list[Seen]:
+    """Return what videos show, after everything that a user may have got wrong was checked."""
+    videos = [Video.of(path) for path in paths]
+    rates = {round(video.fps, 3) for video in videos}
+    if len(rates) > 1:
+        raise ValueError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
+    calibrated(viewing.cameras, [video.size for video in videos])
+    found = [Segmentation(video, viewing.extraction, viewing.frames) for video in videos]
+    seen = []
+    for k, (video, one) in enumerate(zip(videos, found, strict=True)):
+        listener.say(f"taking the person out of {video.path}")
+        seen.append(video_of(video, one, work / f"view-{k}", listener))
+    return seen
 
 
-@dataclass(frozen=True, eq=False)
-class Rendered(Sequence[Observation]):
-    """The observations of a known motion, drawn when asked for."""
-
-    motion: Motion
-    body: Body
-    cameras: Sequence[Camera]
-
-    def __len__(self) -> int:
-        return len(self.motion)
-
-    def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        if not 0 <= k < len(self):
-            raise IndexError(k)
-        pose, translation = self.motion.poses[k], self.motion.translations[k]
-        masks = [project(self.body, camera, pose, translation) for camera in self.cameras]
-        return Observation([Silhouette.of(mask) for mask in masks], translation)
+def _cameras(one: Camera | str | Path, viewing: Viewing) -> list[Camera]:
+    if isinstance(one, Camera):
+        return [one]
+    known = read_calibrations(one)
+    return [calibration.camera(calibration.size, upright(known, viewing.up)) for calibration in known]
 
 
-def observed(
-    views: Views,
-    body: Body,
-    cameras: Sequence[Camera],
-    name: str,
-    fps: float,
-    view_degrees: float | None,
-    pictures: Callable[[], Iterator[Image]] | None = None,
-) -> Scene:
-    """Return the sequence of masks seen by cameras, whose truth nobody knows.
+def _body(viewing: Viewing) -> Body:
+    from posefit.motion.asf import read_asf
 
-    The person is first sought where the rays through the middles of the masks meet; a single camera finds it as far
-    away as its size asks.
-    """
-    seen = views[views.first].silhouettes
-    boxes = [_box(silhouette) for silhouette in seen]
-    if len(cameras) == 1:
-        camera, (middle, tall) = cameras[0], boxes[0]
-        depth = camera.focal[1] * body.stature / tall
-        place = np.array([*((middle - camera.centre) / camera.focal * depth), depth])
-        anchor = camera.rotation.T @ (place - camera.translation)
-    else:
-        rays = [
-            camera.rotation.T @ np.array([*((middle - camera.centre) / camera.focal), 1.0])
-            for camera, (middle, _) in zip(cameras, boxes, strict=True)
-        ]
-        across = [np.eye(3) - np.outer(ray, ray) / (ray @ ray) for ray in rays]
-        positions = [camera.position for camera in cameras]
-        anchor = np.linalg.lstsq(
-            np.sum(across, axis=0), np.sum([a @ p for a, p in zip(across, positions, strict=True)], axis=0)
-        )[0]
-    to_camera = -cameras[0].rotation[2]
-    yaw = None
-    if view_degrees is not None:
-        yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
-    return Scene(name, body, cameras, fps, len(views), yaw, anchor, None, views, pictures)
+    skeleton = library.average_skeleton() if viewing.asf is None else read_asf(viewing.asf)
+    body = Body.of(skeleton)
+    scale = 1.0 if viewing.height is None else viewing.height / body.stature
+    return body.scaled(scale, scale)
 
 
-def _box(silhouette: Silhouette) -> tuple[Array, float]:
-    """Return the middle (2,) and the height in pixels of a silhouette's bounding box."""
-    rows, columns = np.flatnonzero(silhouette.mask.any(axis=1)), np.flatnonzero(silhouette.mask.any(axis=0))
-    middle = 0.5 * np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1])
-    return middle, float(rows[-1] + 1 - rows[0])
+def _built_in(name: str, fps: float) -> Motion:
+    return library.built_in(name, fps=fps)
 
 
 def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:

@@ -1,0 +1,15 @@
+"""The person and the camera: skeletons, bodies of tapered cones, rotations, cameras and their calibrations.
+
+| looking for | file |
+|---|---|
+| 27 joints, 26 bones, 66 angles, and where the joints of a pose are | skeleton.py |
+| cones around the bones, and builds | body.py |
+| root and joint angles as rotations. Reading S3 | rotation.py |
+| a pinhole camera | camera.py |
+| calibration files: OpenCV, Qualisys, Pose2Sim and ours; lens distortion | calibration.py |
+| forward kinematics, compiled | kernels.py |
+
+World: y up, metres. Camera: x right, y down, z forward. Names chain:
+`points_camera = camera_from_world @ points_world`.
+A joint is the end of the bone of its name: `lfemur` is the left knee.
+"""

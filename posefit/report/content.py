@@ -8,7 +8,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, PARENTS
 from posefit.report import curves
-from posefit.report.contest import Contest, baselines, claim, contest_of, leaderboard, pairs, resamples
+from posefit.report.contest import Contest, baseline_rows, claim, contest_of, leaderboard, paired_tests, resamples
 from posefit.report.figures import COLOURS
 from posefit.report.gallery import gallery
 from posefit.report.runs import BASELINES, Runs
@@ -88,8 +88,8 @@ def _compared(contest: Contest) -> dict[str, Any]:
     enough = len(contest.methods) > 1 and contest.rows[0].size > 1
     return {
         "leaderboard": leaderboard(contest),
-        "baselines": baselines(contest),
-        "pairs": pairs(contest) if enough else None,
+        "baselines": baseline_rows(contest),
+        "pairs": paired_tests(contest) if enough else None,
         "claim": claim(contest),
         "taking_part": contest.methods,
         "evaluations": evaluations,

@@ -129,7 +129,7 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     return sorted(found, key=lambda one: (not one["taking_part"], np.inf if one["error"] is None else one["error"]))
 
 
-def baselines(contest: Contest) -> list[dict[str, Any]]:
+def baseline_rows(contest: Contest) -> list[dict[str, Any]]:
     """Return a row for each baseline that anybody reaches, on the same runs as the methods."""
     rows = []
     values = {name: _means(contest.of(f"baseline_{name}")) for name in BASELINES}
@@ -143,7 +143,7 @@ def baselines(contest: Contest) -> list[dict[str, Any]]:
     return rows
 
 
-def pairs(contest: Contest) -> dict[str, Any]:
+def paired_tests(contest: Contest) -> dict[str, Any]:
     """Return ranks, paired tests and probabilities of improvement of a contest of at least two methods and blocks.
 
     `wilcoxon` lists first, second, median difference in degrees, p, and p after Holm; `improvement` how probably first

@@ -27,7 +27,7 @@ _HEADER = "evaluations raw_y"
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class LoggedRun:
     """One run of a method on an instance of a problem."""
 
     method: str
@@ -40,7 +40,7 @@ class Run:
     costs: ArrayLike = field(repr=False)  # (k,), the best so far
 
 
-def write_iohprofiler(runs: Iterable[Run], path: str | Path) -> None:
+def write_iohprofiler(runs: Iterable[LoggedRun], path: str | Path) -> None:
     """Write a new folder `path` with a folder a method and, in it, a .json and a data folder a problem.
 
     A method with other settings is another algorithm: its settings stand in its `info` and, where one name has several,
@@ -65,7 +65,7 @@ def write_iohprofiler(runs: Iterable[Run], path: str | Path) -> None:
                 _write_problem(folder / place, where, numbers[problem], algorithm, here)
 
 
-def _write_problem(folder: Path, where: str, number: int, algorithm: Mapping[str, str], runs: list[Run]) -> None:
+def _write_problem(folder: Path, where: str, number: int, algorithm: Mapping[str, str], runs: list[LoggedRun]) -> None:
     data = folder / f"data_{where}"
     data.mkdir(parents=True)
     scenarios = []
@@ -114,9 +114,9 @@ def _rows(run: Trace) -> tuple[list[int], list[float]]:
     return [int(value) for value in used[kept]], [float(value) for value in best[kept]]
 
 
-def _grouped(runs: Iterable[Run]) -> dict[tuple[str, str], list[Run]]:
+def _grouped(runs: Iterable[LoggedRun]) -> dict[tuple[str, str], list[LoggedRun]]:
     """Return the checked runs of each (method, settings as JSON), in the order of both."""
-    found: dict[tuple[str, str], list[Run]] = {}
+    found: dict[tuple[str, str], list[LoggedRun]] = {}
     seen = set()
     for run in runs:
         named = f"{run.method} on {run.problem}, instance {run.instance}, seed {run.seed}"

@@ -46,7 +46,7 @@ def save(figure: "Figure", path: str | Path) -> None:
         figure.savefig(building, dpi=200, bbox_inches="tight", metadata=metadata)  # long names too
 
 
-def convergence(
+def convergence_figure(
     methods: Sequence[str], evaluations: Array, curves: Sequence[Intervals], label: str = "best cost"
 ) -> "Figure":
     """Return curves over evaluations (p,), each with its band: of each method the intervals of p values."""
@@ -59,7 +59,7 @@ def convergence(
     return figure
 
 
-def attainment(methods: Sequence[str], evaluations: Array, shares: Array) -> "Figure":
+def attainment_figure(methods: Sequence[str], evaluations: Array, shares: Array) -> "Figure":
     """Return the shares (methods, p) of runs and targets reached within evaluations (p,)."""
     figure, axes = _figure()
     for k, share in enumerate(shares):
@@ -70,7 +70,7 @@ def attainment(methods: Sequence[str], evaluations: Array, shares: Array) -> "Fi
     return figure
 
 
-def profile(methods: Sequence[str], levels: Array, shares: Array, label: str = "error, degrees") -> "Figure":
+def profile_figure(methods: Sequence[str], levels: Array, shares: Array, label: str = "error, degrees") -> "Figure":
     """Return the shares (methods, levels) of runs within each level."""
     figure, axes = _figure()
     for k, share in enumerate(shares):
@@ -80,7 +80,7 @@ def profile(methods: Sequence[str], levels: Array, shares: Array, label: str = "
     return figure
 
 
-def joint_errors(
+def joint_errors_figure(
     methods: Sequence[str], joints: Sequence[str], errors: Sequence[Intervals], label: str = "error, mm"
 ) -> "Figure":
     """Return bars, a group a joint and in it one of each method; of each method the intervals of all joints."""
@@ -107,7 +107,7 @@ def joint_errors(
     return figure
 
 
-def critical_difference(methods: Sequence[str], ranking: Ranking) -> "Figure":
+def critical_difference_figure(methods: Sequence[str], ranking: Ranking) -> "Figure":
     """Return mean ranks on a line, best to the left; bars join methods that are not told apart. Demšar, 2006."""
     count, half = len(methods), (len(methods) + 1) // 2
     names = 0.9 + _BAR * len(ranking.cliques)  # rows from the line to the first name

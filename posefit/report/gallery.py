@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.geometry.camera import Camera
 from posefit.report.runs import Runs
-from posefit.sweep.cell import Cell, digest_of, scene_of
+from posefit.sweep.cell import Cell, cell_scene, digest_of
 from posefit.sweep.ledger import Ledger
 
 LARGEST = 5_500_000  # characters of all pictures together
@@ -63,7 +63,7 @@ def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> 
         for path, digest in place["files"].items():
             if digest_of(path) != digest:
                 raise ValueError(f"{path} is another file now")
-        made = scene_of(
+        made = cell_scene(
             Cell(
                 "",
                 place["motion"],

@@ -53,16 +53,16 @@ def write_portfolio(runs: Runs, path: str | Path) -> None:
         (name, one) for name, one in zip(names, convergence(contest, evaluations), strict=True) if one is not None
     ]
     if curves:
-        drawn["convergence"] = figures.convergence(
+        drawn["convergence"] = figures.convergence_figure(
             [name for name, _ in curves], evaluations, [one for _, one in curves]
         )
-        drawn["attainment"] = figures.attainment(names, evaluations, reached(contest, evaluations))
+        drawn["attainment"] = figures.attainment_figure(names, evaluations, reached(contest, evaluations))
     levels = np.linspace(0.0, float(errors.max()), LEVELS)
-    drawn["profile"] = figures.profile(names, levels, performance_profile(errors, levels))
+    drawn["profile"] = figures.profile_figure(names, levels, performance_profile(errors, levels))
     if joints := joint_errors(contest):
-        drawn["joints"] = figures.joint_errors(names, JOINTS, joints)
+        drawn["joints"] = figures.joint_errors_figure(names, JOINTS, joints)
     if len(names) > 1 and errors[0].size > 1:
-        drawn["critical-difference"] = figures.critical_difference(names, friedman(errors))
+        drawn["critical-difference"] = figures.critical_difference_figure(names, friedman(errors))
     rows = leaderboard(contest)
     with new_folder(path) as folder:
         for name, figure in drawn.items():

@@ -10,12 +10,12 @@ LAST = ("instance", "seed")  # what rows of one head differ by
 _ESCAPES = {'"': '\\"', "\\": "\\\\"}
 
 
-def command(spec: Mapping[str, Any]) -> str:
+def repeat_command(spec: Mapping[str, Any]) -> str:
     """Return what a shell runs to get the row of a cell's spec again, in the ledger `rerun`."""
-    return head(spec) + "".join(f"{name} = {spec[name]}\n" for name in LAST) + "END"
+    return command_head(spec) + "".join(f"{name} = {spec[name]}\n" for name in LAST) + "END"
 
 
-def head(spec: Mapping[str, Any]) -> str:
+def command_head(spec: Mapping[str, Any]) -> str:
     """Return the command up to the lines for the instance and the seed, and the line END, which follow.
 
     The shell reads the plan as it is, whatever names it holds: each of its lines begins with a field's name.

@@ -10,7 +10,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
-from posefit.report.repeat import LAST, head
+from posefit.report.repeat import LAST, command_head
 from posefit.sweep.cell import settings_text
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class _Table:
         kind = _text({name: value for name, value in spec.items() if name not in LAST})
         if kind not in self.known:
             variant = _index(self.variants, _variant(spec))
-            self.known[kind] = variant, _index(self.heads, head(spec))
+            self.known[kind] = variant, _index(self.heads, command_head(spec))
         variant, begun = self.known[kind]
         place = _index(
             self.places, _text({name: value for name, value in spec.items() if name not in (*_VARIANT, "seed")})
@@ -172,7 +172,7 @@ def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:
     spec = lost["spec"]
     name = f"{spec['method']} on {spec['motion']}, instance {spec['instance']}, seed {spec['seed']}"
     tail = "".join(f"{one} = {spec[one]}\n" for one in LAST)
-    return {"name": name, "reasons": list(dict.fromkeys(lost["reasons"])), "command": head(spec) + tail + "END"}
+    return {"name": name, "reasons": list(dict.fromkeys(lost["reasons"])), "command": command_head(spec) + tail + "END"}
 
 
 def _variant(spec: Mapping[str, Any]) -> str:

@@ -14,15 +14,9 @@ _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
 def document(data: dict[str, Any]) -> str:
     """Return the page that shows the data of a report."""
-    page = files("posefit.report") / "page"
-
-    def read(name: str) -> str:
-        return (page / name).read_text(encoding="utf-8")
-
-    before, middle, after, end = read("report.html").split(PART)
-    style = f"<style>\n{read('report.css')}</style>"
+    before, middle, after, end = _read("report.html").split(PART)
+    style = f"<style>\n{_read('report.css')}</style>"
     held = f'<script type="application/json" id="data">{embedded(data)}</script>'
-    scripts = "\n".join(read(f"{name}.js") for name in SCRIPTS)
     return "".join(
         [
             MARK,
@@ -31,10 +25,19 @@ def document(data: dict[str, Any]) -> str:
             middle,
             held,
             after,
-            f'<script>\n"use strict";\n(() => {{\n{scripts}}})();\n</script>',
+            f"<script>\n{script()}</script>",
             end,
         ]
     )
+
+
+def script() -> str:
+    """Return the page's script: all of `SCRIPTS` as one, so that no name of theirs reaches beyond it."""
+    return '"use strict";\n(() => {\n' + "\n".join(_read(f"{name}.js") for name in SCRIPTS) + "})();\n"
+
+
+def _read(name: str) -> str:
+    return (files("posefit.report") / "page" / name).read_text(encoding="utf-8")
 
 
 def embedded(value: Any) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from posefit.files import replaceable, replaced_file
 from posefit.geometry.skeleton import ANGLES
 from posefit.report.content import data_of
 from posefit.report.runs import runs_of
@@ -14,7 +15,7 @@ from posefit.sweep.ledger import Ledger
 Say = Callable[[str], None]
 
 
-def report(
+def write_report(
     path: str,
     out: str,
     *,
@@ -38,7 +39,8 @@ def report(
     ledger = Ledger(path, say)
     runs = runs_of(ledger)
     data = data_of(ledger, runs, say)
-    _replace(Path(out), document(data))
+    with replaced_file(out, MARK.encode()) as building:
+        building.write_text(document(data), encoding="utf-8", newline="\n")
     if figures is not None:
         from posefit.report.portfolio import write_portfolio
 
@@ -49,12 +51,12 @@ def report(
         from posefit.report.export import write_csv
         from posefit.sweep.table import flat
 
-        write_csv((flat(row) for source in (ledger.rows(), ledger.quarantined()) for row in source), csv)
-    told = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
-    return {"out": out, **dict(plain(told))}
+        write_csv(map(flat, ledger.all_rows()), csv)
+    said = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
+    return {"out": out, **dict(plain(said))}
 
 
-def told(found: dict[str, Any]) -> list[str]:
+def leaderboard_lines(found: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: the leaderboard and where the page is."""
     lines = []
     for row in found["leaderboard"] or []:
@@ -70,7 +72,7 @@ def _check(ledger: Path, out: str, others: list[str | None]) -> None:
     target = Path(out)
     if target.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"--out must be a file that ends in .html, got {out}")
-    if target.is_dir() or (target.exists() and not _is_report(target)):
+    if not replaceable(target, MARK.encode()):
         raise ValueError(f"{out}: expected a new name or an earlier report, got something else")
     places = [one for one in (out, *others) if one is not None]
     for place in places:
@@ -84,32 +86,17 @@ def _check(ledger: Path, out: str, others: list[str | None]) -> None:
             raise ValueError(f"{place}: expected a place to write to, got one in {parent}, which is none")
 
 
-def _is_report(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(MARK)) == MARK.encode()
-
-
-def _replace(target: Path, text: str) -> None:
-    building = target.with_name(f".{target.stem}.partial{target.suffix}")
-    try:
-        building.write_text(text, encoding="utf-8", newline="\n")
-        building.replace(target)
-    except OSError as error:
-        building.unlink(missing_ok=True)
-        raise ValueError(f"{target}: expected a place to write to, got {error.strerror or error}") from error
-
-
 def _write_iohprofiler(ledger: Ledger, path: str) -> None:
-    from posefit.report.export import Run, write_iohprofiler
+    from posefit.report.export import LoggedRun, write_iohprofiler
 
-    def runs() -> Iterator[Run]:
+    def runs() -> Iterator[LoggedRun]:
         for row in ledger.rows():
             spec, trace = row["spec"], row["trace"]
             if not trace["evaluations"]:
                 continue
             views = " ".join(f"{view:g}" for view in spec["view_degrees"])
             damage = "".join(f" {kind} {share:g}" for kind, share in sorted(spec["corruption"].items()))
-            yield Run(
+            yield LoggedRun(
                 spec["method"],
                 {**spec["settings"], "evaluations": spec["evaluations"], "version": spec["version"]},
                 f"{spec['motion']} view {views}{damage} frames {spec['frames']} {spec['translation']}",

@@ -1,0 +1,10 @@
+"""Masks, and what a body's silhouette costs against one. SAPSO (3), (4).
+
+| looking for | file |
+|---|---|
+| a mask, its unknown pixels, and both as bits | mask.py |
+| areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
+| the rasteriser: cones as spans of bits, compiled | kernels.py |
+| a person told from a background, pixel by pixel | foreground.py |
+| what goes wrong with a mask on its way from a camera, made on purpose | corruption.py |
+"""

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, jit, writeable
+from posefit.arrays import Array, writeable
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
@@ -74,7 +74,7 @@ def paint(
     pixels: NDArray[np.uint16],
     value: int,
 ) -> Areas:
-    """Return R, B, Y (n, 3) as `areas` does, and add `value` to the pixels (n, height, width) of each pose's body.
+    """Return R, B, Y (n, 3) as `areas` does, and OR `value` into the pixels (n, height, width) of each pose's body.
 
     Raises ValueError where a shape does not fit.
     """
@@ -86,7 +86,7 @@ def paint(
         raise ValueError(f"mask and pixels must have shape {shape}, got {silhouette.mask.shape}, {pixels.shape[1:]}")
     out = np.empty((n, 3), dtype=np.int64)
     observed, valid = silhouette.bits
-    kernels.paint_areas(
+    kernels.count_areas(
         body.skeleton.chain,
         body.radii,
         view_of(camera),
@@ -101,21 +101,10 @@ def paint(
     return out
 
 
-@jit
-def add_mismatch(areas, scale, beta, costs):
-    """Add the mismatch of areas (n, 3) to costs (n,). SAPSO (4)."""
-    for i in range(areas.shape[0]):
-        r, b, y = float(areas[i, 0]), float(areas[i, 1]), float(areas[i, 2])
-        # Reading S2: an empty denominator makes its term 1.
-        spilled = b / (b + y) if b + y > 0.0 else 1.0
-        missed = r / (r + y) if r + y > 0.0 else 1.0
-        costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)
-
-
 def mismatch(areas: Areas, beta: float = BETA) -> Array:
     """Return the cost (n,) of areas R, B, Y (n, 3), 0 to 100. SAPSO (4), Reading S2."""
     costs = np.zeros(len(areas))
-    add_mismatch(areas, SCALE, beta, costs)
+    kernels.add_mismatch(areas, SCALE, beta, costs)
     return costs
 
 

@@ -7,14 +7,13 @@ segments. A pixel belongs to it when its centre lies within that span, borders i
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic, overload
 
 from posefit.arrays import Array, jit
 from posefit.geometry.kernels import place_joints
+from posefit.silhouette.popcount import popcount
 
 BLOCK = 8  # rows filled at a time
 PAD = 2 * BLOCK  # rows below the image that a block may spill into
@@ -46,20 +45,6 @@ class View(NamedTuple):
     centre: Array  # (2,) pixels
     width: int
     height: int
-
-
-def _popcount(bits):
-    return int(bits).bit_count()
-
-
-@intrinsic
-def _ctpop(typing_context: Any, bits: Any) -> Any:  # noqa: ARG001 - numba calls both functions by these names
-    return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.ctpop(arguments[0])  # noqa: ARG005
-
-
-@overload(_popcount)
-def _popcount_compiled(bits):  # noqa: ARG001
-    return lambda bits: _ctpop(bits)  # type: ignore[call-arg]
 
 
 @jit
@@ -226,8 +211,8 @@ def count(image, observed, valid, box):
         seen = observed[w][box[0] : box[1]]
         known = valid[w][box[0] : box[1]]
         for y in range(column.size):
-            body += np.uint64(_popcount(column[y] & known[y]))
-            overlap += np.uint64(_popcount(column[y] & seen[y]))
+            body += np.uint64(popcount(column[y] & known[y]))
+            overlap += np.uint64(popcount(column[y] & seen[y]))
         image[w][box[0] : box[1] + BLOCK] = _NONE
     return body, overlap
 
@@ -249,28 +234,8 @@ def scratch(view, bones, angles):
 
 
 @jit
-def count_areas(chain, radii, view, observed, valid, poses, translations, areas):
-    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid."""
-    bones = chain.parents.size
-    (sines, cosines, frames, joints), (seen, ends, lines, bounds, items, box), image = scratch(
-        view, bones, poses.shape[1]
-    )
-    silhouette = _NONE
-    for w in range(observed.shape[0]):
-        for y in range(view.height):
-            silhouette += np.uint64(_popcount(observed[w, y]))
-    for i in range(poses.shape[0]):
-        place_joints(chain, poses[i], translations[i], sines, cosines, frames, joints)
-        draw(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
-        body, overlap = count(image, observed, valid, box)
-        areas[i, 0] = silhouette - overlap
-        areas[i, 1] = body - overlap
-        areas[i, 2] = overlap
-
-
-@jit
 def paint(image, box, value, pixels):
-    """Add `value` to the pixels (height, width) of the body in a bit image.
+    """OR `value` into the pixels (height, width) of the body in a bit image.
 
     Bits past the image's right border may be set and count for nothing: no pixel stands for them.
     """
@@ -287,8 +252,11 @@ def paint(image, box, value, pixels):
 
 
 @jit
-def paint_areas(chain, radii, view, observed, valid, poses, translations, areas, value, pixels):
-    """As `count_areas`, and add `value` to each pixel of pose i's body in pixels[i] (n, height, width)."""
+def count_areas(chain, radii, view, observed, valid, poses, translations, areas, value=None, pixels=None):
+    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid.
+
+    Where `pixels` (n, height, width) are given, `value` is ORed into each body's; numba compiles either case apart.
+    """
     bones = chain.parents.size
     (sines, cosines, frames, joints), (seen, ends, lines, bounds, items, box), image = scratch(
         view, bones, poses.shape[1]
@@ -296,15 +264,27 @@ def paint_areas(chain, radii, view, observed, valid, poses, translations, areas,
     silhouette = _NONE
     for w in range(observed.shape[0]):
         for y in range(view.height):
-            silhouette += np.uint64(_popcount(observed[w, y]))
+            silhouette += np.uint64(popcount(observed[w, y]))
     for i in range(poses.shape[0]):
         place_joints(chain, poses[i], translations[i], sines, cosines, frames, joints)
         draw(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
-        paint(image, box, value, pixels[i])
+        if pixels is not None:
+            paint(image, box, value, pixels[i])
         body, overlap = count(image, observed, valid, box)
         areas[i, 0] = silhouette - overlap
         areas[i, 1] = body - overlap
         areas[i, 2] = overlap
+
+
+@jit
+def add_mismatch(areas, scale, beta, costs):
+    """Add the mismatch of areas (n, 3) to costs (n,). SAPSO (4)."""
+    for i in range(areas.shape[0]):
+        r, b, y = float(areas[i, 0]), float(areas[i, 1]), float(areas[i, 2])
+        # Reading S2: an empty denominator makes its term 1.
+        spilled = b / (b + y) if b + y > 0.0 else 1.0
+        missed = r / (r + y) if r + y > 0.0 else 1.0
+        costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)
 
 
 @jit

@@ -6,7 +6,7 @@ from scipy import stats
 
 from posefit.arrays import Array
 from posefit.statistics.intervals import LEVEL, RESAMPLES, check_bootstrap
-from posefit.statistics.pairing import checked
+from posefit.statistics.pairing import finite
 
 
 def probability_of_improvement(errors: ArrayLike) -> Array:
@@ -15,7 +15,7 @@ def probability_of_improvement(errors: ArrayLike) -> Array:
     `errors` (methods, instances, seeds). On each instance every run of one is held against every run of the other, a
     tie counting half (Mann and Whitney's U); instances weigh the same. The diagonal is 0.5.
     """
-    found = checked("errors", errors, ("methods", "instances", "seeds"))
+    found = finite("errors", errors, ("methods", "instances", "seeds"))
     methods, instances, seeds = found.shape
     ordered = np.sort(found, axis=2)
     wins = np.zeros((methods, methods))
@@ -48,8 +48,8 @@ def improvement_interval(
     luck, its own pair is not like the others and shifts the value by the order of 1 / n. One seed gives nan for both
     ends.
     """
-    one = checked("first", first, ("instances", "seeds"))
-    other = checked("second", second, ("instances", "seeds"))
+    one = finite("first", first, ("instances", "seeds"))
+    other = finite("second", second, ("instances", "seeds"))
     if one.shape != other.shape:
         raise ValueError(f"second must have the shape of first, {one.shape}, got {other.shape}")
     check_bootstrap(resamples, level)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import trim_mean
 
 from posefit.arrays import Array
-from posefit.statistics.pairing import checked
+from posefit.statistics.pairing import finite
 
 TRIMMED = 0.25  # share of the runs left out at either end
 LEVEL = 0.95
@@ -35,7 +35,7 @@ def iqm(errors: ArrayLike) -> Array:
 
     Of n runs floor(n / 4) are left out at either end, as `scipy.stats.trim_mean` does.
     """
-    found = checked("errors", errors, ("methods", "instances", "seeds"))
+    found = finite("errors", errors, ("methods", "instances", "seeds"))
     return np.asarray(trim_mean(found.reshape(len(found), -1), TRIMMED, axis=1))
 
 
@@ -57,7 +57,7 @@ def iqm_intervals(
     same resamples, so that its interval does not depend on which others there are. Raises ValueError where errors are
     not finite or not of that shape, `resamples` is below 100 or `level` not between 0 and 1.
     """
-    found = checked("errors", errors, ("methods", "instances", "seeds"))
+    found = finite("errors", errors, ("methods", "instances", "seeds"))
     check_bootstrap(resamples, level)
     values, seeds = iqm(found), found.shape[2]
     if seeds == 1 or found[0].size < LEAST_RUNS:

@@ -85,7 +85,7 @@ def shared(rows: Iterable[Row]) -> tuple[list[Row], int]:
     return chosen, len(table) - len(chosen)
 
 
-def checked(name: str, values: ArrayLike, dimensions: tuple[str, ...], least: tuple[int, ...] | None = None) -> Array:
+def finite(name: str, values: ArrayLike, dimensions: tuple[str, ...], least: tuple[int, ...] | None = None) -> Array:
     """Return finite numbers of that many dimensions, each at least 1 long or as `least` says, or raise ValueError."""
     found = np.asarray(values, dtype=np.float64)
     least = least or (1,) * len(dimensions)

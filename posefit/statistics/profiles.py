@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posefit.arrays import Array
-from posefit.statistics.pairing import checked
+from posefit.statistics.pairing import finite
 
 TARGETS = 51
 LEAST_TARGET = 0.01  # a cost; what is below is a pixel or none
@@ -19,7 +19,7 @@ Trace = tuple[Array, Array]
 
 def trace(evaluations: ArrayLike, costs: ArrayLike) -> Trace:
     """Return an anytime trace as two arrays (k,), or raise ValueError where it is none."""
-    used, best = checked("evaluations", evaluations, ("k",)), checked("costs", costs, ("k",))
+    used, best = finite("evaluations", evaluations, ("k",)), finite("costs", costs, ("k",))
     if used.shape != best.shape:
         raise ValueError(f"costs must be one for each of {len(used)} evaluations, got {len(best)}")
     if used[0] < 1.0 or (np.diff(used) <= 0.0).any():
@@ -34,7 +34,7 @@ def costs_at(run: Trace, evaluations: ArrayLike) -> Array:
 
     Raises ValueError where one of them is before the trace starts.
     """
-    grid = checked("evaluations", evaluations, ("p",))
+    grid = finite("evaluations", evaluations, ("p",))
     if grid.min() < run[0][0]:
         raise ValueError(f"evaluations must be at least {run[0][0]:g}, where the trace starts, got {grid.min():g}")
     return np.asarray(run[1][np.searchsorted(run[0], grid, side="right") - 1])
@@ -67,7 +67,7 @@ def targets(traces: Iterable[Trace], count: int = TARGETS) -> Array:
 
 def hits(run: Trace, targets: ArrayLike) -> Array:
     """Return after how many evaluations (targets,) a run had a cost as low as each target; inf where it never had."""
-    wanted = checked("targets", targets, ("targets",))
+    wanted = finite("targets", targets, ("targets",))
     first = np.searchsorted(-run[1], -wanted, side="left")
     return np.append(run[0], np.inf)[first]
 
@@ -77,7 +77,10 @@ def attained(hits: ArrayLike, evaluations: ArrayLike) -> Array:
 
     The empirical distribution of running times over runs and targets: Hansen et al., COCO, 2021.
     """
-    found, grid = np.sort(np.asarray(hits, dtype=np.float64), axis=None), checked("evaluations", evaluations, ("p",))
+    found, grid = (
+        np.sort(np.asarray(hits, dtype=np.float64), axis=None),
+        finite("evaluations", evaluations, ("p",)),
+    )
     if not len(found) or np.isnan(found).any():
         raise ValueError(f"hits must be numbers or inf, got {np.count_nonzero(np.isnan(found))} nan of {len(found)}")
     return np.searchsorted(found, grid, side="right") / len(found)
@@ -89,7 +92,7 @@ def expected_running_time(hits: ArrayLike, evaluations: ArrayLike) -> Array:
     `hits` (runs, targets) as of `hits`, `evaluations` (runs,) what each run used in all. It is what all runs used up
     to their hit, or in all, over the number of runs that hit; inf where none did. Auger and Hansen, 2005.
     """
-    found, used = np.asarray(hits, dtype=np.float64), checked("evaluations", evaluations, ("runs",))
+    found, used = np.asarray(hits, dtype=np.float64), finite("evaluations", evaluations, ("runs",))
     if found.ndim != 2 or len(found) != len(used):
         raise ValueError(f"hits must have shape ({len(used)}, targets), got {found.shape}")
     late = np.isfinite(found) & (found > used[:, None])
@@ -108,7 +111,10 @@ def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:
     `errors` (methods, instances, seeds). Of `ratios` it is the profile of Dolan and Moré, 2002; of errors that mean
     the same on every instance, that of Agarwal et al., 2021.
     """
-    found, edges = checked("errors", errors, ("methods", "instances", "seeds")), checked("levels", levels, ("levels",))
+    found, edges = (
+        finite("errors", errors, ("methods", "instances", "seeds")),
+        finite("levels", levels, ("levels",)),
+    )
     runs = np.sort(found.reshape(len(found), -1), axis=1)
     return np.array([np.searchsorted(row, edges, side="right") / len(row) for row in runs])
 
@@ -118,7 +124,7 @@ def ratios(errors: ArrayLike) -> Array:
 
     Raises ValueError where an error is not above 0.
     """
-    found = checked("errors", errors, ("methods", "instances", "seeds"))
+    found = finite("errors", errors, ("methods", "instances", "seeds"))
     if found.min() <= 0.0:
         raise ValueError(f"errors must be above 0 to be compared by ratio, got {found.min():g}")
     return np.asarray(found / found.min(axis=0))

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from posefit.arrays import Array
-from posefit.statistics.pairing import checked
+from posefit.statistics.pairing import finite
 
 LEVEL = 0.05  # of significance
 _SHAPE = ("methods", "instances", "seeds")
@@ -50,7 +50,7 @@ def friedman(errors: ArrayLike, level: float = LEVEL) -> Ranking:
     of classifiers over multiple data sets, 2006. Cliques mean little where `p_value` is above `level`. Raises
     ValueError for fewer than 2 methods or 2 blocks.
     """
-    found = checked("errors", errors, _SHAPE, (2, 1, 1))
+    found = finite("errors", errors, _SHAPE, (2, 1, 1))
     _check(level)
     blocks = found.reshape(len(found), -1).T
     n, k = blocks.shape
@@ -89,7 +89,7 @@ def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) 
     Blocks in which both are equal are ranked but count for neither (Pratt, 1959). The p-value is exact for up to 50
     blocks without ties, as in scipy. Holm's adjustment is over the pairs compared: Holm, 1979.
     """
-    found = checked("errors", errors, _SHAPE, (2, 1, 1))
+    found = finite("errors", errors, _SHAPE, (2, 1, 1))
     chosen = list(combinations(range(len(found)), 2)) if pairs is None else list(pairs)
     for pair in chosen:
         if len({*pair}) != 2 or not all(0 <= m < len(found) for m in pair):

@@ -15,32 +15,15 @@ import posefit
 if TYPE_CHECKING:
     from posefit.arrays import Array
     from posefit.fitting.tracker import Frame
-    from posefit.footage.source import Scene
+    from posefit.footage.scene import Scene
     from posefit.motion.motion import Motion
+    from posefit.tracking.method import Choice
+    from posefit.tracking.opening import Opening
 
-SALT = 2013  # part of the seed of every instance
-SPEED = 0.15  # how far the cadence of a built-in motion's instance is from its own at most
-VIEW_DEGREES = 10.0  # how far the cameras of an instance are turned at most
 POINTS = 64  # of an anytime trace at most
 TIMES = ("seconds", "seconds_per_frame")  # what two runs of a cell do not have in common
 DROPPED = "dropped"  # the corruption that takes whole frames away, a share of them
-_MEASURED = (
-    "error_degrees",
-    "geodesic_degrees",
-    "free_error_degrees",
-    "mpjpe_mm",
-    "pa_mpjpe_mm",
-    "iou",
-    "cost",
-    "swap_rate",
-    "lost_rate",
-    "held_frames",
-    "skill",
-    "baselines_degrees",
-    "prior_floor_degrees",
-    "seconds_per_frame",
-    "warnings",
-)
+UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
 
 
 @dataclass(frozen=True)
@@ -48,8 +31,7 @@ class Cell:
     """Everything a run depends on. `posefit.sweep.plan` makes cells that are checked.
 
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
-    0 is the motion as it is; any other number changes its phase, its speed and the view a little, or where in a file
-    the frames begin. `corruption` gives kinds of `posefit.silhouette.corruption` their strength, 0 to 1, and
+    numbers what is seen of the motion, see `posefit.footage.instance`. `corruption` gives kinds of `posefit.silhouette.corruption` their strength, 0 to 1, and
     `dropped` the share of frames that are not seen; what is spoilt follows from the instance, so that every method and
     seed sees the same. `files` holds the SHA-256 of every capture file that is read.
     """
@@ -88,19 +70,21 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Result:
+class Measurement:
     """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
 
     row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
     joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres
 
 
-def run_cell(cell: Cell) -> Result:
+def run_cell(cell: Cell) -> Measurement:
     """Return what following the cell's motion by its method measures. Raises ValueError where a file has changed.
 
     And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
     """
-    from posefit.tracking.run import track
+    from posefit.footage.source import motion_of
+    from posefit.tracking.measures import MEASURES
+    from posefit.tracking.run import follow
 
     began = time.perf_counter()
     if (planned := cell.version.partition(",")[0]) != posefit.__version__:
@@ -108,53 +92,37 @@ def run_cell(cell: Cell) -> Result:
     for path, digest in cell.files.items():
         if (found := digest_of(path)) != digest:
             raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
-    result = track(scene_of(cell), train=cell.train, seed=cell.seed, **_chosen(cell))
+    scene = cell_scene(cell)
+    training = [motion_of(one, None, scene.fps) for one in cell.train]
+    result = follow(scene, training, choice=_choice(cell), opening=_opening(cell), seed=cell.seed)
     truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
-    errors = _joint_errors_mm(truth, estimate)
+    errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
     row = {
         "key": cell.key,
         "spec": cell.spec,
         "status": "done",
-        **{name: result.summary[name] for name in _MEASURED},
-        "evaluations_used": result.summary["evaluations"],
+        **{name: measured[name] for name in MEASURES if name not in UNLIKE},
+        "warnings": result.summary["warnings"],
+        "evaluations_used": result.measures.evaluations,
         "joint_errors_mm": [round(float(error), 3) for error in errors],
-        "trace": trace(result.found),
+        "trace": anytime_trace(result.found),
         "seconds": time.perf_counter() - began,
     }
     try:
         json.dumps(row, allow_nan=False)
     except ValueError:
         raise ValueError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
-    return Result(row, packed(estimate=estimate, truth=truth))
+    return Measurement(row, packed_joints(estimate=estimate, truth=truth))
 
 
-def scene_of(cell: Cell) -> "Scene":
+def cell_scene(cell: Cell) -> "Scene":
     """Return what is seen in a cell; the same for all methods and seeds."""
-    import numpy as np
-
-    from posefit.footage.source import motion_of, synthetic
-    from posefit.motion import library
+    from posefit.footage.instance import motion_of_instance, variation
+    from posefit.footage.scene import synthetic
     from posefit.tracking.synthetic import Spoilt
 
-    rng = np.random.default_rng([SALT, cell.instance])
-    speed, phase, turn, start = (
-        1.0 + SPEED * rng.uniform(-1.0, 1.0),
-        rng.uniform(),
-        rng.uniform(-1.0, 1.0),
-        rng.uniform(),
-    )
-    if cell.instance == 0:
-        speed, phase, turn, start = 1.0, 0.0, 0.0, 0.0
-    if cell.motion in library.names():
-        motion = library.built_in(cell.motion, frames=cell.frames, fps=cell.fps, speed=speed, phase=phase)
-    else:
-        motion = motion_of(cell.motion, None, cell.fps)
-        if cell.frames > len(motion):
-            raise ValueError(f"frames must be at most {len(motion)}, the length of {cell.motion}, got {cell.frames}")
-        first = int(start * (len(motion) - cell.frames + 1))
-        motion = motion.frames(first, first + cell.frames)
-    views = [view + VIEW_DEGREES * turn for view in cell.view_degrees]
-    scene = synthetic(motion, views, cell.size, [], (None, None))
+    motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
+    scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
     noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
     if not cell.corruption:
         return scene
@@ -181,7 +149,7 @@ def settings_text(settings: Mapping[str, Any]) -> list[str]:
     return [f"{name}={setting_text(value)}" for name, value in settings.items()]
 
 
-def trace(found: "list[Frame]") -> dict[str, list[float]]:
+def anytime_trace(found: "list[Frame]") -> dict[str, list[float]]:
     """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
 
     A frame that spent fewer keeps its last cost; frames that were held do not count. There are at most 64 points.
@@ -215,14 +183,20 @@ def _spent(frame: "Frame") -> "Array":
     return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
 
 
-def _chosen(cell: Cell) -> dict[str, Any]:
-    from posefit.tracking.method import parse_settings
+def _choice(cell: Cell) -> "Choice":
+    from posefit.tracking.method import Choice, parse_settings
 
     optimiser, prior, tracker = parts(cell.method)
-    settings = parse_settings(settings_text(cell.settings), optimiser, prior, tracker)
-    named = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
-    told = {name: getattr(cell, name) for name in ("evaluations", "translation", "first_pose")}
-    return {**named, **told, **settings}
+    settings: dict[str, Any] = dict(parse_settings(settings_text(cell.settings), optimiser, prior, tracker))
+    named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
+    return Choice(evaluations=cell.evaluations, **named, **settings)
+
+
+def _opening(cell: Cell) -> "Opening":
+    from posefit.tracking.opening import Opening
+
+    told: dict[str, Any] = {name: getattr(cell, name) for name in ("translation", "first_pose")}
+    return Opening(**told)
 
 
 def _joints(motion: "Motion | None") -> "Array":
@@ -238,7 +212,7 @@ def _joint_errors_mm(truth: "Array", estimate: "Array") -> "Array":
     return np.asarray(1e3 * np.linalg.norm(difference, axis=-1).mean(axis=0))
 
 
-def packed(**arrays: "Array") -> bytes:
+def packed_joints(**arrays: "Array") -> bytes:
     """Return arrays in metres as an .npz, float32."""
     import numpy as np
 

@@ -12,7 +12,8 @@ import numpy as np
 import posefit
 from posefit.entries import PROJECT
 from posefit.fitting.space import TRANSLATIONS
-from posefit.footage.source import FPS, MOTIONS, motion_of
+from posefit.footage.masks import FPS
+from posefit.footage.source import MOTIONS, motion_of
 from posefit.motion import library
 from posefit.registry import Kind, Offer, registry
 from posefit.settings import planned

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from posefit.sweep.cell import Cell, run_cell, settings_text
-from posefit.sweep.drive import Tally, drive, follow
+from posefit.sweep.drive import Tally, drive_cells, progress_of
 from posefit.sweep.driver import Driver
 from posefit.sweep.engines.engine import Engine
 from posefit.sweep.engines.limits import Limits
@@ -22,7 +22,7 @@ DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 Say = Callable[[str], None]
 
 
-def sweep(
+def run_plan(
     plan: str,
     out: str,
     *,
@@ -58,7 +58,7 @@ def preview(
     plan: str, out: str | None, *, workers: int | None, scheduler: str | None, dask_local: int | None, limits: Limits
 ) -> dict[str, Any]:
     """Return the cells of a plan, which of them are done already, and about how long the others take."""
-    from posefit.sweep.estimate import seconds
+    from posefit.sweep.estimate import estimated_seconds
 
     cells = Plan.read(plan).cells
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
@@ -67,7 +67,7 @@ def preview(
         return {"cells": [_shown(cell, True) for cell in cells], "seconds": 0.0, "workers": 0}
     with closing(engine(workers, scheduler, dask_local, limits)()) as running:
         count = running.window()
-        taken = seconds(left, running, count)
+        taken = estimated_seconds(left, running, count)
     waiting = {cell.key for cell in left}
     return {"cells": [_shown(cell, cell.key not in waiting) for cell in cells], "seconds": taken, "workers": count}
 
@@ -95,7 +95,7 @@ def engine(workers: int | None, scheduler: str | None, dask_local: int | None, l
     return start
 
 
-def told(tally: Tally, out: str) -> str:
+def tally_text(tally: Tally, out: str) -> str:
     """Return how a sweep ended, and the command that shows what it found."""
     line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
     if tally.quarantined:
@@ -108,7 +108,7 @@ def told(tally: Tally, out: str) -> str:
     return line
 
 
-def listed(found: dict[str, Any]) -> list[str]:
+def preview_lines(found: dict[str, Any]) -> list[str]:
     """Return the lines that show a preview."""
     lines = []
     for cell in found["cells"]:
@@ -119,11 +119,11 @@ def listed(found: dict[str, Any]) -> list[str]:
             f"seed {cell['seed']}{''.join(f', {one}' for one in more)}{'  done' if cell['done'] else ''}"
         )
     left = sum(not cell["done"] for cell in found["cells"])
-    takes = f": about {described(found['seconds'])} on {found['workers']} workers" if left else ""
+    takes = f": about {duration_text(found['seconds'])} on {found['workers']} workers" if left else ""
     return [*lines, f"{len(lines)} cells, {left} of them to run{takes}"]
 
 
-def described(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """Return a time as people say it."""
     for name, size in (("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 1.5 * size:
@@ -141,7 +141,7 @@ def _driven(cells: Sequence[Cell], driver: Driver, running: Engine, already: int
         say(message)
 
     with bar:
-        return drive(cells, driver, running, beside, follow(bar))
+        return drive_cells(cells, driver, running, beside, progress_of(bar))
 
 
 def _shown(cell: Any, done: bool) -> dict[str, Any]:

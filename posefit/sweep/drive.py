@@ -58,7 +58,7 @@ class _Stop:
             self._say("finishing the cells that run; Ctrl-C once more stops at once")
 
 
-def drive(
+def drive_cells(
     cells: Sequence[Cell],
     driver: Driver,
     engine: Engine,
@@ -185,7 +185,7 @@ class _Sweep:
         return state in (State.DONE, State.QUARANTINED)
 
 
-def follow(bar: Any) -> Callable[[Tally], None]:
+def progress_of(bar: Any) -> Callable[[Tally], None]:
     """Return what tells a progress bar of tqdm how a sweep stands."""
 
     def watch(tally: Tally) -> None:

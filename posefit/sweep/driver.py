@@ -7,7 +7,6 @@ creating a claim a driver looks whether the row has come meanwhile: it was writt
 
 import json
 import os
-import secrets
 import socket
 import time
 from collections.abc import Callable
@@ -17,8 +16,9 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Self
 
-from posefit.sweep.cell import Cell, Result
-from posefit.sweep.ledger import CLAIMS, QUARANTINE, ROWS, Ledger, appear, create
+from posefit.files import appear, replaced_file
+from posefit.sweep.cell import Cell, Measurement
+from posefit.sweep.ledger import CLAIMS, QUARANTINE, ROWS, Ledger, create
 from posefit.sweep.log import Writer, alive
 
 ATTEMPTS = 3
@@ -100,7 +100,7 @@ class Driver:
             self._clear(cell.key)
         return State.QUARANTINED
 
-    def finish(self, claim: Claim, result: Result) -> None:
+    def finish(self, claim: Claim, result: Measurement) -> None:
         """Write the row of a claimed cell. Raises OSError where there is no room."""
         self._log.append(claim.cell.key, result.row, result.joints)
         self.ledger.refresh()
@@ -108,10 +108,9 @@ class Driver:
 
     def fail(self, claim: Claim, reason: str) -> None:
         """Note why an attempt failed."""
-        path = self._path(claim.cell.key, claim.attempt)
-        temporary = path.parent / f".{path.name}.{secrets.token_hex(8)}"
-        temporary.write_text(json.dumps({**self._me, "failed": reason}), encoding="utf-8")
-        os.replace(temporary, path)
+        mine = json.dumps(self._me).removesuffix("}").encode()  # how the claim begins, and goes on beginning
+        with replaced_file(self._path(claim.cell.key, claim.attempt), mine) as building:
+            building.write_text(json.dumps({**self._me, "failed": reason}), encoding="utf-8")
 
     def release(self, claim: Claim) -> None:
         """Give a claim up as if it had never been."""

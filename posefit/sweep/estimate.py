@@ -11,7 +11,7 @@ EVALUATIONS = 400  # of a frame of them, at most
 PATIENCE = 0.2  # seconds
 
 
-def seconds(cells: Sequence[Cell], engine: Engine, workers: int) -> float:
+def estimated_seconds(cells: Sequence[Cell], engine: Engine, workers: int) -> float:
     """Return about how many seconds cells take on so many workers.
 
     For each kind of cell a short and a shorter one are run, each after one that compiles what is not compiled yet: they

@@ -11,14 +11,15 @@ aside/               damaged lines that were found; their cells are run again
 import io
 import json
 import os
-import secrets
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import posefit
+from posefit.files import appear
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
+from posefit.sweep.table import dataframe
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,6 +88,11 @@ class Ledger:
         row: dict[str, Any] = json.loads(found[1])
         return row
 
+    def all_rows(self) -> Iterator[dict[str, Any]]:
+        """Yield every finished row, and then the cells in quarantine."""
+        yield from self.rows()
+        yield from self.quarantined()
+
     def joints(self, key: str) -> dict[str, "Array"]:
         """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
         import numpy as np
@@ -110,9 +116,7 @@ class Ledger:
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
-        from posefit.sweep.table import frame
-
-        return frame(self)
+        return dataframe(self.all_rows())
 
     def _logs(self) -> list[str]:
         return sorted(entry.name for entry in os.scandir(self.path / ROWS) if entry.name.endswith(SUFFIX))
@@ -150,19 +154,6 @@ def create(path: Path) -> None:
             f"{path}: expected a ledger of posefit {posefit.__version__}, got one of {version}; its rows are kept "
             "apart: choose another folder"
         )
-
-
-def appear(path: Path, content: Any) -> bool:
-    """Write a JSON file that appears whole, and only where there is none of its name; return whether it did."""
-    temporary = path.parent / f".{path.name}.{secrets.token_hex(8)}"
-    try:
-        temporary.write_text(json.dumps(content), encoding="utf-8")
-        os.link(temporary, path)
-    except FileExistsError:
-        return False
-    finally:
-        temporary.unlink(missing_ok=True)
-    return True
 
 
 def _version(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""The rows of a ledger as a table of pandas, one row a cell.
+"""The rows of a ledger as a table of pandas, one row a cell: `Ledger.frame` gives it.
 
 Columns are `key`, `version`, `status` ("done" or "quarantined"), `reason`; the cell's spec, with `settings`,
 `corruption`, `train`, `view_degrees` and `size` as text, so that rows can be grouped by them; every figure, those of a
@@ -8,7 +8,7 @@ spec says, not by when they were finished.
 """
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from posefit.geometry.skeleton import JOINTS
@@ -17,24 +17,19 @@ from posefit.sweep.cell import settings_text
 if TYPE_CHECKING:
     import pandas as pd
 
-    from posefit.sweep.ledger import Ledger
-
 ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings", "seed", "key")
 _TEXTS = ("key", "version", "status", "reason", "method", "motion", "train", "settings", "view_degrees", "corruption")
 
 
-def frame(ledger: "Ledger") -> "pd.DataFrame":
-    """Return the table. Raises ImportError where pandas is not installed."""
+def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
+    """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
     try:
         pandas = importlib.import_module("pandas")
     except ImportError as error:
         raise ImportError("tables need the library pandas: python -m pip install 'posefit[sweep]'") from error
     columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
     count = 0
-    for row in ledger.rows():
-        _add(columns, count, flat(row))
-        count += 1
-    for row in ledger.quarantined():
+    for row in rows:
         _add(columns, count, flat(row))
         count += 1
     for values in columns.values():

@@ -1,0 +1,28 @@
+"""A scene is followed: by a method, from a first pose that has to be found, into files and figures.
+
+    import posefit
+    result = posefit.track("walk", view_degrees=90, seed=1)     # the flat call
+    print(result.measures.mpjpe_mm, result.motion.poses.shape)
+
+    from pathlib import Path                                    # the same in pieces
+    from posefit.footage.source import Viewing, scene_of
+    from posefit.motion import library
+    from posefit.tracking.method import Choice
+    from posefit.tracking.run import follow
+
+    scene = scene_of(["walk"], Viewing(view_degrees=[90.0]), work=Path())
+    training = [library.built_in(style) for style in library.other_styles("walk")]
+    result = follow(scene, training, choice=Choice(optimiser="pso"), seed=1)
+
+| looking for | file |
+|---|---|
+| `posefit.track` and `posefit.fit`, every option a keyword | front.py |
+| a scene is followed: the order of what happens | run.py |
+| names become an optimiser, a prior or a tracker, with settings checked and a budget | method.py |
+| the first pose, searched from several starts; the person's build | opening.py |
+| errors and baselines of a track, frame by frame | evaluation.py |
+| what every figure is called, its unit and meaning | measures.py |
+| the folder that appears whole, and goes on where it ended; its files | outputs.py, formats.py |
+| whether two tracks are the same | identity.py |
+| pictures, a recording for the Rerun viewer, the table that is printed | picture.py, recording.py, table.py |
+"""

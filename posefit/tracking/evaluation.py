@@ -8,8 +8,22 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.source import Scene
+from posefit.footage.scene import Scene
 from posefit.silhouette.cost import BETA, areas, mismatch
+from posefit.tracking.measures import Measures, Spread
+
+_OF_THE_TRUTH = (
+    "error_degrees",
+    "geodesic_degrees",
+    "free_error_degrees",
+    "mpjpe_mm",
+    "pa_mpjpe_mm",
+    "swap_rate",
+    "lost_rate",
+    "skill",
+    "baselines_degrees",
+    "prior_floor_degrees",
+)
 
 
 def nearest(scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA) -> Array:
@@ -51,47 +65,36 @@ class Evaluation:
             self._nearest.append(nearest(self._scene, self._training, k, observation, self._beta))
         return row
 
-    def close(self) -> tuple[list[dict[str, float]], dict[str, Any]]:
-        """Return the rows of all frames and the summary's figures."""
+    def close(self) -> tuple[list[dict[str, float]], Measures]:
+        """Return a row for each frame, as `measures.FRAME` names its columns, and what the whole track is worth."""
         frames = self._frames
         columns: dict[str, Array] = {
             "cost": np.array([frame.cost for frame in frames]),
             "iou": np.array(self._ious),
+            "usable": np.array(self._usable, dtype=np.float64),
         }
-        summary: dict[str, Any] = dict.fromkeys(
-            (
-                "error_degrees",
-                "geodesic_degrees",
-                "mpjpe_mm",
-                "pa_mpjpe_mm",
-                "iou",
-                "swap_rate",
-                "lost_rate",
-                "skill",
-                "baselines_degrees",
-                "prior_floor_degrees",
-            )
-        )
         usable = np.array(self._usable) if any(self._usable) else np.ones(len(frames), dtype=bool)
-        summary["iou"], summary["cost"] = (float(columns[name][usable].mean()) for name in ("iou", "cost"))
-        summary["held_frames"] = int(np.count_nonzero(~np.array(self._usable)))
-        columns["usable"] = np.array(self._usable, dtype=np.float64)
+        errors: dict[str, Any] = dict.fromkeys(_OF_THE_TRUTH)
         if self._scene.truth is not None:
-            columns |= self._errors(summary)
+            per_frame, errors = self._errors()
+            columns |= per_frame
         used, seconds = sum(frame.evaluations for frame in frames), sum(frame.seconds for frame in frames)
-        summary |= {
-            "evaluations": used,
-            "seconds_per_frame": seconds / len(frames),
-            "evaluations_per_second": used / max(seconds, 1e-9),  # a tracker of somebody else may say 0
-        }
-        if len(frames) == 1:
-            summary["history"] = frames[0].history.tolist()
+        measures = Measures(
+            **errors,
+            iou=float(columns["iou"][usable].mean()),
+            cost=float(columns["cost"][usable].mean()),
+            held_frames=int(np.count_nonzero(~np.array(self._usable))),
+            seconds_per_frame=seconds / len(frames),
+            evaluations=used,
+            evaluations_per_second=used / max(seconds, 1e-9),  # a tracker of somebody else may say 0
+        )
         columns["evaluations"] = np.array([frame.evaluations for frame in frames])
         columns["seconds"] = np.array([frame.seconds for frame in frames])
         rows = [{"frame": k, **{name: float(v[k]) for name, v in columns.items()}} for k in range(len(frames))]
-        return rows, summary
+        return rows, measures
 
-    def _errors(self, summary: dict[str, Any]) -> dict[str, Array]:
+    def _errors(self) -> tuple[dict[str, Array], dict[str, Any]]:
+        """Return the columns and the measures that need a truth."""
         assert self._scene.truth is not None
         truth = self._scene.truth.poses[: len(self._frames)]
         places = self._scene.truth.translations[: len(self._frames)]
@@ -107,12 +110,10 @@ class Evaluation:
             name: float(metrics.pose_error_degrees(truth, pose).mean()) for name, pose in self._baselines(truth)
         }
         floor = baselines.pop("prior_floor", None)
-        summary |= {
-            "error_degrees": {
-                "mean": float(metrics.mean_error(errors)),
-                "std": float(metrics.error_spread(errors)),
-                "max": float(errors.max()),
-            },
+        measures = {
+            "error_degrees": Spread(
+                float(metrics.mean_error(errors)), float(metrics.error_spread(errors)), float(errors.max())
+            ),
             "geodesic_degrees": float(geodesic.mean()),
             "free_error_degrees": float(metrics.pose_error_degrees(truth, poses, skeleton.free).mean()),
             "mpjpe_mm": float(mpjpe.mean()),
@@ -123,13 +124,14 @@ class Evaluation:
             "baselines_degrees": baselines,
             "prior_floor_degrees": floor,
         }
-        return {
+        columns = {
             "error_degrees": errors,
             "geodesic_degrees": geodesic,
             "mpjpe_mm": mpjpe,
             "pa_mpjpe_mm": aligned,
             "swapped": swapped.astype(np.float64),
         }
+        return columns, measures
 
     def _baselines(self, truth: Array) -> list[tuple[str, Array]]:
         def with_root(angles: Array) -> Array:

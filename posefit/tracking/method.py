@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,7 @@ from posefit.fitting.box import Space
 from posefit.fitting.guard import BrokenRuleError, Guarded
 from posefit.fitting.optimiser import NextFrame, Optimiser, OptimiserFactory
 from posefit.fitting.prior import Prior
-from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE
 from posefit.fitting.tracker import (
-    FLOOR,
-    SPREAD,
     Frame,
     Observation,
     Prediction,
@@ -30,12 +27,11 @@ from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 
 ITERATIONS = 60  # C of the SAPSO paper, section 5.2
-COMPILING = 60.0  # seconds that a plugin's first calls may take longer than its limit
 
 Settings = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Choice:
     """What a user chose: names or factories, their settings, and the budget."""
 
@@ -68,47 +64,40 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A tracker that is ready, and what it is made of."""
+    """What was chosen, ready to follow: a prior has been learned, and trackers are made of it."""
 
     name: str
-    tracker: Tracker
-    prior: Prior | None
-    beta: float
+    prior: Prior | None  # of a tracker of its own, None
+    beta: float  # of the silhouette cost
     settings: dict[str, dict[str, Any]]
-    warm_up: Tracker = field(repr=False)  # the same, with time to compile
+    _make: Callable[[Task, float], Tracker] = field(repr=False)
+
+    def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
+        """Return a tracker for a task, whose plugin may take so many seconds longer to propose a population."""
+        return self._make(task, patience)
 
 
 def prepare(choice: Choice, task: Task) -> Method:
-    """Return the method that was chosen, for a task.
+    """Return the method that was chosen, its prior learned from a task's training motions.
 
     Raises ValueError where a name, a setting or the budget is wrong, ImportError where a library is not installed, and
     BrokenRuleError where a plugin does not do what its kind has to.
     """
     if choice.tracker is not None:
-        return _tracker(choice, task)
+        return _tracker(choice)
     offer = _offered("optimiser", choice.optimiser)
     mine = settings.planned(offer.factory, choice.optimiser_settings, task.evaluations, choice.particles)
     settings.check(offer.name, offer.factory, mine)
-    settings.check("tracker", _driver, choice.tracker_settings)
+    settings.check("tracker", Prediction, choice.tracker_settings)
     prior, learned = _prior(choice, task)
+    prediction = Prediction(**choice.tracker_settings)
 
-    driven = dict(choice.tracker_settings)
-    beta = float(driven.pop("beta", BETA))
-    prediction = Prediction(**driven)
+    def make(task: Task, patience: float) -> SynthesisTracker:
+        limit = None if choice.ask_seconds is None else choice.ask_seconds + patience
+        return SynthesisTracker(task, learned, partial(_guarded, offer, mine, limit), offer.next_frame, prediction)
 
-    def tracker(limit: float | None) -> SynthesisTracker:
-        make = partial(_guarded, offer, mine, limit)
-        return SynthesisTracker(task, learned, make, offer.next_frame, prediction, beta)
-
-    patient = None if choice.ask_seconds is None else choice.ask_seconds + COMPILING
-    return Method(
-        f"{offer.name} + {prior}",
-        tracker(choice.ask_seconds),
-        learned,
-        beta,
-        {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)},
-        tracker(patient),
-    )
+    made_of = {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)}
+    return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, make)
 
 
 def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: str | None) -> dict[str, dict[str, Any]]:
@@ -121,7 +110,7 @@ def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: st
     places: dict[str, tuple[str, Callable[..., Any]]] = {}
     if tracker is None:
         chosen: list[tuple[Kind, str]] = [("optimiser", optimiser), ("prior", prior)]
-        places["tracker"] = "tracker", _driver
+        places["tracker"] = "tracker", Prediction
     else:
         chosen = [("tracker", tracker)]
     for one, name in chosen:
@@ -141,26 +130,17 @@ def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: st
     return parsed
 
 
-def _driver(
-    *,
-    spread: float = SPREAD,
-    floor: float = FLOOR,
-    prediction: Literal["latest", "literal"] = "latest",
-    root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES,
-    translation_range: tuple[float, float, float] = TRANSLATION_RANGE,
-    beta: float = BETA,
-) -> None:
-    """Stand for the settings of `SynthesisTracker`."""
-
-
-def _tracker(choice: Choice, task: Task) -> Method:
+def _tracker(choice: Choice) -> Method:
     assert choice.tracker is not None
     offer, mine = _offered("tracker", choice.tracker), dict(choice.tracker_settings)
     settings.check(offer.name, offer.factory, mine)
-    with _rules(offer):
-        tracker = offer.factory(task, **mine)
-    watched = _Watched(tracker, offer.label)
-    return Method(offer.name, watched, None, float(mine.get("beta", BETA)), {"tracker": mine}, watched)
+
+    def make(task: Task, _patience: float) -> Tracker:
+        with _rules(offer):
+            tracker = offer.factory(task, **mine)
+        return _Watched(tracker, offer.label)
+
+    return Method(offer.name, None, float(mine.get("beta", BETA)), {"tracker": mine}, make)
 
 
 def _prior(choice: Choice, task: Task) -> tuple[str, Prior]:

@@ -12,12 +12,14 @@ import numpy as np
 from posefit.fitting.shape import Shape, fit_shape
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
-from posefit.footage.source import Scene
+from posefit.footage.scene import Scene
+from posefit.listening import Listener
 from posefit.motion.motion import Motion
-from posefit.tracking.method import Choice, prepare
+from posefit.tracking.method import Method
 
 RESTARTS = 8  # searches of the first frame
 BODY_FRAMES = 30  # from which a build is found
+COMPILING = 60.0  # seconds that a plugin's first calls may take longer than its limit
 PATIENCE = 1.5  # seconds of compiling before it is announced
 FRAMES = 10  # how many a start is judged by
 STRIDE = 3  # and how far apart they are, so that it shows which way somebody walks
@@ -28,11 +30,10 @@ LEAST = 5  # frames; a body is not fitted to fewer
 Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Opening:
-    """What is to be found out before the first frame; None leaves it to whether nobody knows the truth, `blind`."""
+    """What is to be found out before the first frame; None leaves it to whether somebody knows the truth."""
 
-    blind: bool
     translation: Translation | None = None
     first_pose: Literal["searched", "given"] = "searched"
     restarts: int | None = None
@@ -42,67 +43,68 @@ class Opening:
     def __post_init__(self) -> None:
         if self.first_pose not in ("searched", "given"):
             raise ValueError(f"first_pose must be one of searched, given, got {self.first_pose!r}")
-        if self.blind and self.translation == "known":
-            raise ValueError("translation must be searched or aligned where only masks are given, got known")
-        if self.blind and self.first_pose == "given":
-            raise ValueError("first_pose must be searched where only masks are given, got given")
         for name in ("restarts", "body_frames"):
             value = getattr(self, name)
             if value is not None and value < 0:
                 raise ValueError(f"{name} must be 0 or more, got {value}")
 
+    def check(self, known: bool) -> None:
+        """Raise ValueError where something is taken for known although nobody knows the truth."""
+        if not known and self.translation == "known":
+            raise ValueError("translation must be searched or aligned where only masks are given, got known")
+        if not known and self.first_pose == "given":
+            raise ValueError("first_pose must be searched where only masks are given, got given")
 
-def opened(
-    seen: Scene,
-    choice: Choice,
-    how: Opening,
-    trained: Sequence[Motion],
-    seed: int,
-    threads: int,
-    say: Callable[[str], None],
-) -> tuple[Task, Shape | None]:
-    """Return the task of following a scene, and the person's build where it was fitted."""
-    mode: Translation = how.translation or ("aligned" if how.blind else "known")
-    known = None if seen.truth is None or how.first_pose == "searched" else seen.truth.poses[0, 3:]
-    task = Task(
-        seen.body,
-        seen.cameras,
-        choice.budget(),
-        seen.yaw,
-        seen.anchor,
-        translation=mode,
-        fps=seen.fps,
-        training=trained,
+
+def task_of(scene: Scene, how: Opening, training: Sequence[Motion], evaluations: int, threads: int) -> Task:
+    """Return the task of following a scene, as far as it is known before anything is searched."""
+    how.check(scene.truth is not None)
+    known = None if scene.truth is None or how.first_pose == "searched" else scene.truth.poses[0, 3:]
+    return Task(
+        scene.body,
+        scene.cameras,
+        evaluations,
+        scene.yaw,
+        scene.anchor,
+        translation=how.translation or ("aligned" if scene.truth is None else "known"),
+        fps=scene.fps,
+        training=training,
         first_pose=known,
         threads=threads,
     )
-    began = time.perf_counter()
-    with _announced(say):
-        _warm_up(prepare(choice, task).warm_up, seen)
-    say(f"ready in {time.perf_counter() - began:.1f} s; {seen.count} frames of {seen.name}")
 
-    follow = following(choice)
-    restarts = (RESTARTS if how.blind else 0) if how.restarts is None else how.restarts
-    body_frames = (BODY_FRAMES if how.blind else 0) if how.body_frames is None else how.body_frames
+
+def opened(
+    scene: Scene, method: Method, task: Task, how: Opening, seed: int, listener: Listener
+) -> tuple[Task, Shape | None]:
+    """Return a task with what was found out before the first frame, and the person's build where it was fitted."""
+    began = time.perf_counter()
+    with _announced(listener.say):
+        _warm_up(method.tracker(task, COMPILING), scene)
+    listener.say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
+
+    follow, blind = following(method), scene.truth is None
+    restarts = (RESTARTS if blind else 0) if how.restarts is None else how.restarts
+    body_frames = (BODY_FRAMES if blind else 0) if how.body_frames is None else how.body_frames
     if restarts:
-        say(f"looking for the first pose, {restarts} times")
-        task = begun(task, seen.observations, follow, restarts, seed)
+        listener.say(f"looking for the first pose, {restarts} times")
+        task = begun(task, scene.observations, follow, restarts, seed)
     shape = None
     if body_frames:
-        say(f"fitting the person's build to {body_frames} frames")
-        alone = len(seen.cameras) == 1 and mode == "aligned"
+        listener.say(f"fitting the person's build to {body_frames} frames")
+        alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = how.height or (task.body.stature if alone else None)
-        shape = built(task, seen.observations, follow, body_frames, height, seed)
+        shape = built(task, scene.observations, follow, body_frames, height, seed)
         if shape is not None:
             task = replace(task, body=shape.body)
     return task, shape
 
 
-def following(choice: Choice) -> Follow:
+def following(method: Method) -> Follow:
     """Return a function that follows observations with a method, as a task asks."""
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        return prepare(choice, task).tracker.track(observations, rng)
+        return method.tracker(task).track(observations, rng)
 
     return follow
 

@@ -4,42 +4,27 @@ Until it is whole it stands beside its place, hidden, with every frame that was 
 early, because a disk is full or somebody stops it, those frames are kept, and the same track can go on from them.
 """
 
-import csv
 import json
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from posefit.fitting.tracker import Frame
-from posefit.footage.source import Scene
+from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
-from posefit.geometry.skeleton import JOINTS
 from posefit.motion.motion import Motion
+from posefit.tracking.formats import FILES, Rows, State, write_formats
+from posefit.tracking.identity import Told, difference
 from posefit.tracking.picture import Painter
 
-FILES = (
-    "poses.npz",
-    "track.amc",
-    "skeleton.asf",
-    "track.bvh",
-    "track.trc",
-    "camera.json",
-    "frames.csv",
-    "summary.json",
-    "overlay.mp4",
-    "summary.png",
-)
 _FOUND, _SPEC = "found.jsonl", "spec.json"
 _ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
 _NUMBERS = ("cost", "evaluations", "seconds")
-
-Rows = Sequence[Mapping[str, float]]
-State = dict[str, Any]
 
 
 class Output(Protocol):
@@ -89,7 +74,7 @@ class OutputFolder:
     """
 
     def __init__(
-        self, path: str | Path, force: bool, resume: bool, spec: Mapping[str, str], say: Callable[[str], None]
+        self, path: str | Path, force: bool, resume: bool, spec: Mapping[str, Told], say: Callable[[str], None]
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
         if self.path.exists() and not self.path.is_dir():
@@ -113,10 +98,8 @@ class OutputFolder:
             before = json.loads((self._building / _SPEC).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             raise ValueError(f"{self.path}: expected a track that was interrupted to resume, got none") from None
-        for name in sorted(before.keys() | self._spec.keys()):
-            if before.get(name) != self._spec.get(name):
-                expected, came = before.get(name), self._spec.get(name)
-                raise ValueError(f"{self.path}: {name} must be {expected}, as before, to resume, got {came}")
+        if (other := difference(before, self._spec)) is not None:
+            raise ValueError(f"{self.path}: {other}")
 
     def __enter__(self) -> Self:
         try:
@@ -124,7 +107,8 @@ class OutputFolder:
                 shutil.rmtree(self._building)
             shutil.rmtree(self.work, ignore_errors=True)
             self.work.mkdir(parents=True)
-            (self._building / _SPEC).write_text(json.dumps(self._spec), encoding="utf-8")
+            told = {name: one.as_json() for name, one in self._spec.items()}
+            (self._building / _SPEC).write_text(json.dumps(told), encoding="utf-8")
         except OSError as error:
             raise ValueError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
         return self
@@ -192,7 +176,7 @@ class OutputFolder:
         import cv2
 
         folder, painter = self._building, Painter(scene)
-        _write_tables(folder, scene, estimate, frames, rows, summary)
+        write_formats(folder, scene, estimate, frames, rows, summary)
         filmed = scene.pictures() if scene.pictures is not None else repeat(None)
         writer: VideoWriter | None = None
         for frame, observation, row, picture in zip(frames, scene.observations, rows, filmed, strict=False):
@@ -204,35 +188,3 @@ class OutputFolder:
         writer.close()
         if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows)):
             raise OSError("no room for summary.png")
-
-
-def _write_tables(
-    folder: Path, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State
-) -> None:
-    from posefit.motion.amc import write_amc
-    from posefit.motion.asf import write_asf
-    from posefit.motion.bvh import write_bvh
-    from posefit.motion.trc import write_trc
-
-    np.savez_compressed(
-        folder / "poses.npz",
-        poses=estimate.poses,
-        translations=estimate.translations,
-        fps=np.array(estimate.fps),
-        joints=np.array(JOINTS),
-        costs=np.array([frame.cost for frame in frames]),
-        radii=scene.body.radii,
-    )
-    write_asf(folder / "skeleton.asf", estimate.skeleton)
-    write_amc(folder / "track.amc", estimate)
-    write_bvh(folder / "track.bvh", estimate)
-    write_trc(folder / "track.trc", estimate)
-    (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
-    joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
-    names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
-    with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*rows[0], *names])
-        for row, points in zip(rows, joints, strict=True):
-            writer.writerow([*row.values(), *(f"{value:.6f}" for value in points.reshape(-1))])
-    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -9,7 +9,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.source import Scene
+from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES, PARENTS

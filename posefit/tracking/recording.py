@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.footage.source import Scene
+from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import BONES, PARENTS
 from posefit.motion.motion import Motion
 

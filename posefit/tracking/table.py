@@ -3,11 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-_NAMES = {
-    "mean_pose": "mean training pose",
-    "persistence": "first true pose, held",
-    "nearest": "best training pose",
-}
+from posefit.tracking.measures import BASELINES, MEASURES
+
 NOTABLE = 0.05  # a part of the build that is off the average by less is not worth a word
 
 
@@ -22,14 +19,13 @@ def table(summary: Mapping[str, Any]) -> str:
         lines.append(f"{'':24} {'error deg':>9} {'skill':>7}")
         lines.append(f"{summary['method']:24} {error['mean']:9.2f}")
         for name, baseline in summary["baselines_degrees"].items():
-            skill = summary["skill"][name]  # None where the baseline has no error at all
-            lines.append(f"{_NAMES[name]:24} {baseline:9.2f} " + (f"{'-':>7}" if skill is None else f"{skill:7.2f}"))
+            skill = MEASURES["skill"].number(summary["skill"][name])  # a dash where the baseline has no error at all
+            lines.append(f"{BASELINES[name]:24} {baseline:9.2f} {skill:>7}")
         if summary["prior_floor_degrees"] is not None:  # a tracker of its own may have no prior
-            lines.append(f"{'floor of the prior':24} {summary['prior_floor_degrees']:9.2f}")
-        lines.append(
-            f"MPJPE {summary['mpjpe_mm']:.0f} mm, PA-MPJPE {summary['pa_mpjpe_mm']:.0f} mm, left/right swapped "
-            f"{100 * summary['swap_rate']:.0f} %, lost {100 * summary['lost_rate']:.0f} % of frames"
-        )
+            floor = MEASURES["prior_floor_degrees"]
+            lines.append(f"{floor.label:24} {floor.number(summary[floor.name]):>9}")
+        told = (_shown(summary, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
+        lines.append(f"{', '.join(told)} of frames")
     if summary["held_frames"]:
         held = summary["held_frames"]
         show = "frame shows" if held == 1 else "frames show"
@@ -53,7 +49,12 @@ def table(summary: Mapping[str, Any]) -> str:
         )
     used = summary["evaluations"] / summary["frames"]
     lines.append(
-        f"IoU {summary['iou']:.3f}, {used:,.0f} of {summary['evaluations_per_frame']:,} evaluations and "
-        f"{1e3 * summary['seconds_per_frame']:.1f} ms a frame, {summary['evaluations_per_second']:,.0f} poses a second"
+        f"{_shown(summary, 'iou')}, {used:,.0f} of {summary['evaluations_per_frame']:,} evaluations and "
+        f"{MEASURES['seconds_per_frame'].number(summary['seconds_per_frame'])} ms a frame, "
+        f"{MEASURES['evaluations_per_second'].number(summary['evaluations_per_second'])} poses a second"
     )
     return "\n".join(lines)
+
+
+def _shown(summary: Mapping[str, Any], name: str) -> str:
+    return MEASURES[name].shown(summary[name])

@@ -383,6 +383,38 @@ def test_a_new_plugin_installs_offline_and_passes_its_own_test(kind: str, tmp_pa
     assert "my-own" in json.loads(used.stdout)["method"]
 
 
+def test_a_new_command_installs_offline_and_passes_its_own_test(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    result = run("plugins", "new", "how-far", "--kind", "command", "--out", folder)
+    assert result.exit_code == 0, result.output
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation"]
+    subprocess.run([*pip, "--target", str(tmp_path / "site"), str(folder)], check=True, capture_output=True)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
+    environment.pop("POSEFIT_LOAD_PLUGINS", None)
+
+    def called(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", *words]
+        return subprocess.run(command, cwd=folder, env={**environment, **more}, capture_output=True, text=True)
+
+    tests = called("pytest", "-q", "-p", "no:cacheprovider", "test_how_far.py")
+    assert tests.returncode == 0, tests.stdout
+    assert "2 passed" in tests.stdout
+    assert "how-far  " in called("posefit", "--help").stdout
+    used = called("posefit", "how-far", "--frames", "30")
+    assert used.returncode == 0, used.stderr
+    assert used.stdout.startswith("walk ")
+    assert "offers command how-far" in called("posefit", "plugins", "doctor").stdout
+    left_out = called("posefit", "how-far", POSEFIT_BLOCK_PLUGINS="posefit-how-far")
+    assert left_out.returncode == 2
+    assert "No such command 'how-far'" in left_out.stderr
+
+
+@pytest.mark.parametrize("taken", ["track", "bench"])
+def test_a_new_command_has_a_new_name(taken: str, tmp_path: Path) -> None:
+    said = fails("plugins", "new", taken, "--kind", "command", "--out", tmp_path / "x")
+    assert f"name must be a new one, got '{taken}', which posefit registers already" in said
+
+
 def test_a_new_plugin_replaces_nothing(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     assert "expected a new folder, got one that exists" in fails("plugins", "new", "a", "--out", tmp_path / "mine")
@@ -390,7 +422,7 @@ def test_a_new_plugin_replaces_nothing(tmp_path: Path) -> None:
     assert "name must be small letters" in fails("plugins", "new", "9 lives", "--out", tmp_path / "x")
     known = fails("plugins", "new", "sapso", "--out", tmp_path / "x")
     assert "name must be a new one, got 'sapso', which posefit registers already" in known
-    assert "kind must be one of optimiser, prior, tracker, got 'camera'" in fails(
+    assert "kind must be one of optimiser, prior, tracker, command, got 'camera'" in fails(
         "plugins", "new", "a", "--kind", "camera", "--out", tmp_path / "x"
     )
     assert not (tmp_path / "x").exists()

@@ -14,7 +14,7 @@ from posefit import minimise
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import check_vector_env, drive, to_sb3_vec_env
-from posefit_envs.fit_vector import FitVector
+from posefit_envs.fit_vector import FitVectorEnv
 
 FIT: list[dict[str, Any]] = [
     {},
@@ -47,18 +47,18 @@ def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
         check_vector_env(vector, lambda: gym.make("posefit/Fit-v0", max_evaluations=4), steps=20)
     check_vector_env(gym.make_vec("CartPole-v1", 3, "sync"), lambda: gym.make("CartPole-v1"), steps=60)
 
-    class Shifted(FitVector):
+    class Shifted(FitVectorEnv):
         def step(self, actions: Any) -> Any:
             observations, rewards, *rest = super().step(actions)
             return observations, rewards - 1e-9, *rest
 
-    class Masked(FitVector):
+    class Masked(FitVectorEnv):
         def step(self, actions: Any) -> Any:
             *rest, infos = super().step(actions)
             infos["_cost"][0] = False
             return *rest, infos
 
-    class SameSeed(FitVector):
+    class SameSeed(FitVectorEnv):
         def reset(self, *, seed: Any = None, options: Any = None) -> Any:
             return super().reset(seed=None if seed is None else [seed] * self.num_envs, options=options)
 
@@ -217,7 +217,7 @@ def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
         assert rewards.shape == (2,)
         assert infos[0]["terminal_observation"][..., 1].any()
         assert not observations[0][..., 1].any()  # a new episode: nothing proposed yet
-        assert infos[0]["TimeLimit.truncated"] is ("Fit" in name)
+        assert infos[0]["TimeLimit.truncated"] is ("FitEnv" in name)
         assert adapted.get_attr("num_envs") == [2, 2]
         adapted.close()
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from posefit.cli import main
 from posefit.geometry.rotation import wrapped
 from posefit.motion import library
-from posefit.tracking.run import track
+from posefit.tracking.front import track
 from posefit_experiments.sapso.experiment import (
     BASELINES,
     COMPARED,

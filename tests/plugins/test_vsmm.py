@@ -23,7 +23,7 @@ from posefit_experiments.vsmm import activities
 from posefit_experiments.vsmm import experiment as patent
 from posefit_vsmm.course import COAST
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.joined import joined
+from posefit_vsmm.joined.tracker import joined
 from posefit_vsmm.tracker import vsmm
 
 SIZE = (200, 240)
@@ -278,15 +278,15 @@ def test_the_experiment_is_about_as_good_as_the_patents(experiment: patent.Run) 
 
 
 def test_no_motion_of_the_experiment_was_learned_from() -> None:
-    from posefit_vsmm.fit_motion import PLANS
+    from posefit_vsmm.fit.motion import TEACHINGS
 
     tested = {one.motion for one in activities.ACTIVITIES}
     stored = json.loads((Path(library.__file__).parent / "library.json").read_text(encoding="utf-8"))["motions"]
     sources = {stored[name]["source"] for name in tested}
-    parts = {(clip.path.split("/")[1], clip.start) for plan in PLANS.values() for clip in plan.fitted}
+    parts = {(clip.path.split("/")[1], clip.start) for teaching in TEACHINGS.values() for clip in teaching.fitted}
     assert not sources & {name for name, _ in parts}
     assert not tested & set(activities.TRAINING)
-    assert not tested & {name for plan in PLANS.values() for name in plan.drawn}
+    assert not tested & {name for teaching in TEACHINGS.values() for name in teaching.drawn}
 
 
 def test_the_figures_are_drawn(tmp_path: Path, experiment: patent.Run) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.report.contest import CLAIM, Contest, baselines, claim, contest_of, leaderboard, pairs
+from posefit.report.contest import CLAIM, Contest, baseline_rows, claim, contest_of, leaderboard, paired_tests
 from posefit.report.curves import convergence, grid, joint_errors, reached
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
@@ -69,13 +69,13 @@ def test_the_leaderboard_has_middles_of_runs_and_baselines_have_skills_too(tmp_p
     assert row["error"] == pytest.approx(2.5)  # of four runs the first and the last are left out
     assert row["skill_mean_pose"] == pytest.approx(1.0 - 2.5 / 4.0)
     assert np.isnan(row["low"])  # one seed says nothing of others
-    for base in baselines(found):
+    for base in baseline_rows(found):
         assert base["error"] == 4.0
         assert base["skill_nearest"] == 0.0
 
 
 def test_pairs_say_who_is_better_and_how_surely(tmp_path: Path) -> None:
-    found = pairs(contest(tmp_path, full({"a": 1.0, "b": 2.0}, instances=3, seeds=3)))
+    found = paired_tests(contest(tmp_path, full({"a": 1.0, "b": 2.0}, instances=3, seeds=3)))
     assert found["ranks"].tolist() == [1.0, 2.0]
     ((first, second, difference, p, adjusted, better, low, high),) = found["pairs"]
     assert (first, second, better, low, high) == (0, 1, 1.0, 1.0, 1.0)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from posefit.report import export
-from posefit.report.export import Run, write_csv, write_iohprofiler
+from posefit.report.export import LoggedRun, write_csv, write_iohprofiler
 
 
 def run(method="sapso@pca", settings=None, problem="walk", dimension=9, instance=0, seed=0, evaluations=(1, 40, 80), costs=(90.0, 5.0, 2.5)):  # fmt: skip
-    return Run(method, settings or {}, problem, dimension, instance, seed, evaluations, costs)
+    return LoggedRun(method, settings or {}, problem, dimension, instance, seed, evaluations, costs)
 
 
 def sweep():
@@ -24,7 +24,7 @@ def sweep():
             for instance in (2, 0, 1):
                 for seed in (1, 0):
                     used = np.cumsum(rng.integers(1, 50, 20))
-                    yield Run(
+                    yield LoggedRun(
                         method,
                         settings,
                         problem,

@@ -33,13 +33,13 @@ def every():
     """Return one figure of each kind."""
     shares = np.array([[0.1, 0.5, 1.0], [0.0, 0.3, 0.9], [0.0, 0.0, 0.2]])
     return {
-        "convergence": figures.convergence(METHODS, GRID, [band([9, 5, 3]), band([9, 8, 7]), band([9, 9, 9])]),
-        "attainment": figures.attainment(METHODS, GRID, shares),
-        "profile": figures.profile(METHODS, np.array([1.0, 2.0, 3.0]), shares),
-        "joint_errors": figures.joint_errors(
+        "convergence": figures.convergence_figure(METHODS, GRID, [band([9, 5, 3]), band([9, 8, 7]), band([9, 9, 9])]),
+        "attainment": figures.attainment_figure(METHODS, GRID, shares),
+        "profile": figures.profile_figure(METHODS, np.array([1.0, 2.0, 3.0]), shares),
+        "joint_errors": figures.joint_errors_figure(
             METHODS, ["head", "l_foot"], [band([30, 60]), band([40, 50]), band([9, 9])]
         ),
-        "critical_difference": figures.critical_difference(METHODS, ranking([1.2, 1.8, 3.0], ((0, 1),))),
+        "critical_difference": figures.critical_difference_figure(METHODS, ranking([1.2, 1.8, 3.0], ((0, 1),))),
     }
 
 
@@ -71,7 +71,7 @@ def test_a_curve_has_its_values_and_its_band():
 
 def test_bars_have_their_intervals_and_one_seed_has_none():
     errors = Intervals(np.array([3.0]), np.array([np.nan]), np.array([np.nan]))
-    axes = figures.joint_errors(("a", "b"), ["head"], [band([30]), errors]).axes[0]
+    axes = figures.joint_errors_figure(("a", "b"), ["head"], [band([30]), errors]).axes[0]
     assert [bar.get_width() for bar in axes.patches] == [30, 3]
     whiskers = [one.get_segments()[0][:, 0].tolist() for one in axes.collections]
     assert whiskers == [[29.5, 31.0], [3.0, 3.0]]
@@ -91,7 +91,9 @@ def test_a_critical_difference_plot_names_methods_best_first_with_their_ranks():
 
 
 def test_a_bar_joins_what_is_not_told_apart():
-    axes = figures.critical_difference(("a", "b", "c", "d"), ranking([1.0, 2.0, 3.2, 3.8], ((0, 1), (2, 3)))).axes[0]
+    axes = figures.critical_difference_figure(
+        ("a", "b", "c", "d"), ranking([1.0, 2.0, 3.2, 3.8], ((0, 1), (2, 3)))
+    ).axes[0]
     bars = [line.get_xdata() for line in axes.lines if line.get_linewidth() == 3.5]
     assert [
         (min(ends) <= low, max(ends) >= high) for ends, (low, high) in zip(bars, ((1, 2), (3.2, 3.8)), strict=True)
@@ -103,7 +105,7 @@ def test_a_bar_joins_what_is_not_told_apart():
 
 
 def test_a_critical_difference_longer_than_the_line_is_said_to_be():
-    drawn = figures.critical_difference(("a", "b"), friedman([[[1.0, 2.0]], [[2.0, 1.0]]]))
+    drawn = figures.critical_difference_figure(("a", "b"), friedman([[[1.0, 2.0]], [[2.0, 1.0]]]))
     # sqrt(2 * 3 / (6 * 2)) * 1.960 = 1.39, and the line is 1 long
     assert texts(drawn)[-1] == "critical difference 1.39, longer than the line"
 
@@ -111,8 +113,8 @@ def test_a_critical_difference_longer_than_the_line_is_said_to_be():
 def test_thirty_methods_are_drawn_and_no_two_lines_look_alike(tmp_path):
     names = [f"method-{k}-with-a-rather-long-name-for-a-figure" for k in range(28)]
     found = friedman(np.random.default_rng(0).gamma(2.0, size=(28, 5, 5)))
-    figures.save(figures.critical_difference(names, found), tmp_path / "cd.png")
-    drawn = figures.profile(names, np.array([0.0, 1.0]), np.tile([0.0, 1.0], (28, 1)))
+    figures.save(figures.critical_difference_figure(names, found), tmp_path / "cd.png")
+    drawn = figures.profile_figure(names, np.array([0.0, 1.0]), np.tile([0.0, 1.0], (28, 1)))
     assert len({(line.get_color(), line.get_linestyle()) for line in drawn.axes[0].lines}) == 28
 
 

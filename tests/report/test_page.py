@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from posefit.report.repeat import command
+from posefit.report.repeat import repeat_command
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import run
 from tests.report.browser import browser, ledger, opened, result
@@ -163,7 +163,7 @@ def test_the_gallery_plays_and_the_skeleton_turns(chromium: Any, swept: Path) ->
 
 
 def test_a_row_gives_the_command_that_runs_it_again(chromium: Any, swept: Path) -> None:
-    commands = {command(row["spec"]) for row in Ledger(swept / "results").rows()}
+    commands = {repeat_command(row["spec"]) for row in Ledger(swept / "results").rows()}
     with opened(chromium, swept / "report.html") as seen:
         buttons = seen.page.locator("#all-rows button", has_text="command")
         assert buttons.count() == len(commands) == 24

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from posefit.report.repeat import command
+from posefit.report.repeat import repeat_command
 from posefit.sweep.cell import TIMES, run_cell
 from posefit.sweep.check import cell_of
 from posefit.sweep.ledger import Ledger
@@ -37,7 +37,7 @@ def plan_in(text: str) -> dict[str, Any]:
 @pytest.mark.parametrize("spec", SPECS)
 def test_the_command_asks_for_the_very_cell(spec: dict[str, Any]) -> None:
     cell = cell_of(SMALL | spec)
-    assert [one.key for one in Plan.of(plan_in(command(cell.spec)))] == [cell.key]
+    assert [one.key for one in Plan.of(plan_in(repeat_command(cell.spec)))] == [cell.key]
 
 
 def test_the_command_brings_back_the_row(tmp_path: Path) -> None:
@@ -47,7 +47,7 @@ def test_the_command_brings_back_the_row(tmp_path: Path) -> None:
     cell = cell_of(SMALL | SPECS[0])
     path = os.pathsep.join([str(posefit.parent), os.environ["PATH"]])
     subprocess.run(
-        [bash, "-c", command(cell.spec)],
+        [bash, "-c", repeat_command(cell.spec)],
         cwd=tmp_path,
         env={**os.environ, "PATH": path},
         check=True,
@@ -66,9 +66,9 @@ def test_the_command_brings_back_the_row(tmp_path: Path) -> None:
 )
 def test_nothing_in_a_name_ends_the_plan_or_reaches_the_shell(name: str) -> None:
     cell = replace(cells(1)[0], motion=name, train=(name,), settings={f"sapso.{name}": name}, corruption={name: 0.5})
-    (found,) = plan_in(command(cell.spec))["cells"]
+    (found,) = plan_in(repeat_command(cell.spec))["cells"]
     assert found["motion"] == name
     assert found["train"] == [name]
     assert found["settings"] == {f"sapso.{name}": name}
     assert found["corruption"] == {name: 0.5}
-    assert "END" not in command(cell.spec).split("\n")[1:-1]
+    assert "END" not in repeat_command(cell.spec).split("\n")[1:-1]

@@ -13,7 +13,8 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion.library import average_skeleton
-from posefit.silhouette.cost import LEAST_SHARE, add_mismatch, areas, mismatch, paint, project
+from posefit.silhouette.cost import LEAST_SHARE, areas, mismatch, paint, project
+from posefit.silhouette.kernels import add_mismatch
 from posefit.silhouette.mask import Silhouette
 
 counts = st.tuples(*[st.integers(0, 10**9)] * 3)

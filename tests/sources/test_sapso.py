@@ -19,7 +19,7 @@ from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import library
 from posefit.silhouette.cost import areas, mismatch, project
 from posefit_priors.pca import PCA
-from posefit_swarm import flock, sapso, swarm
+from posefit_swarm import flock, kernels, sapso, swarm
 from posefit_swarm.sapso import SAPSO
 
 ROOT = Path(__file__).parents[2]
@@ -199,7 +199,7 @@ def flown(**changed: Any) -> tuple[Array, Array]:
         "periodic": np.array([False]),
     }
     velocity, position = np.empty((1, 1)), np.empty((1, 1))
-    swarm.fly(*{**given, **changed}.values(), velocity, position)
+    kernels.fly(*{**given, **changed}.values(), velocity, position)
     return velocity, position
 
 
@@ -302,7 +302,9 @@ def settled(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool,
     position, costs = np.array([[0.1]]), np.array([2.0])
     best, best_costs, accepted = np.array([[0.5]]), np.array([1.5]), np.empty(1, dtype=bool)
     moved = np.array([[0.7]])
-    swarm.settle(moved, np.array([cost]), np.array([chance]), temperature, position, costs, best, best_costs, accepted)
+    kernels.settle(
+        moved, np.array([cost]), np.array([chance]), temperature, position, costs, best, best_costs, accepted
+    )
     return bool(accepted[0]), float(position[0, 0]), float(best[0, 0])
 
 
@@ -338,11 +340,11 @@ def test_a1_2c_only_a_particle_that_no_rand_could_keep_in_the_box_is_not_redrawn
     low, high, periodic = np.full(2, -0.15), np.full(2, 0.15), np.zeros(2, dtype=bool)
     pull = (0.9, 2.0, position, velocity, best, np.array([0.99, -0.99]), low, high, periodic)
     everyone = np.arange(300)
-    hopeful = set(swarm.redrawable(everyone, *pull).tolist())
+    hopeful = set(kernels.redrawable(everyone, *pull).tolist())
     flown, moved, ever = np.empty((300, 2)), np.empty((300, 2)), np.zeros(300, dtype=bool)
     for corner in np.ndindex(2, 2, 2, 2):  # rand() of 0 or 1: the extremes of each coordinate
         rand = np.broadcast_to(np.array(corner, dtype=float).reshape(2, 1, 2), (2, 300, 2)).copy()
-        swarm.fly(everyone, rand, *pull, flown, moved)
+        kernels.fly(everyone, rand, *pull, flown, moved)
         ever |= (np.abs(moved) <= 1.0).all(axis=1)
     assert 0 < len(hopeful) < 300
     assert set(np.flatnonzero(ever)) <= hopeful

@@ -11,17 +11,27 @@ from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import library as motions
-from posefit_vsmm.fit_motion import LAMBDA, ridge
+from posefit_imm import Belief, Measurement, start
+from posefit_imm.kernels import minus, plus
+from posefit_vsmm.detection.joints import detected
+from posefit_vsmm.detection.preprocess import Lines, lines_of
+from posefit_vsmm.detection.shown import Shown
+from posefit_vsmm.fit.motion import LAMBDA, ridge
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.imm import Belief, Measurement, start
-from posefit_vsmm.joints import detected
 from posefit_vsmm.motion import library
-from posefit_vsmm.points import AT, POINTS, Figure, points_of
-from posefit_vsmm.preprocess import Lines, lines_of
-from posefit_vsmm.shown import Shown
-from posefit_vsmm.state import ERROR, HELD_ANGLES, decode, encode, minus, plus
-from posefit_vsmm.structure import FIRST, Models, Settings
-from posefit_vsmm.switching import Contest, Rules, enlarged, joined, limb_angles, restricted
+from posefit_vsmm.points import AT, POINTS, points_of
+from posefit_vsmm.sight import Figure
+from posefit_vsmm.state import ERROR, HELD_ANGLES, decode, encode
+from posefit_vsmm.structure import FIRST, Models, Switching
+from posefit_vsmm.switching import (
+    Rivalry,
+    Rules,
+    SequentialTest,
+    enlarged,
+    enlarged_literally,
+    limb_angles,
+    restricted,
+)
 
 SIZE = (240, 320)  # rows, columns
 NO_BIAS = np.zeros((len(POINTS), 2))
@@ -260,9 +270,9 @@ def test_the_groups_are_those_of_the_reading() -> None:  # VSMM 4
 
 def models(**changes: object) -> Models:
     carried = library()
-    given = {"structure": "variable", "rules": Rules(), "new": "rerun", "contest": Contest((), ())} | changes
-    settings = Settings(carried, read_topology(None, carried.names), **given)  # type: ignore[arg-type]
-    return Models(settings, motions.average_skeleton(), 30.0)
+    given = {"structure": "variable", "rules": Rules(), "new": "rerun", "test": SequentialTest()} | changes
+    switching = Switching(library=carried, topology=read_topology(None, carried.names), **given)  # type: ignore[arg-type]
+    return Models(switching, motions.average_skeleton(), 30.0)
 
 
 def telling(name: str, running: Models) -> Callable[[Array], Measurement]:
@@ -383,7 +393,7 @@ def believing() -> Belief:
 
 def patents() -> Belief:
     before = believing()
-    return joined(before, OLD, UNION, {"jacks": before.states[0] * 1.0}, {"jacks": 0.5 * np.eye(ERROR)})
+    return enlarged_literally(before, OLD, UNION, {"jacks": before.states[0] * 1.0}, {"jacks": 0.5 * np.eye(ERROR)})
 
 
 def test_a_new_model_is_as_probable_as_the_most_probable_one() -> None:  # VSMM 8.1
@@ -439,29 +449,29 @@ def latest(probabilities: Sequence[float], likelihoods: Sequence[float]) -> Beli
 
 
 def test_the_patents_test_looks_at_one_frame() -> None:  # VSMM 9
-    contest = Contest(("walk",), ("jacks",), "patent")
+    rivalry = Rivalry(SequentialTest(test="patent"), old=("walk",), new=("jacks",))
     models = ("walk", "jacks")
-    assert contest.decide(latest([0.6, 0.4], [1.0, 1.0]), models) == "old"  # 0.4 / 0.6 < 0.9
-    assert contest.decide(latest([0.51, 0.49], [1.0, 1.0]), models) is None  # 0.96
-    assert contest.decide(latest([0.4, 0.6], [1.0, 2.0]), models) == "new"
-    assert contest.decide(latest([0.4, 0.6], [1.0, 0.8]), models) == "old"  # the likelihoods' ratio is 0.8
+    assert rivalry.decide(latest([0.6, 0.4], [1.0, 1.0]), models) == "old"  # 0.4 / 0.6 < 0.9
+    assert rivalry.decide(latest([0.51, 0.49], [1.0, 1.0]), models) is None  # 0.96
+    assert rivalry.decide(latest([0.4, 0.6], [1.0, 2.0]), models) == "new"
+    assert rivalry.decide(latest([0.4, 0.6], [1.0, 0.8]), models) == "old"  # the likelihoods' ratio is 0.8
 
 
 def test_the_sequential_test_waits_for_evidence_of_99_to_1() -> None:
     models = ("walk", "jacks")
-    contest = Contest(("walk",), ("jacks",))
+    rivalry = Rivalry(SequentialTest(), old=("walk",), new=("jacks",))
     ratios = [3.0] * 4 + [1.3]  # 81, then 105
-    decisions = [contest.decide(latest([0.5, 0.5], [1.0, ratio]), models) for ratio in ratios]
+    decisions = [rivalry.decide(latest([0.5, 0.5], [1.0, ratio]), models) for ratio in ratios]
     assert decisions == [None] * 4 + ["new"]
-    contest = Contest(("walk",), ("jacks",))
-    decisions = [contest.decide(latest([0.5, 0.5], [1.0, 1.0 / ratio]), models) for ratio in ratios]
+    rivalry = Rivalry(SequentialTest(), old=("walk",), new=("jacks",))
+    decisions = [rivalry.decide(latest([0.5, 0.5], [1.0, 1.0 / ratio]), models) for ratio in ratios]
     assert decisions == [None] * 4 + ["old"]
 
 
-def test_a_contest_that_is_never_decided_ends() -> None:
-    contest = Contest(("walk",), ("jacks",), longest=3)
+def test_a_rivalry_that_is_never_decided_ends() -> None:
+    rivalry = Rivalry(SequentialTest(longest=3), old=("walk",), new=("jacks",))
     models = ("walk", "jacks")
-    assert [contest.decide(latest([0.4, 0.6], [1.0, 1.0]), models) for _ in range(3)] == [None, None, "new"]
+    assert [rivalry.decide(latest([0.4, 0.6], [1.0, 1.0]), models) for _ in range(3)] == [None, None, "new"]
 
 
 def test_the_body_and_its_models_fit_any_frame_rate() -> None:

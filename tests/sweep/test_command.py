@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from posefit.cli import main
-from posefit.sweep.command import described
+from posefit.sweep.command import duration_text
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import fails, run
 
@@ -75,7 +75,7 @@ def test_a_preview_lists_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> 
 
 
 def test_times_are_told_as_people_say_them() -> None:
-    assert [described(seconds) for seconds in (4.4, 89.0, 90.0, 5400.0)] == [
+    assert [duration_text(seconds) for seconds in (4.4, 89.0, 90.0, 5400.0)] == [
         "4 seconds", "89 seconds", "1.5 minutes", "1.5 hours",
     ]  # fmt: skip
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from posefit.sweep.cell import TIMES, run_cell
-from posefit.sweep.drive import Tally, drive
+from posefit.sweep.drive import Tally, drive_cells
 from posefit.sweep.driver import ATTEMPTS, Driver
 from posefit.sweep.engines.engine import Engine, EngineError
 from posefit.sweep.engines.limits import Limits
@@ -110,7 +110,7 @@ def timed(count: int, engine: Engine, folder: Path) -> float:
         while warm < engine.window():
             warm += len(engine.wait(1.0))
         began = time.perf_counter()
-        tally = drive(cells(count, fake.SECOND), driver, Unclosed(engine), print, lambda _: None)
+        tally = drive_cells(cells(count, fake.SECOND), driver, Unclosed(engine), print, lambda _: None)
         taken = time.perf_counter() - began
     engine.close()
     assert tally.done == count
@@ -215,7 +215,7 @@ def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp
         Driver(tmp_path / "ledger") as driver,
         pytest.raises(ValueError, match=r"127.*; \d of 20 cells are done and safe: the same command goes on"),
     ):
-        drive(cells(20), driver, engine, print, watch)
+        drive_cells(cells(20), driver, engine, print, watch)
     assert 3 <= len(Ledger(tmp_path / "ledger")) < 20
     assert not list((tmp_path / "ledger" / "claims").iterdir())
     assert swept(tmp_path / "ledger", cells(20), Processes(2, SHORT, behave)).done == 20
@@ -234,6 +234,6 @@ def test_a_scheduler_that_comes_back_is_waited_for(served: Served, tmp_path: Pat
             served.come()
 
     with Driver(tmp_path / "ledger") as driver:
-        tally = drive(cells(8), driver, engine, print, watch)
+        tally = drive_cells(cells(8), driver, engine, print, watch)
     assert (tally.done, tally.quarantined) == (8, 0)
     assert len(list(Ledger(tmp_path / "ledger").rows())) == 8

@@ -13,7 +13,7 @@ import pytest
 import posefit
 from posefit.sweep import log
 from posefit.sweep.cell import Cell
-from posefit.sweep.drive import drive
+from posefit.sweep.drive import drive_cells
 from posefit.sweep.driver import Claim, Driver, State
 from posefit.sweep.engines.engine import Outcome
 from posefit.sweep.ledger import Ledger
@@ -42,7 +42,7 @@ class Here:
 def filled(folder: Path, count: int = 5, start: int = 0) -> Path:
     """Return a ledger with the rows of so many cells."""
     with Driver(folder) as driver:
-        assert drive(cells(start + count)[start:], driver, Here(), print, lambda _: None).done == count
+        assert drive_cells(cells(start + count)[start:], driver, Here(), print, lambda _: None).done == count
     return folder
 
 
@@ -127,7 +127,7 @@ def test_a_damaged_row_is_named_put_aside_and_run_again(harm: Any, tmp_path: Pat
     assert aside.read_bytes() == lines[2]
 
     with Driver(folder, said.append) as driver:
-        assert drive(cells(5), driver, Here(), print, lambda _: None).ran == 1
+        assert drive_cells(cells(5), driver, Here(), print, lambda _: None).ran == 1
     assert len(said) == 1
     assert sorted(row["key"] for row in Ledger(folder).rows()) == sorted(cell.key for cell in cells(5))
 
@@ -230,7 +230,7 @@ def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
             ValueError, match=r"expected room to write to, got No space left on device; \d of 9 cells are done"
         ),
     ):
-        drive(cells(9), driver, Here(), print, lambda _: None)
+        drive_cells(cells(9), driver, Here(), print, lambda _: None)
     monkeypatch.undo()
     said: list[str] = []
     assert 3 <= len(Ledger(folder, said.append)) < 9

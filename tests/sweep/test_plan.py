@@ -13,7 +13,7 @@ from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.registry import Offer, Registry
 from posefit.sweep import check
-from posefit.sweep.cell import Cell, digest_of, run_cell, scene_of, trace
+from posefit.sweep.cell import Cell, anytime_trace, cell_scene, digest_of, run_cell
 from posefit.sweep.plan import Plan
 from posefit.tracking import method
 from tests.testing.planted import Holds
@@ -164,7 +164,7 @@ def test_a_cell_is_restored_from_its_rows_spec() -> None:
 def test_instances_differ_and_a_number_is_the_same_for_every_method_and_seed() -> None:
     def seen(**spec: Any) -> tuple[bytes, bytes]:
         (cell,) = Plan.of({"cells": [{"method": "sapso@pca", "motion": "walk", "frames": 4, "size": [80, 60], **spec}]})
-        scene = scene_of(cell)
+        scene = cell_scene(cell)
         assert scene.truth is not None
         return scene.truth.poses.tobytes(), scene.observations[2].silhouettes[0].mask.tobytes()
 
@@ -180,7 +180,7 @@ def test_a_share_of_the_frames_is_dropped() -> None:
     (cell,) = Plan.of(
         {"cells": [{"method": "sapso@pca", "motion": "walk", "size": [80, 60], "corruption": {"dropped": 0.5}}]}
     )
-    usable = [observation.usable for observation in scene_of(cell).observations]
+    usable = [observation.usable for observation in cell_scene(cell).observations]
     assert usable[0]
     assert 15 <= usable.count(False) <= 45  # of 60
 
@@ -212,9 +212,9 @@ def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_eval
 
     # by hand: after 20 evaluations the frames have 6 and 9, after 30: 4 and 9, after 40: 4 and 1
     found = [frame([8.0, 6.0, 4.0], [10, 20, 30], 30), frame([9.0, 1.0], None, 40), frame([], None, 0)]
-    assert trace(found) == {"evaluations": [20, 30, 40], "cost": [7.5, 6.5, 2.5]}
-    assert trace([frame([], None, 0)]) == {"evaluations": [], "cost": []}
-    long = trace([frame(list(range(500, 0, -1)), None, 500)])
+    assert anytime_trace(found) == {"evaluations": [20, 30, 40], "cost": [7.5, 6.5, 2.5]}
+    assert anytime_trace([frame([], None, 0)]) == {"evaluations": [], "cost": []}
+    long = anytime_trace([frame(list(range(500, 0, -1)), None, 500)])
     assert len(long["cost"]) <= 64
     assert long["evaluations"][-1] == 500
     assert long["cost"][-1] == 1.0

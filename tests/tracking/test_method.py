@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ import posefit
 from posefit import registry as registry_package
 from posefit.entries import Plugin
 from posefit.fitting.guard import BrokenRuleError
+from posefit.footage.scene import synthetic
 from posefit.registry import Offer, Registry, registry
-from posefit.tracking import method
+from posefit.tracking import method, opening
 from tests.testing import planted
 
 QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 200}
@@ -87,8 +89,8 @@ def test_a_filter_carries_its_particles_and_the_others_are_built_anew(monkeypatc
 def installed(monkeypatch: Any) -> Iterator[Any]:
     """Let plugins of the tests pass for installed ones."""
 
-    def install(kind: Any, factory: Any, **more: Any) -> None:
-        mine = Offer(kind, "bad", factory, "posefit-bad", "1.0", **more)
+    def install(kind: Any, factory: Any, name: str = "bad", **more: Any) -> None:
+        mine = Offer(kind, name, factory, "posefit-bad", "1.0", **more)
         rest = tuple(offer for plugin in registry().plugins for offer in plugin.offers)
         found = Registry((Plugin("bad", "posefit-bad", "1.0", "loaded", offers=(mine, *rest)),))
         monkeypatch.setattr(method, "registry", lambda: found)
@@ -130,7 +132,7 @@ class FailsToBuild(planted.Sound):
 def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
     factory: Any, rule: str | None, installed: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr(method, "COMPILING", 0.0)
+    monkeypatch.setattr(opening, "COMPILING", 0.0)
     installed("optimiser", factory)
     settings = {**QUICK, "ask_seconds": 0.3}
     if rule is not None:
@@ -216,7 +218,7 @@ def test_every_prior_can_be_searched(prior: str) -> None:
 
 
 def test_a_scene_is_followed_as_it_is() -> None:
-    from posefit.footage.source import synthetic
+
     from posefit.motion import library
 
     motion = library.built_in("walk", frames=3)
@@ -229,3 +231,20 @@ def test_a_scene_is_followed_as_it_is() -> None:
         posefit.track(seen, fps=20.0)
     with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth nobody knows"):
         posefit.track(replace(seen, truth=None))
+
+
+def test_the_prior_is_learned_once_whatever_a_track_searches_before(tmp_path: Path, installed: Any) -> None:
+    pca, fits = registry().prior("pca"), []
+
+    class Counted(pca):  # type: ignore[misc, valid-type]
+        def fit(self, angles: Any, skeleton: Any = None) -> Any:
+            fits.append(len(angles))
+            return super().fit(angles, skeleton)
+
+    motion = posefit.track("walk", **QUICK).truth
+    assert motion is not None
+    scene = synthetic(motion, [45.0, 135.0], (120, 90), [], (None, None))
+    np.savez(tmp_path / "one.npz", masks=np.stack([one.silhouettes[0].mask for one in scene.observations] * 3))
+    installed("prior", Counted, "counted")
+    posefit.track(tmp_path / "one.npz", prior="counted", restarts=2, body_frames=5, evaluations=80)
+    assert len(fits) == 1

@@ -17,7 +17,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Mask
-from posefit.tracking.run import track
+from posefit.tracking.front import track
 from posefit_experiments.filmed.gait import gait
 from posefit_experiments.filmed.reference import references
 from posefit_experiments.filmed.speed import loop_speed

@@ -12,9 +12,9 @@ from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace
 from posefit.fitting.tracker import Task
 from posefit.footage.masks import Range
-from posefit.footage.scenes import Viewing, scene
+from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Box, Extraction, Segmentation
-from posefit.footage.source import Scene
+from posefit.footage.source import Viewing, scene_of
 from posefit.footage.video import Video
 from posefit.motion import library
 from posefit.tracking.method import Choice, prepare
@@ -36,9 +36,9 @@ def loop_speed(source: str | Path, roi: Box, frames: Range) -> dict[str, float]:
         "video_frames_a_second": video.fps,
     }
     with tempfile.TemporaryDirectory() as folder, threadpool_limits(1):
-        seen, _ = scene([source], Viewing(frames=frames, extraction=how), Path(folder), None, lambda _: None)
+        seen = scene_of([source], Viewing(frames=frames, extraction=how), Path(folder))
         for optimiser, prior in METHODS:
-            whole, alone = _times(seen, Choice(optimiser, prior))
+            whole, alone = _times(seen, Choice(optimiser=optimiser, prior=prior))
             speeds[f"{optimiser}_{prior}_track_ms"] = whole
             speeds[f"{optimiser}_{prior}_evaluations_ms"] = alone
             speeds[f"{optimiser}_{prior}_overhead"] = whole / alone
@@ -53,7 +53,7 @@ def _times(seen: Scene, choice: Choice) -> tuple[float, float]:
     assert method.prior is not None
     whole, alone = [], []
     for frame, observation in zip(
-        method.tracker.track(seen.observations, np.random.default_rng(0)), seen.observations, strict=True
+        method.tracker(task).track(seen.observations, np.random.default_rng(0)), seen.observations, strict=True
     ):
         if frame.coordinates is None:
             continue

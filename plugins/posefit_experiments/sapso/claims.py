@@ -8,7 +8,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.statistics.ranks import LEVEL, holm, wilcoxon
-from posefit_experiments.sapso.design import BASELINES, METHODS
+from posefit.tracking.measures import BASELINES
+from posefit_experiments.sapso.design import METHODS
 from posefit_experiments.sapso.first_frame import compact_space
 from posefit_experiments.sapso.motions import LABELS
 from posefit_experiments.sapso.numbers import CONVERGED, SMALL_DEGREES, TABLE_2, VARIANCE

@@ -28,11 +28,6 @@ METHODS = {
 }
 PAPER = ("particle@full", "sapso@full", "sapso@pca")
 COMPARED = {"walk": tuple(METHODS), "turn": ("sapso@pca",), "run": tuple(METHODS)}
-BASELINES = {
-    "mean_pose": "mean training pose",
-    "persistence": "first true pose, held",
-    "nearest": "best training pose",
-}
 
 
 @dataclass(frozen=True)

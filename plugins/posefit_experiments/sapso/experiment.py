@@ -14,7 +14,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.tracking.evaluation import nearest
-from posefit.tracking.run import track
+from posefit.tracking.front import track
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.sapso.design import COMPARED, METHODS, WORKERS, Scale
 from posefit_experiments.sapso.motions import PaperMotion, paper_scene

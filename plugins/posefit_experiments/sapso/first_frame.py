@@ -7,8 +7,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.space import SearchSpace
-from posefit.footage.source import Scene
-from posefit.tracking.run import track
+from posefit.footage.scene import Scene
+from posefit.tracking.front import track
 from posefit_experiments.sapso.design import Scale
 from posefit_experiments.sapso.motions import PaperMotion, paper_scene
 from posefit_priors.pca import PCA

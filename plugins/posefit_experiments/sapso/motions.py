@@ -8,7 +8,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.footage.masks import Range
-from posefit.footage.source import Scene, motion_of, synthetic
+from posefit.footage.scene import Scene, synthetic
+from posefit.footage.source import motion_of
 from posefit.motion import library
 from posefit.motion.motion import Motion
 from posefit_experiments.clips import clip_path

@@ -16,10 +16,11 @@ from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, angle_index
+from posefit.tracking.measures import BASELINES
 from posefit_experiments.grid import Progress
 from posefit_experiments.known import SIZE
 from posefit_experiments.sapso.claims import paper_claims
-from posefit_experiments.sapso.design import BASELINES, COMPARED, METHODS, WORKERS, Scale
+from posefit_experiments.sapso.design import COMPARED, METHODS, WORKERS, Scale
 from posefit_experiments.sapso.experiment import repeat_paper
 from posefit_experiments.sapso.motions import FPS, LABELS, paper_motions
 from posefit_experiments.sapso.numbers import FRAMES, TABLE_1, TABLE_2, TRAINING_FRAMES

@@ -9,7 +9,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
-from posefit_experiments.sapso.design import BASELINES, Scale
+from posefit.tracking.measures import BASELINES
+from posefit_experiments.sapso.design import Scale
 from posefit_experiments.sapso.motions import PaperMotion
 
 

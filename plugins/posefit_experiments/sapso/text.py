@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from typing import Any
 
-from posefit_experiments.sapso.design import BASELINES, METHODS
+from posefit.tracking.measures import BASELINES
+from posefit_experiments.sapso.design import METHODS
 from posefit_experiments.sapso.motions import LABELS
 from posefit_experiments.sapso.numbers import TABLE_1_JOINTS
 

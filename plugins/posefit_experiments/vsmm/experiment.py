@@ -29,8 +29,8 @@ METHODS: dict[str, Choice] = {
     "imm_all_six": Choice(tracker="vsmm", tracker_settings={"structure": "all"}),
 }
 SEARCHES: dict[str, Choice] = {
-    "sapso_loose": Choice("sapso", "loose"),
-    "sapso_pca": Choice("sapso", "pca"),
+    "sapso_loose": Choice(optimiser="sapso", prior="loose"),
+    "sapso_pca": Choice(optimiser="sapso", prior="pca"),
     "sapso_vsmm": Choice(tracker="sapso+vsmm"),
 }
 SHOWN = 0  # the seed that is drawn
@@ -60,7 +60,7 @@ def follow_film(choice: Choice, seed: int) -> PatentTrack:
         [library.built_in(one) for one in TRAINING],
     )
     with threadpool_limits(1):
-        frames = list(prepare(choice, task).tracker.track(seen.observations, np.random.default_rng(seed)))
+        frames = list(prepare(choice, task).tracker(task).track(seen.observations, np.random.default_rng(seed)))
     return PatentTrack(frames, {**patent_errors(seen, frames), **switching_figures(seen, told_by(frames))})
 
 

@@ -15,7 +15,7 @@ from posefit.silhouette.foreground import Image
 from posefit.tracking.picture import draw_body, side_view
 from posefit_experiments.vsmm.activities import ACTIVITIES, FPS, Film
 from posefit_experiments.vsmm.experiment import ELBOW, HAND, both_joints, projected_cm
-from posefit_experiments.vsmm.told import Told, told_by
+from posefit_experiments.vsmm.told import ModelsTold, told_by
 
 STILLS = (10, 60, 110, 140, 180, 235, 258, 290, 340, 380, 405, 430)
 PATENT_CM = (2.7, 5.2)  # between these lie the patent's own mean errors
@@ -38,7 +38,7 @@ def patent_figures(seen: Film, frames: Sequence[Frame], folder: Path) -> list[st
     return [stills, *figures]
 
 
-def probability_figure(seen: Film, told: Sequence[Told]) -> Figure:
+def probability_figure(seen: Film, told: Sequence[ModelsTold]) -> Figure:
     """Return the probability of each model over time, with the groups that are in force."""
     names = list(dict.fromkeys(model for group in told[0].groups.values() for model in group))
     values = np.zeros((len(names), len(told)))
@@ -93,14 +93,14 @@ def _activities(axes: Any, seen: Film, label: bool) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def film_stills(seen: Film, frames: Sequence[Frame], told: Sequence[Told]) -> Image:
+def film_stills(seen: Film, frames: Sequence[Frame], told: Sequence[ModelsTold]) -> Image:
     """Return stills: the detected joints on the mask, the body found on it, and the body from its side."""
     columns = [_still(seen, frames[k], told[k], k) for k in STILLS]
     rows = [np.hstack(columns[k : k + len(columns) // 2]) for k in (0, len(columns) // 2)]
     return np.asarray(np.vstack(rows))
 
 
-def _still(seen: Film, frame: Frame, told: Told, k: int) -> Image:
+def _still(seen: Film, frame: Frame, told: ModelsTold, k: int) -> Image:
     mask = seen.observations[k].silhouettes[0].mask
     grey = np.where(mask, 150, 28).astype(np.uint8)
     blank = cv2.cvtColor(

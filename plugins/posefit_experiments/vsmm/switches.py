@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from posefit_experiments.vsmm.activities import ACTIVITIES, Film
-from posefit_experiments.vsmm.told import Told
+from posefit_experiments.vsmm.told import ModelsTold
 
 
-def switching_figures(seen: Film, told: Sequence[Told]) -> dict[str, Any]:
+def switching_figures(seen: Film, told: Sequence[ModelsTold]) -> dict[str, Any]:
     """Return how the models' probabilities and the groups in force fare; nothing where a tracker tells none."""
     if not told:
         return {}
@@ -39,7 +39,7 @@ def switching_figures(seen: Film, told: Sequence[Told]) -> dict[str, Any]:
     }
 
 
-def _delay(told: Sequence[Told], first: int, labels: Sequence[int], right: frozenset[str]) -> int:
+def _delay(told: Sequence[ModelsTold], first: int, labels: Sequence[int], right: frozenset[str]) -> int:
     """Return how many frames after a switch a group with a right model is in force; all of the activity if never."""
     for k in range(first, len(told)):
         if labels[k] != labels[first]:
@@ -52,5 +52,5 @@ def _delay(told: Sequence[Told], first: int, labels: Sequence[int], right: froze
     return len(told) - first
 
 
-def _came(before: Told, now: Told) -> bool:
+def _came(before: ModelsTold, now: ModelsTold) -> bool:
     return now.newcomer is not None and now.newcomer != before.newcomer

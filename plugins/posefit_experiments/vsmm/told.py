@@ -9,7 +9,7 @@ from posefit.fitting.tracker import Frame
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class ModelsTold:
     """The models and the groups in force in a frame, and the joints that were seen."""
 
     groups: Mapping[str, tuple[str, ...]]  # the models of every group there is
@@ -39,7 +39,7 @@ class Told:
         return cls(**{name: frame.details[name] for name in (*names, *seen)})
 
 
-def told_by(frames: Sequence[Frame]) -> list[Told]:
+def told_by(frames: Sequence[Frame]) -> list[ModelsTold]:
     """Return what every frame tells; nothing where one of them tells nothing."""
-    told = [Told.of(frame) for frame in frames]
+    told = [ModelsTold.of(frame) for frame in frames]
     return [] if None in told else [one for one in told if one is not None]

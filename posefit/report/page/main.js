@@ -1,34 +1,67 @@
 // Puts the page together.
 function header() {
-  const H = D.header, words = list => list.join("; ");
-  $("lead").textContent = `${whole(H.done)} runs of ${METHODS.length} method${METHODS.length === 1 ? "" : "s"} on ${INSTANCES.length} instance${INSTANCES.length === 1 ? "" : "s"} of ${H.motions.length} motion${H.motions.length === 1 ? "" : "s"}` +
+  const H = D.header;
+  const words = (list) => list.join("; ");
+  $("lead").textContent =
+    `${whole(H.done)} runs of ${counted(METHODS.length, "method")} on ${counted(INSTANCES.length, "instance")}` +
+    ` of ${counted(H.motions.length, "motion")}` +
     `${H.failed ? `; ${whole(H.failed)} cells failed` : "; no cell failed"}.`;
   const facts = [
-    ["methods", words(METHODS)], ["motions", words(H.motions)], ["views, degrees", words(H.views)], ["corruptions", words(H.corruptions)],
-    ["frames", words(H.frames)], ["translation", words(H.translations)], ["seeds", H.seeds.join(", ") + (H.seed_count > H.seeds.length ? `, … (${whole(H.seed_count)})` : "")], ["evaluations a frame", H.budgets.map(whole).join("; ")],
-    ["posefit", words(H.versions)], ["time in the loop", H.hours < 0.1 ? `${number(60 * H.hours, 1)} minutes` : `${number(H.hours, 1)} hours`],
+    ["methods", words(METHODS)],
+    ["motions", words(H.motions)],
+    ["views, degrees", words(H.views)],
+    ["corruptions", words(H.corruptions)],
+    ["frames", words(H.frames)],
+    ["translation", words(H.translations)],
+    ["seeds", H.seeds.join(", ") + (H.seed_count > H.seeds.length ? `, … (${whole(H.seed_count)})` : "")],
+    ["evaluations a frame", H.budgets.map(whole).join("; ")],
+    ["posefit", words(H.versions)],
+    ["time in the loop", H.hours < 0.1 ? `${number(60 * H.hours, 1)} minutes` : `${number(H.hours, 1)} hours`],
   ];
   $("facts").append(...facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
   const notes = [];
   if (H.shared === null) notes.push("No run has an error: nothing can be compared.");
   else {
-    if (H.shared < H.done) notes.push(`Methods are compared on the ${whole(H.shared)} runs that all of them share, ${whole(H.shared_instances)} instances with ${whole(H.shared_seeds)} seed${H.shared_seeds === 1 ? "" : "s"} each; ${whole(H.done - H.shared)} others count only below, in the list of all runs.`);
-    if (H.apart.length) notes.push(`Too few runs in common with the others, so not compared: ${H.apart.map(m => METHODS[m]).join("; ")}. Their rows of the leaderboard are of their own runs.`);
+    if (H.shared < H.done)
+      notes.push(
+        `Methods are compared on the ${whole(H.shared)} runs that all of them share, ` +
+          `${whole(H.shared_instances)} instances with ${counted(H.shared_seeds, "seed")} each; ` +
+          `${whole(H.done - H.shared)} others count only below, in the list of all runs.`,
+      );
+    if (H.apart.length)
+      notes.push(
+        `Too few runs in common with the others, so not compared: ${words(H.apart.map((m) => METHODS[m]))}. ` +
+          "Their rows of the leaderboard are of their own runs.",
+      );
     if (H.shared_seeds === 1) notes.push("One seed says nothing about others: there are no intervals.");
-    else if (H.shared / Math.max(D.taking_part.length, 1) < 20) notes.push("Fewer than 20 runs of each method: the intervals are wide.");
+    else if (H.shared / Math.max(D.taking_part.length, 1) < 20)
+      notes.push("Fewer than 20 runs of each method: the intervals are wide.");
     if (H.resamples < 2000) notes.push(`So many runs have ${H.resamples} bootstrap resamples instead of 2,000.`);
-    if (H.drawn[0] * H.drawn[1] < H.shared_instances * H.shared_seeds) notes.push(`Curves and joints are of ${whole(H.drawn[0])} instances with ${whole(H.drawn[1])} seeds each, not of all.`);
+    if (H.drawn[0] * H.drawn[1] < H.shared_instances * H.shared_seeds)
+      notes.push(
+        `Curves and joints are of ${whole(H.drawn[0])} instances with ${whole(H.drawn[1])} seeds each, not of all.`,
+      );
   }
   if (H.budgets.length > 1) notes.push("Budgets differ: compare methods of one budget only.");
   if (H.versions.length > 1) notes.push("Commands run rows again where the same versions are installed.");
-  $("notes").append(...notes.map(text => make("p", { class: "note" }, text)));
+  $("notes").append(...notes.map((text) => make("p", { class: "note" }, text)));
   if (H.failed) {
     const sorts = new Map();
-    D.failures.forEach(one => one.reasons.forEach(reason => sorts.set(reason, (sorts.get(reason) || 0) + 1)));
+    D.failures.forEach((one) => one.reasons.forEach((reason) => sorts.set(reason, (sorts.get(reason) || 0) + 1)));
     const most = [...sorts].sort((a, b) => b[1] - a[1]).slice(0, 5);
-    $("notes").append(make("div", { class: "note warn" }, `${whole(H.failed)} cells failed, each in every attempt:`, make("ul", {}, ...most.map(([reason, count]) => make("li", {}, `${count} × ${reason}`)))));
+    $("notes").append(
+      make(
+        "div",
+        { class: "note warn" },
+        `${whole(H.failed)} cells failed, each in every attempt:`,
+        make("ul", {}, ...most.map(([reason, count]) => make("li", {}, `${count} × ${reason}`))),
+      ),
+    );
   }
-  if (H.unfinished.length) $("notes").append(make("p", { class: "note warn" }, `No cell finished, so not on the leaderboard: ${words(H.unfinished)}.`));
+  if (H.unfinished.length)
+    $("notes").append(
+      make("p", { class: "note warn" }, `No cell finished, so not on the leaderboard: ${words(H.unfinished)}.`),
+    );
   $("foot").textContent = `posefit ${H.version}. This file holds everything it shows and asks the network for nothing.`;
 }
 
@@ -40,15 +73,22 @@ if (D.leaderboard) {
   comparison();
   curves();
   jointErrors();
-} else ["leaderboard", "comparison", "curves", "joints"].forEach(id => $(id).remove());
+} else ["leaderboard", "comparison", "curves", "joints"].forEach((id) => $(id).remove());
 gallery();
 viewer();
 const first = D.leaderboard ? D.leaderboard[0].method : 0;
-choose($("mine"), METHODS.map((name, m) => [String(m), name]), String(first), () => author(+$("mine").value));
+choose(
+  $("mine"),
+  METHODS.map((name, m) => [String(m), name]),
+  String(first),
+  () => author(+$("mine").value),
+);
 author(first);
 choose($("of-method"), [["", "all"], ...METHODS.map((name, m) => [String(m), name])], "", allRows);
 choose($("of-instance"), [["", "all"], ...INSTANCES.map((name, i) => [String(i), name])], "", allRows);
 allRows();
 failures();
 $("copy").onclick = copy;
-document.querySelectorAll("dialog .close").forEach(button => { button.onclick = () => button.closest("dialog").close(); });
+document.querySelectorAll("dialog .close").forEach((button) => {
+  button.onclick = () => button.closest("dialog").close();
+});

@@ -1,36 +1,97 @@
 // Who is better than whom: mean ranks with the critical difference, and paired tests of one method with all others.
 function differenceDiagram(P) {
-  const order = P.ranks.map((rank, k) => [rank, k]).sort((a, b) => a[0] - b[0]), count = order.length;
-  const half = Math.ceil(count / 2), width = 760, left = 250, right = width - 250, step = 20;
-  const x = rank => left + (right - left) * (rank - 1) / Math.max(count - 1, 1);
-  const axis = 62, names = axis + 22 + 8 * P.cliques.length, height = names + step * half + 4;
-  const svg = draw("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img",
-    "aria-label": `Mean ranks, best first: ${order.map(([rank, k]) => `${METHODS[P.methods[k]]} ${rank.toFixed(2)}`).join(", ")}` });
+  const order = P.ranks.map((rank, k) => [rank, k]).sort((a, b) => a[0] - b[0]);
+  const count = order.length;
+  const half = Math.ceil(count / 2);
+  const width = 760;
+  const left = 250;
+  const right = width - 250;
+  const step = 20;
+  const x = (rank) => left + ((right - left) * (rank - 1)) / Math.max(count - 1, 1);
+  const axis = 62;
+  const names = axis + 22 + 8 * P.cliques.length;
+  const height = names + step * half + 4;
+  const ranks = order.map(([rank, k]) => `${METHODS[P.methods[k]]} ${rank.toFixed(2)}`);
+  const svg = draw("svg", {
+    width,
+    height,
+    viewBox: `0 0 ${width} ${height}`,
+    role: "img",
+    "aria-label": `Mean ranks, best first: ${ranks.join(", ")}`,
+  });
   const long = Math.min(P.critical_difference, count - 1);
-  svg.append(draw("line", { class: "ink", x1: x(1), x2: x(1 + long), y1: 26, y2: 26, "stroke-width": 2 }),
-    draw("text", { x: x(1), y: 17 }, `critical difference ${P.critical_difference.toFixed(2)}${P.critical_difference > long ? ", longer than the line" : ""}`),
-    draw("line", { class: "ink", x1: x(1), x2: x(count), y1: axis, y2: axis }));
+  svg.append(
+    draw("line", { class: "ink", x1: x(1), x2: x(1 + long), y1: 26, y2: 26, "stroke-width": 2 }),
+    draw(
+      "text",
+      { x: x(1), y: 17 },
+      `critical difference ${P.critical_difference.toFixed(2)}` +
+        (P.critical_difference > long ? ", longer than the line" : ""),
+    ),
+    draw("line", { class: "ink", x1: x(1), x2: x(count), y1: axis, y2: axis }),
+  );
   const every = Math.ceil(count / 14);
   for (let rank = 1; rank <= count; rank += every) {
-    svg.append(draw("line", { class: "ink", x1: x(rank), x2: x(rank), y1: axis - 6, y2: axis }), draw("text", { x: x(rank), y: axis - 10, "text-anchor": "middle" }, String(rank)));
+    svg.append(
+      draw("line", { class: "ink", x1: x(rank), x2: x(rank), y1: axis - 6, y2: axis }),
+      draw("text", { x: x(rank), y: axis - 10, "text-anchor": "middle" }, String(rank)),
+    );
   }
-  P.cliques.forEach((clique, k) => svg.append(draw("line", { class: "ink", "stroke-width": 4, x1: x(P.ranks[clique[0]]) - 4, x2: x(P.ranks[clique.at(-1)]) + 4, y1: axis + 10 + 8 * k, y2: axis + 10 + 8 * k })));
+  P.cliques.forEach((clique, k) =>
+    svg.append(
+      draw("line", {
+        class: "ink",
+        "stroke-width": 4,
+        x1: x(P.ranks[clique[0]]) - 4,
+        x2: x(P.ranks[clique.at(-1)]) + 4,
+        y1: axis + 10 + 8 * k,
+        y2: axis + 10 + 8 * k,
+      }),
+    ),
+  );
   order.forEach(([rank, k], place) => {
-    const m = P.methods[k], best = place < half, at = names + step * (best ? place : count - 1 - place) + 6, edge = best ? left - 14 : right + 14;
+    const m = P.methods[k];
+    const best = place < half;
+    const at = names + step * (best ? place : count - 1 - place) + 6;
+    const edge = best ? left - 14 : right + 14;
     const name = METHODS[m].length > 30 ? `${METHODS[m].slice(0, 29)}…` : METHODS[m];
-    svg.append(draw("polyline", { points: `${x(rank)},${axis} ${x(rank)},${at} ${edge},${at}`, fill: "none", style: `stroke: ${colour(m)}`, "stroke-dasharray": dash(m) }),
+    svg.append(
+      draw("polyline", {
+        points: `${x(rank)},${axis} ${x(rank)},${at} ${edge},${at}`,
+        fill: "none",
+        style: `stroke: ${colour(m)}`,
+        "stroke-dasharray": dash(m),
+      }),
       draw("circle", { cx: x(rank), cy: axis, r: 3.5, style: `fill: ${colour(m)}` }),
-      draw("text", { x: best ? edge - 5 : edge + 5, y: at + 4, "text-anchor": best ? "end" : "start" }, best ? `${name}  ${rank.toFixed(2)}` : `${rank.toFixed(2)}  ${name}`));
+      draw(
+        "text",
+        { x: best ? edge - 5 : edge + 5, y: at + 4, "text-anchor": best ? "end" : "start" },
+        best ? `${name}  ${rank.toFixed(2)}` : `${rank.toFixed(2)}  ${name}`,
+      ),
+    );
   });
   return svg;
 }
 
 // Every comparison of a method, turned so that it comes first; a difference below 0 is in its favour.
 function duelsOf(m) {
-  const P = D.pairs, mine = P.methods.indexOf(m);
-  return P.pairs.filter(pair => pair[0] === mine || pair[1] === mine).map(([first, second, difference, p, adjusted, better, low, high]) =>
-    first === mine ? { other: P.methods[second], difference, p, adjusted, better, low, high }
-      : { other: P.methods[first], difference: -difference, p, adjusted, better: 1 - better, low: given(high) ? 1 - high : null, high: given(low) ? 1 - low : null });
+  const P = D.pairs;
+  const mine = P.methods.indexOf(m);
+  return P.pairs
+    .filter((pair) => pair[0] === mine || pair[1] === mine)
+    .map(([first, second, difference, p, adjusted, better, low, high]) =>
+      first === mine
+        ? { other: P.methods[second], difference, p, adjusted, better, low, high }
+        : {
+            other: P.methods[first],
+            difference: -difference,
+            p,
+            adjusted,
+            better: 1 - better,
+            low: given(high) ? 1 - high : null,
+            high: given(low) ? 1 - low : null,
+          },
+    );
 }
 
 function comparison() {
@@ -40,34 +101,88 @@ function comparison() {
     $("against").closest(".row").remove();
     return;
   }
-  $("friedman").textContent = `Friedman's test over ${whole(P.blocks)} pairs of instance and seed: p ${P.friedman < 0.001 ? "" : "= "}${probability(P.friedman)} that all methods are alike` +
-    `${P.friedman >= 0.05 ? "; what follows means little then" : ""}. Below are mean ranks, 1 is best; bars join methods whose ranks differ by less than Nemenyi's critical difference at 5 %. Seeds of one instance are not independent: all of it holds for these instances.`;
+  $("friedman").textContent =
+    `Friedman's test over ${whole(P.blocks)} pairs of instance and seed: ` +
+    `${stated(P.friedman)} that all methods are alike` +
+    `${P.friedman >= 0.05 ? "; what follows means little then" : ""}. Below are mean ranks, 1 is best; ` +
+    "bars join methods whose ranks differ by less than Nemenyi's critical difference at 5 %. " +
+    "Seeds of one instance are not independent: all of it holds for these instances.";
   $("difference").append(differenceDiagram(P));
   const first = D.leaderboard[0].method;
-  choose($("against"), P.methods.map(m => [String(m), METHODS[m]]), String(first), () => show(+$("against").value));
-  const show = m => table($("pairs"), [
-    { title: "other method", text: true, value: row => METHODS[row.other], show: row => METHODS[row.other] },
-    { title: "median difference °", about: "Below 0 the chosen method is better", value: row => row.difference, show: row => number(row.difference, 2) },
-    { title: "Wilcoxon p", value: row => row.p, show: row => probability(row.p) },
-    { title: "p after Holm", about: `Adjusted for all ${P.pairs.length} comparisons`, value: row => row.adjusted, show: row => probability(row.adjusted) },
-    { title: "probability of improvement", about: "That a run of the chosen method has the lower error", down: true, value: row => row.better, show: row => number(row.better, 2) },
-    { title: "95 % interval", about: "From three seeds on, where the runs are not too many", value: row => row.low, show: row => given(row.low) ? `${number(row.low, 2)} – ${number(row.high, 2)}` : "–" },
-    { title: "verdict", text: true, value: row => verdict(row), show: row => verdict(row) },
-  ], duelsOf(m), { by: 1, name: "Paired tests" });
+  choose(
+    $("against"),
+    P.methods.map((m) => [String(m), METHODS[m]]),
+    String(first),
+    () => show(+$("against").value),
+  );
+  const show = (m) =>
+    table(
+      $("pairs"),
+      [
+        { title: "other method", text: true, value: (row) => METHODS[row.other], show: (row) => METHODS[row.other] },
+        {
+          title: "median difference °",
+          about: "Below 0 the chosen method is better",
+          value: (row) => row.difference,
+          show: (row) => number(row.difference, 2),
+        },
+        { title: "Wilcoxon p", value: (row) => row.p, show: (row) => probability(row.p) },
+        {
+          title: "p after Holm",
+          about: `Adjusted for all ${P.pairs.length} comparisons`,
+          value: (row) => row.adjusted,
+          show: (row) => probability(row.adjusted),
+        },
+        {
+          title: "probability of improvement",
+          about: "That a run of the chosen method has the lower error",
+          down: true,
+          value: (row) => row.better,
+          show: (row) => number(row.better, 2),
+        },
+        {
+          title: "95 % interval",
+          about: "From three seeds on, where the runs are not too many",
+          value: (row) => row.low,
+          show: (row) => (given(row.low) ? `${number(row.low, 2)} – ${number(row.high, 2)}` : "–"),
+        },
+        { title: "verdict", text: true, value: (row) => verdict(row), show: (row) => verdict(row) },
+      ],
+      duelsOf(m),
+      { by: 1, name: "Paired tests" },
+    );
   show(first);
 }
 
-const verdict = row => row.adjusted >= 0.05 ? "not told apart" : row.difference < 0 ? "better" : "worse";
+const verdict = (row) => (row.adjusted >= 0.05 ? "not told apart" : row.difference < 0 ? "better" : "worse");
 
 function claim() {
   const C = D.claim;
   if (!C) return;
-  const names = C.methods.map(m => METHODS[m]), errors = C.errors.map(value => `${number(value, 2)}°`);
-  const step = ({ difference, adjusted, by_instance }) => (difference < 0 ? "worse" : difference > 0 ? "better" : "the same") +
-    ` by a median of ${number(Math.abs(difference), 2)}° (paired Wilcoxon with Holm over both, ${C.blocks} pairs: p ${adjusted < 0.001 ? "" : "= "}${probability(adjusted)}; over ${C.instances} instances alone: p ${by_instance < 0.001 ? "" : "= "}${probability(by_instance)})`;
-  const holds = C.steps.map(one => one.difference > 0 && one.adjusted < 0.05);
-  const said = holds.every(Boolean) ? "Both steps are seen here" : holds[1] ? "The second step is seen here, the first is not" : holds[0] ? "The first step is seen here, the second is not" : "Neither step is seen here";
-  $("claim").append(make("div", { class: "note", id: "paper" }, make("strong", {}, "What the SAPSO paper claims"),
-    ": the swarm beats a particle filter in the full space of angles, and is better again in the compact space of principal components. " +
-    `Here ${names[0]} has ${errors[0]}, ${names[1]} ${errors[1]}, ${names[2]} ${errors[2]}. ${names[1]} is ${step(C.steps[0])} than ${names[0]}; ${names[2]} is ${step(C.steps[1])} than ${names[1]}. ${said}, at 5 %.`));
+  const names = C.methods.map((m) => METHODS[m]);
+  const errors = C.errors.map((value) => `${number(value, 2)}°`);
+  const step = ({ difference, adjusted, by_instance }) =>
+    (difference < 0 ? "worse" : difference > 0 ? "better" : "the same") +
+    ` by a median of ${number(Math.abs(difference), 2)}° (paired Wilcoxon with Holm over both, ` +
+    `${C.blocks} pairs: ${stated(adjusted)}; over ${C.instances} instances alone: ${stated(by_instance)})`;
+  const holds = C.steps.map((one) => one.difference > 0 && one.adjusted < 0.05);
+  const said = holds.every(Boolean)
+    ? "Both steps are seen here"
+    : holds[1]
+      ? "The second step is seen here, the first is not"
+      : holds[0]
+        ? "The first step is seen here, the second is not"
+        : "Neither step is seen here";
+  $("claim").append(
+    make(
+      "div",
+      { class: "note", id: "paper" },
+      make("strong", {}, "What the SAPSO paper claims"),
+      ": the swarm beats a particle filter in the full space of angles, " +
+        "and is better again in the compact space of principal components. " +
+        `Here ${names.map((name, k) => `${name} ${k ? "" : "has "}${errors[k]}`).join(", ")}. ` +
+        `${names[1]} is ${step(C.steps[0])} than ${names[0]}; ` +
+        `${names[2]} is ${step(C.steps[1])} than ${names[1]}. ${said}, at 5 %.`,
+    ),
+  );
 }

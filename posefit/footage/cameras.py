@@ -10,13 +10,14 @@ import cv2
 import numpy as np
 
 from posefit.footage.extract import store
-from posefit.footage.masks import LazyMasks, Masks, Range, Straight, Views
+from posefit.footage.masks import FPS, LazyMasks, Masks, Range, Straight, Views
+from posefit.footage.scene import Placing, Scene, observed
 from posefit.footage.segmentation import Segmentation
-from posefit.footage.source import FPS, Scene, observed
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
+from posefit.listening import Listener
 from posefit.silhouette.foreground import Image
 
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
@@ -40,15 +41,15 @@ def masks_of(path: Path, fps: float | None, frames: Range) -> Seen:
     return Seen(masks, Views([masks]).sizes[0], None, fps or masks.fps or FPS)
 
 
-def video_of(video: Video, found: Segmentation, folder: Path, progress: Callable[..., Any] | None) -> Seen:
+def video_of(video: Video, found: Segmentation, folder: Path, listener: Listener) -> Seen:
     """Return what a video shows; its masks are written to a new folder, so that none has to stay in memory."""
     folder.mkdir()
-    masks = store(folder, found, progress)
+    masks = store(folder, found, listener.progress)
     pictures = partial(video.frames, found.start, found.stop, found.size)
     return Seen(masks, found.size, video.size, video.fps, pictures, found.warnings)
 
 
-def scene_of(
+def combined(
     seen: Sequence[Seen],
     name: str,
     body: Body,
@@ -81,7 +82,9 @@ def scene_of(
     pictures = seen[0].pictures
     if pictures is not None and (first := maps[0]) is not None:
         pictures = partial(_straightened, pictures, first)
-    return observed(Views(masks), body, placed, name, seen[0].fps, view_degrees, pictures)
+    placing: Placing = "given" if cameras else "guessed"
+    warnings = [warning for one in seen for warning in one.warnings]
+    return observed(Views(masks), body, placed, name, seen[0].fps, view_degrees, pictures, placing, warnings)
 
 
 def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]) -> Iterator[Image]:

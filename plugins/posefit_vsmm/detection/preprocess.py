@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, jit
+from posefit.arrays import Array
 from posefit.silhouette.mask import Mask
+from posefit_vsmm.kernels import branch
 
 PIECE = 0.05  # of the largest piece's area: a smaller piece is no part of a person
 SPUR = 1.2  # radii of the body where it branches off: a shorter branch of the skeleton line is a bump of the outline
@@ -41,7 +42,7 @@ def lines_of(mask: Mask) -> Lines | None:
     clean = _pieces(np.asarray(closed, dtype=np.uint8))  # VSMM 1.3
     corner = np.array([left - 2, top - 2], dtype=np.float64) + 0.5  # pixel centres
     outlines, _ = cv2.findContours(clean, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    thin = skeletonize(clean > 0)  # VSMM 1.4
+    thin = skeletonize(clean > 0)  # type: ignore[no-untyped-call]  # VSMM 1.4
     ends = _ends(thin, np.asarray(cv2.distanceTransform(clean, cv2.DIST_L2, 3), dtype=np.float32))
     pixels = np.argwhere(clean)[:, ::-1] + corner
     return Lines(
@@ -69,26 +70,7 @@ def _ends(thin: Mask, radii: NDArray[np.float32]) -> NDArray[np.int64]:
     number = cv2.filter2D(thin.astype(np.uint8), -1, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT)
     found = []
     for end in np.argwhere(thin & (number == 2)):
-        row, column = _branch(thin, number, end[0], end[1])
+        row, column = branch(thin, number, end[0], end[1])
         if row < 0 or np.hypot(end[0] - row, end[1] - column) > SPUR * radii[row, column]:
             found.append(end)
     return np.array(found, dtype=np.int64).reshape(-1, 2)
-
-
-@jit
-def _branch(thin, number, row, column):
-    """Return row and column where the line that ends in a pixel meets another; -1, -1 where it does not."""
-    before_row, before_column = -1, -1
-    for _ in range(thin.size):
-        count, next_row, next_column = 0, -1, -1
-        for dy in range(-1, 2):
-            for dx in range(-1, 2):
-                y, x = row + dy, column + dx
-                if thin[y, x] and (dy or dx) and not (y == before_row and x == before_column):
-                    count, next_row, next_column = count + 1, y, x
-        if count != 1:
-            return (row, column) if count else (-1, -1)
-        before_row, before_column, row, column = row, column, next_row, next_column
-        if number[row, column] > 3:
-            return row, column
-    return -1, -1

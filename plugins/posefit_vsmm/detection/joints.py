@@ -12,8 +12,8 @@ from importlib.resources import files
 import numpy as np
 
 from posefit.arrays import Array
+from posefit_vsmm.detection.preprocess import Lines
 from posefit_vsmm.points import AT, POINTS
-from posefit_vsmm.preprocess import Lines
 
 BODY = ("torso", "left clavicle", "right clavicle", "left shoulder", "right shoulder", "left hip", "right hip")
 _TORSO = np.array([AT[name] for name in BODY])
@@ -33,7 +33,7 @@ class Detection:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """How far the rules are off, measured by `fit_joints.py` on silhouettes whose truth is known. Reading V7."""
+    """How far the rules are off, measured by `fit/joints.py` on silhouettes whose truth is known. Reading V7."""
 
     bias: Array = field(repr=False)  # (17, 2) legs, detected less true
     deviation: Array = field(repr=False)  # (17, 2) legs, around the bias
@@ -42,7 +42,7 @@ class Errors:
 @lru_cache(maxsize=1)
 def errors() -> Errors:
     """Return the errors that the package carries."""
-    stored = json.loads((files("posefit_vsmm") / "joints.json").read_text(encoding="utf-8"))
+    stored = json.loads((files("posefit_vsmm.detection") / "joints.json").read_text(encoding="utf-8"))
     bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
     return Errors(bias, deviation)
 

@@ -1,8 +1,9 @@
 """The interacting multiple-model filter: several motion models at once, each as probable as its predictions are good.
 
-It knows nothing of bodies. A state is an array, and an error of a state is a vector that `Manifold` adds to it and
-takes out of it: for a vector these are + and -, for unit quaternions a rotation (Reading V4). Everything is computed
-with logarithms of likelihoods, so that a residual of any size leaves probabilities that sum to 1 (Reading V13).
+A state is an array, and an error of a state is a vector that `Manifold` adds to it and takes out of it: for a vector
+these are + and -, for unit quaternions a rotation (Reading V4); a filter of this kind is called an error-state Kalman
+filter. Everything is computed with logarithms of likelihoods, so that a residual of any size leaves probabilities that
+sum to 1 (Reading V13).
 """
 
 from collections.abc import Callable, Sequence
@@ -88,9 +89,9 @@ def start(state: Array, covariance: Array, models: int) -> Belief:
 
 @dataclass(frozen=True, eq=False)
 class IMM:
-    """One cycle after the other over models that change into each other with probabilities `transition` (r, r).
+    """One cycle after the other over models that change into each other: the states of a Markov chain.
 
-    Row i of `transition` holds how probable each model is after model i.
+    Row i of `transition` (r, r) holds how probable each model is after model i.
     """
 
     models: Sequence[Model]
@@ -164,6 +165,7 @@ def update(state: Array, covariance: Array, seen: Measurement, manifold: Manifol
     innovation = jacobian @ covariance @ jacobian.T + noise  # VSMM 6.3b
     factor = cho_factor(innovation, lower=True)
     size = 2.0 * float(np.log(np.diag(factor[0])).sum())
+    # the squared Mahalanobis distance of the residual, also called the normalised innovation squared (NIS)
     distance = float(seen.residual @ cho_solve(factor, seen.residual))
     likelihood = -0.5 * (distance + size + len(seen.residual) * float(np.log(2.0 * np.pi)))  # VSMM 6.3c
     gain = cho_solve(factor, jacobian @ covariance).T  # VSMM 6.3d

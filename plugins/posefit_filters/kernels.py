@@ -1,4 +1,4 @@
-"""From costs to weights, and from weights to the particles that survive."""
+"""From costs to weights, and from weights to the particles that survive, in numba: plain functions over arrays."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Fits the motion models to CMU clips: `python -m posefit_vsmm.fit_motion CMU_DIR`. VSMM step 3, Readings V4 to V6.
+"""Fits the motion models to CMU clips: `python -m posefit_vsmm.fit.motion CMU_DIR`. VSMM step 3, Readings V4 to V6.
 
 Ridge regression of how the quaternions go on to the next frame; what is stored are its coefficients, the covariance of
 what it leaves, and means of similar poses, no recorded frame. Every clip is also used mirrored. Printed, and stored
@@ -23,8 +23,10 @@ from posefit.motion import library
 from posefit.motion.amc import FPS as AMC_FPS
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
+from posefit_imm.kernels import minus
+from posefit_vsmm import motion as models
 from posefit_vsmm.motion import FPS, MotionModel, headed, leg_of
-from posefit_vsmm.state import BONES, ERROR, OTHER_ANGLES, STATE, encode, minus
+from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode
 
 ORIGIN = (
     "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
@@ -36,7 +38,8 @@ DRAWN = 400  # frames of a built-in motion
 POSES = 24  # typical poses of a model
 LEAST = (0.002, np.radians(0.3))  # legs and radians: the least deviation a frame that any coordinate is granted
 AHEAD = 10  # frames
-SIDES = [0, 3, 4, 1, 2, 7, 8, 5, 6, 9]  # the quaternion of the other side
+# of the whole body's quaternion and each bone's: the one of the other side
+OTHER_SIDE = [0, *(1 + HELD.index(MIRROR[joint]) for joint in HELD)]
 
 
 class Clip(NamedTuple):
@@ -47,7 +50,7 @@ class Clip(NamedTuple):
     stop: int | None = None
 
 
-class Plan(NamedTuple):
+class Teaching(NamedTuple):
     """What a model is fitted to, and what it is judged by: another person's clip, or a part kept apart."""
 
     fitted: tuple[Clip, ...]
@@ -55,13 +58,13 @@ class Plan(NamedTuple):
     drawn: tuple[str, ...] = ()  # built-in motions: no clip of ours shows somebody who walks with arms held out
 
 
-PLANS = {
-    "stiff-walk": Plan((Clip("17/17_03", 0, 330),), Clip("17/17_03", 340)),
-    "walk": Plan((Clip("02/02_01"), Clip("05/05_01"), Clip("16/16_15")), Clip("16/16_17", 0, 250)),
-    "arms-out": Plan((Clip("49/49_18", 0, 820),), Clip("49/49_18", 830), ("arms-out-a",)),
-    "jacks": Plan((Clip("13/13_29", 0, 456),), Clip("14/14_06", 0, 420)),
-    "jump": Plan((Clip("16/16_03"), Clip("49/49_02")), Clip("16/16_01")),
-    "squat": Plan((Clip("13/13_29", 3792, 4584),), Clip("14/14_06", 1008, 1572)),
+TEACHINGS = {
+    "stiff-walk": Teaching((Clip("17/17_03", 0, 330),), Clip("17/17_03", 340)),
+    "walk": Teaching((Clip("02/02_01"), Clip("05/05_01"), Clip("16/16_15")), Clip("16/16_17", 0, 250)),
+    "arms-out": Teaching((Clip("49/49_18", 0, 820),), Clip("49/49_18", 830), ("arms-out-a",)),
+    "jacks": Teaching((Clip("13/13_29", 0, 456),), Clip("14/14_06", 0, 420)),
+    "jump": Teaching((Clip("16/16_03"), Clip("49/49_02")), Clip("16/16_01")),
+    "squat": Teaching((Clip("13/13_29", 3792, 4584),), Clip("14/14_06", 1008, 1572)),
 }
 
 
@@ -91,7 +94,7 @@ def mirrored(states: Array) -> Array:
     """Return states (n, 43) of the mirror image, left for right."""
     other = states.copy()
     other[:, 0] *= -1.0
-    quaternions = states[:, 3:].reshape(len(states), -1, 4)[:, SIDES]
+    quaternions = states[:, 3:].reshape(len(states), -1, 4)[:, OTHER_SIDE]
     quaternions[:, :, 2:] *= -1.0
     other[:, 3:] = quaternions.reshape(len(states), -1)
     return other
@@ -195,17 +198,17 @@ def rounded(values: Array) -> Any:
 
 
 def main(root: Path) -> None:
-    """Write models.json beside this file. Raises ValueError where a clip it needs is missing."""
+    """Write models.json beside the models. Raises ValueError where a clip it needs is missing."""
     stored: dict[str, Any] = {}
     every: list[Recorded] = []
     identity = np.vstack([np.zeros((3, STATE - 3)), np.eye(STATE - 3)])
-    for clip in (clip for plan in PLANS.values() for clip in (*plan.fitted, plan.kept)):
+    for clip in (clip for teaching in TEACHINGS.values() for clip in (*teaching.fitted, teaching.kept)):
         if not (root / f"{clip.path}.amc").is_file():
             raise ValueError(f"CMU_DIR must hold {clip.path}.amc, got {root} without it")
-    for name, plan in PLANS.items():
-        clips = [recorded(root, clip) for clip in plan.fitted]
-        clips += [moving(library.built_in(one, frames=DRAWN, fps=AMC_FPS)) for one in plan.drawn]
-        kept = recorded(root, plan.kept)
+    for name, teaching in TEACHINGS.items():
+        clips = [recorded(root, clip) for clip in teaching.fitted]
+        clips += [moving(library.built_in(one, frames=DRAWN, fps=AMC_FPS)) for one in teaching.drawn]
+        kept = recorded(root, teaching.kept)
         every += clips
         sides = [pairs(one._replace(states=s)) for one in clips for s in (one.states, mirrored(one.states))]
         before, after = (np.concatenate(part) for part in zip(*sides, strict=True))
@@ -222,7 +225,7 @@ def main(root: Path) -> None:
                 report |= {f"{shrink}_{frames}": round(error, 2), f"still_{frames}": round(still, 2)}
         print(name, len(before), report)
         stored[name] = {**found, "poses": rounded(typicals), "report": report}
-    target_file = Path(__file__).with_name("models.json")
+    target_file = Path(models.__file__).with_name("models.json")
     text = json.dumps({"origin": ORIGIN, "models": stored, "reliance": relied(every)}, separators=(",", ":"))
     target_file.write_text(text + "\n", encoding="utf-8")
     print(f"{target_file.name}: {len(text)} bytes")
@@ -231,7 +234,7 @@ def main(root: Path) -> None:
 if __name__ == "__main__":
     folders = sys.argv[1:] or [folder for folder in [os.environ.get("POSEFIT_CMU")] if folder]
     if len(folders) != 1:
-        sys.exit("usage: python -m posefit_vsmm.fit_motion CMU_DIR")
+        sys.exit("usage: python -m posefit_vsmm.fit.motion CMU_DIR")
     try:
         main(Path(folders[0]))
     except ValueError as error:

@@ -19,22 +19,23 @@ from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.registry import registry
+from posefit_imm import PLACED, Measurement
 from posefit_vsmm.course import Course, Found
-from posefit_vsmm.directions import Directions
 from posefit_vsmm.fresh import Matcher
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.imm import Measurement
+from posefit_vsmm.joined.directions import Directions
 from posefit_vsmm.motion import library
-from posefit_vsmm.state import ERROR, MANIFOLD, Reliance, decode, encode, free_errors
-from posefit_vsmm.structure import Settings
-from posefit_vsmm.switching import Contest, Rules
+from posefit_vsmm.state import ERROR, FIRST_BONE, YAW_PITCH_ROLL, Reliance, decode, encode, free_errors
+from posefit_vsmm.structure import Switching
+from posefit_vsmm.switching import Rules, SequentialTest
 
 LEAST = np.repeat([0.02, np.radians(4.0)], [3, ERROR - 3])  # metres and radians: deviations added to the filter's
 LEAST_BUDGET = 80  # evaluations; with fewer, the filter's own pose is as good
 REACH = 3.5  # deviations to either side
 ROOT_LEAST = np.radians([6.0, 4.0, 4.0])  # deviations of yaw, pitch and roll, at the least
-# metres and radians: how far what a search finds is off, as one silhouette lets it be
-FOUND = np.repeat([0.03, 0.03, 0.08, np.radians(6.0), np.radians(9.0)], [1, 1, 1, 3, ERROR - 6])
+# How far what a search finds is off, as one silhouette lets it be: metres across, up and along the depth, then radians
+# of the whole body and of the bones
+FOUND = np.repeat([0.03, 0.03, 0.08, np.radians(6.0), np.radians(9.0)], [1, 1, 1, 3, ERROR - FIRST_BONE])
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,7 @@ class Search:
         poses, places = decode(state[None], self.reliance)
         around = spread + np.diag((LEAST * free_errors(self.task.body.skeleton)) ** 2)
         prior = Directions.of(state, around, self.reliance, self.dimensions, REACH)
-        root = np.maximum(np.sqrt(np.diag(around)[[4, 3, 5]]), ROOT_LEAST)
+        root = np.maximum(np.sqrt(np.diag(around)[[*YAW_PITCH_ROLL]]), ROOT_LEAST)
         space = SearchSpace(prior, poses[0, :3], REACH * root, places[0], self.task.translation)
         start = np.full(space.dimensions, 1.0 / REACH)
         space = space.around(space.centre, Start(np.zeros(space.dimensions), start, np.zeros(space.dimensions)))
@@ -81,7 +82,7 @@ class Search:
         found = encode(pose, place)[0]
 
         def measure(one: Array) -> Measurement:
-            return Measurement(MANIFOLD.minus(found, one), np.eye(ERROR), np.diag(FOUND**2))
+            return Measurement(PLACED.minus(found, one), np.eye(ERROR), np.diag(FOUND**2))
 
         return Found(pose[0], best.evaluations, measure)
 
@@ -91,12 +92,12 @@ class Joined:
     """Follows a person with a `Course` whose every frame ends in a search."""
 
     task: Task
-    settings: Settings = field(repr=False)
+    switching: Switching = field(repr=False)
     search: Search = field(repr=False)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; its `details` are those of the filter."""
-        course = Course(self.task, self.settings, rng, self.search)
+        course = Course(self.task, self.switching, rng, self.search)
         for observation in observations:
             yield course.frame(observation)
 
@@ -111,8 +112,11 @@ def joined(
 ) -> Joined:
     """The motion models of `vsmm` predict where a swarm starts, and learn from what it finds.
 
-    `optimiser` is any registered one; it searches `dimensions` directions beside the root. `weight` is that of a
-    prediction's silhouette cost, 0 to 100, in its model's log-likelihood.
+    Settings:
+        optimiser: name of any registered one, with its own defaults.
+        dimensions: directions that it searches beside the root, 1 or more; those in which the filter is least sure.
+        weight: of a prediction's silhouette cost, 0 to 100, in its model's log-likelihood; above 0. Ours.
+        groups: path of a TOML file of groups and neighbours; "" is the package's own. VSMM step 4, Reading V1.
     """
     if dimensions < 1:
         raise ValueError(f"dimensions must be at least 1, got {dimensions}")
@@ -120,6 +124,8 @@ def joined(
         raise ValueError(f"weight must be above 0, got {weight}")
     carried = library("identity")
     topology = read_topology(Path(groups) if groups else None, carried.names)
-    how = Settings(carried, topology, "variable", Rules(), "rerun", Contest((), ()))
+    switching = Switching(
+        library=carried, topology=topology, structure="variable", rules=Rules(), new="rerun", test=SequentialTest()
+    )
     search = Search(task, carried.reliance, registry().optimiser(optimiser), dimensions, weight)
-    return Joined(task, how, search)
+    return Joined(task, switching, search)

@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
-from posefit_vsmm.state import MANIFOLD, Reliance, decode
+from posefit_imm import PLACED
+from posefit_vsmm.state import FIRST_BONE, Reliance, decode
+
+STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
 
 
 @dataclass(eq=False)
@@ -26,17 +29,18 @@ class Directions:
     def of(cls, state: Array, covariance: Array, reliance: Reliance, count: int, reach: float) -> "Directions":
         """Return the `count` directions of a state (43,) in which its covariance (33, 33) is largest.
 
+        They are principal axes of the bones' part of the covariance, carried over to joint angles.
         Their range is `reach` standard deviations to either side.
         """
-        values, vectors = np.linalg.eigh(covariance[6:, 6:])
+        values, vectors = np.linalg.eigh(covariance[FIRST_BONE:, FIRST_BONE:])
         chosen = np.argsort(values)[::-1][:count]
         errors = np.zeros((2 * len(chosen), len(covariance)))
-        errors[:, 6:] = np.concatenate([vectors[:, chosen].T, -vectors[:, chosen].T]) * 0.05
-        poses, _ = decode(np.array([state, *(MANIFOLD.plus(state, error) for error in errors)]), reliance)
-        angles = poses[:, 3:]
-        ways = wrapped(angles[1 : len(chosen) + 1] - angles[len(chosen) + 1 :]) / 0.1
+        errors[:, FIRST_BONE:] = np.concatenate([vectors[:, chosen].T, -vectors[:, chosen].T]) * STEP
+        poses, _ = decode(np.array([state, *(PLACED.plus(state, error) for error in errors)]), reliance)
+        middle, ahead, back = np.split(poses[:, 3:], [1, 1 + len(chosen)])
+        ways = wrapped(ahead - back) / (2.0 * STEP)  # central differences
         far = reach * np.sqrt(values[chosen])
-        return cls(angles[0], ways, -far, far)
+        return cls(middle[0], ways, -far, far)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Return itself: everything is known already."""

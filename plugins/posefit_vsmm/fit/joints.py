@@ -1,4 +1,4 @@
-"""Measures how far the rules of joint detection are off: `python -m posefit_vsmm.fit_joints`. VSMM step 2, Reading V7.
+"""Measures how far the rules of joint detection are off: `python -m posefit_vsmm.fit.joints`. VSMM step 2, Reading V7.
 
 The rules look at silhouettes of built-in motions from all sides, whose truth is known, and expect every point about
 where it is. Left and right share their errors, and no point is biased to one side. What is farther off than OUTLIER is
@@ -17,10 +17,11 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import library
 from posefit.silhouette.cost import project
-from posefit_vsmm.joints import BODY, detected
+from posefit_vsmm.detection import joints
+from posefit_vsmm.detection.joints import BODY, detected
+from posefit_vsmm.detection.preprocess import lines_of
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.points import POINTS, points_of
-from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.sight import NARROWEST, head_radius
 
 MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a")
@@ -55,7 +56,7 @@ def measured(rng: np.random.Generator) -> dict[str, list[Array]]:
 
 
 def main() -> None:
-    """Write joints.json beside this file."""
+    """Write joints.json beside the rules."""
     found = measured(np.random.default_rng(0))
     frames = len(found["root"])
     stored: dict[str, dict[str, Any]] = {}
@@ -74,7 +75,7 @@ def main() -> None:
         )
         stored |= {one: {"bias": bias.round(4).tolist(), "deviation": spread.round(4).tolist()} for one in sides}
     text = json.dumps({"points": {name: stored[name] for name in POINTS}}, indent=1)
-    Path(__file__).with_name("joints.json").write_text(text + "\n", encoding="utf-8")
+    Path(joints.__file__).with_name("joints.json").write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

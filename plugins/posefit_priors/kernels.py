@@ -1,0 +1,88 @@
+"""From latents to joint angles, and how far latents are from clusters, in numba: plain functions over arrays.
+
+One row is computed after the other, so that a row has the same bits whatever stands beside it.
+"""
+
+import numpy as np
+
+from posefit.arrays import jit
+
+
+@jit
+def recover(latents, components, mean, angles):
+    """Write the joint angles (n, 63) of latents (n, m), from components (m, 63) and a mean (63,)."""
+    for i in range(latents.shape[0]):
+        for j in range(mean.size):
+            angles[i, j] = mean[j]
+        for k in range(components.shape[0]):
+            for j in range(mean.size):
+                angles[i, j] += latents[i, k] * components[k, j]  # SAPSO 2.1.3 recovery
+
+
+@jit
+def distance(centres, latent):
+    """Return D: the mean absolute difference of a latent pose (m,) from the nearest centre."""
+    nearest = np.inf
+    for c in range(centres.shape[0]):
+        total = 0.0
+        for j in range(centres.shape[1]):
+            total += abs(centres[c, j] - latent[j])
+        nearest = min(nearest, total / centres.shape[1])
+    return nearest
+
+
+@jit
+def near(centres, latents, reach):
+    """Return which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
+    within = np.empty(latents.shape[0], np.bool_)
+    for i in range(latents.shape[0]):
+        within[i] = distance(centres, latents[i]) < reach[()]  # SAPSO 2.2 constraint 2
+    return within
+
+
+@jit
+def recover_loose(latents, components, mean, loose, angles):
+    """Write the joint angles (n, 63) of latents (n, m + k): m components, k loose angles."""
+    m = components.shape[0]
+    for i in range(latents.shape[0]):
+        for j in range(mean.size):
+            angles[i, j] = mean[j]
+        for k in range(m):
+            for j in range(mean.size):
+                angles[i, j] += latents[i, k] * components[k, j]
+        for k in range(loose.size):
+            angles[i, loose[k]] += latents[i, m + k]
+
+
+@jit
+def near_and_bearable(latents, components, mean, loose, low, high, centres, reach):
+    """Return which latents (n, m + k) are near a cluster and bend no loose joint too far."""
+    m = components.shape[0]
+    allowed = np.empty(latents.shape[0], np.bool_)
+    for i in range(latents.shape[0]):
+        allowed[i] = distance(centres, latents[i, :m]) < reach[()]
+        for k in range(loose.size):
+            angle = mean[loose[k]] + latents[i, m + k]
+            for c in range(m):
+                angle += latents[i, c] * components[c, loose[k]]
+            allowed[i] &= (angle >= low[k]) & (angle <= high[k])
+    return allowed
+
+
+@jit
+def mahalanobis(centres, whitening, latents):
+    """Return the Mahalanobis distance (n,) of latents (n, m) from the cluster that is nearest by it."""
+    m = centres.shape[1]
+    nearest = np.full(latents.shape[0], np.inf)
+    for i in range(latents.shape[0]):
+        for c in range(centres.shape[0]):
+            total = 0.0
+            for j in range(m):
+                part = 0.0
+                for k in range(j + 1):
+                    part += whitening[c, j, k] * (latents[i, k] - centres[c, k])
+                total += part * part
+                if total > nearest[i]:
+                    break
+            nearest[i] = min(nearest[i], total)
+    return np.sqrt(nearest)

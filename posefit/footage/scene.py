@@ -1,0 +1,142 @@
+"""A scene: everything a tracker needs to know of what is to be followed, a known motion or what cameras saw."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Observation
+from posefit.footage.masks import Range, Views, span
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.motion.motion import Motion
+from posefit.silhouette.cost import project
+from posefit.silhouette.foreground import Image
+from posefit.silhouette.mask import Silhouette
+
+VIEW_DEGREES = 45.0  # where the camera of a synthetic sequence stands when nobody says: 0 is in front, 90 to the side
+Placing = Literal["given", "guessed", "placed"]  # where cameras come from: a user, nobody, or a view of a known motion
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is to be followed, whatever it came from: the person, the cameras, and what they saw."""
+
+    name: str
+    body: Body
+    cameras: Sequence[Camera]
+    fps: float
+    count: int
+    yaw: float | None  # radians: about where the person faces at first
+    anchor: Array  # (3,) metres: about where the root is at first
+    truth: Motion | None
+    observations: Sequence[Observation] = field(repr=False)
+    placing: Placing = "placed"
+    warnings: Sequence[str] = ()  # what a user should know before he trusts it
+    # yields the frames that the first camera filmed, of its size; None where nobody filmed
+    pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
+
+
+def synthetic(
+    motion: Motion,
+    views_degrees: Sequence[float],
+    size: tuple[int, int],
+    cameras: Sequence[Camera],
+    frames: Range,
+) -> Scene:
+    """Return the sequence that cameras see of a motion; masks are drawn frame by frame as they are needed.
+
+    Without cameras there is one at each of `views_degrees`, which frames the whole motion.
+    """
+    body = Body.of(motion.skeleton)
+    placing: Placing = "given" if cameras else "placed"
+    motion = motion.frames(*span(frames, len(motion)))
+    if not cameras:
+        joints = motion.skeleton.joints(motion.poses, motion.translations).reshape(-1, 3)
+        radii = np.tile(body.joint_radii(), len(motion))
+        azimuths = motion.poses[0, 0] + np.radians(views_degrees or [VIEW_DEGREES])
+        cameras = [Camera.framing(joints, radii, float(azimuth), size) for azimuth in azimuths]
+    observations = Rendered(motion, body, cameras)
+    for k in (0, len(motion) - 1):
+        if not all(silhouette.mask.any() for silhouette in observations[k].silhouettes):
+            raise ValueError(f"camera must see the person, got an empty mask in frame {k}")
+    return Scene(
+        motion.name,
+        body,
+        cameras,
+        motion.fps,
+        len(motion),
+        float(motion.poses[0, 0]),
+        motion.translations[0],
+        motion,
+        observations,
+        placing,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered(Sequence[Observation]):
+    """The observations of a known motion, drawn when asked for."""
+
+    motion: Motion
+    body: Body
+    cameras: Sequence[Camera]
+
+    def __len__(self) -> int:
+        return len(self.motion)
+
+    def __getitem__(self, k):  # type: ignore[no-untyped-def]
+        if not 0 <= k < len(self):
+            raise IndexError(k)
+        pose, translation = self.motion.poses[k], self.motion.translations[k]
+        masks = [project(self.body, camera, pose, translation) for camera in self.cameras]
+        return Observation([Silhouette.of(mask) for mask in masks], translation)
+
+
+def observed(
+    views: Views,
+    body: Body,
+    cameras: Sequence[Camera],
+    name: str,
+    fps: float,
+    view_degrees: float | None,
+    pictures: Callable[[], Iterator[Image]] | None = None,
+    placing: Placing = "given",
+    warnings: Sequence[str] = (),
+) -> Scene:
+    """Return the sequence of masks seen by cameras, whose truth nobody knows.
+
+    The person is first sought where the rays through the middles of the masks meet; a single camera finds it as far
+    away as its size asks.
+    """
+    seen = views[views.first].silhouettes
+    boxes = [_box(silhouette) for silhouette in seen]
+    if len(cameras) == 1:
+        camera, (middle, tall) = cameras[0], boxes[0]
+        depth = camera.focal[1] * body.stature / tall
+        place = np.array([*((middle - camera.centre) / camera.focal * depth), depth])
+        anchor = camera.rotation.T @ (place - camera.translation)
+    else:
+        rays = [
+            camera.rotation.T @ np.array([*((middle - camera.centre) / camera.focal), 1.0])
+            for camera, (middle, _) in zip(cameras, boxes, strict=True)
+        ]
+        across = [np.eye(3) - np.outer(ray, ray) / (ray @ ray) for ray in rays]
+        positions = [camera.position for camera in cameras]
+        anchor = np.linalg.lstsq(
+            np.sum(across, axis=0), np.sum([a @ p for a, p in zip(across, positions, strict=True)], axis=0)
+        )[0]
+    to_camera = -cameras[0].rotation[2]
+    yaw = None
+    if view_degrees is not None:
+        yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
+    return Scene(name, body, cameras, fps, len(views), yaw, anchor, None, views, placing, warnings, pictures)
+
+
+def _box(silhouette: Silhouette) -> tuple[Array, float]:
+    """Return the middle (2,) and the height in pixels of a silhouette's bounding box."""
+    rows, columns = np.flatnonzero(silhouette.mask.any(axis=1)), np.flatnonzero(silhouette.mask.any(axis=0))
+    middle = 0.5 * np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1])
+    return middle, float(rows[-1] + 1 - rows[0])

@@ -1,0 +1,63 @@
+"""The files of a finished track: arrays, motion capture, tables and the camera."""
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posefit.fitting.tracker import Frame
+from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import JOINTS
+from posefit.motion.motion import Motion
+
+FILES = (
+    "poses.npz",
+    "track.amc",
+    "skeleton.asf",
+    "track.bvh",
+    "track.trc",
+    "camera.json",
+    "frames.csv",
+    "summary.json",
+    "overlay.mp4",
+    "summary.png",
+)
+
+Rows = Sequence[Mapping[str, float]]
+State = dict[str, Any]
+
+
+def write_formats(
+    folder: Path, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State
+) -> None:
+    """Write every file of a track to a folder but for its pictures; see `FILES`."""
+    from posefit.motion.amc import write_amc
+    from posefit.motion.asf import write_asf
+    from posefit.motion.bvh import write_bvh
+    from posefit.motion.trc import write_trc
+
+    np.savez_compressed(
+        folder / "poses.npz",
+        poses=estimate.poses,
+        translations=estimate.translations,
+        fps=np.array(estimate.fps),
+        joints=np.array(JOINTS),
+        costs=np.array([frame.cost for frame in frames]),
+        radii=scene.body.radii,
+    )
+    write_asf(folder / "skeleton.asf", estimate.skeleton)
+    write_amc(folder / "track.amc", estimate)
+    write_bvh(folder / "track.bvh", estimate)
+    write_trc(folder / "track.trc", estimate)
+    (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
+    joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
+    names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
+    with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*rows[0], *names])
+        for row, points in zip(rows, joints, strict=True):
+            writer.writerow([*row.values(), *(f"{value:.6f}" for value in points.reshape(-1))])
+    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,218 @@
+"""`posefit.track` and `posefit.fit`: every option a keyword, sorted here into what the floors below take."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+import posefit
+from posefit.arrays import Array
+from posefit.fitting.optimiser import OptimiserFactory
+from posefit.fitting.prior import Prior
+from posefit.fitting.space import Translation
+from posefit.fitting.tracker import TrackerFactory
+from posefit.footage.masks import Range
+from posefit.footage.scene import Scene
+from posefit.footage.segmentation import Extraction
+from posefit.footage.source import Source, Viewing, clip_of, kind_of, scene_of
+from posefit.geometry.calibration import Up
+from posefit.geometry.camera import Camera
+from posefit.listening import QUIET, Listener
+from posefit.motion import library
+from posefit.motion.motion import Motion
+from posefit.tracking.identity import Told
+from posefit.tracking.method import Choice
+from posefit.tracking.opening import Opening
+from posefit.tracking.outputs import Nowhere, OutputFolder
+from posefit.tracking.run import Track, follow
+
+_FILES = ("source", "train", "asf", "cameras", "extraction")  # what may name files, whose content counts
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The pose found in one frame."""
+
+    pose: Array = field(repr=False)  # (66,)
+    translation: Array  # (3,) metres
+    cost: float
+    history: Array = field(repr=False)  # (populations,) best cost after each
+    summary: dict[str, Any] = field(repr=False)
+
+
+def track(
+    source: Source | Scene | Sequence[Source] = "walk",
+    *,
+    asf: str | Path | None = None,
+    camera: Camera | str | Path | Sequence[Camera | str | Path] | None = None,
+    optimiser: str | OptimiserFactory = "sapso",
+    prior: str | Prior | None = None,
+    tracker: str | TrackerFactory | None = None,
+    train: Sequence[Source] = (),
+    view_degrees: float | Sequence[float] | None = None,
+    size: tuple[int, int] = (320, 240),
+    fps: float | None = None,
+    frames: Range = (None, None),
+    particles: int | None = None,
+    iterations: int | None = None,
+    evaluations: int | None = None,
+    translation: Translation | None = None,
+    first_pose: Literal["searched", "given"] = "searched",
+    restarts: int | None = None,
+    body_frames: int | None = None,
+    height: float | None = None,
+    extraction: Extraction | None = None,
+    up: Up | None = None,
+    seed: int = 0,
+    threads: int = 1,
+    ask_seconds: float | None = None,
+    optimiser_settings: Mapping[str, Any] | None = None,
+    prior_settings: Mapping[str, Any] | None = None,
+    tracker_settings: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    resume: bool = False,
+    rerun: str | Path | None = None,
+    progress: Callable[[Iterator[Any], int], Iterator[Any]] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Track:
+    """Return the motion followed through a source's silhouettes, with its errors where the truth is known.
+
+    `source` is a built-in motion's name, a `Motion`, an .amc or .bvh file, a folder of mask images, an .npz of masks, a
+    video, or several masks or videos that cameras took at the same time; or a `Scene` of a known motion, as it is.
+    `train` names the motions a prior learns from; by default the other styles of a built-in motion, else the built-in
+    walks. The method is `optimiser` with `prior`, or `tracker`. The budget of a frame is `evaluations`, by default
+    particles x (iterations + 1) = 40 x 61, the same for every method. `translation` is "known" where the truth is, else
+    "aligned". A `first_pose` that is "given" starts the first frame around the true one. `ask_seconds` is how long a
+    plugin may take to propose a population.
+
+    Where the truth is known the prior is `pca`. Where it is not it is `loose`, the first frame is searched `restarts`
+    times (8), and the person's build is fitted to `body_frames` (30; none where an .asf is given), as tall as `height`
+    says. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
+    calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video.
+
+    With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at
+    all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
+    recording for the Rerun viewer goes. Raises ValueError for every mistake in the arguments or files.
+    """
+    sources = _sources(source)
+    viewing = Viewing(
+        asf=asf,
+        cameras=() if camera is None else (camera,) if isinstance(camera, Camera | str | Path) else tuple(camera),
+        view_degrees=() if view_degrees is None else np.atleast_1d(view_degrees).astype(float).tolist(),
+        size=size,
+        fps=fps,
+        frames=frames,
+        extraction=extraction or Extraction(),
+        height=height,
+        up=up,
+    )
+    if isinstance(source, Scene) and viewing != Viewing():
+        raise ValueError(f"a scene must be followed as it is, got {viewing}")
+    choice = Choice(
+        optimiser=optimiser,
+        prior=prior or prior_of(sources[0]),
+        tracker=tracker,
+        optimiser_settings=optimiser_settings or {},
+        prior_settings=prior_settings or {},
+        tracker_settings=tracker_settings or {},
+        particles=particles,
+        iterations=iterations,
+        evaluations=evaluations,
+        ask_seconds=ask_seconds,
+    )
+    choice.budget()
+    opening = Opening(
+        translation=translation,
+        first_pose=first_pose,
+        restarts=restarts,
+        body_frames=0 if body_frames is None and asf is not None else body_frames,
+        height=height,
+    )
+    opening.check(kind_of(sources[0]) == "motion")
+    clips = [clip_of(one, asf) for one in _training(sources, train)]  # before the work, as a name may be wrong
+    if seed < 0:
+        raise ValueError(f"seed must be 0 or more, got {seed}")
+    if resume and out is None:
+        raise ValueError("resume must be given with out, the folder of the track that goes on, got none")
+    if rerun is not None:
+        from posefit.tracking.recording import check_recording
+
+        check_recording(rerun)
+    listener = Listener(say or QUIET.say, progress or QUIET.progress)
+    folder: AbstractContextManager[Nowhere | OutputFolder] = Nowhere()
+    if out is not None:
+        folder = OutputFolder(out, force, resume, _told(sources, train, viewing, choice, opening, seed), listener.say)
+    with folder as output:
+        scene = source if isinstance(source, Scene) else scene_of(sources, viewing, output.work, listener)
+        result = follow(
+            scene,
+            [clip(scene.fps) for clip in clips],
+            choice=choice,
+            opening=opening,
+            seed=seed,
+            threads=threads,
+            output=output,
+            listener=listener,
+            source={
+                "source": [one.name if isinstance(one, Motion) else str(one) for one in sources],
+                "frames_chosen": list(frames),
+                "view_degrees": view_degrees,
+            },
+        )
+        if rerun is not None:
+            from posefit.tracking.recording import record
+
+            record(rerun, scene, result.motion)
+    return result
+
+
+def fit(source: Source | Sequence[Source] = "walk", *, frame: int = 0, **settings: Any) -> Fit:
+    """Return the pose found in one frame of a source; settings as for `track`, but for `frames`."""
+    if frame < 0:
+        raise ValueError(f"frame must be 0 or more, got {frame}")
+    result = track(source, frames=(frame, frame + 1), **settings)
+    history = np.array(result.summary.pop("history"))
+    return Fit(result.motion.poses[0], result.motion.translations[0], result.measures.cost, history, result.summary)
+
+
+def prior_of(source: Source) -> str:
+    """Return the prior that a source is followed with by default."""
+    return "pca" if kind_of(source) == "motion" else "loose"
+
+
+def _sources(source: Source | Scene | Sequence[Source]) -> Sequence[Source]:
+    if isinstance(source, Scene):
+        if source.truth is None:
+            raise ValueError(f"a scene must be of a known motion, got {source.name}, whose truth nobody knows")
+        return [source.truth]
+    return source if isinstance(source, Sequence) and not isinstance(source, str) else [source]
+
+
+def _training(sources: Sequence[Source], train: Sequence[Source]) -> Sequence[Source]:
+    """Return what a prior learns from: by default the other styles of a built-in motion, else the built-in walks."""
+    source, chosen = sources[0], train
+    if not chosen:
+        known = isinstance(source, str) and source in library.names()
+        chosen = library.other_styles(str(source) if known else "walk")
+    for one in chosen:
+        if one is source or (
+            not isinstance(one, Motion) and not isinstance(source, Motion) and str(one) == str(source)
+        ):
+            raise ValueError(f"train must not contain the source itself, got {one}")
+    return chosen
+
+
+def _told(
+    sources: Sequence[Source], train: Sequence[Source], viewing: Viewing, choice: Choice, opening: Opening, seed: int
+) -> dict[str, Told]:
+    """Return what a track has to have in common with one that it goes on with."""
+    told: dict[str, Any] = {"source": sources, "train": train, "seed": seed, "version": posefit.__version__}
+    for group in (viewing, choice, opening):
+        told |= {one.name: getattr(group, one.name) for one in fields(group)}
+    if kind_of(sources[0]) == "motion" and sources[0] in library.names():
+        return {name: Told.of(value, files=name in _FILES and name != "source") for name, value in told.items()}
+    return {name: Told.of(value, files=name in _FILES) for name, value in told.items()}

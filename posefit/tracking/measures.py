@@ -1,0 +1,139 @@
+"""The figures that say what a track is worth, each defined once: its name, label, unit, digits and meaning.
+
+`Measures` are those of a whole track: summary.json, `--json`, the rows of a sweep, its CSV and the report's columns
+have them under these names. `FRAME` are the columns of frames.csv, one value a frame. Where nobody knows the truth, a
+figure that needs it is None.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+# Trivial methods that a track is held against, and how a table calls them. All have the true root and translation.
+BASELINES = {
+    "mean_pose": "mean training pose",
+    "persistence": "first true pose, held",
+    "nearest": "best training pose",
+}
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a figure is: how it is called, how it is shown, and what it means."""
+
+    name: str
+    label: str
+    unit: str  # in which it is shown; "" for none
+    digits: int  # that are shown after the point
+    meaning: str
+    factor: float = 1.0  # what a value is multiplied by to be in `unit`
+
+    def number(self, value: float | None) -> str:
+        """Return a value with its digits and without its unit; a dash where there is none."""
+        return "-" if value is None else f"{self.factor * value:,.{self.digits}f}"
+
+    def shown(self, value: float | None) -> str:
+        """Return a value with its label and unit, such as `MPJPE 18 mm`."""
+        return " ".join(word for word in (self.label, self.number(value), self.unit) if word)
+
+
+def _about(label: str, unit: str, digits: int, meaning: str, factor: float = 1.0) -> dict[str, Any]:
+    return {"measure": (label, unit, digits, meaning, factor)}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A figure over the frames of a track."""
+
+    mean: float
+    std: float
+    max: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measures:
+    """What one track is worth. Baselines and skill are by the names of `BASELINES`."""
+
+    error_degrees: Spread | None = field(
+        metadata=_about(
+            "error",
+            "degrees",
+            2,
+            "absolute difference of the 66 angles from the true ones, the mean over angles: its mean over the frames, "
+            "standard deviation and maximum. SAPSO (8)-(10)",
+        )
+    )
+    geodesic_degrees: float | None = field(
+        metadata=_about(
+            "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
+        )
+    )
+    free_error_degrees: float | None = field(
+        metadata=_about(
+            "error of free angles", "degrees", 2, "the error over those angles alone that the skeleton lets move"
+        )
+    )
+    mpjpe_mm: float | None = field(
+        metadata=_about("MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point")
+    )
+    pa_mpjpe_mm: float | None = field(
+        metadata=_about("PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)")
+    )
+    iou: float = field(
+        metadata=_about(
+            "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
+        )
+    )
+    cost: float = field(metadata=_about("cost", "", 2, "silhouette mismatch of the poses found, 0 to 100. SAPSO (4)"))
+    swap_rate: float | None = field(
+        metadata=_about("left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored", 100.0)
+    )
+    lost_rate: float | None = field(
+        metadata=_about("lost", "%", 0, "share of frames with an MPJPE above 150 mm", 100.0)
+    )
+    held_frames: int = field(
+        metadata=_about("held", "frames", 0, "frames that show too little: the pose is held, not searched")
+    )
+    skill: Mapping[str, float | None] | None = field(
+        metadata=_about("skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline")
+    )
+    baselines_degrees: Mapping[str, float] | None = field(
+        metadata=_about(
+            "baselines", "degrees", 2, "errors of what anybody reaches, given the true root and translation"
+        )
+    )
+    prior_floor_degrees: float | None = field(
+        metadata=_about(
+            "floor of the prior", "degrees", 2, "error of the truth's own projection into the prior and back"
+        )
+    )
+    seconds_per_frame: float = field(metadata=_about("time", "ms a frame", 1, "wall time a frame", 1e3))
+    evaluations: int = field(
+        metadata=_about("evaluations", "", 0, "poses whose cost was computed, in all frames together")
+    )
+    evaluations_per_second: float = field(
+        metadata=_about("speed", "poses a second", 0, "evaluations over the time they took")
+    )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures by name, as JSON holds them."""
+        return asdict(self)
+
+
+MEASURES = {one.name: Measure(one.name, *one.metadata["measure"]) for one in fields(Measures)}
+FRAME = {
+    one.name: one
+    for one in (
+        Measure("frame", "frame", "", 0, "number of the frame, from 0"),
+        Measure("cost", "cost", "", 2, "silhouette mismatch of the pose found, 0 to 100. SAPSO (4)"),
+        Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
+        Measure("usable", "usable", "", 0, "1 where the frame was searched, 0 where the pose was held"),
+        Measure("error_degrees", "error", "degrees", 2, "mean absolute difference of the 66 angles. SAPSO (8)"),
+        Measure("geodesic_degrees", "geodesic", "degrees", 2, "mean angle between true and estimated rotations"),
+        Measure("mpjpe_mm", "MPJPE", "mm", 0, "mean distance of the 27 joints, both roots at one point"),
+        Measure("pa_mpjpe_mm", "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation"),
+        Measure("swapped", "swapped", "", 0, "1 where the frame is nearer to the truth when mirrored"),
+        Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
+        Measure("seconds", "time", "ms", 1, "wall time", 1e3),
+    )
+}

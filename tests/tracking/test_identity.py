@@ -1,0 +1,95 @@
+"""Two tracks are the same where what they were told has the same content, whatever its objects are called."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.motion import library
+from posefit.tracking.identity import Told, difference
+
+QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200}
+
+
+class StopError(Exception):
+    """Somebody pulled the plug."""
+
+
+def stopping(frames: Any, count: int) -> Any:
+    for k, frame in enumerate(frames):
+        yield frame
+        if k + 1 == 4:
+            raise StopError
+
+
+def camera(azimuth: float) -> posefit.Camera:
+    return posefit.Camera.around(library.built_in("walk").translations[0], azimuth, 4.0, (120, 90))
+
+
+def test_cameras_at_two_azimuths_are_not_the_same_track(tmp_path: Path) -> None:
+    assert repr(camera(0.5)) == repr(camera(1.5))  # which is why texts are not enough
+    out = tmp_path / "out"
+    with pytest.raises(StopError):
+        posefit.track("walk", camera=camera(0.5), out=out, progress=stopping, **QUICK)
+    with pytest.raises(ValueError, match="cameras must be .* as it was, to resume, got one with another content"):
+        posefit.track("walk", camera=camera(1.5), out=out, resume=True, **QUICK)
+    resumed = posefit.track(
+        "walk", camera=camera(0.5), out=out, resume=True, **QUICK
+    )  # another object, the same camera
+    whole = posefit.track("walk", camera=camera(0.5), **QUICK)
+    np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
+
+
+def test_two_motions_of_one_name_are_not_the_same_track(tmp_path: Path) -> None:
+    motion, out = library.built_in("walk", frames=8), tmp_path / "out"
+    other = replace(motion, poses=motion.poses + 0.01)
+    with pytest.raises(StopError):
+        posefit.track(motion, out=out, progress=stopping, **QUICK)
+    with pytest.raises(ValueError, match="source must be .* as it was, to resume"):
+        posefit.track(other, out=out, resume=True, **QUICK)
+
+
+def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
+    first, second = tmp_path / "a.npz", tmp_path / "b"
+    first.write_bytes(b"masks")
+    before = Told.of(first, files=True)
+    assert Told.of(str(first), files=True).digest == before.digest
+    assert Told.of(first).digest != before.digest
+    first.write_bytes(b"maskz")
+    assert Told.of(first, files=True).digest != before.digest
+    second.mkdir()
+    empty = Told.of(second, files=True)
+    (second / "0.png").write_bytes(b"x")
+    assert Told.of(second, files=True).digest != empty.digest
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (1, 1.5),
+        (0, False),
+        ("1", 1),
+        (None, 0),
+        ((1, 2), (2, 1)),
+        ({"a": 1}, {"a": 2}),
+        (np.zeros(3), np.zeros(4)),
+        (np.zeros(2, np.float32), np.zeros(2)),
+        (np.sin, np.cos),
+        (library.built_in, library.names),
+    ],
+)
+def test_what_differs_has_another_digest(one: Any, other: Any) -> None:
+    assert Told.of(one).digest == Told.of(one).digest
+    assert Told.of(one).digest != Told.of(other).digest
+
+
+def test_the_first_difference_is_said_in_one_line() -> None:
+    now = {"seed": Told.of(1), "source": Told.of("walk")}
+    before = {name: told.as_json() for name, told in now.items()}
+    assert difference(before, now) is None
+    assert difference(before, {**now, "seed": Told.of(2)}) == "seed must be 1, as before, to resume, got 2"
+    assert difference({"seed": before["seed"]}, now) == "source must be None, as before, to resume, got 'walk'"
+    assert len(Told.of("x" * 1000).text) == 80
