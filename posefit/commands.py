@@ -45,10 +45,10 @@ def posefit_register_commands(register: Callable[[click.Command], None]) -> Any:
 @lru_cache(maxsize=1)
 def installed(taken: tuple[str, ...] = ()) -> tuple[Plugin[click.Command], ...]:
     """Return what became of all installed plugins with commands; `taken` are the names of posefit's own commands."""
-    return load(entry_points(group=GROUP), taken)
+    return commands_of(entry_points(group=GROUP), taken)
 
 
-def load(
+def commands_of(
     points: Iterable[EntryPoint], taken: Iterable[str] = (), variables: Mapping[str, str] = os.environ
 ) -> tuple[Plugin[click.Command], ...]:
     """Return what became of the plugins behind entry points; see `posefit.entries.load`."""

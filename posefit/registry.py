@@ -111,10 +111,10 @@ class Registry:
 @lru_cache(maxsize=1)
 def registry() -> Registry:
     """Return what all installed plugins offer; they are loaded once a process."""
-    return load(entry_points(group=PROJECT))
+    return registry_of(entry_points(group=PROJECT))
 
 
-def load(points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ) -> Registry:
+def registry_of(points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ) -> Registry:
     """Return what the plugins behind these entry points offer; see `posefit.entries.load`."""
     return Registry(entries.load(points, hooks, _offers, _named, variables))
 

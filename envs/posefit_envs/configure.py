@@ -70,8 +70,8 @@ class ConfigureEnv(gym.Env[State, Any]):
     As in `Fit-v0`, with `particles=40` and `iterations=60` instead of `target_cost` and `max_evaluations`.
 
     ## Version History
-    - v0: first version. In posefit 0.2 instances changed: number n is now the motion, speed, phase and view of instance n
-      of a sweep, and 0 the motion as it is; results of earlier ones cannot be compared with those.
+    - v0: first version. After posefit 0.1.0 its instances changed: number n is now the motion, speed, phase and view of
+      a sweep's instance n, and 0 the motion as it is. Results from before cannot be compared with later ones.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it

@@ -48,9 +48,9 @@ def doctor(context: click.Context) -> None:
 @click.pass_context
 def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> None:
     """Write a small plugin to start from: it installs, works and has a test that passes."""
-    from posefit.cli.template import new as write
+    from posefit.cli.template import write_plugin
 
-    folder = write(name, kind, out, _own(context))
+    folder = write_plugin(name, kind, out, _own(context))
     click.echo(f"written to {folder}; next: cd {folder} && python -m pip install -e '.[test]' && python -m pytest")
 
 

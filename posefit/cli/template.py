@@ -15,7 +15,9 @@ from posefit.registry import KINDS, Kind, registry
 COMMAND: Literal["command"] = "command"  # a kind of plugin that registers no method
 
 
-def new(name: str, kind: Kind | Literal["command"], folder: str | Path | None = None, own: Sequence[str] = ()) -> Path:
+def write_plugin(
+    name: str, kind: Kind | Literal["command"], folder: str | Path | None = None, own: Sequence[str] = ()
+) -> Path:
     """Return the new folder with a small installable plugin, `posefit-NAME` unless another is given.
 
     `own` are the names of posefit's own commands, which a new one cannot have. Raises ValueError where the name cannot

@@ -67,6 +67,11 @@ class Task:
     before: Sequence[Frame] = field(default=(), repr=False)  # found earlier, where a track goes on that was interrupted
     threads: int = 1
 
+    @property
+    def angles(self) -> Array:
+        """The joint angles (T, 63) of all motions that may be learned from."""
+        return np.concatenate([motion.poses[:, 3:] for motion in self.training])
+
 
 class Tracker(Protocol):
     """Follows a person through a sequence; nothing to inherit."""

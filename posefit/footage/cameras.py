@@ -24,7 +24,7 @@ SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may 
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class CameraView:
     """The masks of one camera."""
 
     masks: Masks
@@ -35,22 +35,22 @@ class Seen:
     warnings: Sequence[str] = ()
 
 
-def masks_of(path: Path, fps: float | None, frames: Range) -> Seen:
+def masks_of(path: Path, fps: float | None, frames: Range) -> CameraView:
     """Return what a folder or an .npz of masks shows, at `fps`, or else at the rate that the file states, or 30."""
     masks = LazyMasks.of(path, frames)
-    return Seen(masks, Views([masks]).sizes[0], None, fps or masks.fps or FPS)
+    return CameraView(masks, Views([masks]).sizes[0], None, fps or masks.fps or FPS)
 
 
-def video_of(video: Video, found: Segmentation, folder: Path, listener: Listener) -> Seen:
+def video_of(video: Video, found: Segmentation, folder: Path, listener: Listener) -> CameraView:
     """Return what a video shows; its masks are written to a new folder, so that none has to stay in memory."""
     folder.mkdir()
     masks = store(folder, found, listener.progress)
     pictures = partial(video.frames, found.start, found.stop, found.size)
-    return Seen(masks, found.size, video.size, video.fps, pictures, found.warnings)
+    return CameraView(masks, found.size, video.size, video.fps, pictures, found.warnings)
 
 
 def combined(
-    seen: Sequence[Seen],
+    seen: Sequence[CameraView],
     name: str,
     body: Body,
     cameras: Sequence[Camera | str | Path],

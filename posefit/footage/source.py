@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from posefit.footage.cameras import Seen, calibrated, combined, masks_of, video_of
+from posefit.footage.cameras import CameraView, calibrated, combined, masks_of, video_of
 from posefit.footage.masks import FPS, IMAGES, Range, existing
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
@@ -140,7 +140,7 @@ def _filmed(
     viewing: Viewing,
     work: Path,
     listener: Listener,
-) -> list[Seen]:
+) -> list[CameraView]:
     """Return what videos show, after everything that a user may have got wrong was checked."""
     videos = [Video.of(path) for path in paths]
     rates = {round(video.fps, 3) for video in videos}

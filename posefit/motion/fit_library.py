@@ -21,7 +21,7 @@ from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton, an
 from posefit.motion.amc import read_clip
 from posefit.motion.asf import read_asf
 from posefit.motion.fit_arms import PHASES, drawn, held_out, waving
-from posefit.motion.library import kind_of
+from posefit.motion.library import activity_of
 
 ORIGIN = (
     "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
@@ -209,9 +209,9 @@ def main(root: Path) -> None:
         tuple((bone, tuple(free)) for bone, free in bones["channels"]),
         np.radians(bones["limits_degrees"]),
     )
-    motions = {name: fitted(root, clip, kind_of(name)) for name, clip in CLIPS.items()}
+    motions = {name: fitted(root, clip, activity_of(name)) for name, clip in CLIPS.items()}
     for name, model in motions.items():
-        armed(model, skeleton, kind_of(name))
+        armed(model, skeleton, activity_of(name))
         grounded(model, skeleton)
         print(f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees")
     target = Path(__file__).with_name("library.json")

@@ -33,10 +33,10 @@ def _library() -> dict[str, Any]:
 def names() -> tuple[str, ...]:
     """Return the names that `built_in` takes."""
     styles = tuple(_library()["motions"])
-    return tuple(dict.fromkeys(kind_of(name) for name in styles)) + styles
+    return tuple(dict.fromkeys(activity_of(name) for name in styles)) + styles
 
 
-def kind_of(name: str) -> str:
+def activity_of(name: str) -> str:
     """Return the kind of motion that a name is of: `walk` of `walk-a`, `arms-out` of `arms-out`."""
     return re.sub(r"-[a-z]$", "", name)
 
@@ -44,7 +44,7 @@ def kind_of(name: str) -> str:
 def other_styles(name: str) -> tuple[str, ...]:
     """Return the other styles of a motion's kind, what its prior is trained on by default."""
     _check(name)
-    return tuple(style for style in _library()["motions"] if kind_of(style) == kind_of(name) and style != name)
+    return tuple(style for style in _library()["motions"] if activity_of(style) == activity_of(name) and style != name)
 
 
 @lru_cache(maxsize=1)

@@ -31,9 +31,10 @@ class Cell:
     """Everything a run depends on. `posefit.sweep.plan` makes cells that are checked.
 
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
-    numbers what is seen of the motion, see `posefit.footage.instance`. `corruption` gives kinds of `posefit.silhouette.corruption` their strength, 0 to 1, and
-    `dropped` the share of frames that are not seen; what is spoilt follows from the instance, so that every method and
-    seed sees the same. `files` holds the SHA-256 of every capture file that is read.
+    numbers what is seen of the motion, see `posefit.footage.instance`. `corruption` gives kinds of
+    `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames that are not seen; what is
+    spoilt follows from the instance, so that every method and seed sees the same. `files` holds the SHA-256 of every
+    capture file that is read.
     """
 
     method: str

@@ -17,7 +17,7 @@ from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
 from posefit.motion import library
 from posefit.settings import settings_of
-from posefit.testing.problem import training_angles
+from posefit.testing.problem import walking_angles
 from posefit.testing.randomness import left_alone
 from posefit.testing.results import Checklist, SkippedError, expect, refusal
 
@@ -35,7 +35,7 @@ class Case:
     def fitted(self) -> Prior:
         """Return the prior after it has learned the built-in walks."""
         prior: Prior = self.factory(**self.settings)
-        return prior.fit(training_angles(), library.average_skeleton())
+        return prior.fit(walking_angles(), library.average_skeleton())
 
     def latents(self, prior: Prior) -> Array:
         """Return some latents (ROWS, m) within the range."""
@@ -54,9 +54,7 @@ def construction(case: Case) -> None:
 def fit(case: Case) -> None:
     """The method fit returns the prior itself."""
     prior = case.factory(**case.settings)
-    expect(
-        prior.fit(training_angles(), library.average_skeleton()) is prior, "fit must return self, got another object"
-    )
+    expect(prior.fit(walking_angles(), library.average_skeleton()) is prior, "fit must return self, got another object")
 
 
 @checklist
@@ -75,7 +73,7 @@ def transform(case: Case) -> None:
     """Joint angles (n, 63) become latents (n, m)."""
     prior = case.fitted()
     for rows in (1, 7):
-        latents = np.asarray(prior.transform(training_angles()[:rows]))
+        latents = np.asarray(prior.transform(walking_angles()[:rows]))
         expect(
             latents.shape == (rows, len(prior.low)),
             f"transform must return {(rows, len(prior.low))}, got {latents.shape}",
@@ -100,7 +98,7 @@ def inverse(case: Case) -> None:
 def training_in_range(case: Case) -> None:
     """The training poses lie within the range."""
     prior = case.fitted()
-    latents = np.asarray(prior.transform(training_angles()))
+    latents = np.asarray(prior.transform(walking_angles()))
     slack = 1e-9 * (1.0 + np.abs(latents).max())
     out = (latents < np.asarray(prior.low) - slack) | (latents > np.asarray(prior.high) + slack)
     expect(not out.any(), f"training poses must lie in low to high, got {int(out.any(axis=1).sum())} that do not")
@@ -110,8 +108,8 @@ def training_in_range(case: Case) -> None:
 def training_feasible(case: Case) -> str:
     """Nine of ten training poses are feasible."""
     prior = case.fitted()
-    feasible = np.asarray(prior.feasible(prior.transform(training_angles())))
-    expect(feasible.shape == (len(training_angles()),), f"feasible must return (n,), got {feasible.shape}")
+    feasible = np.asarray(prior.feasible(prior.transform(walking_angles())))
+    expect(feasible.shape == (len(walking_angles()),), f"feasible must return (n,), got {feasible.shape}")
     expect(feasible.dtype == np.bool_, f"feasible must return booleans, got {feasible.dtype}")
     expect(feasible.mean() >= 0.9, f"90 % of the training poses must be feasible, got {100 * feasible.mean():.0f} %")
     return f"{100 * feasible.mean():.0f} %"
@@ -143,7 +141,7 @@ def same_again(case: Case) -> None:
 @checklist
 def inputs(case: Case) -> None:
     """What a method gets stays as it was."""
-    angles = training_angles()
+    angles = walking_angles()
     before = angles.copy()
     prior = case.factory(**case.settings).fit(angles, library.average_skeleton())
     latents = case.latents(prior)
@@ -194,7 +192,7 @@ def file(case: Case) -> None:
 @checklist
 def learns(case: Case) -> str:
     """Training poses come back nearer than their mean is."""
-    prior, angles = case.fitted(), training_angles()
+    prior, angles = case.fitted(), walking_angles()
     back = prior.inverse_transform(prior.transform(angles))
     error, mean = np.abs(back - angles).mean(), np.abs(angles.mean(axis=0) - angles).mean()
     expect(
@@ -207,7 +205,7 @@ def learns(case: Case) -> str:
 @checklist
 def bad_input(case: Case) -> None:
     """Joint angles of a wrong shape, with nan, or too few are refused."""
-    angles = training_angles()
+    angles = walking_angles()
     spoilt = angles.copy()
     spoilt[3, 3] = np.nan
     for what, value in (("60 columns", angles[:, :60]), ("nan", spoilt), ("no frames", angles[:0])):

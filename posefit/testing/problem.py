@@ -17,7 +17,7 @@ from posefit.silhouette.mask import Silhouette
 SIZE = (160, 120)
 
 
-def training_angles() -> Array:
+def walking_angles() -> Array:
     """Return the joint angles (T, 63) of the built-in walks but `walk` itself."""
     return np.concatenate([library.built_in(style).poses[:, 3:] for style in library.other_styles("walk")])
 
@@ -27,7 +27,7 @@ def pose_problem() -> PoseProblem:
     """Return the problem: known translation, prior `pca`, seen from 45 degrees."""
     motion = library.built_in("walk", frames=1)
     body = Body.of(motion.skeleton)
-    prior = registry().prior("pca")().fit(training_angles())
+    prior = registry().prior("pca")().fit(walking_angles())
     camera = Camera.around(motion.translations[0], 0.8, 3.5, SIZE)
     space = SearchSpace(prior, np.zeros(3), np.radians([45.0, 15.0, 15.0]), motion.translations[0])
     silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))

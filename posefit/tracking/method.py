@@ -149,16 +149,11 @@ def _prior(choice: Choice, task: Task) -> tuple[str, Prior]:
         return type(choice.prior).__name__, choice.prior
     offer = registry().offer("prior", choice.prior)
     settings.check(offer.name, offer.factory, choice.prior_settings)
-    angles = training_angles(task)
+    angles = task.angles
     with _rules(offer):
         prior: Prior = offer.factory(**choice.prior_settings).fit(angles, task.body.skeleton)
         _check_prior(prior, angles[:3], offer)
     return offer.name, prior
-
-
-def training_angles(task: Task) -> Array:
-    """Return the joint angles (T, 63) of all motions that may be learned from."""
-    return np.concatenate([motion.poses[:, 3:] for motion in task.training])
 
 
 def _check_prior(prior: Prior, angles: Array, offer: Offer) -> None:

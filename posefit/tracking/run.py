@@ -15,7 +15,7 @@ from posefit.listening import QUIET, Listener
 from posefit.motion.motion import Motion
 from posefit.tracking.evaluation import Evaluation
 from posefit.tracking.measures import Measures
-from posefit.tracking.method import Choice, Method, prepare, training_angles
+from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, opened, task_of
 from posefit.tracking.outputs import Nowhere, Output
 
@@ -61,7 +61,7 @@ def follow(
         scene = replace(scene, body=task.body)
         output = output or Nowhere()
         found = _found(scene, method, task, output, seed, listener)
-        evaluation = Evaluation(scene, method.prior, training_angles(task), method.beta)
+        evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
         for frame, observation in zip(found, scene.observations, strict=True):
             evaluation.add(frame, observation)
         rows, measures = evaluation.close()

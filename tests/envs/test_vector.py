@@ -217,7 +217,7 @@ def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
         assert rewards.shape == (2,)
         assert infos[0]["terminal_observation"][..., 1].any()
         assert not observations[0][..., 1].any()  # a new episode: nothing proposed yet
-        assert infos[0]["TimeLimit.truncated"] is ("FitEnv" in name)
+        assert infos[0]["TimeLimit.truncated"] is ("Fit" in name)
         assert adapted.get_attr("num_envs") == [2, 2]
         adapted.close()
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.registry import Registry, load, registry
+from posefit.registry import Registry, registry, registry_of
 from posefit.testing.toy import Toy
 
 EXTRAS = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna"}
@@ -19,7 +19,7 @@ EXTRAS = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": 
 
 @pytest.mark.parametrize("name", EXTRAS)
 def test_an_absent_library_is_named_with_the_extra_to_install(name: str) -> None:
-    found = load([EntryPoint(name, f"posefit_{name}", "posefit")])
+    found = registry_of([EntryPoint(name, f"posefit_{name}", "posefit")])
     plugin = found.plugins[0]
     absent = tuple(replace(offer, needs=(f"no_such_{offer.name}", f"posefit[{offer.name}]")) for offer in plugin.offers)
     with pytest.raises(ImportError, match=rf"optimiser {name} needs the library .* pip install 'posefit\[{name}\]'"):

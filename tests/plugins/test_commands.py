@@ -7,7 +7,7 @@ import click
 import pytest
 
 from posefit import hookimpl
-from posefit.commands import load
+from posefit.commands import commands_of
 
 
 def point(name: str, module: Any) -> Any:
@@ -28,7 +28,7 @@ def plugin(*commands: Any, hook: str = "posefit_register_commands") -> Any:
 
 
 def test_commands_are_found_by_the_name_they_have() -> None:
-    (found,) = load([point("hello", plugin(click.Command("greet"), click.Group("part")))], variables={})
+    (found,) = commands_of([point("hello", plugin(click.Command("greet"), click.Group("part")))], variables={})
     assert found.state == "loaded"
     assert [command.name for command in found.offers] == ["greet", "part"]
 
@@ -50,15 +50,21 @@ def test_commands_are_found_by_the_name_they_have() -> None:
 def test_a_broken_one_is_left_out_and_the_others_work(module: Any, cause: str) -> None:
     points = [point("bad", module), point("good", plugin(click.Command("greet")))]
     with pytest.warns(UserWarning, match="plugin 'bad' of posefit-bad 1.0 is left out"):
-        bad, good = load(points, taken=["track"], variables={})
+        bad, good = commands_of(points, taken=["track"], variables={})
     assert bad.state == "broken"
     assert bad.cause.startswith(cause)
     assert good.state == "loaded"
     with pytest.raises(ValueError, match="plugin 'bad' of posefit-bad 1.0 is left out"):
-        load(points, taken=["track"], variables={"POSEFIT_STRICT_PLUGINS": "1"})
+        commands_of(points, taken=["track"], variables={"POSEFIT_STRICT_PLUGINS": "1"})
 
 
 def test_variables_choose_which_are_loaded() -> None:
     points = [point("one", plugin(click.Command("a"))), point("two", plugin(click.Command("b")))]
-    assert [one.state for one in load(points, variables={"POSEFIT_BLOCK_PLUGINS": "two"})] == ["loaded", "left out"]
-    assert [one.state for one in load(points, variables={"POSEFIT_LOAD_PLUGINS": "two"})] == ["left out", "loaded"]
+    assert [one.state for one in commands_of(points, variables={"POSEFIT_BLOCK_PLUGINS": "two"})] == [
+        "loaded",
+        "left out",
+    ]
+    assert [one.state for one in commands_of(points, variables={"POSEFIT_LOAD_PLUGINS": "two"})] == [
+        "left out",
+        "loaded",
+    ]

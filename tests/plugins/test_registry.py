@@ -10,7 +10,7 @@ import pytest
 
 from posefit import hookimpl
 from posefit.motion import library
-from posefit.registry import load, registry
+from posefit.registry import registry, registry_of
 from posefit_priors.pca import PCA
 
 
@@ -49,7 +49,7 @@ def test_the_built_ins_are_there_under_their_names() -> None:
 
 
 def test_a_third_partys_optimiser_is_found_like_a_built_in() -> None:
-    assert load([Point("mine", offering("mine"))]).optimiser("mine") is PCA  # type: ignore[list-item]
+    assert registry_of([Point("mine", offering("mine"))]).optimiser("mine") is PCA  # type: ignore[list-item]
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_a_third_partys_optimiser_is_found_like_a_built_in() -> None:
 )
 def test_a_broken_plugin_costs_one_warning_that_names_it(broken: Any, cause: str) -> None:
     with pytest.warns(UserWarning, match="posefit-bad") as caught:
-        found = load([Point("bad", broken), Point("good", offering("good"))])  # type: ignore[list-item]
+        found = registry_of([Point("bad", broken), Point("good", offering("good"))])  # type: ignore[list-item]
     assert len(caught) == 1
     assert cause in str(caught[0].message)
     assert list(found.offers["optimiser"]) == ["good"]
@@ -70,7 +70,7 @@ def test_a_broken_plugin_costs_one_warning_that_names_it(broken: Any, cause: str
 
 def test_a_taken_name_is_refused() -> None:
     with pytest.warns(UserWarning, match="'one' is already registered by posefit-a"):
-        found = load([Point("a", offering("one")), Point("b", offering("one"))])  # type: ignore[list-item]
+        found = registry_of([Point("a", offering("one")), Point("b", offering("one"))])  # type: ignore[list-item]
     assert found.offers["optimiser"]["one"].distribution == "posefit-a"
 
 
@@ -78,7 +78,7 @@ def test_an_unknown_name_lists_the_known_and_the_nearest() -> None:
     with pytest.raises(
         ValueError, match=r"optimiser must be one of pso, random, sapso, got 'sapzo'; did you mean 'sapso'\?"
     ):
-        load(
+        registry_of(
             EntryPoint(f"p{k}", module, "posefit") for k, module in enumerate(["posefit_swarm", "posefit_priors"])
         ).optimiser("sapzo")
 
@@ -103,7 +103,7 @@ def test_the_registry_says_what_becomes_of_an_optimiser_in_the_next_frame() -> N
     ],
 )
 def test_variables_choose_what_is_loaded(variables: dict[str, str], loaded: set[str]) -> None:
-    found = load([Point("a", offering("one")), Point("b", offering("two"))], variables)  # type: ignore[list-item]
+    found = registry_of([Point("a", offering("one")), Point("b", offering("two"))], variables)  # type: ignore[list-item]
     assert {plugin.distribution for plugin in found.plugins if plugin.state == "loaded"} == loaded
     assert {offer.distribution for offer in found.offers["optimiser"].values()} == loaded
     assert all("names it" in one.cause or "not name it" in one.cause for one in found.plugins if one.state != "loaded")
@@ -111,17 +111,17 @@ def test_variables_choose_what_is_loaded(variables: dict[str, str], loaded: set[
 
 def test_built_ins_are_loaded_whatever_the_load_variable_says_but_may_be_blocked() -> None:
     points = [point for point in entry_points(group="posefit") if point.name in ("swarm", "priors")]
-    assert "sapso" in load(points, {"POSEFIT_LOAD_PLUGINS": ""}).offers["optimiser"]
-    assert "sapso" not in load(points, {"POSEFIT_BLOCK_PLUGINS": "swarm"}).offers["optimiser"]
+    assert "sapso" in registry_of(points, {"POSEFIT_LOAD_PLUGINS": ""}).offers["optimiser"]
+    assert "sapso" not in registry_of(points, {"POSEFIT_BLOCK_PLUGINS": "swarm"}).offers["optimiser"]
 
 
 @pytest.mark.parametrize("value", ["1", "yes"])
 def test_a_broken_plugin_is_an_error_where_plugins_are_strict(value: str) -> None:
     points: Any = [Point("bad", ImportError("no module named 'lost'"))]
     with pytest.raises(ValueError, match="plugin 'bad' of posefit-bad 1.0 is left out: ImportError: no module named"):
-        load(points, {"POSEFIT_STRICT_PLUGINS": value})
+        registry_of(points, {"POSEFIT_STRICT_PLUGINS": value})
     with pytest.warns(UserWarning, match="posefit-bad"):
-        assert load(points, {"POSEFIT_STRICT_PLUGINS": "0"}).plugins[0].state == "broken"
+        assert registry_of(points, {"POSEFIT_STRICT_PLUGINS": "0"}).plugins[0].state == "broken"
 
 
 def registering(*arguments: Any, **more: Any) -> ModuleType:
@@ -150,7 +150,7 @@ def test_a_registration_that_makes_no_sense_is_left_out(module: Any, cause: str)
     else:
         point = Point("bad", module)
     with pytest.warns(UserWarning, match=cause):
-        assert not load([point]).offers["optimiser"]  # type: ignore[list-item]
+        assert not registry_of([point]).offers["optimiser"]  # type: ignore[list-item]
 
 
 def exits() -> Any:
@@ -167,7 +167,7 @@ def test_a_plugin_that_takes_one_name_that_is_taken_is_left_out_whole() -> None:
         Point("b", plugin(posefit_register_optimisers=posefit_register_optimisers)),
     ]
     with pytest.warns(UserWarning, match="'one' is already registered by posefit-a"):
-        assert list(load(points).offers["optimiser"]) == ["one"]
+        assert list(registry_of(points).offers["optimiser"]) == ["one"]
 
 
 def test_a_prior_survives_its_file(tmp_path: Path) -> None:

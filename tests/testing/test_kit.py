@@ -35,10 +35,9 @@ def test_it_passes_every_shipped_prior(name: str) -> None:
 
 
 def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
-    from posefit.tracking.method import training_angles
 
     make = partial(SAPSO, particles=20, iterations=task.evaluations // 20 - 1)
-    return SynthesisTracker(task, PCA().fit(training_angles(task)), make, prediction=Prediction(floor=floor))
+    return SynthesisTracker(task, PCA().fit(task.angles), make, prediction=Prediction(floor=floor))
 
 
 def test_it_passes_the_papers_tracker() -> None:

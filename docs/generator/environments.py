@@ -1,0 +1,19 @@
+"""The page of the environments: their docstrings, which are written in Markdown as Gymnasium's are."""
+
+import inspect
+import re
+
+from posefit_envs.configure import Configure
+from posefit_envs.fit import Fit
+from posefit_envs.track import Track
+
+ENVIRONMENTS = {"posefit/Fit-v0": Fit, "posefit/Track-v0": Track, "posefit/Configure-v0": Configure}
+
+
+def page() -> str:
+    """Return the manual of every environment, as Markdown."""
+    parts = []
+    for name, environment in ENVIRONMENTS.items():
+        text = re.sub(r"^(#+) ", r"\1# ", inspect.getdoc(environment) or "", flags=re.MULTILINE)
+        parts.append(f"## `{name}`\n\n{text}")
+    return "\n\n".join(parts) + "\n"

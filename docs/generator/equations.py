@@ -1,0 +1,85 @@
+"""The map of the equations: every tag in the code, the line that it stands on, and the tests that hold it."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+SOURCES = {
+    "SAPSO": "Li, Sun, Chen and Li, Acta Automatica Sinica 38(5), 2012",
+    "VSMM": "Patent application CN101894278, 2010",
+    "KENNEDY1995": "Kennedy and Eberhart, Particle swarm optimization, 1995",
+    "CLERC2002": "Clerc and Kennedy, The particle swarm: explosion, stability and convergence, 2002",
+    "GORDON1993": "Gordon, Salmond and Smith, Novel approach to nonlinear/non-Gaussian Bayesian state estimation, 1993",
+    "DEUTSCHER2005": "Deutscher and Reid, Articulated body motion capture by stochastic search, 2005",
+    "HANSEN2016": "Hansen, The CMA evolution strategy: a tutorial, 2016",
+    "AUGER2005": "Auger and Hansen, A restart CMA evolution strategy with increasing population size, 2005",
+}
+_TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>[^,]+?)(?:, Reading S\d+)?$")
+_WORDS = re.compile(r"[^a-z0-9]+")
+_TEST = re.compile(r"^def (?P<name>test_\w+)\([^#\n]*\n?[^#\n]*?(?:  # (?P<tag>.*))?$", re.MULTILINE)
+
+
+class Tag(NamedTuple):
+    """One equation or step, and where it stands."""
+
+    source: str
+    step: str
+    path: str
+    line: int
+    code: str
+
+
+def page() -> str:
+    """Return a table of tags for each source, as Markdown."""
+    found = sorted(tags(), key=lambda tag: _key(tag.step))
+    parts = []
+    for source, title in SOURCES.items():
+        lines = [f"## {source}", f"{title}.", "| tag | the line that carries it | where | tests |\n|---|---|---|---|"]
+        for tag in (one for one in found if one.source == source):
+            code = f"`{tag.code}`".replace("|", "\\|")
+            named = ", ".join(f"`{name}`" for name in tests_of(tag))
+            lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}`, line {tag.line} | {named} |"
+        parts += lines
+    return "\n\n".join(parts) + "\n"
+
+
+def tags() -> Iterator[Tag]:
+    """Yield every tag in posefit and its plugins."""
+    for folder in ("posefit", "plugins"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            lines = path.read_text("utf-8").splitlines()
+            for number, line in enumerate(lines, 1):
+                found = _TAG.search(line)
+                if found is None:
+                    continue
+                code = line[: found.start()].strip() or lines[number].strip()  # a tag on its own is of the next line
+                yield Tag(found["source"], found["step"], str(path.relative_to(ROOT)), number, code)
+
+
+def tests_of(tag: Tag) -> list[str]:
+    """Return the tests, as FILE::NAME, that carry a tag or are named after the paper's equation or step."""
+    found = []
+    for path in sorted((ROOT / "tests" / "sources").glob("test_*.py")):
+        for one in _TEST.finditer(path.read_text("utf-8")):
+            carries = one["tag"] == f"{tag.source} {tag.step}"
+            if carries or (path.name == f"test_{tag.source.lower()}.py" and _is_named_after(one["name"], tag.step)):
+                found.append(f"{path.name}::{one['name']}")
+    return found
+
+
+def _is_named_after(test: str, step: str) -> bool:
+    """Return whether a test is of a step of the SAPSO paper: eq_4 of (4), 2_1_3_..._recovery of 2.1.3 recovery."""
+    if step.isalpha():
+        return f"_{step}_" in test
+    number, _, word = step.lower().partition(" ")
+    number = f"eq{number}" if step.startswith("(") else number
+    place = f"_{_WORDS.sub('_', number).strip('_')}_"
+    stem = word[:6] if word.isalpha() else word.replace(" ", "_")  # of velocity, also velocities
+    return place in f"{test}_" and stem in test
+
+
+def _key(step: str) -> list[tuple[int, int, str]]:
+    """Return what sorts steps as a reader counts: (2) before (10)."""
+    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.findall(r"\d+|[^\d]+", step)]

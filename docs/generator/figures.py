@@ -1,0 +1,113 @@
+"""The page of the figures: every key of summary.json, column of frames.csv and column of a sweep's CSV, with its unit."""
+
+from collections.abc import Iterable, Mapping
+
+from posefit.geometry.skeleton import JOINTS
+from posefit.tracking.measures import BASELINES, FRAME, MEASURES, Measure
+
+# How a value stands in a file whose table shows it times a factor.
+RAW = {"%": "share, 0 to 1", "ms": "s", "ms a frame": "s"}
+
+# What summary.json says beside the figures: the question, not the answer.
+ASKED = {
+    "motion": ("", "name of the motion, the video or the masks"),
+    "source": ("", "what was given as the source, a list with one entry for each camera"),
+    "frames_chosen": ("frames", "start and stop of `--frames`; null is an end that was not given"),
+    "method": ("", "the optimiser and the prior, or the tracker"),
+    "seed": ("", "the seed that everything random follows from"),
+    "frames": ("frames", "how many frames were followed"),
+    "evaluations_per_frame": ("", "budget of a frame"),
+    "version": ("", "the version of posefit"),
+    "train": ("", "names of the motions that the prior learned from"),
+    "view_degrees": ("degrees", "where the cameras were told to stand; null where nobody said"),
+    "translation": ("", "how the root's place is found: known, searched or aligned"),
+    "first_pose": ("", "how the first pose is found: searched, or given"),
+    "views": ("", "number of cameras"),
+    "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
+    "size": ("pixels", "width and height of the first camera's masks"),
+    "fps": ("1/s", "frames a second"),
+    "settings": ("", "settings that differ from their defaults, or all that matter, by the method's parts"),
+    "body": ("m", "the build that was fitted: `stature` in metres, `factors` on the average and their `spread`; or null"),
+    "warnings": ("", "what to look at before the result is trusted"),
+    "history": ("", "of a single frame only: best cost after each population"),
+}
+
+# What a sweep's row says beside the figures.
+ROW = {
+    "key": ("", "the cell's name: the SHA-256 of everything it depends on"),
+    "version": ("", "versions of posefit and of the plugins that are not its own"),
+    "status": ("", "`done` or `quarantined`, after three failed attempts"),
+    "reason": ("", "why a quarantined cell failed"),
+    "evaluations_used": ("", "poses whose cost was computed, in all frames together"),
+    "seconds": ("s", "wall time of the whole cell"),
+    "warnings": ("", "what to look at before the result is trusted"),
+}
+CELL = {
+    "method": ("", "OPTIMISER@PRIOR, or a tracker"),
+    "motion": ("", "a built-in motion, or a capture file"),
+    "train": ("", "motions that the prior learned from"),
+    "settings": ("", "settings as `--set` takes them"),
+    "view_degrees": ("degrees", "where the cameras stand: 0 in front of the person, 90 to the side"),
+    "corruption": ("", "kinds of damage to the silhouettes, with their strength from 0 to 1"),
+    "instance": ("", "number of the variation of the motion; 0 is the motion as it is"),
+    "frames": ("frames", "length of the sequence"),
+    "fps": ("1/s", "frames a second"),
+    "size": ("pixels", "width and height of the masks"),
+    "evaluations": ("", "budget of a frame"),
+    "translation": ("", "how the root's place is found: known, searched or aligned"),
+    "first_pose": ("", "how the first pose is found: searched, or given"),
+    "seed": ("", "the seed of the method"),
+}
+HEAD = "| {0} | unit | meaning |\n|---|---|---|"
+
+Said = Mapping[str, tuple[str, str]]
+
+
+def page() -> str:
+    """Return the three tables, as Markdown."""
+    parts = [
+        "## Keys of `summary.json`",
+        "`posefit track --json` prints the same object. First what was asked, then what was found.",
+        _table("key", _told(ASKED)),
+        _table("key", _measured(MEASURES.values())),
+        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill` and `baselines_degrees` hold one number "
+        "for each baseline:",
+        _table("baseline", [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()]),
+        "A figure that needs the truth is `null` where nobody knows it.",
+        "## Columns of `frames.csv`",
+        "One row a frame; those that need the truth are there only where it is known.",
+        _table("column", [*_measured(FRAME.values()), ("JOINT_x, JOINT_y, JOINT_z", "m", _joints())]),
+        "## Columns of a sweep's CSV",
+        "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as a "
+        "table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
+        "`baselines_degrees.mean_pose`.",
+        "What the cell is:",
+        _table("column", [*_told({name: ROW[name] for name in ("key", "version", "status", "reason")}), *_told(CELL)]),
+        "What it measured:",
+        _table("column", [*_measured(_of_rows()), *_told({name: ROW[name] for name in ("evaluations_used", "seconds", "warnings")})]),
+        _table("column", [("joint_errors_mm.JOINT", "mm", "mean distance of one joint from the true one, both roots at one point")]),
+        "In this file `evaluations` is the budget of a frame, and `evaluations_used` what all frames took.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _of_rows() -> list[Measure]:
+    """Return the figures of a track that a row of a sweep has under the same name."""
+    return [one for one in MEASURES.values() if one.name not in ("evaluations", "evaluations_per_second")]
+
+
+def _measured(measures: Iterable[Measure]) -> list[tuple[str, str, str]]:
+    return [(one.name, one.unit if one.factor == 1.0 else RAW[one.unit], one.meaning) for one in measures]
+
+
+def _told(said: Said) -> list[tuple[str, str, str]]:
+    return [(name, unit, meaning) for name, (unit, meaning) in said.items()]
+
+
+def _joints() -> str:
+    return f"place in the world of each of the {len(JOINTS)} joints: {', '.join(JOINTS)}"
+
+
+def _table(head: str, rows: Iterable[tuple[str, str, str]]) -> str:
+    lines = (f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in rows)
+    return "\n".join([HEAD.format(head), *lines])

@@ -1,0 +1,128 @@
+"""Docstrings as the builder reads them: plain text with code in single backticks becomes reStructuredText."""
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+_COLUMNS = re.compile(r"\S {2,}\S")
+_ENTRY = re.compile(r"(?P<name>[A-Za-z_]\w*)(?: \((?P<symbol>[^()]*)\))?: (?P<meaning>.*)")
+SETTINGS = "Settings:"
+
+
+class Entry(NamedTuple):
+    """What a docstring's list of settings says of one of them."""
+
+    symbol: str  # the source's letter; "" where it has none
+    meaning: str
+
+
+def restructured(lines: list[str]) -> list[str]:
+    """Return the lines of a docstring as reStructuredText."""
+    out: list[str] = []
+    for block in _blocks(lines):
+        out += [*_block(block), ""]
+    return out
+
+
+def without_settings(text: str) -> str:
+    """Return a docstring without its list of settings."""
+    lines = text.splitlines()
+    start, stop = _section(lines)
+    return "\n".join([*lines[:start], *lines[stop:]]).strip()
+
+
+def settings_in(text: str) -> dict[str, Entry]:
+    """Return what the list of settings of a docstring says, by the settings' names; empty where it has no list.
+
+    Such a list is a line `Settings:`, then an indented line `name (symbol): meaning` for each, which may go on in lines
+    that are indented more.
+    """
+    lines = text.splitlines()
+    start, stop = _section(lines)
+    found: dict[str, Entry] = {}
+    indents = [len(line) - len(line.lstrip()) for line in lines[start + 1 : stop] if line.strip()]
+    name = ""
+    for line in lines[start + 1 : stop]:
+        entry = _ENTRY.fullmatch(line.strip())
+        if entry is not None and len(line) - len(line.lstrip()) == min(indents):
+            name = entry["name"]
+            found[name] = Entry(entry["symbol"] or "", entry["meaning"])
+        elif name and line.strip():
+            found[name] = found[name]._replace(meaning=f"{found[name].meaning} {line.strip()}")
+    return found
+
+
+def _section(lines: list[str]) -> tuple[int, int]:
+    """Return where the list of settings begins and ends, both the end of the lines where there is none."""
+    start = next((k for k, line in enumerate(lines) if line.strip() == SETTINGS), len(lines))
+    if start == len(lines):
+        return start, start
+    base = len(lines[start]) - len(lines[start].lstrip())
+    stop = start + 1
+    while stop < len(lines) and (not lines[stop].strip() or len(lines[stop]) - len(lines[stop].lstrip()) > base):
+        stop += 1
+    return start, stop
+
+
+def _blocks(lines: list[str]) -> Iterator[list[str]]:
+    """Yield the runs of lines that stand together: an indented one after another is one, empty lines and all."""
+    block: list[str] = []
+    for line in [*lines, ""]:
+        if line.strip():
+            block.append(line)
+        elif block:
+            yield block
+            block = []
+
+
+def _block(block: list[str]) -> list[str]:
+    if all(line.startswith("    ") for line in block):
+        return ["::", "", *block]
+    if all(line.lstrip().startswith("|") for line in block):
+        return _table(block)
+    if sum(bool(_COLUMNS.search(line.strip())) for line in block) >= 2:
+        return ["::", "", *(f"    {line}" for line in block)]
+    if len(block) > 1 and block[0].rstrip().endswith(":") and block[1].startswith("    "):
+        return [*_block(block[:1]), "", *_entries(block[1:])]
+    heading = re.fullmatch(r"#+ (.*)", block[0])
+    if heading:
+        return [f"**{heading[1]}**", "", *(_block(block[1:]) if block[1:] else [])]
+    return _escaped("\n".join(block)).split("\n")
+
+
+def _entries(lines: list[str]) -> list[str]:
+    """Return an indented list such as the settings, one bullet an entry."""
+    out: list[str] = []
+    base = len(lines[0]) - len(lines[0].lstrip())
+    for line in lines:
+        text = _escaped(line.strip())
+        if len(line) - len(line.lstrip()) == base:
+            name, colon, rest = text.partition(":")
+            out.append(f"* **{name}**:{rest}" if colon and "`" not in name else f"* {text}")
+        else:
+            out.append(f"  {text}")
+    return out
+
+
+def _table(lines: list[str]) -> list[str]:
+    """Return a table of Markdown as a list-table."""
+    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines]
+    rows = [row for row in rows if not all(re.fullmatch(r":?-+:?", cell) for cell in row)]
+    out = [".. list-table::", "   :header-rows: 1", ""]
+    for row in rows:
+        for k, cell in enumerate(row):
+            out.append(f"   {'* -' if k == 0 else '  -'} {_escaped(cell)}")
+    return out
+
+
+def _escaped(text: str) -> str:
+    """Return text in which only backticks mean something."""
+    parts = re.split(r"(`[^`]+`)", text)
+    for k, part in enumerate(parts):
+        if k % 2:
+            following = parts[k + 1][:1]
+            parts[k] = f"``{part[1:-1].strip()}``" + ("\\ " if following.isalnum() else "")
+        else:
+            parts[k] = re.sub(r"([*|\\])", r"\\\1", part)
+            parts[k] = re.sub(r"(?<=\w)_(?!\w)", r"\\_", parts[k])
+    return "".join(parts)

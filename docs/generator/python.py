@@ -1,0 +1,41 @@
+"""The reference of the Python packages: a page for each, with the docstrings of all its modules."""
+
+import importlib
+import pkgutil
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def pages() -> dict[str, str]:
+    """Return a page for each package, by its name, and one that lists them."""
+    packages = {name: _modules(name) for name in _packages()}
+    alone = [f"posefit.{one.name}" for one in pkgutil.iter_modules([str(ROOT / "posefit")]) if _alone(one)]
+    found = {name: _page(name, modules) for name, modules in packages.items()}
+    found["posefit"] = _page("posefit", alone)
+    return found
+
+
+def _alone(module: pkgutil.ModuleInfo) -> bool:
+    return not module.ispkg and not module.name.startswith("_")
+
+
+def _packages() -> list[str]:
+    """Return the packages of posefit, its plugins and its environments."""
+    inner = [f"posefit.{one.name}" for one in pkgutil.iter_modules([str(ROOT / "posefit")]) if one.ispkg]
+    outer = [path.name for folder in ("plugins", "envs") for path in sorted((ROOT / folder).glob("posefit_*"))]
+    return [*inner, *outer]
+
+
+def _modules(package: str) -> list[str]:
+    path = importlib.import_module(package).__path__
+    found = sorted(one.name for one in pkgutil.walk_packages(path, f"{package}."))
+    return [name for name in found if importlib.import_module(name).__doc__]
+
+
+def _page(package: str, modules: list[str]) -> str:
+    members = [] if modules else ["   :members:"]
+    lines = [f"``{package}``", "=" * (len(package) + 4), "", f".. automodule:: {package}", *members, ""]
+    for module in modules:
+        lines += [f"``{module}``", "-" * (len(module) + 4), "", f".. automodule:: {module}", "   :members:", ""]
+    return "\n".join(lines)
