@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from posefit.geometry.body import varied
-from posefit.tracking.method import Choice
+from posefit.tracking.method import Choice, prepare
 from posefit.tracking.synthetic import Spoilt
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.known import follow_known, known_errors, known_scene, known_task, mean_pose_degrees
@@ -29,12 +29,17 @@ KINDS = ("holes", "blobs", "shadow", "jitter", "occluder", "dropped frames", "bo
 def degradation(
     optimiser: str, prior: str, seeds: int, workers: int | None, progress: Progress | None = None
 ) -> dict[str, Any]:
-    """Return what every kind and strength of damage leaves of a track, and the mean pose's error in degrees."""
+    """Return what every kind and strength of damage leaves of a track, and the mean pose's error in degrees.
+
+    Raises ValueError where there is no such optimiser or prior.
+    """
     check_seeds(seeds)
     choice = Choice(optimiser=optimiser, prior=prior)
+    scene = known_scene(MOTION, [VIEW])
+    task = known_task(scene, choice, scene.body)
+    prepare(choice, task)  # which says before the minutes that the tracks take where a name is wrong
     keys = list(product(KINDS, STRENGTHS, range(seeds)))
     found = each({key: partial(_errors, choice, *key) for key in keys}, workers, progress)
-    scene = known_scene(MOTION, [VIEW])
     return {
         "optimiser": optimiser,
         "prior": prior,
@@ -42,7 +47,7 @@ def degradation(
         "view_degrees": VIEW,
         "seeds": seeds,
         "strengths": list(STRENGTHS),
-        "mean_pose_degrees": mean_pose_degrees(scene, known_task(scene, choice, scene.body)),
+        "mean_pose_degrees": mean_pose_degrees(scene, task),
         "kinds": {  # of every strength, of every seed
             kind: [[found[kind, strength, seed] for seed in range(seeds)] for strength in STRENGTHS] for kind in KINDS
         },

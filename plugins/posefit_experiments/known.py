@@ -53,8 +53,7 @@ def known_errors(scene: Scene, frames: Sequence[Frame]) -> dict[str, float]:
 def mean_pose_degrees(scene: Scene, task: Task) -> float:
     """Return the error in degrees of the mean training pose, given the true root: what anybody reaches."""
     truth = _truth(scene)
-    angles = np.concatenate([motion.poses[:, 3:] for motion in task.training]).mean(axis=0)
-    poses = np.column_stack([truth.poses[:, :3], np.tile(angles, (len(truth), 1))])
+    poses = np.column_stack([truth.poses[:, :3], np.tile(task.angles.mean(axis=0), (len(truth), 1))])
     return float(metrics.pose_error_degrees(truth.poses, poses).mean())
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.footage.masks import Range
+from posefit.footage.masks import Range, existing
 from posefit.footage.segmentation import WIDTH, Box, Extraction
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
@@ -34,6 +34,7 @@ def filmed(
     Raises ValueError where the video, the region or the frames make no sense.
     """
     check_seeds(seeds)
+    existing(Path(video))
     speed = each({"speed": partial(loop_speed, video, roi, frames)}, 1)["speed"]
     tracks = each({seed: partial(filmed_figures, video, roi, frames, seed) for seed in range(seeds)}, workers, progress)
     return {"video": video, "roi": list(roi), "frames": list(frames), "speed": speed, "tracks": list(tracks.values())}
