@@ -39,7 +39,7 @@ def page() -> str:
         lines = [f"## {source}", f"{title}.", "| tag | the line that carries it | where | tests |\n|---|---|---|---|"]
         for tag in (one for one in found if one.source == source):
             code = f"`{tag.code}`".replace("|", "\\|")
-            named = ", ".join(f"`{name}`" for name in tests_of(tag))
+            named = "<br>".join(f"`{name}`" for name in tests_of(tag))
             lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}`, line {tag.line} | {named} |"
         parts += lines
     return "\n\n".join(parts) + "\n"
