@@ -4,8 +4,9 @@ import inspect
 import re
 
 import gymnasium
-import posefit_envs  # noqa: F401, which registers them
 from gymnasium.envs.registration import load_env_creator
+
+import posefit_envs  # noqa: F401, which registers them
 
 NAMESPACE = "posefit"
 

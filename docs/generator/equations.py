@@ -16,7 +16,7 @@ SOURCES = {
     "HANSEN2016": "Hansen, The CMA evolution strategy: a tutorial, 2016",
     "AUGER2005": "Auger and Hansen, A restart CMA evolution strategy with increasing population size, 2005",
 }
-_TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>[^,]+?)(?:, Reading S\d+)?$")
+_TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")
 _TEST = re.compile(r"^def (?P<name>test_\w+)\([^#\n]*\n?[^#\n]*?(?:  # (?P<tag>.*))?$", re.MULTILINE)
 

@@ -27,7 +27,10 @@ ASKED = {
     "size": ("pixels", "width and height of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
     "settings": ("", "settings that differ from their defaults, or all that matter, by the method's parts"),
-    "body": ("m", "the build that was fitted: `stature` in metres, `factors` on the average and their `spread`; or null"),
+    "body": (
+        "m",
+        "the build that was fitted: `stature` in metres, `factors` on the average and their `spread`; or null",
+    ),
     "warnings": ("", "what to look at before the result is trusted"),
     "history": ("", "of a single frame only: best cost after each population"),
 }
@@ -72,7 +75,10 @@ def page() -> str:
         _table("key", _measured(MEASURES.values())),
         "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill` and `baselines_degrees` hold one number "
         "for each baseline:",
-        _table("baseline", [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()]),
+        _table(
+            "baseline",
+            [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],
+        ),
         "A figure that needs the truth is `null` where nobody knows it.",
         "## Columns of `frames.csv`",
         "One row a frame; those that need the truth are there only where it is known.",
@@ -84,8 +90,14 @@ def page() -> str:
         "What the cell is:",
         _table("column", [*_told({name: ROW[name] for name in ("key", "version", "status", "reason")}), *_told(CELL)]),
         "What it measured:",
-        _table("column", [*_measured(_of_rows()), *_told({name: ROW[name] for name in ("evaluations_used", "seconds", "warnings")})]),
-        _table("column", [("joint_errors_mm.JOINT", "mm", "mean distance of one joint from the true one, both roots at one point")]),
+        _table(
+            "column",
+            [*_measured(_of_rows()), *_told({name: ROW[name] for name in ("evaluations_used", "seconds", "warnings")})],
+        ),
+        _table(
+            "column",
+            [("joint_errors_mm.JOINT", "mm", "mean distance of one joint from the true one, both roots at one point")],
+        ),
         "In this file `evaluations` is the budget of a frame, and `evaluations_used` what all frames took.",
     ]
     return "\n\n".join(parts) + "\n"

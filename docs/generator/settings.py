@@ -4,13 +4,12 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+from generator.prose import Entry, settings_in, without_settings
 from posefit.entries import PROJECT
 from posefit.fitting.tracker import Prediction
 from posefit.registry import KINDS, Offer, registry
 from posefit.settings import settings_of
 from posefit.sweep.cell import setting_text
-
-from generator.prose import Entry, settings_in, without_settings
 
 
 def page() -> str:
@@ -38,7 +37,9 @@ def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
     lines = ["| `--set` | symbol | type | default | meaning and source |", "|---|---|---|---|---|"]
     for setting in settings:
         symbol, meaning = said.get(setting.name, Entry("", "see the text above"))
-        default = "" if setting.default is inspect.Parameter.empty else f"`{setting_text(setting.default) or chr(39) * 2}`"
+        default = (
+            "" if setting.default is inspect.Parameter.empty else f"`{setting_text(setting.default) or chr(39) * 2}`"
+        )
         cells = [f"`{name}.{setting.name}`", symbol, setting.type, default, meaning]
         lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return f"{without_settings(text)}{more}\n\n" + "\n".join(lines)
