@@ -1,4 +1,4 @@
-"""The page of the figures: every key of summary.json, column of frames.csv and column of a sweep's CSV, with its unit."""
+"""The page of the figures: the keys of summary.json, the columns of frames.csv and of a sweep's CSV, with units."""
 
 from collections.abc import Iterable, Mapping
 
@@ -73,8 +73,8 @@ def page() -> str:
         "`posefit track --json` prints the same object. First what was asked, then what was found.",
         _table("key", _told(ASKED)),
         _table("key", _measured(MEASURES.values())),
-        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill` and `baselines_degrees` hold one number "
-        "for each baseline:",
+        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill` and `baselines_degrees` hold one "
+        "number for each baseline:",
         _table(
             "baseline",
             [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],
@@ -84,8 +84,8 @@ def page() -> str:
         "One row a frame; those that need the truth are there only where it is known.",
         _table("column", [*_measured(FRAME.values()), ("JOINT_x, JOINT_y, JOINT_z", "m", _joints())]),
         "## Columns of a sweep's CSV",
-        "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as a "
-        "table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
+        "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
+        "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
         "`baselines_degrees.mean_pose`.",
         "What the cell is:",
         _table("column", [*_told({name: ROW[name] for name in ("key", "version", "status", "reason")}), *_told(CELL)]),
