@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import click
+
 from posefit.cli import main
 
 WIDTH = 100  # columns of a terminal

@@ -2,10 +2,9 @@
 
 import inspect
 
+from generator.prose import Entry, settings_in, without_settings
 from posefit.entries import PROJECT
 from posefit.registry import KINDS, Offer, registry
-
-from generator.prose import Entry, settings_in, without_settings
 
 
 def page() -> str:

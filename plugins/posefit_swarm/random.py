@@ -10,6 +10,8 @@ from posefit.fitting.check import at_least
 class Random:
     """Draws every population uniformly from the feasible part of the box, whatever was found before."""
 
+    baseline = True  # the chance that other optimisers are held against
+
     def __init__(self, space: Space, rng: np.random.Generator, *, particles: int = 40) -> None:
         at_least("particles", particles, 1)
         self._space, self._rng, self._particles = space, rng, particles
