@@ -3,11 +3,11 @@
 import inspect
 import re
 
-from posefit_envs.configure import Configure
-from posefit_envs.fit import Fit
-from posefit_envs.track import Track
+from posefit_envs.configure import ConfigureEnv
+from posefit_envs.fit import FitEnv
+from posefit_envs.track import TrackEnv
 
-ENVIRONMENTS = {"posefit/Fit-v0": Fit, "posefit/Track-v0": Track, "posefit/Configure-v0": Configure}
+ENVIRONMENTS = {"posefit/Fit-v0": FitEnv, "posefit/Track-v0": TrackEnv, "posefit/Configure-v0": ConfigureEnv}
 
 
 def page() -> str:
