@@ -14,6 +14,8 @@ class Random:
         particles: size of a population, 1 or more.
     """
 
+    baseline = True  # the chance that other optimisers are held against
+
     def __init__(self, space: Space, rng: np.random.Generator, *, particles: int = 40) -> None:
         at_least("particles", particles, 1)
         self._space, self._rng, self._particles = space, rng, particles

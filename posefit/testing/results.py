@@ -94,7 +94,7 @@ class Report:
         return f"{passed + failed} checks ran, {failed} failed, {skipped} skipped"
 
 
-def report(plugin: str, checks: Iterable[Check]) -> Report:
+def run_checks(plugin: str, checks: Iterable[Check]) -> Report:
     """Return the results of running all checks."""
     return Report(plugin, tuple(check.run() for check in checks))
 
