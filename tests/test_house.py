@@ -19,7 +19,7 @@ PACKAGES = [
 ]
 LINES, MODULES = 300, 14  # of a file, of a folder: with more it probably hides two nouns, or two rooms
 # What is not reached yet: a set only ever gets smaller, and the tests fail where it holds what is mended.
-NAMES_A_PLUGIN = {"posefit/testing/search_rules.py"}
+NAMES_A_PLUGIN: set[str] = set()
 TOO_LONG: set[str] = set()
 TOO_FULL: set[str] = set()
 

@@ -146,7 +146,7 @@ def test_nothing_is_ever_seen() -> None:
     assert all(frame.evaluations == 0 for frame in frames)
 
 
-@pytest.mark.parametrize("factory", [vsmm, joined])
+@pytest.mark.parametrize("factory", [vsmm, pytest.param(joined, marks=pytest.mark.slow)])
 def test_what_is_no_person_is_no_reason_to_fail(factory: Any) -> None:
     task, observations = seen(frames=24)
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
@@ -251,11 +251,13 @@ def test_a_senseless_setting_of_the_joined_tracker_is_one_line(setting: str) -> 
         {"shrink": "zero"},
     ],
 )
+@pytest.mark.slow
 def test_the_patents_own_form_runs(settings: dict[str, Any]) -> None:
     task, observations = seen(frames=60)
     follow(task, observations, **settings)
 
 
+@pytest.mark.slow
 def test_two_cameras_are_better_than_one() -> None:
     motion = library.built_in("squat-b", frames=40)
     body = Body.of(motion.skeleton)

@@ -37,7 +37,8 @@ def test_it_passes_every_shipped_optimiser(name: str) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("pca", "loose", "full", "union", "sklearn"),
+        "pca",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("loose", "full", "union", "sklearn")),
         *(pytest.param(f"sklearn:{name}", marks=pytest.mark.slow) for name in ("FactorAnalysis", "FastICA")),
     ],
 )
@@ -52,6 +53,7 @@ def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
     return SynthesisTracker(task, PCA().fit(task.angles), make, prediction=Prediction(floor=floor))
 
 
+@pytest.mark.slow
 def test_it_passes_the_papers_tracker() -> None:
     result = check_tracker(synthesis)
     assert result, str(result)
@@ -108,6 +110,7 @@ def test_it_finds_a_filter_that_forgets() -> None:
 
 
 @pytest.mark.parametrize(("bug", "checks"), planted.PRIORS.items(), ids=lambda one: getattr(one, "__name__", ""))
+@pytest.mark.slow
 def test_it_finds_each_bug_planted_in_a_prior(bug: Any, checks: tuple[str, ...]) -> None:
     assert set(checks) <= {one.name for one in check_prior(bug).of("failed")}
 

@@ -18,7 +18,7 @@ def summaries(cmu: Path, view: float, seeds: range) -> list[dict[str, Any]]:
     ]
 
 
-@pytest.mark.parametrize("view", [0.0, 45.0])
+@pytest.mark.parametrize("view", [pytest.param(0.0, marks=pytest.mark.slow), 45.0])
 def test_walking_is_followed_within_1_9_degrees(cmu: Path, view: float) -> None:
     found = summaries(cmu, view, range(5))
     errors = [summary["error_degrees"]["mean"] for summary in found]
