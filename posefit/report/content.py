@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import JOINTS, PARENTS
+from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
 from posefit.report.contest import Contest, baseline_rows, claim, contest_of, leaderboard, paired_tests, resamples
 from posefit.report.figures import COLOURS
@@ -36,6 +36,7 @@ def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str,
         "instances": _instances(runs),
         "joints": JOINTS,
         "parents": PARENTS,
+        "sides": SIDES,
         "colours": len(COLOURS),
         **(_compared(contest) if contest is not None else {}),
         "rows": _rows(runs),

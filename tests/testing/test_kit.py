@@ -7,7 +7,15 @@ import pytest
 
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
-from posefit.testing import check_optimiser, check_prior, check_tracker, optimiser_checks, parametrize, report, results
+from posefit.testing import (
+    check_optimiser,
+    check_prior,
+    check_tracker,
+    optimiser_checks,
+    parametrize,
+    results,
+    run_checks,
+)
 from posefit_priors.pca import PCA
 from posefit_swarm.sapso import SAPSO
 from tests.testing import planted
@@ -44,6 +52,34 @@ def test_it_passes_the_papers_tracker() -> None:
     result = check_tracker(synthesis)
     assert result, str(result)
     assert len(result.of("passed")) >= 13
+
+
+class Chance:
+    """Draws uniformly."""
+
+    def __init__(self, space: Any, rng: Any, *, particles: int = 40) -> None:
+        self.space, self.rng, self.particles = space, rng, particles
+
+    def ask(self) -> Any:
+        return self.space.draw(self.rng, self.particles)
+
+    def tell(self, proposals: Any, costs: Any) -> None: ...
+
+
+class Baseline(Chance):
+    baseline = True
+
+
+def test_chance_does_not_beat_chance_and_need_not_where_it_says_that_it_is_the_baseline() -> None:
+    names = "sphere_problem", "real_problem"
+
+    def outcomes(factory: Any) -> list[tuple[str, str]]:
+        found = [check.run() for check in optimiser_checks(factory, next_frame="forget") if check.name in names]
+        return [(one.outcome, one.detail) for one in found]
+
+    assert [outcome for outcome, _ in outcomes(Chance)] == ["failed", "failed"]
+    for factory in (Baseline, partial(Baseline, particles=20), registry().optimiser("random")):
+        assert outcomes(factory) == [("skipped", "it is the baseline itself")] * 2
 
 
 @pytest.mark.parametrize("name", ["Sound"])
@@ -88,7 +124,7 @@ def test_a_skipped_check_is_visible() -> None:
 
 def test_a_report_is_false_where_a_check_failed() -> None:
     assert not check_optimiser(planted.AsksList)
-    assert report("nothing", [])
+    assert run_checks("nothing", [])
 
 
 @parametrize(optimiser_checks(planted.Sound))
