@@ -33,7 +33,7 @@ def differences(before: Any, after: Any, place: str = "") -> Iterator[str]:
         yield f"{place}: {before!r} became {after!r}"
 
 
-def same(before: Path, after: Path) -> list[str]:
+def report_differences(before: Path, after: Path) -> list[str]:
     """Return where two files of JSON differ, but for the times."""
     first, second = (json.loads(path.read_text(encoding="utf-8")) for path in (before, after))
     return list(differences(first, second))
@@ -42,6 +42,6 @@ def same(before: Path, after: Path) -> list[str]:
 if __name__ == "__main__":
     if len(sys.argv) != 3:
         sys.exit("usage: python -m posefit_experiments.same BEFORE.json AFTER.json")
-    found = same(Path(sys.argv[1]), Path(sys.argv[2]))
+    found = report_differences(Path(sys.argv[1]), Path(sys.argv[2]))
     print("\n".join(found) or "the same, but for the times")
     sys.exit(bool(found))

@@ -13,7 +13,7 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit_experiments import grid
 from posefit_experiments.grid import each, rows
-from posefit_experiments.same import differences, same
+from posefit_experiments.same import differences, report_differences
 
 PLAN = {
     "defaults": {"motion": "walk", "frames": 2, "evaluations": 80},
@@ -83,7 +83,7 @@ def test_reports_are_the_same_but_for_the_times(tmp_path: Path) -> None:
     after = {"error": [1.5, {"seconds_per_frame": 9.0, "frame_ms": 9.0}], "evaluations_used": 3}
     for name, told in (("before", before), ("after", after)):
         (tmp_path / name).write_text(json.dumps(told))
-    assert same(tmp_path / "before", tmp_path / "after") == []
+    assert report_differences(tmp_path / "before", tmp_path / "after") == []
     assert list(differences(before, {**after, "evaluations_used": 4})) == [".evaluations_used: 3 became 4"]
     assert list(differences({"a": 1.0}, {"a": 1.0 + 2.0**-52})) == [".a: 1.0 became 1.0000000000000002"]
     assert list(differences({"a": [1]}, {"a": [1, 2]})) == [".a: [1] became [1, 2]"]
