@@ -5,7 +5,7 @@ const SIDE = (joint) =>
     ? "middle"
     : { l: "left", r: "right" }[D.joints[joint][0]] || "middle";
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const limbs = () => ({ left: ink("--c1"), right: ink("--c0"), middle: ink("--ink") });
+const limbs = () => ({ left: ink("--left"), right: ink("--right"), middle: ink("--ink") });
 
 // Joints of all frames of a picture: a function of the frame that gives 27 points.
 function decoded(text) {
@@ -165,7 +165,7 @@ function still(scene) {
     4 + (y - top) * scale,
   ];
   const svg = draw("svg", { width: size, height: size, "aria-hidden": "true" });
-  const tints = { left: "var(--c1)", right: "var(--c0)", middle: "var(--ink)" };
+  const tints = { left: "var(--left)", right: "var(--right)", middle: "var(--ink)" };
   for (const [parent, joint] of BONES) {
     const [a, b] = [at(flat[parent]), at(flat[joint])].map((one) => one.map((value) => value.toFixed(1)));
     svg.append(
