@@ -6,7 +6,7 @@ import click
 
 from posefit.cli import main
 
-WIDTH = 100  # columns of a terminal
+WIDTH = 78  # columns: what click takes of a terminal of 80 or more
 
 
 def page() -> str:
@@ -16,7 +16,7 @@ def page() -> str:
 
 def helps() -> Iterator[tuple[str, str]]:
     """Yield every command and what `--help` prints of it, a group before what it holds."""
-    yield from _of(main, click.Context(main, info_name="posefit", terminal_width=WIDTH, max_content_width=WIDTH))
+    yield from _of(main, click.Context(main, info_name="posefit", terminal_width=WIDTH, **main.context_settings))
 
 
 def _of(command: click.Command, context: click.Context) -> Iterator[tuple[str, str]]:

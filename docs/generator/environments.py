@@ -3,17 +3,21 @@
 import inspect
 import re
 
-from posefit_envs.configure import ConfigureEnv
-from posefit_envs.fit import FitEnv
-from posefit_envs.track import TrackEnv
+import gymnasium
+from gymnasium.envs.registration import load_env_creator
 
-ENVIRONMENTS = {"posefit/Fit-v0": FitEnv, "posefit/Track-v0": TrackEnv, "posefit/Configure-v0": ConfigureEnv}
+import posefit_envs  # noqa: F401, which registers them
+
+NAMESPACE = "posefit"
 
 
 def page() -> str:
     """Return the manual of every environment, as Markdown."""
     parts = []
-    for name, environment in ENVIRONMENTS.items():
-        text = re.sub(r"^(#+) ", r"\1# ", inspect.getdoc(environment) or "", flags=re.MULTILINE)
-        parts.append(f"## `{name}`\n\n{text}")
+    for name, spec in gymnasium.registry.items():
+        if spec.namespace != NAMESPACE:
+            continue
+        assert isinstance(spec.entry_point, str)
+        text = inspect.getdoc(load_env_creator(spec.entry_point)) or ""
+        parts.append(f"## `{name}`\n\n" + re.sub(r"^(#+) ", r"\1# ", text, flags=re.MULTILINE))
     return "\n\n".join(parts) + "\n"

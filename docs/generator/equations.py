@@ -16,7 +16,7 @@ SOURCES = {
     "HANSEN2016": "Hansen, The CMA evolution strategy: a tutorial, 2016",
     "AUGER2005": "Auger and Hansen, A restart CMA evolution strategy with increasing population size, 2005",
 }
-_TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>[^,]+?)(?:, Reading S\d+)?$")
+_TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")
 _TEST = re.compile(r"^def (?P<name>test_\w+)\([^#\n]*\n?[^#\n]*?(?:  # (?P<tag>.*))?$", re.MULTILINE)
 
@@ -39,7 +39,7 @@ def page() -> str:
         lines = [f"## {source}", f"{title}.", "| tag | the line that carries it | where | tests |\n|---|---|---|---|"]
         for tag in (one for one in found if one.source == source):
             code = f"`{tag.code}`".replace("|", "\\|")
-            named = ", ".join(f"`{name}`" for name in tests_of(tag))
+            named = "<br>".join(f"`{name}`" for name in tests_of(tag))
             lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}`, line {tag.line} | {named} |"
         parts += lines
     return "\n\n".join(parts) + "\n"

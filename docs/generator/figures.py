@@ -1,4 +1,4 @@
-"""The page of the figures: every key of summary.json, column of frames.csv and column of a sweep's CSV, with its unit."""
+"""The page of the figures: the keys of summary.json, the columns of frames.csv and of a sweep's CSV, with units."""
 
 from collections.abc import Iterable, Mapping
 
@@ -27,7 +27,10 @@ ASKED = {
     "size": ("pixels", "width and height of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
     "settings": ("", "settings that differ from their defaults, or all that matter, by the method's parts"),
-    "body": ("m", "the build that was fitted: `stature` in metres, `factors` on the average and their `spread`; or null"),
+    "body": (
+        "m",
+        "the build that was fitted: `stature` in metres, `factors` on the average and their `spread`; or null",
+    ),
     "warnings": ("", "what to look at before the result is trusted"),
     "history": ("", "of a single frame only: best cost after each population"),
 }
@@ -70,22 +73,31 @@ def page() -> str:
         "`posefit track --json` prints the same object. First what was asked, then what was found.",
         _table("key", _told(ASKED)),
         _table("key", _measured(MEASURES.values())),
-        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill` and `baselines_degrees` hold one number "
-        "for each baseline:",
-        _table("baseline", [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()]),
+        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill` and `baselines_degrees` hold one "
+        "number for each baseline:",
+        _table(
+            "baseline",
+            [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],
+        ),
         "A figure that needs the truth is `null` where nobody knows it.",
         "## Columns of `frames.csv`",
         "One row a frame; those that need the truth are there only where it is known.",
         _table("column", [*_measured(FRAME.values()), ("JOINT_x, JOINT_y, JOINT_z", "m", _joints())]),
         "## Columns of a sweep's CSV",
-        "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as a "
-        "table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
+        "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
+        "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
         "`baselines_degrees.mean_pose`.",
         "What the cell is:",
         _table("column", [*_told({name: ROW[name] for name in ("key", "version", "status", "reason")}), *_told(CELL)]),
         "What it measured:",
-        _table("column", [*_measured(_of_rows()), *_told({name: ROW[name] for name in ("evaluations_used", "seconds", "warnings")})]),
-        _table("column", [("joint_errors_mm.JOINT", "mm", "mean distance of one joint from the true one, both roots at one point")]),
+        _table(
+            "column",
+            [*_measured(_of_rows()), *_told({name: ROW[name] for name in ("evaluations_used", "seconds", "warnings")})],
+        ),
+        _table(
+            "column",
+            [("joint_errors_mm.JOINT", "mm", "mean distance of one joint from the true one, both roots at one point")],
+        ),
         "In this file `evaluations` is the budget of a frame, and `evaluations_used` what all frames took.",
     ]
     return "\n\n".join(parts) + "\n"

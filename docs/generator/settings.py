@@ -1,10 +1,15 @@
 """The page of the settings: every optimiser, prior and tracker that posefit brings, read from the code."""
 
 import inspect
+from collections.abc import Callable
+from typing import Any
 
 from generator.prose import Entry, settings_in, without_settings
 from posefit.entries import PROJECT
+from posefit.fitting.tracker import Prediction
 from posefit.registry import KINDS, Offer, registry
+from posefit.settings import settings_of
+from posefit.sweep.cell import setting_text
 
 
 def page() -> str:
@@ -14,30 +19,27 @@ def page() -> str:
     for kind in KINDS:
         mine = [offer for offer in offers[kind].values() if offer.distribution == PROJECT]
         parts += [f"## {kind.capitalize()}s", *map(_method, mine)]
+    parts += ["## What drives an optimiser and a prior", _described("tracker", Prediction)]
     return "\n\n".join(parts) + "\n"
 
 
 def _method(offer: Offer) -> str:
-    text = inspect.getdoc(offer.factory) or ""
     needs = "" if offer.needs is None else f"\n\nIt needs a library: `python -m pip install '{offer.needs[1]}'`."
-    said = settings_in(text)
-    return f"### `{offer.name}`\n\n{without_settings(text)}{needs}\n\n{_table(offer, said)}"
+    return f"### `{offer.name}`\n\n{_described(offer.name, offer.factory, needs)}"
 
 
-def _table(offer: Offer, said: dict[str, Entry]) -> str:
-    if not offer.settings:
-        return "It has no settings."
+def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
+    """Return what a docstring says of a method, and the table of its settings."""
+    text = inspect.getdoc(factory) or ""
+    said, settings = settings_in(text), settings_of(factory)
+    if not settings:
+        return f"{text}{more}\n\nIt has no settings."
     lines = ["| `--set` | symbol | type | default | meaning and source |", "|---|---|---|---|---|"]
-    for setting in offer.settings:
-        symbol, meaning = said.get(setting.name, Entry("", ""))
-        default = "" if setting.default is inspect.Parameter.empty else f"`{_shown(setting.default)}`"
-        cells = [f"`{offer.name}.{setting.name}`", symbol, setting.type, default, meaning or "see the text above"]
+    for setting in settings:
+        symbol, meaning = said.get(setting.name, Entry("", "see the text above"))
+        default = (
+            "" if setting.default is inspect.Parameter.empty else f"`{setting_text(setting.default) or chr(39) * 2}`"
+        )
+        cells = [f"`{name}.{setting.name}`", symbol, setting.type, default, meaning]
         lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
-    return "\n".join(lines)
-
-
-def _shown(value: object) -> str:
-    """Return a default as `--set` takes it."""
-    if isinstance(value, bool) or value is None:
-        return str(value).lower()
-    return '""' if value == "" else str(value)
+    return f"{without_settings(text)}{more}\n\n" + "\n".join(lines)

@@ -13,10 +13,10 @@ from gymnasium.envs.registration import register
 
 if TYPE_CHECKING:
     from posefit_envs.checker import check_vector_env as check_vector_env
-    from posefit_envs.drive import drive as drive
+    from posefit_envs.driving import drive as drive
     from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
 
-_HOME = {"check_vector_env": "checker", "drive": "drive", "to_sb3_vec_env": "sb3"}
+_HOME = {"check_vector_env": "checker", "drive": "driving", "to_sb3_vec_env": "sb3"}
 __all__ = list(_HOME)
 
 register(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import JOINTS, PARENTS
+from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
 from posefit.report.colours import METHODS
 from posefit.report.columns import COLUMNS, SHOWN
@@ -27,6 +27,7 @@ def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str,
         "instances": _instances(runs),
         "joints": JOINTS,
         "parents": PARENTS,
+        "sides": SIDES,
         "colours": len(METHODS),
         "columns": {name: COLUMNS[name].about() for name in SHOWN},
         "trivial": BASELINES,

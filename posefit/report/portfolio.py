@@ -31,8 +31,10 @@ TABLE = {  # the heads of the leaderboard's columns, and what they hold
 
 
 def write_portfolio(runs: Runs, path: str | Path) -> None:
-    """Write a new folder: convergence, attainment, profile, joints and critical-difference as PNG and PDF, and the
-    leaderboard as leaderboard.tex and .csv. Figures that the runs do not allow are left out.
+    """Write a new folder of figures and tables; figures that the runs do not allow are left out.
+
+    They are convergence, attainment, profile, joints and critical-difference as PNG and PDF, and the leaderboard as
+    leaderboard.tex and .csv.
 
     Raises ValueError where no run has an error, or where the folder exists or cannot be written.
     """

@@ -57,6 +57,7 @@ class Check:
         return Result(self.name, "passed", detail or "")
 
     def __call__(self) -> None:
+        """Return nothing. Raises BrokenError where the rule is broken; skips the test where it cannot be tried."""
         result = self.run()
         if result.outcome == "skipped":
             import pytest

@@ -1,6 +1,5 @@
 """The vsmm trackers on what goes wrong: nothing to see, pieces, borders, wrong files; and whole, by name."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,6 @@ from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
-from posefit_experiments.vsmm import activities
-from posefit_experiments.vsmm import experiment as patent
 from posefit_vsmm.course import COAST
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.joined.tracker import joined
@@ -259,61 +256,6 @@ def test_it_writes_what_a_track_writes(tmp_path: Path) -> None:
         "squat-a", tracker="vsmm", view_degrees=10.0, translation="aligned", frames=(0, 12), out=tmp_path / "new"
     )
     assert (tmp_path / "new" / "track.amc").stat().st_size > 0  # only free axes turn
-
-
-# ------------------------------------------------------------------------------------------------ the experiment
-
-
-@pytest.fixture(scope="module")
-def experiment() -> patent.Run:
-    return patent.run(patent.METHODS["vsmm"], activities.sequence(0), 0)
-
-
-def test_the_experiment_is_about_as_good_as_the_patents(experiment: patent.Run) -> None:
-    figures = experiment.figures
-    assert figures["dominant_fraction"] >= 0.8
-    assert figures["switch_delay_frames"] <= 15
-    assert figures["elbow_cm"] <= 5.2
-    assert figures["hand_cm"] <= 5.2
-
-
-def test_no_motion_of_the_experiment_was_learned_from() -> None:
-    from posefit_vsmm.fit.motion import TEACHINGS
-
-    tested = {one.motion for one in activities.ACTIVITIES}
-    stored = json.loads((Path(library.__file__).parent / "library.json").read_text(encoding="utf-8"))["motions"]
-    sources = {stored[name]["source"] for name in tested}
-    parts = {(clip.path.split("/")[1], clip.start) for teaching in TEACHINGS.values() for clip in teaching.fitted}
-    assert not sources & {name for name, _ in parts}
-    assert not tested & set(activities.TRAINING)
-    assert not tested & {name for teaching in TEACHINGS.values() for name in teaching.drawn}
-
-
-def test_the_figures_are_drawn(tmp_path: Path, experiment: patent.Run) -> None:
-    pytest.importorskip("matplotlib")
-    from posefit_experiments.vsmm import figures as patent_figures
-
-    names = patent_figures.draw(experiment, tmp_path)
-    assert names == ["figure-9-joints.png", "figure-10-probabilities.png", "figure-11-errors.png"]
-    assert all((tmp_path / name).stat().st_size > 10_000 for name in names)
-
-
-def test_reproduce_prints_the_figures_as_json(tmp_path: Path) -> None:
-    result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "1", "--json"])
-    assert result.exit_code == 0
-    figures = json.loads(result.stdout)
-    keys = {
-        "dominant_fraction", "switch_delay_frames", "elbow_cm", "hand_cm", "elbow_3d_cm", "hand_3d_cm", "filter_ms",
-        "detection_ms", "wrong_activations", "wrong_terminations",
-    }  # fmt: skip
-    assert keys <= set(figures)
-    assert keys <= set(figures["imm_all_six"])
-
-
-def test_reproduce_says_what_seeds_must_be() -> None:
-    result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "0"])
-    assert result.exit_code == 2
-    assert result.output.splitlines()[-1] == "posefit: seeds must be at least 1, got 0"
 
 
 @pytest.mark.parametrize("option", [("--optimiser", "cma"), ("--prior", "full"), ("--optimiser", "sapso")])

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
-from posefit_imm import IMM, Belief, Manifold, Measurement, positive, start, update
+from posefit_imm import IMM, Belief, Manifold, Measurement, positive_definite, start, update
 
 STEP, SIGMA = 1.0, 20.0  # seconds between measurements, metres of noise in each
 TRANSITION = np.array([[0.95, 0.05], [0.10, 0.90]])
@@ -211,10 +211,10 @@ def test_quaternions_are_mixed_on_their_manifold() -> None:  # Reading V4
 
 def test_a_covariance_that_is_none_is_repaired_and_counted() -> None:
     broken = np.diag([1.0, -0.5])
-    mended, repaired = positive(broken)
+    mended, repaired = positive_definite(broken)
     assert repaired == 1
     assert np.linalg.eigvalsh(mended).min() > 0.0
-    np.testing.assert_allclose(positive(np.diag([1.0, 2.0]))[0], np.diag([1.0, 2.0]))
+    np.testing.assert_allclose(positive_definite(np.diag([1.0, 2.0]))[0], np.diag([1.0, 2.0]))
     imm = IMM(MODELS, TRANSITION)
     belief = start(np.zeros(4), np.diag([1.0, 1.0, -1e-3, 1.0]), 2)
     after = imm.cycle(belief, measuring(np.zeros(2)))

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from posefit.sweep.cell import TIMES
+from posefit.sweep.cell import TIMES, run_cell
 from posefit.sweep.drive import Tally, drive_cells
 from posefit.sweep.driver import ATTEMPTS, Driver
 from posefit.sweep.engines.engine import Engine, EngineError
@@ -80,8 +80,8 @@ def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(t
         }
     )
     runs: list[tuple[str, Any, Engine]] = [
-        ("pebble", plan.cells, Processes(2)),
-        ("again", plan.cells[::-1], Processes(1)),
+        ("pebble", plan.cells, Processes(2, Limits(), run_cell)),
+        ("again", plan.cells[::-1], Processes(1, Limits(), run_cell)),
         ("dask", plan.cells[::-1], Cluster(workers=2)),
     ]
     found = []
@@ -139,7 +139,7 @@ def test_cells_of_a_second_take_at_most_5_percent_longer_and_two_workers_halve_t
 
 def test_a_number_of_workers_below_one_is_a_mistake() -> None:
     with pytest.raises(ValueError, match="workers must be at least 1, got 0"):
-        Processes(0)
+        Processes(0, Limits(), run_cell)
 
 
 def test_a_limit_of_nothing_is_a_mistake() -> None:

@@ -1,9 +1,5 @@
 // Bodies on a canvas: joints in metres from the scene's origin, seen by a camera of the scene or by one that turns.
 const BONES = D.parents.map((parent, joint) => [parent, joint]).slice(1);
-const SIDE = (joint) =>
-  ["lowerback", "lowerneck", "root"].includes(D.joints[joint])
-    ? "middle"
-    : { l: "left", r: "right" }[D.joints[joint][0]] || "middle";
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const limbs = () => ({ left: ink("--left"), right: ink("--right"), middle: ink("--ink") });
 
@@ -51,7 +47,7 @@ const seen = (camera, points) =>
 function sticks(pen, pixels, colours, width) {
   for (const [parent, joint] of BONES) {
     if (pixels[parent][2] <= 0.05 || pixels[joint][2] <= 0.05) continue;
-    pen.strokeStyle = typeof colours === "string" ? colours : colours[SIDE(joint)];
+    pen.strokeStyle = typeof colours === "string" ? colours : colours[D.sides[joint]];
     pen.lineWidth = width;
     pen.beginPath();
     pen.moveTo(pixels[parent][0], pixels[parent][1]);
@@ -174,7 +170,7 @@ function still(scene) {
         y1: a[1],
         x2: b[0],
         y2: b[1],
-        style: `stroke: ${tints[SIDE(joint)]}`,
+        style: `stroke: ${tints[D.sides[joint]]}`,
         "stroke-width": 2.5,
         "stroke-linecap": "round",
       }),

@@ -1,0 +1,47 @@
+"""The blocks of code in README and the handbook."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+RUN = ("python", "sh", "toml")  # languages whose blocks are tested
+SHOWN = ("text",)  # output, layouts of files, and what is no code
+_BLOCK = re.compile(r"^(?P<fence>`{3,})(?P<language>[^\n]*)\n(?P<text>.*?)^(?P=fence)[ ]*$", re.MULTILINE | re.DOTALL)
+_MARK = re.compile(r"<!-- (?P<mark>not run|not a plan): (?P<reason>(?:(?!-->).)*) -->\n\Z", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block, and why it is not run, where a comment right before it says so."""
+
+    page: str
+    line: int
+    language: str
+    text: str = field(repr=False)
+    mark: str = ""  # "not run", or "not a plan" of TOML that is something else
+    reason: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+def pages() -> list[Path]:
+    """Return README and every page of the handbook that somebody wrote."""
+    written = [path for path in DOCS.rglob("*.md") if not {"_build", "generated"} & set(path.parts)]
+    return [ROOT / "README.md", *sorted(written)]
+
+
+def blocks(page: Path) -> Iterator[Block]:
+    """Yield the blocks of a page, in order; not those that are instructions to the builder."""
+    text = page.read_text("utf-8")
+    for found in _BLOCK.finditer(text):
+        language = found["language"].strip()
+        if language.startswith("{"):
+            continue
+        before = text[: found.start()]
+        marked = _MARK.search(before)
+        why = ("", "") if marked is None else (marked["mark"], marked["reason"])
+        yield Block(str(page.relative_to(ROOT)), before.count("\n") + 1, language, found["text"], *why)

@@ -1,0 +1,64 @@
+"""Commands of a page that cannot be run: do they and their options exist?"""
+
+import importlib.util
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator
+
+import click
+
+from posefit.cli import main
+from tests.docs.pages import ROOT
+
+TOOLS = ("bash", "cd", "lint-imports", "mypy", "ruff", "sphinx-build")
+
+
+def commands(text: str) -> Iterator[list[str]]:
+    """Yield the words of every command of a block."""
+    words: list[str] = []
+    for line in text.replace("\\\n", " ").splitlines():
+        lexer = shlex.shlex(line, posix=True, punctuation_chars="&|;")
+        lexer.whitespace_split = True
+        for word in [*lexer, ";"]:
+            if set(word) <= set("&|;"):
+                if words:
+                    yield words
+                words = []
+            else:
+                words.append(word)
+
+
+def check(words: list[str]) -> None:
+    """Raise AssertionError or click.UsageError where a command is not one."""
+    name, *rest = words
+    if name == "posefit":
+        _check_posefit(main, rest)
+    elif words[:4] == ["python", "-m", "pip", "install"]:
+        _check_extras(rest)
+    elif words[:2] == ["python", "-m"]:
+        assert importlib.util.find_spec(words[2]) is not None, f"no module {words[2]}"
+    elif name == "python":
+        assert (ROOT / words[1]).is_file(), f"no file {words[1]}"
+    elif name == "sbatch":
+        for inner in commands(rest[rest.index("--wrap") + 1]):
+            check(inner)
+    else:
+        assert name in TOOLS, f"a command must be known to the tests, got {name}"
+
+
+def _check_posefit(command: click.Command, words: list[str]) -> None:
+    context = click.Context(command, info_name=command.name)
+    while isinstance(command, click.Group) and words and not words[0].startswith("-"):
+        inner = command.get_command(context, words[0])
+        assert inner is not None, f"posefit has no command {words[0]}"
+        command, words = inner, words[1:]
+    command.make_context(command.name, list(words))
+
+
+def _check_extras(words: list[str]) -> None:
+    known = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    for word in words:
+        found = re.fullmatch(r"(\.|posefit)\[(.*)\]", word)
+        for extra in found[2].split(",") if found else ():
+            assert extra in known, f"no extra {extra}"

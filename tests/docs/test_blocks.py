@@ -1,0 +1,83 @@
+"""Every block of code in README and the handbook runs, or says why it does not and is right as far as can be seen."""
+
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import click
+import pytest
+
+from posefit.sweep.plan import Plan
+from tests.docs import shell
+from tests.docs.pages import RUN, SHOWN, Block, blocks, pages
+
+BLOCKS = [block for page in pages() for block in blocks(page)]
+KEPT = [block for block in BLOCKS if block.mark]
+SLOW = ("docs/ways/sweep.md",)  # pages that take longer than a minute on a busy machine
+
+
+def _run() -> list[object]:
+    names = dict.fromkeys(block.page for block in BLOCKS if block.language in RUN and block.mark != "not run")
+    return [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else [], id=name) for name in names]
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=str)
+def test_a_block_says_what_language_it_is(block: Block) -> None:
+    assert block.language in (*RUN, *SHOWN)
+
+
+@pytest.mark.parametrize("page", _run())
+def test_the_blocks_of_a_page_run_in_order(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "page"}
+    for block in BLOCKS:
+        if block.page != page or block.mark == "not run":
+            continue
+        if block.language == "python":
+            exec(compile("\n" * block.line + block.text, page, "exec"), names)
+        elif block.language == "sh":
+            _shell(block, tmp_path)
+        elif block.language == "toml":
+            (tmp_path / "plan.toml").write_text(block.text, "utf-8")
+            assert block.mark == "not a plan" or len(Plan.of(tomllib.loads(block.text)))
+
+
+def _shell(block: Block, folder: Path) -> None:
+    tools = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    result = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", block.text],
+        cwd=folder,
+        env={**os.environ, "PATH": tools},
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert result.returncode == 0, f"{block}: {result.stderr[-2000:]}"
+
+
+@pytest.mark.parametrize("block", KEPT, ids=lambda block: f"{block}, {block.reason}")
+def test_a_block_that_does_not_run_says_why_and_is_right(block: Block) -> None:
+    assert len(block.reason) > 10
+    if block.language == "python":
+        compile(block.text, str(block), "exec")
+    elif block.language == "toml":
+        tomllib.loads(block.text)
+    else:
+        assert block.language == "sh"
+        found = list(shell.commands(block.text))
+        assert found
+        for words in found:
+            shell.check(words)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["posefit trakc walk", "posefit track --no-such-option 1", "posefit extract video.mp4", "rm -r results",
+     "python -m posefit_experiments.nothing", "python -m pip install -e '.[nothing]'"],
+)  # fmt: skip
+def test_a_command_that_is_none_is_seen(line: str) -> None:
+    (words,) = shell.commands(line)
+    with pytest.raises((AssertionError, click.UsageError)):
+        shell.check(words)

@@ -1,0 +1,152 @@
+"""The pages that are made from the code say what the code does."""
+
+import os
+import re
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+from generator import commands, environments, equations, figures, joints, python, settings
+from generator.prose import restructured, settings_in, without_settings
+
+from posefit import track
+from posefit.geometry.skeleton import JOINTS
+from posefit.registry import KINDS, registry
+from posefit.silhouette.corruption import CORRUPTIONS
+from posefit.sweep.cell import DROPPED, Cell, run_cell
+from posefit.sweep.check import FIELDS, cell_of
+from posefit.sweep.plan import LISTS
+from posefit.sweep.table import flat
+from tests.docs.pages import DOCS
+from tests.sources import test_sapso, test_tags
+
+HELPS = dict(commands.helps())
+
+
+def rows(page: str) -> set[str]:
+    """Return what the rows of a page's tables begin with."""
+    return set(re.findall(r"^\| `([^`]+)` \|", page, re.MULTILINE))
+
+
+@pytest.mark.parametrize("command", HELPS)
+def test_the_page_of_a_command_is_its_help(command: str) -> None:
+    program, *words = command.split()
+    run = [str(Path(sys.executable).with_name(program)), *words, "--help"]
+    shown = subprocess.run(run, env={**os.environ, "COLUMNS": "120"}, capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == HELPS[command]
+
+
+def test_every_command_has_its_place() -> None:
+    assert {"posefit", "posefit track", "posefit plugins new", "posefit reproduce sapso"} <= set(HELPS)
+    assert all(f"## `{command}`" in commands.page() for command in HELPS)
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("docs") / "walk"
+    track("walk", frames=(0, 2), evaluations=80, out=out)
+    return out
+
+
+def test_every_key_of_summary_json_is_told(followed: Path) -> None:
+    import json
+
+    found = json.loads((followed / "summary.json").read_text("utf-8"))
+    told = {*figures.ASKED, *figures.MEASURES}
+    assert set(found) <= told
+    assert told - set(found) <= {"history"}  # of a single frame
+
+
+def test_every_column_of_frames_csv_is_told(followed: Path) -> None:
+    head = (followed / "frames.csv").read_text("utf-8").splitlines()[0].split(",")
+    assert [name for name in head if name not in {f"{j}_{axis}" for j in JOINTS for axis in "xyz"}] == list(
+        figures.FRAME
+    )
+
+
+def test_every_column_of_a_sweeps_csv_is_told() -> None:
+    row = run_cell(cell_of({"method": "sapso@pca", "motion": "walk", "frames": 2, "evaluations": 80})).row
+    told = rows(figures.page().partition("## Columns of a sweep")[2])
+    for column in flat(row):
+        assert column in told or column.partition(".")[0] in told or column.startswith("joint_errors_mm."), column
+
+
+def test_every_setting_of_every_method_is_told() -> None:
+    told = rows(settings.page())
+    for kind in KINDS:
+        for offer in registry().offers[kind].values():
+            assert {f"{offer.name}.{one.name}" for one in offer.settings} <= told or offer.distribution != "posefit"
+
+
+def test_a_list_of_settings_is_read_from_a_docstring() -> None:
+    text = (
+        "A swarm.\n\nSettings:\n    cooling (gamma): factor on the temperature\n        after each iteration: 5.2.\n"
+        "    seed: any.\n\nMore."
+    )
+    assert settings_in(text) == {
+        "cooling": ("gamma", "factor on the temperature after each iteration: 5.2."),
+        "seed": ("", "any."),
+    }
+    assert without_settings(text) == "A swarm.\n\nMore."
+    assert settings_in("Settings are told in prose.") == {}
+
+
+def test_every_equation_has_a_line_and_a_test() -> None:
+    found = {f"{tag.source} {tag.step}": tag for tag in equations.tags()}
+    assert set(found) == {*test_tags.TAGS, *(f"SAPSO {step}" for step in test_sapso.TAGS)}
+    assert {tag.source for tag in found.values()} == set(equations.SOURCES)
+    assert [name for name, tag in found.items() if not equations.tests_of(tag)] == []
+
+
+def test_every_joint_is_told() -> None:
+    assert len(re.findall(r"^\| \d+ \| `", joints.page(), re.MULTILINE)) == len(JOINTS)
+    assert "| 2 | `lfemur` | left knee | `lhipjoint` |" in joints.page()
+
+
+def test_every_environment_is_told() -> None:
+    assert re.findall(r"^## `(.*)`$", environments.page(), re.MULTILINE) == [
+        "posefit/Fit-v0",
+        "posefit/Track-v0",
+        "posefit/Configure-v0",
+    ]
+
+
+def test_every_module_with_a_docstring_has_a_page() -> None:
+    pages = python.pages()
+    assert ".. automodule:: posefit.fitting.optimiser\n" in pages["posefit.fitting"]
+    assert ".. automodule:: posefit_pycma\n" in pages["posefit_pycma"]
+    assert ".. automodule:: posefit.hooks\n" in pages["posefit"]
+
+
+def test_a_plan_is_told_with_every_field_list_and_corruption() -> None:
+    page = (DOCS / "howto" / "plan.md").read_text("utf-8")
+    assert set(FIELDS) | set(LISTS) | set(CORRUPTIONS) | {DROPPED} == rows(page)
+    defaults: dict[str, Any] = {one.name: one.default for one in fields(Cell)}
+    for name in ("instance", "frames", "fps", "evaluations", "seed"):
+        assert f"| `{name}` | {defaults[name]:g} |" in page
+    assert f"| `size` | {list(defaults['size'])} |" in page
+    assert f"| `view_degrees` | {defaults['view_degrees'][0]:g} |" in page
+    for name in ("translation", "first_pose"):
+        assert f'| `{name}` | "{defaults[name]}" |' in page
+
+
+def test_the_changelog_names_modules_that_are_there() -> None:
+    import importlib.util
+
+    page = (DOCS / "changelog.md").read_text("utf-8")
+    moved = re.findall(
+        r"^\| `(?:python -m )?(posefit[\w.]+)` \| `(?:python -m )?(posefit[\w.]+)` \|$", page, re.MULTILINE
+    )
+    assert len(moved) > 50
+    assert [new for _, new in moved if importlib.util.find_spec(new) is None] == []
+
+
+def test_a_docstring_is_read_as_plain_text() -> None:
+    assert restructured(["`a`s and b* and c_ of |d|"])[0] == "``a``\\ s and b\\* and c\\_ of \\|d\\|"
+    assert restructured(["So:", "", "    x = 1"])[:5] == ["So:", "", "::", "", "    x = 1"]
+    assert restructured(["one   first", "two   second"])[0] == "::"
+    assert restructured(["| a | b |", "|---|---|", "| 1 | 2 |"])[0] == ".. list-table::"
+    assert restructured(["Settings:", "    a (b): c"])[:3] == ["Settings:", "", "* **a (b)**: c"]
