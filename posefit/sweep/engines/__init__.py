@@ -1,7 +1,6 @@
 """What runs the cells of a sweep, or other jobs, somewhere else.
 
-    engine.py     what an engine is, and what became of a job
-    processes.py  processes of this machine
-    cluster.py    a Dask cluster
-    limits.py     how long a job may take, how much memory it may have, and one thread of everything
+`engine` says what an engine is and what becomes of a job; `processes` runs jobs in processes of this machine, `cluster`
+cells on a Dask cluster; `limits` says how long a job may take and how much memory it may have, and gives it one thread
+of everything.
 """
