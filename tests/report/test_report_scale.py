@@ -46,6 +46,7 @@ def rows(instances: int, seeds: int) -> Iterator[Measurement]:
 
 
 @counted
+@pytest.mark.slow
 def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_some_times(tmp_path: Path) -> None:
     found = []
     for instances, seeds in ((3, 5), (5, 5), (10, 5), (20, 5)):  # the first imports what the others need
