@@ -13,7 +13,7 @@ import pytest
 
 from posefit.report.gallery import LARGEST
 from posefit.report.write import report
-from posefit.sweep.cell import Measurement
+from posefit.sweep.cell import CellResult
 from tests.effort import effort
 from tests.report.browser import ledger, result, row_of
 from tests.sweep.fake import cells
@@ -32,7 +32,7 @@ print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))
 """
 
 
-def rows(instances: int, seeds: int) -> Iterator[Measurement]:
+def rows(instances: int, seeds: int) -> Iterator[CellResult]:
     """Yield results as large as those of real cells; of one picture, whatever the row."""
     first, rng = replace(cells(1)[0], frames=60), np.random.default_rng(0)
     picture = result(first, 1.0).joints
@@ -42,7 +42,7 @@ def rows(instances: int, seeds: int) -> Iterator[Measurement]:
                 cost = [float(f"{20.0 / k + error:.6g}") for k in range(1, 62)]
                 trace: dict[str, Any] = {"evaluations": list(range(40, 2480, 40)), "cost": cost}
                 cell = replace(first, method=f"m{m}@pca", instance=i, seed=s)
-                yield Measurement(row_of(cell, error, trace=trace), picture)
+                yield CellResult(row_of(cell, error, trace=trace), picture)
 
 
 @counted

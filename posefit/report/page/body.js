@@ -1,7 +1,7 @@
 // Bodies on a canvas: joints in metres from the scene's origin, seen by a camera of the scene or by one that turns.
 const BONES = D.parents.map((parent, joint) => [parent, joint]).slice(1);
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const limbs = () => ({ left: ink("--c1"), right: ink("--c0"), middle: ink("--ink") });
+const limbs = () => ({ left: ink("--left"), right: ink("--right"), middle: ink("--ink") });
 
 // Joints of all frames of a picture: a function of the frame that gives 27 points.
 function decoded(text) {
@@ -161,7 +161,7 @@ function still(scene) {
     4 + (y - top) * scale,
   ];
   const svg = draw("svg", { width: size, height: size, "aria-hidden": "true" });
-  const tints = { left: "var(--c1)", right: "var(--c0)", middle: "var(--ink)" };
+  const tints = { left: "var(--left)", right: "var(--right)", middle: "var(--ink)" };
   for (const [parent, joint] of BONES) {
     const [a, b] = [at(flat[parent]), at(flat[joint])].map((one) => one.map((value) => value.toFixed(1)));
     svg.append(
