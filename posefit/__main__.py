@@ -1,3 +1,1 @@
-from posefit.cli import main
-
-main()
+"""`python -m posefit` is `posefit`."""

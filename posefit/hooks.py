@@ -20,19 +20,22 @@ class RegisterOptimiser(Protocol):
 
     def __call__(
         self, name: str, factory: OptimiserFactory, *, next_frame: NextFrame = "start", needs: Needs | None = None
-    ) -> None: ...
+    ) -> None:
+        """Take an optimiser's factory."""
 
 
 class RegisterPrior(Protocol):
     """Offers a prior under a name, and says what it needs."""
 
-    def __call__(self, name: str, factory: PriorFactory, *, needs: Needs | None = None) -> None: ...
+    def __call__(self, name: str, factory: PriorFactory, *, needs: Needs | None = None) -> None:
+        """Take a prior's factory."""
 
 
 class RegisterTracker(Protocol):
     """Offers a tracker under a name, and says what it needs."""
 
-    def __call__(self, name: str, factory: TrackerFactory, *, needs: Needs | None = None) -> None: ...
+    def __call__(self, name: str, factory: TrackerFactory, *, needs: Needs | None = None) -> None:
+        """Take a tracker's factory."""
 
 
 @hookspec

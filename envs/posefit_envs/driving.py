@@ -6,7 +6,8 @@ import numpy as np
 from gymnasium import error
 from gymnasium.vector import VectorEnv
 
-from posefit import Minimum, Optimiser
+from posefit import Minimum, Optimiser, minimise
+from posefit.fitting.optimiser import BudgetError
 from posefit.registry import registry
 from posefit.settings import check, planned
 
@@ -32,18 +33,10 @@ def drive(
     options = {} if instance is None else {"options": {"instance": instance}}
     env.reset(seed=seed, **options)
     searching = _built(env, optimiser, seed, evaluations, settings) if isinstance(optimiser, str) else optimiser
-    best, lowest, used, history, spent = None, np.inf, 0, [], []
-    while len(proposals := searching.ask()) and used + len(proposals) <= evaluations:
-        costs = _costs(env, proposals.astype(dtype))
-        used += len(proposals)
-        if best is None or costs.min() < lowest:
-            best, lowest = proposals[costs.argmin()].copy(), float(costs.min())
-        history.append(lowest)
-        spent.append(used)
-        searching.tell(proposals, costs)
-    if best is None:
-        raise error.Error(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
-    return Minimum(best, lowest, used, np.array(history), np.array(spent))
+    try:
+        return minimise(lambda proposals: _costs(env, proposals.astype(dtype)), searching, evaluations)
+    except BudgetError as mistake:
+        raise error.Error(str(mistake)) from None
 
 
 def _built(

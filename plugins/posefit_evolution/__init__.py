@@ -1,4 +1,13 @@
-"""Evolution strategies for posefit: `cma`, on the library cmaes."""
+"""Evolution strategies for posefit: `cma`, on the library cmaes.
+
+`cma.CMAES` is covariance matrix adaptation after Hansen's tutorial (2016), with the restarts of Auger and Hansen
+(2005), in a box whose constraints it keeps. `pycma`, an adapter, has the other implementation.
+
+>>> import posefit
+>>> track = posefit.track("walk", optimiser="cma", frames=(0, 3))
+>>> track.summary["iou"] > 0.5
+True
+"""
 
 from posefit import hookimpl
 from posefit.hooks import RegisterOptimiser
@@ -6,6 +15,7 @@ from posefit.hooks import RegisterOptimiser
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `cma`."""
     from posefit_evolution.cma import CMAES
 
     register("cma", CMAES)

@@ -27,9 +27,14 @@ def _library(*arguments: Any, **settings: Any) -> Any:
 class CMAES:
     """Covariance matrix adaptation. It starts around the prediction with its spread, or anywhere with `spread`.
 
-    `population` of 0 is the tutorial's 4 + 3 ln d. When the search stagnates it restarts from a fresh draw with a
-    population `growth` times as large; 1 keeps its size. A proposal that breaks a constraint is moved towards the mean
-    until it keeps it, and the strategy learns from where it was moved to.
+    The library learns the covariance from evolution paths and its step size by cumulation (CSA). When the
+    search stagnates it restarts from a fresh draw with a larger population (IPOP). A proposal that breaks a constraint
+    is moved towards the mean until it keeps it, and the strategy learns from where it was moved to.
+
+    Settings:
+        population (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen 2016.
+        spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
+        growth: a restart's population is so many times as large, 1 or more. Auger and Hansen 2005.
     """
 
     def __init__(

@@ -1,66 +1,87 @@
-"""The accuracy table, over five seeds: `python -m posefit_experiments.accuracy CMU_DIR [OPTIMISER]`."""
+"""The accuracy table: one optimiser with `pca` on two walks of CMU from three sides; `posefit reproduce accuracy`."""
 
-import sys
+from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from posefit.tracking.front import track
+from posefit.sweep.plan import Plan
+from posefit.tracking.measures import BASELINES
+from posefit_experiments.clips import clip_path
+from posefit_experiments.columns import headed, number
+from posefit_experiments.grid import Say, check_seeds, rows
 
-SEEDS = range(5)
+SEEDS = 5
 VIEWS = (0.0, 45.0, 90.0)
-FRAMES = (0, 60)  # at 30 fps
-CASES = (("16/16_17", ("16/16_15",)), ("16/16_15", ("02/02_01", "05/05_01")))
-HEADER = (
-    "| trained on | test | view | error median | error max | mean pose | first pose held | best training pose "
-    "| prior's floor | MPJPE mm | PA-MPJPE mm | IoU | swapped % | lost % |"
-)
+FRAMES = 60  # at 30 fps
+WALKS = (("16/16_17", ("16/16_15",)), ("16/16_15", ("02/02_01", "05/05_01")))  # the clip, and what it is trained on
+MIDDLE = ("prior_floor_degrees", "mpjpe_mm", "pa_mpjpe_mm", "iou")  # medians over seeds
+MEAN = ("swap_rate", "lost_rate")
 
 
-def row(summaries: list[dict[str, Any]], test: str, train: tuple[str, ...], view: float) -> str:
-    """Return a table row: medians over seeds, but the largest mean error, and mean rates."""
+def accuracy(
+    clips: str | None, optimiser: str, seeds: int, workers: int | None, ledger: str | None, say: Say
+) -> dict[str, Any]:
+    """Return what the optimiser reaches on each walk from each side: medians over seeds, but the largest mean error.
+
+    Swapped and lost frames are mean shares. Raises ValueError where `clips` is no folder of CMU clips.
+    """
+    check_seeds(seeds)
+    places = [(test, train, view) for (test, train), view in product(WALKS, VIEWS)]
+    cells = [
+        {
+            "method": f"{optimiser}@pca",
+            "motion": str(clip_path(clips, test)),
+            "train": [str(clip_path(clips, name)) for name in train],
+            "view_degrees": view,
+            "frames": FRAMES,
+            "seed": seed,
+        }
+        for test, train, view in places
+        for seed in range(seeds)
+    ]
+    found = rows(Plan.of({"cells": cells}), workers, ledger, say)
+    table = [
+        {
+            "train": [Path(name).name for name in train],
+            "test": Path(test).name,
+            "view_degrees": view,
+            **_figures(found[k * seeds : (k + 1) * seeds]),
+        }
+        for k, (test, train, view) in enumerate(places)
+    ]
+    return {"optimiser": optimiser, "seeds": seeds, "frames": FRAMES, "rows": table}
+
+
+def _figures(seen: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the figures of a table's row, from the rows of all seeds."""
 
     def middle(key: str) -> float:
-        return float(np.median([summary[key] for summary in summaries]))
+        return float(np.median([row[key] for row in seen]))
 
-    errors = [summary["error_degrees"]["mean"] for summary in summaries]
-    baselines = summaries[0]["baselines_degrees"]
-    figures = [
-        f"{np.median(errors):.2f}",
-        f"{max(errors):.2f}",
-        *(f"{baselines[name]:.2f}" for name in ("mean_pose", "persistence", "nearest")),
-        f"{middle('prior_floor_degrees'):.2f}",
-        f"{middle('mpjpe_mm'):.0f}",
-        f"{middle('pa_mpjpe_mm'):.0f}",
-        f"{middle('iou'):.3f}",
-        *(f"{100 * np.mean([summary[key] for summary in summaries]):.0f}" for key in ("swap_rate", "lost_rate")),
-    ]
-    names = " + ".join(Path(name).name for name in train)
-    return f"| {names} | {Path(test).name} | {view:.0f} | " + " | ".join(figures) + " |"
+    errors = [row["error_degrees"]["mean"] for row in seen]
+    return {
+        "error_degrees": float(np.median(errors)),
+        "worst_degrees": max(errors),
+        "baselines_degrees": seen[0]["baselines_degrees"],
+        **{key: middle(key) for key in MIDDLE},
+        **{key: float(np.mean([row[key] for row in seen])) for key in MEAN},
+    }
 
 
-def main(root: Path, optimiser: str = "sapso") -> None:
-    """Print the table."""
-    print(HEADER)
-    print("|---|---|" + "---:|" * (HEADER.count("|") - 3))
-    for test, train in CASES:
-        for view in VIEWS:
-            summaries = [
-                track(
-                    root / f"{test}.amc",
-                    train=[root / f"{name}.amc" for name in train],
-                    optimiser=optimiser,
-                    view_degrees=view,
-                    frames=FRAMES,
-                    seed=seed,
-                ).summary
-                for seed in SEEDS
-            ]
-            print(row(summaries, test, train, view), flush=True)
-
-
-if __name__ == "__main__":
-    if len(sys.argv) not in (2, 3):
-        sys.exit("usage: python -m posefit_experiments.accuracy CMU_DIR [OPTIMISER]")
-    main(Path(sys.argv[1]), *sys.argv[2:])
+def accuracy_lines(told: dict[str, Any]) -> Iterator[str]:
+    """Yield the table as it is printed."""
+    errors = [headed("error_degrees", which) for which in ("median", "max")]
+    heads = [*errors, *BASELINES.values(), *(headed(name) for name in (*MIDDLE, *MEAN))]
+    yield f"| trained on | test | view | {' | '.join(heads)} |"
+    yield "|---|---|" + "---:|" * (1 + len(heads))
+    for row in told["rows"]:
+        figures = [
+            number("error_degrees", row["error_degrees"]),
+            number("error_degrees", row["worst_degrees"]),
+            *(number("baselines_degrees", row["baselines_degrees"][name]) for name in BASELINES),
+            *(number(name, row[name]) for name in (*MIDDLE, *MEAN)),
+        ]
+        yield f"| {' + '.join(row['train'])} | {row['test']} | {row['view_degrees']:.0f} | {' | '.join(figures)} |"

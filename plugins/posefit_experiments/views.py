@@ -1,44 +1,70 @@
-"""One camera, two or four, at the same budget of evaluations: `python -m posefit_experiments.views`.
+"""One camera, two or four, at the same budget of evaluations: `posefit reproduce views`.
 
-The first pose is searched several times, as it is for footage.
+The first pose is searched several times, as it is for footage: that is no part of a cell, so the runs are jobs.
 """
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import product
+from typing import Any
 
 import numpy as np
 
-from posefit.fitting.tracker import Frame, Task
-from posefit.footage.scene import Scene
+from posefit.tracking.measures import BASELINES
 from posefit.tracking.method import Choice, prepare
 from posefit.tracking.opening import RESTARTS, begun, following
-from posefit.tracking.synthetic import followed, mean_error, measured, scene_of, task_of
+from posefit_experiments.columns import labelled, number
+from posefit_experiments.grid import Progress, check_seeds, each
+from posefit_experiments.known import follow_known, known_errors, known_scene, known_task, mean_pose_degrees
 
-VIEWS = ([90.0], [0.0, 90.0], [0.0, 45.0, 90.0, 135.0])
+VIEWS = ((90.0,), (0.0, 90.0), (0.0, 45.0, 90.0, 135.0))
 MOTIONS = ("walk", "walk-a", "run-a")
-SEEDS = range(5)
+SEEDS = 5
+CHOICE = Choice()
 
 
-def compare() -> None:
-    """Print a row for every motion and number of cameras; translations are found from the silhouettes."""
-    choice = Choice()
-    for motion in MOTIONS:
-        for views in VIEWS:
-            scene = scene_of(motion, views)
-            task = task_of(scene, choice, scene.body, translation="aligned")
-            found = [measured(scene, _track(task, choice, scene, seed)) for seed in SEEDS]
-            error, mpjpe, lost, swapped = (
-                np.array([one[key] for one in found]) for key in ("error_degrees", "mpjpe_mm", "lost", "swapped")
-            )
-            print(
-                f"{motion:8} {len(views)} views  error {np.median(error):5.2f} ({error.min():.2f} to "
-                f"{error.max():.2f}) degrees, MPJPE {np.median(mpjpe):4.0f} mm, lost {100 * lost.mean():3.0f} %, "
-                f"swapped {100 * swapped.mean():3.0f} %; mean pose {mean_error(scene, task):.2f} degrees",
-                flush=True,
-            )
+def views(seeds: int, workers: int | None, progress: Progress | None = None) -> dict[str, Any]:
+    """Return what is reached for every motion and number of cameras; translations are found from the silhouettes."""
+    check_seeds(seeds)
+    places = list(product(MOTIONS, VIEWS))
+    jobs = {(*place, seed): partial(_errors, *place, seed) for place in places for seed in range(seeds)}
+    found = each(jobs, workers, progress)
+    return {"seeds": seeds, "rows": [_row(*place, [found[*place, k] for k in range(seeds)]) for place in places]}
 
 
-def _track(task: Task, choice: Choice, scene: Scene, seed: int) -> list[Frame]:
-    begin = begun(task, scene.observations, following(prepare(choice, task)), RESTARTS, seed)
-    return followed(begin, choice, scene.observations, seed)
+def _errors(motion: str, views_degrees: Sequence[float], seed: int) -> dict[str, float]:
+    scene = known_scene(motion, views_degrees)
+    task = known_task(scene, CHOICE, scene.body, "aligned")
+    begin = begun(task, scene.observations, following(prepare(CHOICE, task)), RESTARTS, seed)
+    return known_errors(scene, follow_known(begin, CHOICE, scene.observations, seed))
 
 
-if __name__ == "__main__":
-    compare()
+def _row(motion: str, views_degrees: Sequence[float], found: list[dict[str, float]]) -> dict[str, Any]:
+    scene = known_scene(motion, views_degrees)
+    error, mpjpe, lost, swapped = (
+        np.array([one[key] for one in found]) for key in ("error_degrees", "mpjpe_mm", "lost_rate", "swap_rate")
+    )
+    return {
+        "motion": motion,
+        "views_degrees": list(views_degrees),
+        "error_degrees": float(np.median(error)),
+        "least_degrees": float(error.min()),
+        "worst_degrees": float(error.max()),
+        "mpjpe_mm": float(np.median(mpjpe)),
+        "lost_rate": float(lost.mean()),
+        "swap_rate": float(swapped.mean()),
+        "mean_pose_degrees": mean_pose_degrees(scene, known_task(scene, CHOICE, scene.body)),
+    }
+
+
+def views_lines(told: dict[str, Any]) -> Iterator[str]:
+    """Yield the table as it is printed."""
+    for row in told["rows"]:
+        least, worst = (number("error_degrees", row[name]) for name in ("least_degrees", "worst_degrees"))
+        others = ", ".join(
+            labelled(name, row[name], width) for name, width in (("mpjpe_mm", 4), ("lost_rate", 3), ("swap_rate", 3))
+        )
+        where = f"{row['motion']:8} {len(row['views_degrees'])} views"
+        error = f"{labelled('error_degrees', row['error_degrees'], 5)} ({least} to {worst})"
+        mean = f"{BASELINES['mean_pose']} {number('error_degrees', row['mean_pose_degrees'])} degrees"
+        yield f"{where}  {error}, {others}; {mean}"

@@ -1,4 +1,15 @@
-"""Particle filters for posefit, which carry their particles from frame to frame: `particle` and `annealed`."""
+"""Particle filters for posefit, which carry their particles from frame to frame: `particle` and `annealed`.
+
+- `particle.Particle` is the bootstrap filter of Gordon, Salmond and Smith (1993), the SAPSO paper's opponent.
+- `annealed.Annealed` is the annealed particle filter of Deutscher and Reid (2005).
+
+`kernels` weighs particles and resamples them.
+
+>>> import posefit
+>>> track = posefit.track("walk", optimiser="annealed", frames=(0, 3))
+>>> track.summary["iou"] > 0.5
+True
+"""
 
 from posefit import hookimpl
 from posefit.hooks import RegisterOptimiser
@@ -6,6 +17,7 @@ from posefit.hooks import RegisterOptimiser
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `particle` and `annealed`."""
     from posefit_filters.annealed import Annealed
     from posefit_filters.particle import Particle
 

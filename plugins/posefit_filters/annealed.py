@@ -21,10 +21,17 @@ NOISE = 0.1  # ours: P0, the motion from frame to frame, in half-ranges of the b
 class Annealed:
     """Layers of resampling with an ever sharper likelihood exp(-beta cost), every frame anew.
 
-    In each of `layers`, beta is what lets `survival` of the particles survive; each survivor moves by normal noise
-    whose standard deviations are `diffusion` times those of the weighted particles, so that the search narrows where
-    the particles agree. With `crossover`, survivors first trade a run of neighbouring coordinates in pairs. `noise` is
-    the motion from frame to frame. What a frame commits is its best particle.
+    In each layer, beta is what lets a given share of the particles survive: the effective sample size by their number.
+    Each survivor moves by normal noise in proportion to the spread of the weighted particles, so that the search
+    narrows where they agree. What a frame commits is its best particle.
+
+    Settings:
+        evaluations: of a frame, shared among the layers, 1 or more. Ours: as many as SAPSO's.
+        layers (M): of resampling, 1 or more.
+        survival (alpha): share of the particles that survives a layer, between 0 and 1.
+        diffusion: noise of a layer as a multiple of the particles' own standard deviations, above 0. Ours.
+        noise (P0): standard deviation of the motion from frame to frame, in half-ranges of the box, above 0. Ours.
+        crossover: whether survivors first trade a run of neighbouring coordinates in pairs.
     """
 
     def __init__(

@@ -26,7 +26,10 @@ def weigh(costs, beta):
 
 @jit
 def survival(weights):
-    """Return the share of particles (0 to 1) that survive resampling: D / n, D = 1 / sum of squared weights."""
+    """Return the share of particles (0 to 1) that survive resampling: D / n, D = 1 / sum of squared weights.
+
+    D is the effective sample size (ESS) of Kish, the survival diagnostic of MacCormick.
+    """
     return 1.0 / (weights**2).sum() / weights.size  # DEUTSCHER2005 (survival)
 
 
@@ -58,7 +61,7 @@ def sharpness(costs, wanted):
 def systematic(weights, u):
     """Return which rows (n,) survive: as often as their weight asks, one of the two whole numbers next to n times it.
 
-    `u` in [0, 1) is where the comb of n evenly spaced teeth begins.
+    This is systematic resampling. `u` in [0, 1) is where the comb of n evenly spaced teeth begins.
     """
     rows = np.empty(weights.size, np.int64)
     i, total = 0, weights[0]

@@ -19,8 +19,15 @@ NOISE = 0.15  # standard deviation of the motion from frame to frame, in half-ra
 class Particle:
     """A bootstrap filter: all evaluations of a frame are one population.
 
-    A particle of the last frame survives with likelihood exp(-`sharpness` cost), moves by `drift` times the predicted
-    velocity and normal `noise`, and is weighted by the new silhouette. What a frame commits is its best particle.
+    It is sampling importance resampling (SIR) with the motion as the proposal. A particle of the last frame survives by
+    systematic resampling with weight exp(-`sharpness` cost), moves, and is weighted by the new silhouette. What a frame
+    commits is its best particle.
+
+    Settings:
+        evaluations (N): particles, which are all evaluations of a frame, 1 or more. Ours: as many as SAPSO's.
+        sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
+        noise: standard deviation of the motion from frame to frame, in half-ranges of the box, above 0. Ours.
+        drift: share of the predicted velocity that particles move by before the noise, 0 or more. Ours.
     """
 
     def __init__(

@@ -33,7 +33,7 @@ A thing on a line either stands or moves by 1 a frame. Its place is measured, an
 3.0
 """
 
-from posefit_imm.filter import IMM, Belief, Manifold, Measurement, Model, positive, start, update
+from posefit_imm.filter import IMM, Belief, Manifold, Measurement, Model, positive_definite, start, update
 from posefit_imm.quaternions import PLACED
 
-__all__ = ["IMM", "PLACED", "Belief", "Manifold", "Measurement", "Model", "positive", "start", "update"]
+__all__ = ["IMM", "PLACED", "Belief", "Manifold", "Measurement", "Model", "positive_definite", "start", "update"]

@@ -113,7 +113,7 @@ class IMM:
         for model, state, covariance in zip(self.models, mixed.states, mixed.covariances, strict=True):
             predicted, spread = model.predict(state, covariance)  # VSMM 6.3a
             updated, left, likelihood = update(predicted, spread, measure(predicted), self.manifold)
-            left, repaired = positive(left)
+            left, repaired = positive_definite(left)
             states.append(updated)
             covariances.append(left)
             likelihoods.append(likelihood)
@@ -134,7 +134,9 @@ class IMM:
         for j, total in enumerate(after):
             weights = np.exp(steps[:, j] - total) if np.isfinite(total) else np.eye(len(after))[j]  # VSMM 6.2a
             middle = self.manifold.mean(belief.states, weights)
-            spread, repaired = positive(self.manifold.spread(belief.states, belief.covariances, weights, middle))
+            spread, repaired = positive_definite(
+                self.manifold.spread(belief.states, belief.covariances, weights, middle)
+            )
             states.append(middle)  # VSMM 6.2b
             covariances.append(spread)
             repairs += repaired
@@ -145,7 +147,7 @@ class IMM:
         states, covariances, repairs = [], [], belief.repairs
         for state, covariance in zip(belief.states, belief.covariances, strict=True):
             moved, left, _ = update(state, covariance, measure(state), self.manifold)
-            left, repaired = positive(left)
+            left, repaired = positive_definite(left)
             states.append(moved)
             covariances.append(left)
             repairs += repaired
@@ -174,7 +176,7 @@ def update(state: Array, covariance: Array, seen: Measurement, manifold: Manifol
     return manifold.plus(state, gain @ seen.residual), left, likelihood + seen.log_likelihood
 
 
-def positive(covariance: Array) -> tuple[Array, int]:
+def positive_definite(covariance: Array) -> tuple[Array, int]:
     """Return a covariance, made symmetric and its eigenvalues positive, and whether they had to be: 1 or 0."""
     symmetric = 0.5 * (covariance + covariance.T)
     try:

@@ -1,4 +1,12 @@
-"""Optimisers of Nevergrad for posefit: `nevergrad:NAME`, a name of `nevergrad.optimizers.registry`."""
+"""Optimisers of Nevergrad for posefit: `nevergrad:NAME`, a name of `nevergrad.optimizers.registry`.
+
+J. Rapin, O. Teytaud, Nevergrad, a gradient-free optimization platform, 2018. `pip install posefit[nevergrad]`.
+
+>>> import posefit
+>>> track = posefit.track("walk", optimiser="nevergrad:OnePlusOne", frames=(0, 3))
+>>> track.summary["iou"] > 0.3
+True
+"""
 
 from functools import partial
 
@@ -19,7 +27,13 @@ def nevergrad(
     particles: int = 40,
     evaluations: int = 2440,
 ) -> Bridged:
-    """An optimiser of Nevergrad, asked for so many `particles` at a time, within a budget of `evaluations`."""
+    """An optimiser of Nevergrad, asked for so many `particles` at a time, within a budget of `evaluations`.
+
+    Settings:
+        variant: a name of `nevergrad.optimizers.registry`; `nevergrad:NAME` sets it.
+        particles: proposals asked for at a time, its `num_workers`, 1 or more.
+        evaluations: of a frame, its `budget`, 1 or more; by default that of the search.
+    """
     from nevergrad import optimizers
 
     at_least("particles", particles, 1)
@@ -54,4 +68,5 @@ def _run(
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `nevergrad:NAME`."""
     register("nevergrad", nevergrad, needs=("nevergrad", "posefit[nevergrad]"))

@@ -17,9 +17,12 @@ _SHAPES: dict[str, Shape] = {"low": ("m",), "high": ("m",), "angles": ("m",), "r
 class Full:
     """The joint angles themselves are the latents, those that are free, with a range for each.
 
-    `limits` "asf" are the joint limits that the skeleton's file states, widened where training poses pass them;
-    "training" is the range of the training poses, widened by `margin` times itself to either side. An angle without
-    range stays at its training mean and is no latent.
+    An angle without range stays at its training mean and is no latent. Limits are widened where training poses pass
+    them.
+
+    Settings:
+        limits: "asf", the joint limits that the skeleton's file states, or "training", the range of training poses.
+        margin: share of the training range by which it is widened to either side, 0 or more. Ours.
     """
 
     low: Array  # (m,) radians

@@ -21,7 +21,7 @@ def recover(latents, components, mean, angles):
 
 @jit
 def distance(centres, latent):
-    """Return D: the mean absolute difference of a latent pose (m,) from the nearest centre."""
+    """Return D: the mean absolute difference of a latent pose (m,) from the nearest centre, the L1 distance over m."""
     nearest = np.inf
     for c in range(centres.shape[0]):
         total = 0.0

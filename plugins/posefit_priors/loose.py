@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least, positive
-from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
+from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index, both
 from posefit_priors.arrays import load_arrays
 from posefit_priors.kernels import near_and_bearable, recover_loose
 from posefit_priors.pca import CLUSTERS, PCA, QUANTILE
@@ -25,9 +25,17 @@ _SHAPES = {"loose": ("k",), "angles_low": ("k",), "angles_high": ("k",), "low": 
 class Loose:
     """The space of `pca`, and a latent more for each angle of shoulders, elbows, hips and knees that moves in training.
 
-    Such a latent, in radians, is added to the angle that the components give: up to `arms_degrees` or `legs_degrees` to
-    either side, within the skeleton's joint limits where it states some. A pose may be `slack` times as far from the
-    clusters as in `pca`, whose settings the others are.
+    Such a latent, in radians, is added to the angle that the components give, within the skeleton's joint limits where
+    it states some.
+
+    Settings:
+        components (m): a whole number of them, or a share of the variance below 1 to keep at least. As `pca`.
+        arms_degrees: how far shoulders and elbows may leave the components to either side, 0 or more. Ours.
+        legs_degrees: how far hips and knees may leave them to either side, 0 or more. Ours.
+        slack: a pose may be so many times as far from the clusters as chi, above 0. Ours.
+        clusters (K): centres that K-means finds among the training poses, 1 or more. As `pca`.
+        quantile: chi is this quantile of the training distances, above 0 and at most 1. As `pca`.
+        seed: of the clustering, 0 or more.
     """
 
     low: Array  # (d,)
@@ -59,7 +67,7 @@ class Loose:
         least, most = angles.min(axis=0), angles.max(axis=0)
         chosen, reach = [], []
         for bones, reached in zip((ARMS, LEGS), self._reach, strict=True):
-            for name in (side + bone for bone in bones for side in "lr"):
+            for name in (name for bone in bones for name in both(bone)):
                 first = angle_index(JOINTS.index(name)) - 3
                 moving = [i for i in range(first, first + 3) if most[i] > least[i]]
                 chosen += moving

@@ -29,8 +29,11 @@ _SHAPES = {
 class PCA:
     """Principal components of joint angles with constraint 1, a range, and constraint 2, nearness to a cluster.
 
-    Settings: how many `components`, a whole number, or a share of the variance below 1 to keep at least;
-    how many `clusters`; the `quantile` of training distances that chi is; the `seed` of the clustering.
+    Settings:
+        components (m): a whole number of them, or a share of the variance below 1 to keep at least. Section 2.1.
+        clusters (K): centres that K-means finds among the training poses, 1 or more. Section 2.2.
+        quantile: chi is this quantile of the training distances, above 0 and at most 1. Reading S5.
+        seed: of the clustering, 0 or more.
     """
 
     mean: Array  # (63,) c

@@ -23,9 +23,16 @@ DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0
 class Transformed:
     """A space that a scikit-learn transformer learns, with the paper's constraints 1 and 2 on its latents.
 
-    `variant` is the class, `components` its n_components, `options` its other parameters as a JSON object; `clusters`,
-    `quantile` and `seed` as for `pca`. A linear transformer is inverted by our own loop; any other is asked row by row,
-    about 100 us each, since the same row must always give the same bits.
+    A linear transformer is inverted by our own loop; any other is asked row by row, about 100 us each, since the same
+    row must always give the same bits.
+
+    Settings:
+        variant: the class, such as KernelPCA; `sklearn:NAME` sets it.
+        components (m): its `n_components`, 1 or more.
+        options: its other parameters, a JSON object.
+        clusters (K): centres that K-means finds among the training poses, 1 or more. As `pca`.
+        quantile: chi is this quantile of the training distances, above 0 and at most 1. As `pca`.
+        seed: of the clustering, and of the class where it takes one, 0 or more.
     """
 
     low: Array  # (m,)

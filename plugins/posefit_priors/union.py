@@ -39,9 +39,14 @@ _SHAPES = {
 class Union:
     """Principal components of several motions with a union of local Gaussians as the constraint.
 
-    Settings: how many `components`, a whole number or a share of the variance below 1; how many `clusters`; their
-    `breadth`, the share of the whole covariance added to each one's own; the `quantile` of training distances that is
-    still near; the `seed` of the clustering.
+    A pose is feasible within a Mahalanobis distance of a cluster, its covariance regularised towards the whole's.
+
+    Settings:
+        components (m): a whole number of them, or a share of the variance below 1 to keep at least. As `pca`.
+        clusters (K): that K-means finds among the training poses, 1 or more. Ours.
+        breadth: share of the whole covariance that is added to each cluster's own, above 0. Ours.
+        quantile: of the training distances that is still near, above 0 and at most 1. As Reading S5.
+        seed: of the clustering, 0 or more.
     """
 
     mean: Array  # (63,)

@@ -1,4 +1,12 @@
-"""CMA-ES as the library pycma implements it, for posefit: `pycma`."""
+"""CMA-ES as the library pycma implements it, for posefit: `pycma`.
+
+N. Hansen, Y. Akimoto, P. Baudis, CMA-ES/pycma on GitHub, 2019. `pip install posefit[pycma]`.
+
+>>> import posefit
+>>> track = posefit.track("walk", optimiser="pycma", frames=(0, 3))
+>>> track.summary["iou"] > 0.5
+True
+"""
 
 from functools import partial
 
@@ -15,6 +23,10 @@ def pycma(space: Space, rng: np.random.Generator, *, population: int = 0, spread
     """pycma's evolution strategy with its own handling of the box; `population` of 0 is its own choice.
 
     It starts around the prediction with its spread, or anywhere with `spread`, and again where it has stopped.
+
+    Settings:
+        population (lambda): 5 or more, or 0 for the library's own choice.
+        spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
     """
     if population != 0:
         at_least("population", population, 5)
@@ -40,4 +52,5 @@ def _evolve(population: int, spread: float, space: Space, rng: np.random.Generat
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `pycma`."""
     register("pycma", pycma, needs=("cma", "posefit[pycma]"))

@@ -1,4 +1,12 @@
-"""Optimisers of pymoo for posefit: `pymoo:NAME`, one of its single-objective algorithms with a population."""
+"""Optimisers of pymoo for posefit: `pymoo:NAME`, one of its single-objective algorithms with a population.
+
+J. Blank, K. Deb, pymoo: multi-objective optimization in Python, IEEE Access 8, 2020. `pip install posefit[pymoo]`.
+
+>>> import posefit
+>>> track = posefit.track("walk", optimiser="pymoo:DE", frames=(0, 3))
+>>> track.summary["iou"] > 0.5
+True
+"""
 
 from functools import partial
 from importlib import import_module
@@ -16,7 +24,12 @@ Variant = Literal["DE", "PSO", "GA", "ES", "SRES", "ISRES"]
 
 
 def pymoo(space: Space, rng: np.random.Generator, *, variant: Variant = "DE", particles: int = 40) -> Bridged:
-    """An algorithm of pymoo, with so many `particles` drawn from the start."""
+    """An algorithm of pymoo, with so many `particles` drawn from the start.
+
+    Settings:
+        variant: a single-objective algorithm with a population; `pymoo:NAME` sets it.
+        particles: size of its population, 5 or more.
+    """
     at_least("particles", particles, 5)
     one_of("variant", variant, ("DE", "PSO", "GA", "ES", "SRES", "ISRES"))
     return Bridged(space, rng, partial(_run, variant, particles))
@@ -42,4 +55,5 @@ def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, o
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `pymoo:NAME`."""
     register("pymoo", pymoo, needs=("pymoo", "posefit[pymoo]"))

@@ -1,4 +1,13 @@
-"""Optimisers of SciPy for posefit: `scipy:differential_evolution` and `scipy:dual_annealing`."""
+"""Optimisers of SciPy for posefit: `scipy:differential_evolution` and `scipy:dual_annealing`.
+
+R. Storn, K. Price, Differential evolution, Journal of Global Optimization 11, 1997; Y. Xiang et al., Generalized
+simulated annealing for global optimization, The R Journal 5(1), 2013.
+
+>>> import posefit
+>>> track = posefit.track("walk", optimiser="scipy:differential_evolution", frames=(0, 3))
+>>> track.summary["iou"] > 0.5
+True
+"""
 
 from functools import partial
 from typing import Any, Literal
@@ -20,6 +29,10 @@ def scipy(
     """SciPy's differential evolution, or its dual annealing, which proposes one at a time.
 
     A search that has converged starts again. Dual annealing goes without its local search, which needs gradients.
+
+    Settings:
+        variant: "differential_evolution" or "dual_annealing"; `scipy:NAME` sets it.
+        particles: size of differential evolution's population, 5 or more; dual annealing has none.
     """
     at_least("particles", particles, 5)
     one_of("variant", variant, ("differential_evolution", "dual_annealing"))
@@ -55,4 +68,5 @@ def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> Non
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `scipy:NAME`."""
     register("scipy", scipy)

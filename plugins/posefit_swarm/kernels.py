@@ -73,7 +73,10 @@ def mend(broken, works, flown, moved, velocity, position):
 
 @jit
 def settle(moved, costs, chances, temperature, position, position_costs, best, best_costs, accepted):
-    """Accept or refuse each move by the annealing rule and update the personal bests; return the swarm's best row."""
+    """Accept or refuse each move by the annealing rule and update the personal bests; return the swarm's best row.
+
+    The rule is Metropolis' criterion: a rise of the cost is accepted with probability exp(-rise / temperature).
+    """
     for i in range(costs.size):
         rise = costs[i] - position_costs[i]
         # true of a first cost, which replaces +inf; false of nan

@@ -29,9 +29,17 @@ def constriction(phi: float) -> float:
 class PSO:
     """A particle swarm with the whole swarm as everybody's neighbourhood; every move is accepted.
 
-    `velocity` is "constricted" by chi, with `phi` the sum of both accelerations; or has an "inertia" that falls as the
-    SAPSO paper's does; or is the "original", which keeps all of the old one. Velocities stay within `alpha` times the
-    half-range of the box, and a particle that breaks a constraint is redrawn, both as in that paper.
+    Velocities are limited, and a particle that breaks a constraint is redrawn, as in the SAPSO paper.
+
+    Settings:
+        particles (N): size of the swarm, 1 or more.
+        iterations (C): over which an "inertia" falls, 1 or more.
+        velocity: "constricted" by chi; or with an "inertia" that falls as SAPSO's does; or the "original", all kept.
+        phi (phi): sum of both accelerations where velocities are constricted, above 4. Clerc and Kennedy 2002.
+        inertia (A): factor on the old velocity at first, where that is "inertia", above 0.1. As SAPSO.
+        acceleration (c1, c2): of either pull, where velocities are not constricted, 0 or more. Kennedy 1995.
+        alpha (alpha): velocities stay within it times the half-range of the box, above 0. As SAPSO.
+        redraws: of rand() before a particle that breaks a constraint is stopped, 0 or more. As SAPSO.
     """
 
     def __init__(

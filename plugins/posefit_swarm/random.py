@@ -8,7 +8,13 @@ from posefit.fitting.check import at_least
 
 
 class Random:
-    """Draws every population uniformly from the feasible part of the box, whatever was found before."""
+    """Draws every population uniformly from the feasible part of the box, whatever was found before.
+
+    Settings:
+        particles: size of a population, 1 or more.
+    """
+
+    baseline = True  # the chance that other optimisers are held against
 
     def __init__(self, space: Space, rng: np.random.Generator, *, particles: int = 40) -> None:
         at_least("particles", particles, 1)

@@ -20,12 +20,20 @@ STOP_TEMPERATURE = 0.0  # T0; Reading S5
 class SAPSO:
     """Algorithm 1 as an ask/tell optimiser. Velocities and positions are those of the unit box.
 
-    Settings beyond the paper's constants choose between readings of it:
-    `cool` once an "iteration" or once an "acceptance", with one shared temperature (Reading S6);
-    `redraws` of rand() before a particle that breaks a constraint is stopped (Reading S7);
-    `rand` fresh for every "dimension" or one "scalar" a particle (Reading S8);
-    `velocity_limits` "symmetric" about 0 or "literal", alpha times the range's own ends (Reading S9);
-    `rejected_velocity` "kept" or "zeroed" (Reading S11).
+    Settings:
+        particles (N): size of the swarm, 1 or more. Section 5.2.
+        iterations (C): moves of the swarm, 1 or more; it is evaluated once more than that (Reading S10). Section 5.2.
+        temperature (T): of the annealing at first, above 0, in units of the cost. Section 5.2.
+        cooling (gamma): factor on the temperature after each iteration, 0 to 1. Section 5.2.
+        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Reading S5.
+        inertia (A): factor on the old velocity at first, above 0.1; it falls to 0.1. Section 3.1, Reading S5.
+        acceleration (c1, c2): of the pulls towards the personal and the swarm's best, 0 or more. Section 3.1.
+        alpha (alpha): velocities stay within it times the half-range of a coordinate, above 0. Section 2.2.
+        redraws: of rand() before a particle that breaks a constraint is stopped, 0 or more. Reading S7.
+        cool: once an "iteration", or once an "acceptance", with one shared temperature. Reading S6.
+        rand: fresh for every "dimension", or one "scalar" a particle. Reading S8.
+        velocity_limits: "symmetric" about 0, or "literal", alpha times the range's own ends. Reading S9.
+        rejected_velocity: of a particle whose move was refused, "kept" or "zeroed". Reading S11.
     """
 
     def __init__(

@@ -12,13 +12,13 @@ from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import areas, mismatch
 from posefit_imm import Belief, Measurement, start
-from posefit_vsmm.detection.joints import errors
+from posefit_vsmm.detection.joints import rule_errors
 from posefit_vsmm.detection.preprocess import Lines, lines_of
 from posefit_vsmm.detection.shown import Shown
 from posefit_vsmm.fresh import Matcher, estimated
 from posefit_vsmm.motion import STIFF
 from posefit_vsmm.points import AT
-from posefit_vsmm.sight import Figure, Seen, Sight
+from posefit_vsmm.sight import Figure, Sight, Sighting
 from posefit_vsmm.state import ERROR, bone_errors, decode, free_errors
 from posefit_vsmm.structure import Measure, Models, Switching
 
@@ -69,7 +69,7 @@ class Course:
     ) -> None:
         self._task, self._reliance, self._rng, self._searcher = task, switching.library.reliance, rng, searcher
         self._models = Models(switching, task.body.skeleton, task.fps)
-        self._sight = Sight(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), errors())
+        self._sight = Sight(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), rule_errors())
         self._free = np.maximum(free_errors(task.body.skeleton), STIFF)
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._shown: list[Shown] = []
@@ -126,7 +126,7 @@ class Course:
         told = {**details, **self._joints(seen, expected), "surprise": surprise, **self._told()}
         return self._frame(pose, place, observation, used + 1, began, told)
 
-    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[Seen | None]:
+    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[Sighting | None]:
         return [
             None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)
         ]
@@ -149,7 +149,7 @@ class Course:
         self._astray = dict.fromkeys(_LIMBS, 0)
         return matcher.evaluations
 
-    def _astray_spread(self, seen: Sequence[Seen | None]) -> Array:
+    def _astray_spread(self, seen: Sequence[Sighting | None]) -> Array:
         """Return the variances (33,) to add for limbs whose ends are not found though an end point is nobody's."""
         extra = np.zeros(ERROR)
         spare = any(one.spare for one in seen if one is not None)
@@ -161,13 +161,13 @@ class Course:
                     extra[bone_errors(bone)] = ASTRAY_SPREAD**2
         return np.asarray(extra * self._free**2)
 
-    def _joints(self, seen: Sequence[Seen | None], expected: Array) -> dict[str, Any]:
+    def _joints(self, seen: Sequence[Sighting | None], expected: Array) -> dict[str, Any]:
         """Return the 17 joints (views, 17, 2) as they are shown, and how sure the rules were of them (views, 17)."""
         points, confidence = [], []
         for view, (camera, one) in enumerate(zip(self._task.cameras, seen, strict=True)):
             if one is None:
                 pixels, _ = self._sight.figure.seen(camera, expected)
-                one = Seen(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
+                one = Sighting(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
             if len(self._shown) == view:
                 self._shown.append(Shown(one.points))
             points.append(self._shown[view].follow(one.points, one.confidence, one.variances))

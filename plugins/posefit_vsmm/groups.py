@@ -20,7 +20,10 @@ SIZE_LIMIT = 100_000  # bytes
 
 @dataclass(frozen=True)
 class Topology:
-    """Groups of models, in the order in which they are numbered, and the neighbours of each model."""
+    """Groups of models, in the order in which they are numbered, and the neighbours of each model.
+
+    The field calls them model sets, and the neighbours a digraph of models.
+    """
 
     groups: Mapping[str, tuple[str, ...]]
     neighbours: Mapping[str, tuple[str, ...]]
@@ -29,6 +32,7 @@ class Topology:
     def transition(self, models: Sequence[str]) -> Array:
         """Return how probable each of some models (r, r) is after each: `stay`, the rest among its neighbours there.
 
+        It is the transition matrix of a Markov chain; each row sums to 1.
         A model without a neighbour there may change into any, as a group of its own can only be left that way.
         """
         matrix = np.zeros((len(models), len(models)))

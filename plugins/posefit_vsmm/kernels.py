@@ -125,7 +125,7 @@ def rotation_vector(w, x, y, z, vector, back):
 
 
 @jit
-def angles_of(w, x, y, z, order_root, out):
+def euler_angles(w, x, y, z, order_root, out):
     """Write the three angles of a quaternion: yaw, pitch, roll, or rx, ry, rz."""
     if order_root:
         out[0] = np.arctan2(2.0 * (x * z + w * y), 1.0 - 2.0 * (x * x + y * y))
@@ -162,13 +162,13 @@ def points_and_jacobian(chain, state, matrix, offset):
     held = _HELD.size
     vectors, backs = np.empty(3 * held), np.empty((held, 3, 3))
     angles = np.empty(3)
-    angles_of(state[3], state[4], state[5], state[6], True, angles)
+    euler_angles(state[3], state[4], state[5], state[6], True, angles)
     pose[0:3] = angles
     for k in range(held):
         at = 7 + 4 * k
         w, x, y, z = state[at], state[at + 1], state[at + 2], state[at + 3]
         rotation_vector(w, x, y, z, vectors[3 * k : 3 * k + 3], backs[k])
-        angles_of(w, x, y, z, False, angles)
+        euler_angles(w, x, y, z, False, angles)
         for i in range(3):
             pose[HELD_ANGLES[3 * k + i]] = angles[i]
     for i in range(offset.size):

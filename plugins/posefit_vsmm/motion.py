@@ -49,7 +49,7 @@ class MotionModel:
 
     def nearest(self, state: Array) -> Array:
         """Return a state (43,) with its place and heading, in the typical pose that is nearest to it."""
-        back, quaternions = headed(state[3:].reshape(-1, 4))
+        back, quaternions = without_heading(state[3:].reshape(-1, 4))
         alike = np.abs(np.einsum("nij,ij->ni", self.poses.reshape(len(self.poses), -1, 4), quaternions))
         pose = self.poses[np.arccos(np.minimum(alike, 1.0)).sum(axis=1).argmin()].copy()
         pose[:4] = product(back, pose[:4])
@@ -105,7 +105,7 @@ def leg_of(skeleton: Skeleton) -> float:
     return float(skeleton.lengths[[SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]].sum())
 
 
-def headed(quaternions: Array) -> tuple[Array, Array]:
+def without_heading(quaternions: Array) -> tuple[Array, Array]:
     """Return the heading (4,) of quaternions (10, 4), and they without it, with w positive.
 
     The heading is the part of the first one that turns about the vertical.

@@ -59,7 +59,7 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Sighting:
     """What one camera measured."""
 
     points: Array  # (17, 2) pixels
@@ -79,7 +79,7 @@ class Sight:
     figure: Figure
     errors: Errors = field(repr=False)
 
-    def look(self, view: int, lines: Lines, expected: Array, spread: Array) -> Seen:
+    def look(self, view: int, lines: Lines, expected: Array, spread: Array) -> Sighting:
         """Return what a camera sees of a state (43,) that is expected, to within a covariance (33, 33).
 
         What is too surprising is not believed.
@@ -98,11 +98,11 @@ class Sight:
         distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
         confidence = np.where(distance < SURPRISE, found.confidence, 0.0)
         dropped = np.count_nonzero((confidence == 0.0) & (found.confidence > 0.0))
-        return Seen(
+        return Sighting(
             found.points, confidence, variances, found.spare + int(dropped), _surprise(distance, found.confidence)
         )
 
-    def measure(self, state: Array, seen: Sequence[Seen | None], known: Array | None) -> Measurement:
+    def measure(self, state: Array, seen: Sequence[Sighting | None], known: Array | None) -> Measurement:
         """Return what was detected, less what a state (43,) would show; hidden joints have no row (Reading V9)."""
         residuals, jacobians, noise = [np.zeros(0)], [np.zeros((0, ERROR))], [np.zeros(0)]
         for camera, one in zip(self.cameras, seen, strict=True):

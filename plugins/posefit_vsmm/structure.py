@@ -16,7 +16,7 @@ from posefit_vsmm.switching import New, Rivalry, Rules, SequentialTest, enlarged
 
 FIRST = 10  # cycles over all models before a group is chosen
 RECENT = 5  # frames: where the median of their surprise is larger than SURPRISED, the group is chosen anew
-SURPRISED = 1.2
+SURPRISED = 1.2  # of the normalised innovation squared a coordinate, which is 1 on average where a filter is consistent
 
 Structure = Literal["variable", "all"]
 Measure = Callable[[Array], Measurement]

@@ -12,7 +12,7 @@ import click
 from posefit.entries import BLOCK, LOAD, STRICT, Plugin
 from posefit.registry import KINDS, Kind, Offer, Registry, registry
 from posefit.settings import parse
-from posefit.testing import Report, optimiser_checks, prior_checks, report, tracker_checks
+from posefit.testing import Report, optimiser_checks, prior_checks, run_checks, tracker_checks
 
 
 def described(offer: Offer) -> dict[str, Any]:
@@ -90,4 +90,4 @@ def checked(kind: Kind, name: str, texts: Sequence[str]) -> Report:
         "prior": lambda: prior_checks(offer.factory, settings=settings),
         "tracker": lambda: tracker_checks(offer.factory, settings=settings),
     }[kind]()
-    return report(offer.label, checks)
+    return run_checks(offer.label, checks)

@@ -26,7 +26,8 @@ def frame_range(_: click.Context, __: click.Parameter, value: str | None) -> tup
     raise click.BadParameter(f"expected A:B such as 0:50, :50 or 10:, got {value!r}")
 
 
-def _box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...] | None:
+def box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...] | None:
+    """Return the left, the top, the width and the height of X,Y,WIDTH,HEIGHT."""
     if value is None:
         return None
     parts = value.split(",")
@@ -37,7 +38,7 @@ def _box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int,
 
 EXTRACTION = (
     click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
-    click.option("--roi", callback=_box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
+    click.option("--roi", callback=box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
     click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
     click.option("--width", type=int, default=640, show_default=True, help="Larger videos are scaled down to this."),
 )

@@ -11,4 +11,5 @@
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
 | a plugin's optimiser watched call by call; other people's optimisers driven as ours | guard.py, bridge.py |
 | the build of one person, fitted with the poses | shape.py |
+| aligning and decoding, compiled | kernels.py |
 """

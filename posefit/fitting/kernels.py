@@ -75,7 +75,7 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
 
 
 @jit
-def decode(proposals, centre, half, anchor, first, poses, translations, latents):
+def unpack_proposals(proposals, centre, half, anchor, first, poses, translations, latents):
     """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite."""
     total = 0.0
     for i in range(proposals.shape[0]):

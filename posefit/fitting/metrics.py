@@ -5,12 +5,12 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
-from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR
+from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR, SIDES
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
 
 _LEFT_HIP, _RIGHT_HIP = JOINTS.index("lhipjoint"), JOINTS.index("rhipjoint")
-_PAIRED = np.array([j for j in range(len(JOINTS)) if MIRROR[j] != j])
+_PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
 
 
 def pose_error_degrees(truth: Array, estimate: Array, dimensions: NDArray[np.bool_] | None = None) -> Array:
@@ -57,7 +57,10 @@ def mpjpe_mm(truth: Array, joints: Array) -> Array:
 
 
 def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
-    """Return the mean distance (T,) of the joints in millimetres after the best rotation, scale and translation."""
+    """Return the mean distance (T,) of the joints in millimetres after the best rotation, scale and translation.
+
+    That is Procrustes alignment, frame by frame.
+    """
     truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
     target = truth - truth.mean(axis=1, keepdims=True)
     source = joints - joints.mean(axis=1, keepdims=True)

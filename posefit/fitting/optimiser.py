@@ -1,7 +1,7 @@
 """What an optimiser is, and the loop that drives one."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -35,6 +35,8 @@ class Filter(Optimiser, Protocol):
 # Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a numpy Generator that is the
 # only source of randomness, and keyword-only settings. The driver fills in the settings `evaluations`, the budget of
 # one search, and `iterations`, the populations after the first that this budget holds, for a factory that takes them.
+# A factory whose attribute `baseline` is true is the chance that others are held against: the kit of checks does not
+# ask it to beat chance.
 OptimiserFactory = Callable[..., Optimiser]
 
 # What an optimiser does when the next frame comes: it is built anew to start around the prediction, SAPSO (6), (7); it
@@ -53,19 +55,37 @@ class Minimum:
     spent: NDArray[np.int64] = field(repr=False)  # (populations,) evaluations so far after each population
 
 
+class BudgetError(ValueError):
+    """A budget does not hold one population."""
+
+
+def populations(
+    optimiser: Optimiser, evaluate: Callable[[Array], Array], evaluations: int
+) -> Iterator[tuple[Array, Array]]:
+    """Yield each population (n, d) that an optimiser proposes, with its costs (n,): the loop that every search is.
+
+    The optimiser is told the costs when the next population is asked for. The search ends when it proposes none, or
+    one that would go over the budget, which is not evaluated. Raises BudgetError where the first one does.
+    """
+    used = 0
+    while len(proposals := optimiser.ask()) and used + len(proposals) <= evaluations:
+        used += len(proposals)
+        costs = evaluate(proposals)
+        yield proposals, costs
+        optimiser.tell(proposals, costs)
+    if not used:
+        raise BudgetError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
+
+
 def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluations: int) -> Minimum:
     """Return the best proposal an optimiser finds within a budget of whole populations.
 
     `evaluate` gives the costs (n,) of proposals (n, d). A population that would go over `evaluations` is not
-    evaluated. A cost that is nan never counts as best. Raises ValueError where the budget does not hold one
-    population, or where every cost is nan.
+    evaluated. A cost that is nan never counts as best. Raises BudgetError where the budget does not hold one
+    population, and ValueError where every cost is nan.
     """
     best, cost, used, history, spent = None, np.inf, 0, [], []
-    while True:
-        proposals = optimiser.ask()
-        if not len(proposals) or used + len(proposals) > evaluations:
-            break
-        costs = evaluate(proposals)
+    for proposals, costs in populations(optimiser, evaluate, evaluations):
         used += len(proposals)
         lowest = int(costs.argmin())
         if math.isnan(costs[lowest]):  # argmin prefers nan to any number
@@ -74,9 +94,6 @@ def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluatio
             best, cost = proposals[lowest].copy(), float(costs[lowest])
         history.append(cost)
         spent.append(used)
-        optimiser.tell(proposals, costs)
-    if best is None:
-        raise ValueError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
-    if math.isnan(cost):
+    if best is None or math.isnan(cost):
         raise ValueError(f"costs must be numbers, got nan for all {used} proposals")
     return Minimum(best, cost, used, np.array(history), np.array(spent))

@@ -11,7 +11,7 @@ from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import BONES
+from posefit.geometry.skeleton import BONES, kind
 from posefit.silhouette.cost import areas, mismatch
 
 LENGTHS = {
@@ -47,11 +47,9 @@ GENERATIONS = 60  # of CMA-ES, a round
 
 def _members(groups: dict[str, tuple[str, ...]]) -> Array:
     """Return which bones (26, groups) belong to which group, as 0 and 1."""
-    plain = [bone if bone in _MIDDLE else bone[1:] for bone in BONES]
-    return np.array([[float(bone in group) for group in groups.values()] for bone in plain])
+    return np.array([[float(kind(bone) in group) for group in groups.values()] for bone in BONES])
 
 
-_MIDDLE = ("lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
 _LENGTHS, _GIRTHS = _members(LENGTHS), _members(GIRTHS)
 
 
@@ -91,7 +89,7 @@ def fit_shape(
 
     `follow` tracks the observations with a body. With a `height` in metres the person stands so tall; one camera alone
     does not see how large somebody is. Where poses are `aligned`, so are those of every body that is tried. `spread`
-    comes from `resamples` fits to frames drawn with replacement.
+    is bootstrapped: it comes from `resamples` fits to frames drawn with replacement.
     """
     factors = np.ones(len(NAMES))
     base = body

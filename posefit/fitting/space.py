@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.fitting import box
 from posefit.fitting.box import Space, Start
-from posefit.fitting.kernels import decode, within
+from posefit.fitting.kernels import unpack_proposals, within
 from posefit.fitting.prior import Prior
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
@@ -89,7 +89,7 @@ class SearchSpace:
         n, first = len(proposals), self.dimensions - len(self.prior.low)
         poses, translations = np.empty((n, ANGLES)), np.empty((n, 3))
         latents = np.empty((n, self.dimensions - first))
-        if not decode(proposals, self.centre, self.half, self.anchor, first, poses, translations, latents):
+        if not unpack_proposals(proposals, self.centre, self.half, self.anchor, first, poses, translations, latents):
             raise ValueError("proposals must be finite, got nan or infinity")
         poses[:, 3:] = self.prior.inverse_transform(latents)
         return poses, translations

@@ -90,12 +90,12 @@ class Prediction:
     """Where the next frame's pose is sought, where the search starts, and what a pose costs. SAPSO (4), (6), (7).
 
     Settings:
-        spread (k): standard deviations of the start, as multiples of the predicted step. Reading S5.
-        floor: the least they are, in half-ranges of the box, so that a still subject keeps some. Reading S5.
-        prediction: from the "latest" step, or the "literal" one before it. Reading S12.
-        root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones.
-        translation_range: metres that are searched to either side of the last place, where it is searched.
-        beta: what a missed pixel counts, and 1 - beta a spilt one. SAPSO (4).
+        spread (k): standard deviations of the start, as multiples of the predicted step, 0 or more. Reading S5.
+        floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Reading S5.
+        prediction (v_pred): the "latest" step, or the "literal" one before it. Reading S12.
+        root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
+        translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
+        beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
     """
 
     spread: float = SPREAD
@@ -106,12 +106,15 @@ class Prediction:
     beta: float = BETA
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
         if not self.floor > 0.0:
             raise ValueError(f"floor must be above 0, got {self.floor}")
         if not self.spread >= 0.0:
             raise ValueError(f"spread must be 0 or more, got {self.spread}")
         if self.prediction not in ("latest", "literal"):
             raise ValueError(f"prediction must be one of latest, literal, got {self.prediction!r}")
+        if not 0.0 <= self.beta <= 1.0:
+            raise ValueError(f"beta must lie in 0 to 1, got {self.beta}")
 
 
 class Follower:

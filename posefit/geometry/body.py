@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton, kind
 
 # Radii as shares of the bone's length: (where the bone starts, where it ends). Ours: read off an adult's build.
 PROPORTIONS = {
@@ -47,7 +47,7 @@ class Body:
     @classmethod
     def of(cls, skeleton: Skeleton, girth: float = 1.0) -> "Body":
         """Return the body whose radii are `PROPORTIONS` of the bone lengths, times `girth`."""
-        shares = np.array([PROPORTIONS[bone if bone in PROPORTIONS else bone[1:]] for bone in BONES])
+        shares = np.array([PROPORTIONS[kind(bone)] for bone in BONES])
         return cls(skeleton, girth * shares * skeleton.lengths[:, None])
 
     def joint_radii(self) -> Array:

@@ -7,6 +7,7 @@ bone about the joint it starts from. The five end bones have no freedom. SAPSO s
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,14 +62,37 @@ BONES = JOINTS[1:]  # bone b runs from joint PARENTS[b + 1] to joint b + 1
 ENDS = tuple(j for j in range(len(JOINTS)) if j not in PARENTS)
 INNER = tuple(j for j in range(1, len(JOINTS)) if j in PARENTS)
 ANGLES = 3 + 3 * len(INNER)  # M = 66
-MIRROR = tuple(
-    JOINTS.index({"l": "r", "r": "l"}[name[0]] + name[1:])
-    if name[0] in "lr" and name not in ("root", "lowerback", "lowerneck")
-    else j
-    for j, name in enumerate(JOINTS)
-)  # the joint on the other side of the body
 
 Channels = tuple[tuple[str, tuple[str, ...]], ...]
+Side = Literal["left", "right", "middle"]
+_OTHER = {"l": "r", "r": "l"}  # a name starts with the letter of its side where another one starts with the other
+
+
+def mirrored(bone: str) -> str:
+    """Return the name of the bone, or joint, on the other side of the body; of one in the middle, its own."""
+    other = _OTHER.get(bone[0], "") + bone[1:]
+    return other if other in JOINTS else bone
+
+
+def side(bone: str) -> Side:
+    """Return on which side of the body a bone, or the joint it ends in, is."""
+    if mirrored(bone) == bone:
+        return "middle"
+    return "left" if bone[0] == "l" else "right"
+
+
+def kind(bone: str) -> str:
+    """Return a bone's name without its side: `femur` of `lfemur` and `rfemur`, `head` of `head`."""
+    return bone if side(bone) == "middle" else bone[1:]
+
+
+def both(kind: str) -> tuple[str, str]:
+    """Return the names of the left and of the right bone of a kind such as `femur`."""
+    return f"l{kind}", f"r{kind}"
+
+
+MIRROR = tuple(JOINTS.index(mirrored(name)) for name in JOINTS)  # (27,) the joint on the other side of the body
+SIDES: tuple[Side, ...] = tuple(side(name) for name in JOINTS)  # (27,) left, right or middle
 
 
 def angle_index(joint: int) -> int:

@@ -6,24 +6,15 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import JOINTS, PARENTS
+from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
+from posefit.report.colours import METHODS
+from posefit.report.columns import COLUMNS, SHOWN
 from posefit.report.contest import Contest, baseline_rows, claim, contest_of, leaderboard, paired_tests, resamples
-from posefit.report.figures import COLOURS
 from posefit.report.gallery import gallery
-from posefit.report.runs import BASELINES, Runs
+from posefit.report.runs import Runs
 from posefit.sweep.ledger import Ledger
-
-_DIGITS = {  # of each figure of a row, after the point
-    "error": 3,
-    **{f"skill_{name}": 3 for name in BASELINES},
-    "lost": 3,
-    "swapped": 3,
-    "mpjpe": 1,
-    "iou": 4,
-    "ms": 2,
-    "evaluations": 1,
-}
+from posefit.tracking.measures import BASELINES
 
 
 def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str, Any]:
@@ -36,7 +27,10 @@ def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str,
         "instances": _instances(runs),
         "joints": JOINTS,
         "parents": PARENTS,
-        "colours": len(COLOURS),
+        "sides": SIDES,
+        "colours": len(METHODS),
+        "columns": {name: COLUMNS[name].about() for name in SHOWN},
+        "trivial": BASELINES,
         **(_compared(contest) if contest is not None else {}),
         "rows": _rows(runs),
         "seeds": [_exact(seed) for seed in runs.seeds],
@@ -133,6 +127,6 @@ def _by_instance(runs: Runs, figure: str) -> Array:
 def _rows(runs: Runs) -> dict[str, Any]:
     """Return the columns of all rows, short enough for a page of a hundred thousand of them."""
     columns: dict[str, Any] = {name: getattr(runs, name) for name in ("method", "instance", "head", "seed")}
-    for name, digits in _DIGITS.items():
-        columns[name] = np.round(runs.figures[name], digits)
+    for name in SHOWN:
+        columns[name] = np.round(runs.figures[name], COLUMNS[name].kept)
     return {**columns, "key": [key[:8] for key in runs.keys]}

@@ -8,11 +8,13 @@ import numpy as np
 from scipy.stats import trim_mean
 
 from posefit.arrays import Array
-from posefit.report.runs import BASELINES, FIGURES, Runs
+from posefit.report.columns import FIGURES
+from posefit.report.runs import Runs
 from posefit.statistics.improvement import improvement_interval, probability_of_improvement
 from posefit.statistics.intervals import LEAST_RESAMPLES, RESAMPLES, TRIMMED, Intervals, iqm_intervals
 from posefit.statistics.pairing import paired, shared
 from posefit.statistics.ranks import friedman, wilcoxon
+from posefit.tracking.measures import BASELINES
 
 SEED = 2013  # of every bootstrap
 WORK = 1e8  # numbers that the resamples of one study may come to

@@ -13,6 +13,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.files import new_file
+from posefit.report.colours import METHODS
 from posefit.statistics.intervals import Intervals
 from posefit.statistics.ranks import Ranking
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers too; without their yellow
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLES = ("-", "--", ":", "-.")  # of the first seven methods, the next seven, and so on
 FORMATS = (".png", ".pdf", ".svg")
 _SIZE = (6.4, 3.6)  # inches
@@ -96,7 +95,7 @@ def joint_errors_figure(
             xerr=reach,
             label=_plain(methods[k]),
             color=_line(k)["color"],
-            hatch=(None, "////", "....", "xxxx")[k // len(COLOURS) % 4],
+            hatch=(None, "////", "....", "xxxx")[k // len(METHODS) % 4],
             error_kw={"elinewidth": 0.8, "ecolor": "0.25"},
         )
     axes.set_yticks(places, [_plain(joint) for joint in joints])
@@ -166,7 +165,7 @@ def _figure(size: tuple[float, float] = _SIZE) -> "tuple[Figure, Axes]":
 
 
 def _line(k: int) -> dict[str, Any]:
-    return {"color": COLOURS[k % len(COLOURS)], "linestyle": STYLES[k // len(COLOURS) % len(STYLES)]}
+    return {"color": METHODS[k % len(METHODS)], "linestyle": STYLES[k // len(METHODS) % len(STYLES)]}
 
 
 def _plain(text: str) -> str:

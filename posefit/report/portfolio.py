@@ -8,6 +8,7 @@ import numpy as np
 from posefit.files import new_folder
 from posefit.geometry.skeleton import JOINTS
 from posefit.report import figures
+from posefit.report.columns import COLUMNS, SHOWN
 from posefit.report.contest import contest_of, leaderboard
 from posefit.report.curves import convergence, grid, joint_errors, reached
 from posefit.report.export import write_csv
@@ -18,27 +19,22 @@ from posefit.statistics.ranks import friedman
 
 KINDS = ("png", "pdf")
 LEVELS = 200  # of a performance profile
-COLUMNS = {
+_ERROR, *_OTHERS = SHOWN
+TABLE = {  # the heads of the leaderboard's columns, and what they hold
     "method": "name",
-    "error (degrees)": "error",
+    COLUMNS[_ERROR].head: _ERROR,
     "low": "low",
     "high": "high",
-    "skill, mean pose": "skill_mean_pose",
-    "skill, first pose held": "skill_persistence",
-    "skill, nearest training pose": "skill_nearest",
-    "lost": "lost",
-    "swapped": "swapped",
-    "MPJPE (mm)": "mpjpe",
-    "IoU": "iou",
-    "ms a frame": "ms",
-    "evaluations a frame": "evaluations",
+    **{COLUMNS[name].head: name for name in _OTHERS},
     "runs": "runs",
 }
 
 
 def write_portfolio(runs: Runs, path: str | Path) -> None:
-    """Write a new folder: convergence, attainment, profile, joints and critical-difference as PNG and PDF, and the
-    leaderboard as leaderboard.tex and .csv. Figures that the runs do not allow are left out.
+    """Write a new folder of figures and tables; figures that the runs do not allow are left out.
+
+    They are convergence, attainment, profile, joints and critical-difference as PNG and PDF, and the leaderboard as
+    leaderboard.tex and .csv.
 
     Raises ValueError where no run has an error, or where the folder exists or cannot be written.
     """
@@ -69,9 +65,9 @@ def write_portfolio(runs: Runs, path: str | Path) -> None:
             for kind in KINDS:
                 figures.save(figure, folder / f"{name}.{kind}")
         write_latex(
-            list(COLUMNS), [[_cell(row[key]) for key in COLUMNS.values()] for row in rows], folder / "leaderboard.tex"
+            list(TABLE), [[_cell(row[key]) for key in TABLE.values()] for row in rows], folder / "leaderboard.tex"
         )
-        write_csv(({title: row[key] for title, key in COLUMNS.items()} for row in rows), folder / "leaderboard.csv")
+        write_csv(({title: row[key] for title, key in TABLE.items()} for row in rows), folder / "leaderboard.csv")
 
 
 def _cell(value: Any) -> Any:

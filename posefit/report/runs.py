@@ -10,27 +10,13 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
+from posefit.report.columns import COLUMNS, FIGURES
 from posefit.report.repeat import LAST, command_head
 from posefit.sweep.cell import settings_text
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
-BASELINES = ("mean_pose", "persistence", "nearest")
-FIGURES = (
-    "error",  # degrees
-    *(f"skill_{name}" for name in BASELINES),
-    "lost",  # share of frames
-    "swapped",
-    "mpjpe",  # mm
-    "pa_mpjpe",
-    "iou",
-    "cost",
-    "ms",  # a frame
-    "evaluations",  # a frame
-    *(f"baseline_{name}" for name in BASELINES),  # degrees
-    "floor",
-)
 _VARIANT = ("method", "settings", "evaluations", "version")  # what a method is
 _PLACE = ("motion", "view_degrees", "corruption", "instance")  # what is always said of an instance
 
@@ -103,7 +89,7 @@ class _Table:
         self.numbers.append((variant, place, begun))
         self.seeds.append(spec["seed"])
         self.keys.append(row["key"])
-        self.figures.append(_figures(row))
+        self.figures.append([column.value(row) for column in COLUMNS.values()])
         self.joints.append(np.array(row.get("joint_errors_mm") or [np.nan] * len(JOINTS), dtype=np.float32))
         trace = row.get("trace") or {"evaluations": [], "cost": []}
         self.traces.append((np.array(trace["evaluations"], np.float32), np.array(trace["cost"], np.float32)))
@@ -146,26 +132,6 @@ class _Table:
             failed=tuple(lost[text] for text in (list(self.variants)[m] for m in best)),
             unfinished=tuple(sorted({json.loads(text)["method"] for text in lost if text not in self.variants})),
         )
-
-
-def _figures(row: Mapping[str, Any]) -> list[float]:
-    frames = row["spec"]["frames"]
-    skill, baselines = row.get("skill") or {}, row.get("baselines_degrees") or {}
-    values: dict[str, Any] = {
-        "error": (row.get("error_degrees") or {}).get("mean"),
-        "lost": row.get("lost_rate"),
-        "swapped": row.get("swap_rate"),
-        "mpjpe": row.get("mpjpe_mm"),
-        "pa_mpjpe": row.get("pa_mpjpe_mm"),
-        "iou": row.get("iou"),
-        "cost": row.get("cost"),
-        "ms": None if row.get("seconds_per_frame") is None else 1e3 * row["seconds_per_frame"],
-        "evaluations": None if row.get("evaluations_used") is None else row["evaluations_used"] / frames,
-        "floor": row.get("prior_floor_degrees"),
-        **{f"skill_{name}": skill.get(name) for name in BASELINES},
-        **{f"baseline_{name}": baselines.get(name) for name in BASELINES},
-    }
-    return [np.nan if values[name] is None else float(values[name]) for name in FIGURES]
 
 
 def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from posefit.report import colours
+
 SCRIPTS = ("base", "tables", "charts", "ranks", "body", "gallery", "author", "main")  # in this order
 PART = "<!--part-->"  # where style, data and scripts go
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
@@ -15,7 +17,7 @@ _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 def document(data: dict[str, Any]) -> str:
     """Return the page that shows the data of a report."""
     before, middle, after, end = _read("report.html").split(PART)
-    style = f"<style>\n{_read('report.css')}</style>"
+    style = f"<style>\n{colours.style()}{_read('report.css')}</style>"
     held = f'<script type="application/json" id="data">{embedded(data)}</script>'
     return "".join(
         [

@@ -171,7 +171,7 @@ def fill(rows, lines, j, row, column):
 
 
 @jit
-def draw(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image):
+def rasterise(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image):
     """Set the pixels of every cone of one body in a clear bit image, and its bounding box. Overwrites `joints`."""
     rotation, translation = view.rotation, view.translation
     scale = math.sqrt(view.focal[0] * view.focal[1])
@@ -234,7 +234,7 @@ def scratch(view, bones, angles):
 
 
 @jit
-def paint(image, box, value, pixels):
+def paint_bits(image, box, value, pixels):
     """OR `value` into the pixels (height, width) of the body in a bit image.
 
     Bits past the image's right border may be set and count for nothing: no pixel stands for them.
@@ -267,9 +267,9 @@ def count_areas(chain, radii, view, observed, valid, poses, translations, areas,
             silhouette += np.uint64(popcount(observed[w, y]))
     for i in range(poses.shape[0]):
         place_joints(chain, poses[i], translations[i], sines, cosines, frames, joints)
-        draw(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
+        rasterise(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
         if pixels is not None:
-            paint(image, box, value, pixels[i])
+            paint_bits(image, box, value, pixels[i])
         body, overlap = count(image, observed, valid, box)
         areas[i, 0] = silhouette - overlap
         areas[i, 1] = body - overlap
@@ -294,6 +294,6 @@ def draw_bits(chain, radii, view, pose, translation):
         view, chain.parents.size, pose.size
     )
     place_joints(chain, pose, translation, sines, cosines, frames, joints)
-    draw(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
+    rasterise(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
     image[:, view.height :] = _NONE
     return image

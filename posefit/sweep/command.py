@@ -4,12 +4,12 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from posefit.sweep.cell import run_cell, settings_text
+from posefit.sweep.cell import Cell, run_cell, settings_text
 from posefit.sweep.drive import Tally, drive_cells, progress_of
 from posefit.sweep.driver import Driver
 from posefit.sweep.engines.engine import Engine
@@ -35,17 +35,23 @@ def run_plan(
     """Return how the sweep of a plan to a folder ended, and the exit status that says so."""
     cells = Plan.read(plan).cells
     start = engine(workers, scheduler, dask_local, limits)
-    with closing(start()) as running, Driver(out, say) as driver:  # without an engine there is no folder either
+    with closing(start()) as running:  # without an engine there is no folder either
+        tally = swept(cells, out, running, say)
+    return tally, STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
+
+
+def swept(cells: Sequence[Cell], out: str | Path, running: Engine, say: Say) -> Tally:
+    """Return how cells ended that an engine ran into the ledger in a folder, with a bar on stderr."""
+    with Driver(out, say) as driver:
         already = sum(driver.state(cell.key) is not None for cell in cells)
         if already:
             say(f"{already} of {len(cells)} cells are done already")
-        if already == len(cells):
-            tally = Tally(len(cells))
-            tally.done = sum(cell.key in driver.ledger for cell in cells)
-            tally.quarantined = len(cells) - tally.done
-        else:
-            tally = _driven(cells, driver, running, already, say)
-    return tally, STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
+        if already < len(cells):
+            return _driven(cells, driver, running, already, say)
+        tally = Tally(len(cells))
+        tally.done = sum(cell.key in driver.ledger for cell in cells)
+        tally.quarantined = len(cells) - tally.done
+        return tally
 
 
 def preview(
@@ -84,7 +90,7 @@ def engine(workers: int | None, scheduler: str | None, dask_local: int | None, l
             return Cluster(scheduler, dask_local, limits, run_cell)
         from posefit.sweep.engines.processes import Processes
 
-        return Processes(workers or _cores(), limits, run_cell)
+        return Processes(workers or cores(), limits, run_cell)
 
     return start
 
@@ -125,7 +131,7 @@ def duration_text(seconds: float) -> str:
     return f"{seconds:.0f} seconds"
 
 
-def _driven(cells: Any, driver: Driver, running: Engine, already: int, say: Say) -> Tally:
+def _driven(cells: Sequence[Cell], driver: Driver, running: Engine, already: int, say: Say) -> Tally:
     from tqdm import tqdm
 
     bar = tqdm(total=len(cells), initial=already, unit="cell", file=sys.stderr, dynamic_ncols=True)
@@ -142,5 +148,6 @@ def _shown(cell: Any, done: bool) -> dict[str, Any]:
     return {"key": cell.key, "done": done, **json.loads(json.dumps(cell.spec))}
 
 
-def _cores() -> int:
+def cores() -> int:
+    """Return how many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

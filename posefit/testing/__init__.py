@@ -11,7 +11,8 @@ or one test a rule:
     def test_kit(check):
         check()
 
-The same checks run for an installed plugin as `posefit check optimiser NAME`.
+The same checks run for an installed plugin as `posefit check optimiser NAME`. A factory with the attribute
+`baseline = True` is chance itself, and is not asked to beat it.
 """
 
 from collections.abc import Callable
@@ -19,8 +20,8 @@ from typing import Any
 
 from posefit.fitting.optimiser import NextFrame
 from posefit.testing import prior_rules, protocol_rules, repeat_rules, search_rules, tracker_rules
-from posefit.testing.case import Case, checklist
-from posefit.testing.results import Check, Report, Result, parametrize, report
+from posefit.testing.case import OptimiserCase, checklist
+from posefit.testing.results import Check, Report, Result, parametrize, run_checks
 
 __all__ = [
     "Check",
@@ -32,7 +33,7 @@ __all__ = [
     "optimiser_checks",
     "parametrize",
     "prior_checks",
-    "report",
+    "run_checks",
     "tracker_checks",
 ]
 _LISTS = protocol_rules, repeat_rules, search_rules  # importing them fills the list
@@ -42,34 +43,34 @@ def optimiser_checks(
     factory: Callable[..., Any], *, next_frame: NextFrame = "start", settings: dict[str, Any] | None = None
 ) -> list[Check]:
     """Return the checks of an optimiser's factory; `next_frame` as it is registered."""
-    return checklist.of(Case(factory, next_frame, settings or {}))
+    return checklist.of(OptimiserCase(factory, next_frame, settings or {}))
 
 
 def check_optimiser(
     factory: Callable[..., Any], *, next_frame: NextFrame = "start", settings: dict[str, Any] | None = None
 ) -> Report:
     """Return what the checks say of an optimiser's factory: true where none failed."""
-    return report(_name(factory), optimiser_checks(factory, next_frame=next_frame, settings=settings))
+    return run_checks(_name(factory), optimiser_checks(factory, next_frame=next_frame, settings=settings))
 
 
 def prior_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a prior's factory."""
-    return prior_rules.checklist.of(prior_rules.Case(factory, settings or {}))
+    return prior_rules.checklist.of(prior_rules.PriorCase(factory, settings or {}))
 
 
 def check_prior(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
     """Return what the checks say of a prior's factory: true where none failed."""
-    return report(_name(factory), prior_checks(factory, settings=settings))
+    return run_checks(_name(factory), prior_checks(factory, settings=settings))
 
 
 def tracker_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a tracker's factory."""
-    return tracker_rules.checklist.of(tracker_rules.Case(factory, settings or {}))
+    return tracker_rules.checklist.of(tracker_rules.TrackerCase(factory, settings or {}))
 
 
 def check_tracker(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
     """Return what the checks say of a tracker's factory: true where none failed."""
-    return report(_name(factory), tracker_checks(factory, settings=settings))
+    return run_checks(_name(factory), tracker_checks(factory, settings=settings))
 
 
 def _name(factory: Callable[..., Any]) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space
-from posefit.fitting.optimiser import Filter, NextFrame, Optimiser
+from posefit.fitting.optimiser import Filter, NextFrame, Optimiser, populations
 from posefit.settings import planned, settings_of
 from posefit.testing.results import Checklist, SkippedError, expect
 
@@ -20,12 +20,17 @@ checklist = Checklist()
 
 
 @dataclass(frozen=True)
-class Case:
+class OptimiserCase:
     """A factory with its settings, and what it is registered to do when the next frame comes."""
 
     factory: Callable[..., Any]
     next_frame: NextFrame = "start"
     settings: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def baseline(self) -> bool:
+        """Whether it says of itself that it is the chance that others are held against."""
+        return bool(getattr(getattr(self.factory, "func", self.factory), "baseline", False))
 
     def build(self, space: Space, seed: int = 0, evaluations: int = EVALUATIONS, **more: Any) -> Optimiser:
         """Return a new optimiser of the space."""
@@ -59,11 +64,7 @@ class Case:
         for frame in range(10 if self.next_frame == "carry" else 1):
             if frame:
                 cast(Filter, optimiser).advance(space)
-            lowest, used = np.inf, 0
-            while len(proposals := optimiser.ask()) and used + len(proposals) <= evaluations:
-                costs = evaluate(proposals)
-                optimiser.tell(proposals, costs)
-                used, lowest = used + len(proposals), min(lowest, float(costs.min()))
+            lowest = min(float(costs.min()) for _, costs in populations(optimiser, evaluate, evaluations))
         return lowest
 
     def valid(self, space: Space, evaluate: Evaluate, count: int = 6, seed: int = 0) -> str:
@@ -92,7 +93,7 @@ def same(first: list[Array], second: list[Array]) -> bool:
     return len(first) == len(second) and all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 
 
-def needs_settings(case: Case) -> None:
+def needs_settings(case: OptimiserCase) -> None:
     """Return nothing. Skips the check where the factory has no settings."""
     if not settings_of(case.factory):
         raise SkippedError("it has no settings")

@@ -26,7 +26,7 @@ checklist = Checklist()
 
 
 @dataclass(frozen=True)
-class Case:
+class PriorCase:
     """A factory with its settings."""
 
     factory: Callable[..., Any]
@@ -44,21 +44,21 @@ class Case:
 
 
 @checklist
-def construction(case: Case) -> None:
+def construction(case: PriorCase) -> None:
     """A factory takes keyword-only settings and nothing else."""
     kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
     expect(all(kind is inspect.Parameter.KEYWORD_ONLY for kind in kinds), "settings must be named and keyword-only")
 
 
 @checklist
-def fit(case: Case) -> None:
+def fit(case: PriorCase) -> None:
     """The method fit returns the prior itself."""
     prior = case.factory(**case.settings)
     expect(prior.fit(walking_angles(), library.average_skeleton()) is prior, "fit must return self, got another object")
 
 
 @checklist
-def ranges(case: Case) -> str:
+def ranges(case: PriorCase) -> str:
     """The range of the latents is finite and not reversed."""
     prior = case.fitted()
     low, high = np.asarray(prior.low), np.asarray(prior.high)
@@ -69,7 +69,7 @@ def ranges(case: Case) -> str:
 
 
 @checklist
-def transform(case: Case) -> None:
+def transform(case: PriorCase) -> None:
     """Joint angles (n, 63) become latents (n, m)."""
     prior = case.fitted()
     for rows in (1, 7):
@@ -83,7 +83,7 @@ def transform(case: Case) -> None:
 
 
 @checklist
-def inverse(case: Case) -> None:
+def inverse(case: PriorCase) -> None:
     """Latents (n, m) become finite joint angles (n, 63), in every corner of the range too."""
     prior = case.fitted()
     corners = np.where(np.random.default_rng(1).random((64, len(prior.low))) < 0.5, prior.low, prior.high)
@@ -95,7 +95,7 @@ def inverse(case: Case) -> None:
 
 
 @checklist
-def training_in_range(case: Case) -> None:
+def training_in_range(case: PriorCase) -> None:
     """The training poses lie within the range."""
     prior = case.fitted()
     latents = np.asarray(prior.transform(walking_angles()))
@@ -105,7 +105,7 @@ def training_in_range(case: Case) -> None:
 
 
 @checklist
-def training_feasible(case: Case) -> str:
+def training_feasible(case: PriorCase) -> str:
     """Nine of ten training poses are feasible."""
     prior = case.fitted()
     feasible = np.asarray(prior.feasible(prior.transform(walking_angles())))
@@ -116,7 +116,7 @@ def training_feasible(case: Case) -> str:
 
 
 @checklist
-def same_bits(case: Case) -> None:
+def same_bits(case: PriorCase) -> None:
     """A row has the same bits whatever rows stand beside it."""
     prior = case.fitted()
     latents = case.latents(prior)
@@ -128,7 +128,7 @@ def same_bits(case: Case) -> None:
 
 
 @checklist
-def same_again(case: Case) -> None:
+def same_again(case: PriorCase) -> None:
     """The same poses teach the same space."""
     first, second = case.fitted(), case.fitted()
     latents = case.latents(first)
@@ -139,7 +139,7 @@ def same_again(case: Case) -> None:
 
 
 @checklist
-def inputs(case: Case) -> None:
+def inputs(case: PriorCase) -> None:
     """What a method gets stays as it was."""
     angles = walking_angles()
     before = angles.copy()
@@ -152,7 +152,7 @@ def inputs(case: Case) -> None:
 
 
 @checklist
-def global_randomness(case: Case) -> None:
+def global_randomness(case: PriorCase) -> None:
     """The global random generators are left alone."""
     with left_alone():
         prior = case.fitted()
@@ -160,7 +160,7 @@ def global_randomness(case: Case) -> None:
 
 
 @checklist
-def copies(case: Case) -> None:
+def copies(case: PriorCase) -> None:
     """A deep copy and what comes out of a pickle are the same space."""
     prior = case.fitted()
     latents = case.latents(prior)
@@ -171,7 +171,7 @@ def copies(case: Case) -> None:
 
 
 @checklist
-def file(case: Case) -> None:
+def file(case: PriorCase) -> None:
     """What is saved is loaded again, and is the same space."""
     prior = case.fitted()
     load = getattr(type(prior), "load", None)
@@ -190,7 +190,7 @@ def file(case: Case) -> None:
 
 
 @checklist
-def learns(case: Case) -> str:
+def learns(case: PriorCase) -> str:
     """Training poses come back nearer than their mean is."""
     prior, angles = case.fitted(), walking_angles()
     back = prior.inverse_transform(prior.transform(angles))
@@ -203,7 +203,7 @@ def learns(case: Case) -> str:
 
 
 @checklist
-def bad_input(case: Case) -> None:
+def bad_input(case: PriorCase) -> None:
     """Joint angles of a wrong shape, with nan, or too few are refused."""
     angles = walking_angles()
     spoilt = angles.copy()
@@ -215,7 +215,7 @@ def bad_input(case: Case) -> None:
 
 
 @checklist
-def nonsense_settings(case: Case) -> str:
+def nonsense_settings(case: PriorCase) -> str:
     """Nonsense in a setting is refused."""
     refused = []
     for setting in settings_of(case.factory):
@@ -236,7 +236,7 @@ def nonsense_settings(case: Case) -> str:
 
 
 @checklist
-def searchable(case: Case) -> str:
+def searchable(case: PriorCase) -> str:
     """A search space on it can be drawn from."""
     prior = case.fitted()
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
@@ -247,7 +247,7 @@ def searchable(case: Case) -> str:
 
 
 @checklist
-def speed(case: Case) -> str:
+def speed(case: PriorCase) -> str:
     """A pose is recovered in less than 5 ms."""
     prior = case.fitted()
     latents = case.latents(prior)

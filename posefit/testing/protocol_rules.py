@@ -8,13 +8,13 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Start
 from posefit.settings import settings_of
-from posefit.testing.case import REFUSALS, Case, Evaluate, check_population, checklist, needs_settings
+from posefit.testing.case import REFUSALS, Evaluate, OptimiserCase, check_population, checklist, needs_settings
 from posefit.testing.results import SkippedError, expect, refusal
 from posefit.testing.toy import Toy, ball, shell, sphere
 
 
 @checklist
-def construction(case: Case) -> None:
+def construction(case: OptimiserCase) -> None:
     """A factory takes the space, the generator and keyword-only settings."""
     kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
     plain = [kind for kind in kinds if kind is not inspect.Parameter.KEYWORD_ONLY]
@@ -24,7 +24,7 @@ def construction(case: Case) -> None:
 
 
 @checklist
-def shape(case: Case) -> str:
+def shape(case: OptimiserCase) -> str:
     """The method ask returns an array (n, d)."""
     proposals = case.build(Toy(9)).ask()
     expect(isinstance(proposals, np.ndarray), f"ask must return an array, got {type(proposals).__name__}")
@@ -34,69 +34,69 @@ def shape(case: Case) -> str:
 
 
 @checklist
-def dtype(case: Case) -> None:
+def dtype(case: OptimiserCase) -> None:
     """The method ask returns float64."""
     for proposals, _ in case.steps(case.build(Toy(9)), Toy(9), sphere, 4):
         expect(proposals.dtype == np.float64, f"ask must return float64, got {proposals.dtype}")
 
 
 @checklist
-def box(case: Case) -> str:
+def box(case: OptimiserCase) -> str:
     """Every proposal lies in [-1, 1]^d."""
     return case.valid(Toy(9), lambda x: -np.abs(x).sum(axis=1), 12)
 
 
 @checklist
-def periodic(case: Case) -> str:
+def periodic(case: OptimiserCase) -> str:
     """Coordinates that wrap around stay in the box too."""
     return case.valid(Toy(6, wrapping=2), lambda x: 1.0 - np.abs(x[:, 0]), 12)
 
 
 @checklist
-def feasible(case: Case) -> str:
+def feasible(case: OptimiserCase) -> str:
     """Every proposal is feasible where a third of the box is."""
     return case.valid(Toy(4, ball), lambda x: -x.sum(axis=1), 12)
 
 
 @checklist
-def hardly_feasible(case: Case) -> str:
+def hardly_feasible(case: OptimiserCase) -> str:
     """Every proposal is feasible, and none is waited for forever, where a few in a thousand are."""
     return case.valid(Toy(3, shell), sphere)
 
 
 @checklist
-def nan_costs(case: Case) -> str:
+def nan_costs(case: OptimiserCase) -> str:
     """Costs that are nan are survived."""
     return case.valid(Toy(9, ball), lambda x: np.where(np.arange(len(x)) % 2, np.nan, sphere(x)))
 
 
 @checklist
-def only_nan_costs(case: Case) -> str:
+def only_nan_costs(case: OptimiserCase) -> str:
     """A population whose costs are all nan is survived."""
     return case.valid(Toy(9, ball), lambda x: np.full(len(x), np.nan))
 
 
 @checklist
-def infinite_costs(case: Case) -> str:
+def infinite_costs(case: OptimiserCase) -> str:
     """Costs of +inf are survived, one or all."""
     case.valid(Toy(9, ball), lambda x: np.full(len(x), np.inf))
     return case.valid(Toy(9, ball), lambda x: np.where(np.arange(len(x)) % 3, np.inf, sphere(x)))
 
 
 @checklist
-def equal_costs(case: Case) -> str:
+def equal_costs(case: OptimiserCase) -> str:
     """Costs that are all equal are survived."""
     return case.valid(Toy(9, ball), lambda x: np.zeros(len(x)))
 
 
 @checklist
-def huge_costs(case: Case) -> str:
+def huge_costs(case: OptimiserCase) -> str:
     """Costs as large as 1e300 are survived."""
     return case.valid(Toy(9, ball), lambda x: 1e300 * sphere(x))
 
 
 @checklist
-def budget(case: Case) -> str:
+def budget(case: OptimiserCase) -> str:
     """A search uses its budget, in whole populations."""
     wanted = 400
     used, optimiser = 0, case.build(Toy(9), evaluations=wanted)
@@ -108,7 +108,7 @@ def budget(case: Case) -> str:
 
 
 @checklist
-def order(case: Case) -> str:
+def order(case: OptimiserCase) -> str:
     """The cost of row i belongs to proposal i."""
     shuffled = np.random.default_rng(1)
 
@@ -133,7 +133,7 @@ def order(case: Case) -> str:
 
 
 @checklist
-def tell_without_ask(case: Case) -> str:
+def tell_without_ask(case: OptimiserCase) -> str:
     """A tell without an ask is refused or harmless."""
     space = Toy(9)
     said = []
@@ -149,7 +149,7 @@ def tell_without_ask(case: Case) -> str:
 
 
 @checklist
-def ask_twice(case: Case) -> str:
+def ask_twice(case: OptimiserCase) -> str:
     """A second ask before the tell is refused or harmless."""
     space = Toy(9)
     optimiser = case.build(space)
@@ -165,26 +165,26 @@ def ask_twice(case: Case) -> str:
 
 
 @checklist
-def one_dimension(case: Case) -> str:
+def one_dimension(case: OptimiserCase) -> str:
     """A space of one dimension is searched."""
     return case.valid(Toy(1), sphere)
 
 
 @checklist
-def many_dimensions(case: Case) -> str:
+def many_dimensions(case: OptimiserCase) -> str:
     """A space of 66 dimensions is searched."""
     return case.valid(Toy(66), sphere)
 
 
 @checklist
-def edge(case: Case) -> str:
+def edge(case: OptimiserCase) -> str:
     """A start on the edge of the box is survived."""
     start = Start(np.ones(5), np.full(5, 0.5), np.full(5, 0.3))
     return case.valid(Toy(5, start=start), sphere)
 
 
 @checklist
-def unknown_setting(case: Case) -> None:
+def unknown_setting(case: OptimiserCase) -> None:
     """A setting that does not exist is refused."""
     try:
         case.build(Toy(9), no_such_setting=1)
@@ -194,7 +194,7 @@ def unknown_setting(case: Case) -> None:
 
 
 @checklist
-def nonsense_settings(case: Case) -> str:
+def nonsense_settings(case: OptimiserCase) -> str:
     """Nonsense in a setting is refused or harmless."""
     needs_settings(case)
     refused: list[str] = []

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.testing.case import Case, checklist, same
+from posefit.testing.case import OptimiserCase, checklist, same
 from posefit.testing.randomness import left_alone, seeded
 from posefit.testing.results import BrokenError, SkippedError, expect
 from posefit.testing.toy import Toy, ball, sphere
@@ -21,20 +21,20 @@ SPACE = Toy(5, ball)
 
 
 @checklist
-def same_seed(case: Case) -> None:
+def same_seed(case: OptimiserCase) -> None:
     """The same seed gives the same proposals."""
     expect(same(case.trace(SPACE, sphere), case.trace(SPACE, sphere)), "one seed must give one trace, got two")
 
 
 @checklist
-def other_seed(case: Case) -> None:
+def other_seed(case: OptimiserCase) -> None:
     """Another seed gives other proposals."""
     other = case.trace(SPACE, sphere, seed=1)
     expect(not same(case.trace(SPACE, sphere), other), "two seeds must give two traces, got the same")
 
 
 @checklist
-def new_process(case: Case) -> None:
+def new_process(case: OptimiserCase) -> None:
     """The same seed gives the same proposals in a new process."""
     try:
         payload = pickle.dumps((sys.path, pickle.dumps(case)))
@@ -51,7 +51,7 @@ def new_process(case: Case) -> None:
 
 
 @checklist
-def global_randomness(case: Case) -> None:
+def global_randomness(case: OptimiserCase) -> None:
     """The global random generators are neither used nor changed."""
     traces = []
     for seed in (1, 2):
@@ -61,7 +61,7 @@ def global_randomness(case: Case) -> None:
 
 
 @checklist
-def inputs(case: Case) -> None:
+def inputs(case: OptimiserCase) -> None:
     """What tell gets stays as it was."""
     optimiser = case.build(SPACE)
     for _ in range(4):
@@ -76,18 +76,18 @@ def inputs(case: Case) -> None:
 
 
 @checklist
-def deep_copy(case: Case) -> None:
+def deep_copy(case: OptimiserCase) -> None:
     """A deep copy goes on as the original does, each on its own."""
     _continues(case, copy.deepcopy)
 
 
 @checklist
-def pickled(case: Case) -> None:
+def pickled(case: OptimiserCase) -> None:
     """What comes out of a pickle goes on as the original does."""
     _continues(case, lambda optimiser: pickle.loads(pickle.dumps(optimiser)))
 
 
-def _continues(case: Case, copied: Any) -> None:
+def _continues(case: OptimiserCase, copied: Any) -> None:
     for told in (0, 2):
         optimiser = case.build(SPACE)
         for _ in case.steps(optimiser, SPACE, sphere, told):
@@ -100,12 +100,12 @@ def _continues(case: Case, copied: Any) -> None:
         expect(same(first, _rest(case, twin)), f"a copy must go on as the original, got another trace after {told}")
 
 
-def _rest(case: Case, optimiser: Any) -> list[Array]:
+def _rest(case: OptimiserCase, optimiser: Any) -> list[Array]:
     return [proposals for proposals, _ in case.steps(optimiser, SPACE, sphere, 3)]
 
 
 @checklist
-def nothing_left(case: Case) -> None:
+def nothing_left(case: OptimiserCase) -> None:
     """No thread and no process outlives a search."""
     threads, children = set(threading.enumerate()), set(multiprocessing.active_children())
     for _ in range(3):
@@ -117,4 +117,4 @@ def nothing_left(case: Case) -> None:
     expect(not left, f"no process must be left, got {', '.join(left)}")
 
 
-trace_again = partial(Case.trace, space=SPACE, evaluate=sphere)
+trace_again = partial(OptimiserCase.trace, space=SPACE, evaluate=sphere)

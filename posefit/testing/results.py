@@ -57,6 +57,7 @@ class Check:
         return Result(self.name, "passed", detail or "")
 
     def __call__(self) -> None:
+        """Return nothing. Raises BrokenError where the rule is broken; skips the test where it cannot be tried."""
         result = self.run()
         if result.outcome == "skipped":
             import pytest
@@ -93,7 +94,7 @@ class Report:
         return f"{passed + failed} checks ran, {failed} failed, {skipped} skipped"
 
 
-def report(plugin: str, checks: Iterable[Check]) -> Report:
+def run_checks(plugin: str, checks: Iterable[Check]) -> Report:
     """Return the results of running all checks."""
     return Report(plugin, tuple(check.run() for check in checks))
 

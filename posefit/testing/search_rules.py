@@ -8,7 +8,7 @@ import numpy as np
 
 from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Filter, Optimiser
-from posefit.testing.case import Case, Evaluate, check_population, checklist
+from posefit.testing.case import Evaluate, OptimiserCase, check_population, checklist
 from posefit.testing.problem import pose_problem
 from posefit.testing.results import SkippedError, expect
 from posefit.testing.toy import Toy, sphere
@@ -19,7 +19,7 @@ SLOW = 0.05  # seconds a proposal: twenty thousand times what a pose costs
 
 
 @checklist
-def start(case: Case) -> str:
+def start(case: OptimiserCase) -> str:
     """The first population comes from the start that the space gives."""
     if case.next_frame == "forget":
         raise SkippedError("it is registered to forget")
@@ -32,7 +32,7 @@ def start(case: Case) -> str:
 
 
 @checklist
-def next_frame(case: Case) -> str:
+def next_frame(case: OptimiserCase) -> str:
     """A filter carries its particles into the next frame; another optimiser has no such method."""
     if case.next_frame != "carry":
         raise SkippedError(f"it is registered to {case.next_frame}, not to carry")
@@ -61,20 +61,20 @@ def _frame(optimiser: Optimiser) -> Iterator[None]:
 
 
 @checklist
-def sphere_problem(case: Case) -> str:
+def sphere_problem(case: OptimiserCase) -> str:
     """A sphere is solved better than by chance."""
     return _beats_chance(case, Toy(6), sphere)
 
 
 @checklist
-def real_problem(case: Case) -> str:
+def real_problem(case: OptimiserCase) -> str:
     """A real pose problem is solved better than by chance."""
     problem = pose_problem()
     return _beats_chance(case, problem.space, problem.evaluate)
 
 
-def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
-    if getattr(case.factory, "__module__", "") == "posefit_swarm.random":
+def _beats_chance(case: OptimiserCase, space: Space, evaluate: Evaluate) -> str:
+    if case.baseline:
         raise SkippedError("it is the baseline itself")
     found = float(np.median([case.best(space, evaluate, seed, BUDGET) for seed in SEEDS]))
     chance = float(np.median([_by_chance(space, evaluate, seed) for seed in SEEDS]))
@@ -88,7 +88,7 @@ def _by_chance(space: Space, evaluate: Evaluate, seed: int) -> float:
 
 
 @checklist
-def speed(case: Case) -> str:
+def speed(case: OptimiserCase) -> str:
     """A proposal costs less than 50 ms to make."""
     space = Toy(9)
     spent, count = np.inf, 0

@@ -42,7 +42,7 @@ def scene() -> tuple[Task, Motion, Sequence[Observation]]:
 
 
 @dataclass(frozen=True)
-class Case:
+class TrackerCase:
     """A factory with its settings."""
 
     factory: Callable[..., Any]
@@ -59,7 +59,7 @@ class Case:
 
 
 @checklist
-def construction(case: Case) -> None:
+def construction(case: TrackerCase) -> None:
     """A factory takes the task and keyword-only settings."""
     kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
     plain = [kind for kind in kinds if kind is not inspect.Parameter.KEYWORD_ONLY]
@@ -68,7 +68,7 @@ def construction(case: Case) -> None:
 
 
 @checklist
-def one_frame_each(case: Case) -> str:
+def one_frame_each(case: TrackerCase) -> str:
     """Every observation gives one frame."""
     count = len(case.frames())
     expect(count == FRAMES, f"{FRAMES} observations must give {FRAMES} frames, got {count}")
@@ -76,7 +76,7 @@ def one_frame_each(case: Case) -> str:
 
 
 @checklist
-def as_they_come(case: Case) -> None:
+def as_they_come(case: TrackerCase) -> None:
     """A frame is given before the observation after the next is taken."""
     taken = 0
 
@@ -91,14 +91,14 @@ def as_they_come(case: Case) -> None:
 
 
 @checklist
-def no_observation(case: Case) -> None:
+def no_observation(case: TrackerCase) -> None:
     """No observation gives no frame."""
     found = list(case.build().track([], np.random.default_rng(0)))
     expect(not found, f"no observation must give no frame, got {len(found)}")
 
 
 @checklist
-def whole_frames(case: Case) -> None:
+def whole_frames(case: TrackerCase) -> None:
     """A frame has a pose (66,), a translation (3,) and areas (1, 3), all finite."""
     for frame in case.frames():
         for name, shape in (("pose", (66,)), ("translation", (3,)), ("areas", (1, 3))):
@@ -108,7 +108,7 @@ def whole_frames(case: Case) -> None:
 
 
 @checklist
-def honest_cost(case: Case) -> None:
+def honest_cost(case: TrackerCase) -> None:
     """The cost and the areas of a frame are those of its pose."""
     task, _, seen = scene()
     for frame, observation in zip(case.frames(), seen, strict=False):
@@ -124,7 +124,7 @@ def honest_cost(case: Case) -> None:
 
 
 @checklist
-def budget(case: Case) -> str:
+def budget(case: TrackerCase) -> str:
     """No frame uses more evaluations than the task allows."""
     used = [frame.evaluations for frame in case.frames()]
     expect(max(used) <= EVALUATIONS, f"a frame must use at most {EVALUATIONS} evaluations, got {max(used)}")
@@ -132,7 +132,7 @@ def budget(case: Case) -> str:
 
 
 @checklist
-def seconds(case: Case) -> None:
+def seconds(case: TrackerCase) -> None:
     """A frame says how long it took."""
     for frame in case.frames():
         expect(np.isfinite(frame.seconds) and frame.seconds >= 0.0, f"seconds must be 0 or more, got {frame.seconds}")
@@ -143,13 +143,13 @@ def _poses(frames: list[Frame]) -> Any:
 
 
 @checklist
-def same_seed(case: Case) -> None:
+def same_seed(case: TrackerCase) -> None:
     """The same seed gives the same poses."""
     expect(np.array_equal(_poses(case.frames()), _poses(case.frames())), "one seed must give one track, got two")
 
 
 @checklist
-def used_twice(case: Case) -> None:
+def used_twice(case: TrackerCase) -> None:
     """A tracker that has tracked before does the same again."""
     tracker, seen = case.build(), scene()[2]
     first, second = (_poses(list(tracker.track(seen, np.random.default_rng(0)))) for _ in range(2))
@@ -157,14 +157,14 @@ def used_twice(case: Case) -> None:
 
 
 @checklist
-def global_randomness(case: Case) -> None:
+def global_randomness(case: TrackerCase) -> None:
     """The global random generators are left alone."""
     with left_alone():
         case.frames()
 
 
 @checklist
-def inputs(case: Case) -> None:
+def inputs(case: TrackerCase) -> None:
     """Observations and task stay as they were."""
     task, _, seen = scene()
     before = (
@@ -178,7 +178,7 @@ def inputs(case: Case) -> None:
 
 
 @checklist
-def follows(case: Case) -> str:
+def follows(case: TrackerCase) -> str:
     """The track is nearer to the truth than a body lying on the floor: its MPJPE is below 400 mm."""
     task, motion, _ = scene()
     frames = case.frames()
@@ -194,7 +194,7 @@ def follows(case: Case) -> str:
 
 
 @checklist
-def unknown_setting(case: Case) -> None:
+def unknown_setting(case: TrackerCase) -> None:
     """A setting that does not exist is refused."""
     try:
         case.factory(scene()[0], **case.settings, no_such_setting=1)

@@ -38,10 +38,10 @@ def nearest(scene: Scene, training: Array, k: int, observation: Observation, bet
 
 
 class Evaluation:
-    """Collects a row a frame. Baselines have the true root and translation, which a tracker has not:
+    """Collects a row a frame. Baselines have the true root and translation, which a tracker has not.
 
-    `mean_pose`, the mean of the training poses; `persistence`, the true pose of the first frame, held; `nearest`, the
-    training pose of least cost in each frame; `prior_floor`, the truth's own projection into the prior.
+    They are `mean_pose`, the mean of the training poses; `persistence`, the true pose of the first frame, held;
+    `nearest`, the training pose of least cost in each frame; `prior_floor`, the truth's own projection into the prior.
     """
 
     def __init__(self, scene: Scene, prior: Prior | None, training: Array, beta: float) -> None:

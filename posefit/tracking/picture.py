@@ -12,7 +12,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import BONES, PARENTS
+from posefit.geometry.skeleton import PARENTS, SIDES
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.kernels import NEAR
@@ -129,9 +129,7 @@ def draw_body(image: Image, body: Body, camera: Camera, pose: Array, translation
         if depths[ends].min() <= NEAR:
             continue
         shade = 1.0 - 0.25 * float(np.clip(depths[ends].mean() - depths[0], -0.4, 0.4)) / 0.4
-        colour = (
-            MIDDLE if BONES[bone] in ("lowerback", "lowerneck") else {"l": LEFT, "r": RIGHT}.get(BONES[bone][0], MIDDLE)
-        )
+        colour = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}[SIDES[bone + 1]]
         _cone(image, pixels[ends], body.radii[bone] * scale[ends], tuple(min(255.0, shade * c) for c in colour))
 
 

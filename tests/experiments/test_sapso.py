@@ -13,19 +13,13 @@ from posefit.cli import main
 from posefit.geometry.rotation import wrapped
 from posefit.motion import library
 from posefit.tracking.front import track
-from posefit_experiments.sapso.experiment import (
-    BASELINES,
-    COMPARED,
-    METHODS,
-    Cell,
-    Scale,
-    baselines,
-    follow,
-    scene_of,
-    swarm,
-)
-from posefit_experiments.sapso.motions import CLIPS, Case, cases, turned
+from posefit.tracking.measures import BASELINES
+from posefit_experiments.sapso.design import COMPARED, METHODS, Scale
+from posefit_experiments.sapso.experiment import baseline_poses, follow_paper
+from posefit_experiments.sapso.first_frame import watched_swarm
+from posefit_experiments.sapso.motions import CLIPS, PaperMotion, paper_motions, paper_scene, turned
 from posefit_experiments.sapso.numbers import TABLE_1, TABLE_2
+from posefit_experiments.sapso.results import TrackKey
 
 TINY = Scale(frames=4, views=(45.0,), iterations=3, swarms=(5, 10))
 FIGURES = {
@@ -52,15 +46,15 @@ def fails(*words: object) -> str:
 
 
 @pytest.fixture(scope="module")
-def walk() -> Case:
-    return cases(None, 3)["walk"]
+def walk() -> PaperMotion:
+    return paper_motions(None, 3)["walk"]
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Result]]:
     out = tmp_path_factory.mktemp("paper") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("posefit_experiments.sapso.experiment.QUICK", TINY)
+        patch.setattr("posefit_experiments.sapso.design.QUICK", TINY)
         yield out, run("--quick", "--seeds", 2, "--out", out)
 
 
@@ -85,7 +79,7 @@ def test_a_folder_without_one_clip_names_it(tmp_path: Path) -> None:
     (tmp_path / "16").mkdir()
     (tmp_path / "16" / "16_15.amc").write_text("")
     with pytest.raises(ValueError, match=r"such as 16/16_17\.amc"):
-        cases(tmp_path, 10)
+        paper_motions(tmp_path, 10)
 
 
 def test_figures_need_matplotlib_and_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,16 +89,17 @@ def test_figures_need_matplotlib_and_say_so(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_a_run_that_is_interrupted_leaves_nothing(tmp_path: Path) -> None:
-    from posefit_experiments.sapso.report import report
+    from posefit_experiments.sapso.report import paper_report
 
     def interrupted(found: Iterator[Any], count: int) -> Iterator[Any]:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        report(None, 1, TINY, tmp_path / "out", interrupted)
+        paper_report(None, 1, TINY, tmp_path / "out", 1, interrupted)
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_folder_holds_report_and_figures(written: tuple[Path, Result], told: dict[str, Any]) -> None:
     out, result = written
     assert result.exit_code == 0, result.stderr
@@ -115,6 +110,7 @@ def test_the_folder_holds_report_and_figures(written: tuple[Path, Result], told:
         assert (out / name).read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_table_2_has_the_papers_numbers_ours_and_every_baseline(told: dict[str, Any]) -> None:
     # table 2, columns walk and run
     walk, run = told["table_2"]["walk"], told["table_2"]["run"]
@@ -129,6 +125,7 @@ def test_table_2_has_the_papers_numbers_ours_and_every_baseline(told: dict[str, 
     assert walk["particle@full"]["evaluations"] == 160
 
 
+@pytest.mark.slow
 def test_table_1_has_the_papers_mean_error(told: dict[str, Any]) -> None:
     # by hand, walk: 1.618 + 2.059 + 5.880 + 0.505 + 3.715 + 0.189 + 0.878 + 2.774 + 2.569 + 0.800 + 3.141 + 2.936
     rows = told["table_1"]["walk"]
@@ -140,6 +137,7 @@ def test_table_1_has_the_papers_mean_error(told: dict[str, Any]) -> None:
         assert rows[name]["error"] == pytest.approx(np.minimum(away, 360.0 - away).mean())
 
 
+@pytest.mark.slow
 def test_it_says_what_was_shortened(told: dict[str, Any], written: tuple[Path, Result]) -> None:
     assert "4 of the walk" in told["shortened"][1]
     assert "the paper has 100 of each" in told["shortened"][1]
@@ -147,6 +145,7 @@ def test_it_says_what_was_shortened(told: dict[str, Any], written: tuple[Path, R
         assert line in written[1].stdout
 
 
+@pytest.mark.slow
 def test_every_claim_of_the_paper_has_a_verdict_on_one_line(told: dict[str, Any], written: tuple[Path, Result]) -> None:
     lines = written[1].stdout.splitlines()
     for one in told["claims"]:
@@ -158,23 +157,24 @@ def test_every_claim_of_the_paper_has_a_verdict_on_one_line(told: dict[str, Any]
     assert all("too few to confirm anything" in one["evidence"] for one in tested)
 
 
+@pytest.mark.slow
 def test_json_is_one_object_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("posefit_experiments.sapso.experiment.QUICK", TINY)
+    monkeypatch.setattr("posefit_experiments.sapso.design.QUICK", TINY)
     result = run("--quick", "--seeds", 1, "--json")
     assert result.exit_code == 0, result.stderr
     assert set(json.loads(result.stdout)) >= {"table_1", "table_2", "claims", "shortened", "seeds", "version"}
 
 
 def test_no_motion_is_learned_from_that_is_followed() -> None:
-    for case in cases(None, 2).values():
-        assert case.test.name not in [one.name for one in case.training]
+    for motion in paper_motions(None, 2).values():
+        assert motion.test.name not in [one.name for one in motion.training]
     for test, training in CLIPS.values():
         assert test not in training
 
 
 def test_built_in_training_is_as_long_as_the_papers() -> None:
     # 386 of a walk in three styles, 129 each; 198 of a run in two
-    found = cases(None, 2)
+    found = paper_motions(None, 2)
     assert [len(found[name].angles) for name in ("walk", "turn", "run")] == [387, 387, 198]
 
 
@@ -189,25 +189,25 @@ def test_a_turned_motion_keeps_its_steps_and_ends_to_the_left() -> None:
     np.testing.assert_array_equal(bent.poses[:, 1:], straight.poses[:, 1:])
 
 
-def test_baselines_are_what_a_track_reports(walk: Case) -> None:
-    found = track(scene_of(walk, 45.0), train=walk.training, particles=5, iterations=1).summary["baselines_degrees"]
-    for name, poses in baselines(walk, 45.0).items():
+def test_baselines_are_what_a_track_reports(walk: PaperMotion) -> None:
+    found = track(paper_scene(walk, 45.0), train=walk.training, particles=5, iterations=1).summary["baselines_degrees"]
+    for name, poses in baseline_poses(walk, 45.0).items():
         away = np.degrees(np.abs(wrapped(poses - walk.test.poses)))
         assert away.mean() == pytest.approx(found[name])
 
 
-def test_a_run_is_a_track_of_the_same_seed(walk: Case) -> None:
-    found = follow(walk, Cell("walk", "pso@pca", 45.0, 3), Scale(iterations=4))
-    again = track(scene_of(walk, 45.0), train=walk.training, optimiser="pso", prior="pca", iterations=4, seed=3)
+def test_a_run_is_a_track_of_the_same_seed(walk: PaperMotion) -> None:
+    found = follow_paper(walk, TrackKey("walk", "pso@pca", 45.0, 3), Scale(iterations=4))
+    again = track(paper_scene(walk, 45.0), train=walk.training, optimiser="pso", prior="pca", iterations=4, seed=3)
     np.testing.assert_array_equal(found.poses, again.motion.poses)
     assert found.evaluations == 40 * 5
 
 
-def test_the_swarm_of_figure_5_is_that_of_a_search(walk: Case) -> None:
-    seen = swarm(walk, Scale(iterations=6), 30, seed=1)
+def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
+    seen = watched_swarm(walk, Scale(iterations=6), 30, seed=1)
     assert [one.shape for one in seen.poses] == [(30, 66)] * 7
     again = track(
-        scene_of(walk, 45.0, (0, 1)), train=walk.training, particles=30, iterations=6, optimiser="sapso", seed=1
+        paper_scene(walk, 45.0, (0, 1)), train=walk.training, particles=30, iterations=6, optimiser="sapso", seed=1
     )
     np.testing.assert_array_equal(seen.history, again.found[0].history)
     # the best pose of all iterations is what the search found
@@ -222,7 +222,7 @@ def test_the_papers_tables_are_whole() -> None:
 
 
 def test_clips_are_cut_to_the_frames_that_are_asked_for(cmu: Path) -> None:
-    found = cases(cmu, 100)
+    found = paper_motions(cmu, 100)
     # 16_35 has 162 frames at 120 Hz, 81 at 60 Hz, the first of which is left out
     assert [len(found[name].test) for name in ("walk", "turn", "run")] == [100, 100, 80]
-    assert all(case.test.fps == 60.0 for case in found.values())
+    assert all(one.test.fps == 60.0 for one in found.values())

@@ -9,6 +9,7 @@ import pytest
 from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
 from posefit.arrays import Array
 from posefit.fitting.alignment import align
+from posefit.fitting.optimiser import BudgetError, populations
 from posefit.motion import library
 from posefit.silhouette.cost import project
 from posefit_priors.pca import PCA
@@ -126,6 +127,17 @@ def test_the_budget_is_spent_in_whole_populations() -> None:
     assert best.spent.tolist() == [7, 14, 21, 28, 35]
 
 
+def test_the_loop_tells_the_costs_of_a_population_before_it_asks_for_the_next() -> None:
+    walker = Walker(2)
+    seen = []
+    for proposals, costs in populations(walker, lambda x: 10.0 * x[:, 0], 6):
+        assert len(walker.told) == len(seen)
+        seen.append((proposals, costs))
+    assert [costs.tolist() for _, costs in seen] == [[0.0, 0.0], [10.0, 10.0], [20.0, 20.0]]
+    assert all(told[0] is ours[0] and told[1] is ours[1] for told, ours in zip(walker.told, seen, strict=True))
+    assert len(walker.told) == 3
+
+
 def test_nan_is_never_the_best_cost() -> None:
     best = minimise(lambda x: np.where(x[:, 0] == 1.0, 5.0, np.nan), Walker(3), 9)
     assert best.cost == 5.0
@@ -134,7 +146,7 @@ def test_nan_is_never_the_best_cost() -> None:
 
 
 def test_a_budget_below_one_population_is_refused() -> None:
-    with pytest.raises(ValueError, match="evaluations must hold one population of 7, got 6"):
+    with pytest.raises(BudgetError, match="evaluations must hold one population of 7, got 6"):
         minimise(lambda x: x[:, 0], Walker(7), 6)
 
 

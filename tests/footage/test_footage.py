@@ -351,21 +351,6 @@ def test_a_recording_for_the_viewer_holds_body_and_masks(tmp_path: Path) -> None
         posefit.track("walk", frames=(0, 3), evaluations=200, rerun=path)
 
 
-def test_a_real_walk_is_followed_from_a_camera_file(tmp_path: Path) -> None:
-    video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
-    if not video.is_file():
-        pytest.skip(f"no video at {video}")
-    from posefit_experiments.real import measure
-
-    found = measure(video, (0, 420, 1520, 532), (55, 166), 0)
-    assert found["usable"] >= 105
-    assert found["iou_masks"] >= 0.80
-    assert found["lowest_iou_masks"] > 0.6  # nowhere lost
-    assert found["travel_seen"] == found["travel_fitted"] == "left"
-    assert found["facing_its_way"] > 0.8
-    assert found["steps_a_second_fitted"] == pytest.approx(found["steps_a_second_seen"], rel=0.1)
-
-
 def test_frames_are_found_as_masks_too(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
     extract(filmed[0], tmp_path / "seen", Extraction(), frames=(EMPTY + 6, EMPTY + 14))
     from_masks = run("track", tmp_path / "seen" / "masks.npz", *BRIEF[:-2], "--json")

@@ -17,7 +17,19 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
     wrapped,
 )
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton, angle_index
+from posefit.geometry.skeleton import (
+    ANGLES,
+    BONES,
+    JOINTS,
+    MIRROR,
+    PARENTS,
+    SIDES,
+    Skeleton,
+    angle_index,
+    both,
+    kind,
+    side,
+)
 from posefit.motion.library import average_skeleton
 
 angles = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
@@ -112,6 +124,14 @@ def test_the_mirror_pairs_left_with_right() -> None:
         "thorax",
     ]
     assert [MIRROR[j] for j in MIRROR] == list(range(27))
+
+
+def test_a_bone_is_left_right_or_in_the_middle_and_of_a_kind() -> None:
+    named = {"lfemur": ("left", "femur"), "rhand": ("right", "hand"), "head": ("middle", "head")}
+    named |= {"lowerback": ("middle", "lowerback"), "lowerneck": ("middle", "lowerneck"), "root": ("middle", "root")}
+    assert {name: (side(name), kind(name)) for name in named} == named
+    assert [SIDES.count(one) for one in ("left", "right", "middle")] == [10, 10, 7]
+    assert all(JOINTS[j] in (kind(name), *both(kind(name))) for j, name in enumerate(JOINTS))
 
 
 def test_the_average_skeleton_is_the_same_left_and_right() -> None:

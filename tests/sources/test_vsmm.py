@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
-from posefit_imm import IMM, Belief, Manifold, Measurement, positive, start, update
+from posefit_imm import IMM, Belief, Manifold, Measurement, positive_definite, start, update
 
 STEP, SIGMA = 1.0, 20.0  # seconds between measurements, metres of noise in each
 TRANSITION = np.array([[0.95, 0.05], [0.10, 0.90]])
@@ -209,12 +210,32 @@ def test_quaternions_are_mixed_on_their_manifold() -> None:  # Reading V4
     assert np.degrees(np.sqrt(spread[1, 1])) == pytest.approx(10.0)
 
 
+def test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance() -> None:  # Reading V4
+    def plus(state: Array, error: Array) -> Array:
+        return np.asarray((Rotation.from_quat(state) * Rotation.from_rotvec(error)).as_quat())
+
+    def minus(first: Array, second: Array) -> Array:
+        return np.asarray((Rotation.from_quat(second).inv() * Rotation.from_quat(first)).as_rotvec())
+
+    # quarter turns about x, y and z, alike in every way: the mean turns about (1, 1, 1), by an angle t at which
+    # nothing is left along (1, 1, 1). One step from the first of them comes near it, but not there.
+    turns = Rotation.from_rotvec(0.5 * np.pi * np.eye(3))
+    mean = Manifold(plus, minus).mean(turns.as_quat(), np.full(3, 1.0 / 3.0))
+    diagonal = np.full(3, 1.0 / np.sqrt(3.0))
+
+    def left(t: float) -> float:
+        return float((Rotation.from_rotvec(t * diagonal).inv() * turns).as_rotvec().sum())
+
+    t = brentq(left, 0.1, 2.0, xtol=1e-14)
+    np.testing.assert_allclose(Rotation.from_quat(mean).as_rotvec(), t * diagonal, atol=1e-9)
+
+
 def test_a_covariance_that_is_none_is_repaired_and_counted() -> None:
     broken = np.diag([1.0, -0.5])
-    mended, repaired = positive(broken)
+    mended, repaired = positive_definite(broken)
     assert repaired == 1
     assert np.linalg.eigvalsh(mended).min() > 0.0
-    np.testing.assert_allclose(positive(np.diag([1.0, 2.0]))[0], np.diag([1.0, 2.0]))
+    np.testing.assert_allclose(positive_definite(np.diag([1.0, 2.0]))[0], np.diag([1.0, 2.0]))
     imm = IMM(MODELS, TRANSITION)
     belief = start(np.zeros(4), np.diag([1.0, 1.0, -1e-3, 1.0]), 2)
     after = imm.cycle(belief, measuring(np.zeros(2)))

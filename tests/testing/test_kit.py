@@ -7,7 +7,15 @@ import pytest
 
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
-from posefit.testing import check_optimiser, check_prior, check_tracker, optimiser_checks, parametrize, report, results
+from posefit.testing import (
+    check_optimiser,
+    check_prior,
+    check_tracker,
+    optimiser_checks,
+    parametrize,
+    results,
+    run_checks,
+)
 from posefit_priors.pca import PCA
 from posefit_swarm.sapso import SAPSO
 from tests.testing import planted
@@ -16,7 +24,7 @@ SHIPPED = ("sapso", "pso", "random", "particle", "annealed", "cma", "scipy", "sc
 ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna")
 
 
-@pytest.mark.parametrize("name", SHIPPED + ADAPTERS)
+@pytest.mark.parametrize("name", [*SHIPPED, *(pytest.param(name, marks=pytest.mark.slow) for name in ADAPTERS)])
 def test_it_passes_every_shipped_optimiser(name: str) -> None:
     offer = registry().offer("optimiser", name)
     result = check_optimiser(offer.factory, next_frame=offer.next_frame)
@@ -27,7 +35,12 @@ def test_it_passes_every_shipped_optimiser(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["pca", "loose", "full", "union", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA"]
+    "name",
+    [
+        "pca",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("loose", "full", "union", "sklearn")),
+        *(pytest.param(f"sklearn:{name}", marks=pytest.mark.slow) for name in ("FactorAnalysis", "FastICA")),
+    ],
 )
 def test_it_passes_every_shipped_prior(name: str) -> None:
     result = check_prior(registry().offer("prior", name).factory)
@@ -40,10 +53,39 @@ def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
     return SynthesisTracker(task, PCA().fit(task.angles), make, prediction=Prediction(floor=floor))
 
 
+@pytest.mark.slow
 def test_it_passes_the_papers_tracker() -> None:
     result = check_tracker(synthesis)
     assert result, str(result)
     assert len(result.of("passed")) >= 13
+
+
+class Chance:
+    """Draws uniformly."""
+
+    def __init__(self, space: Any, rng: Any, *, particles: int = 40) -> None:
+        self.space, self.rng, self.particles = space, rng, particles
+
+    def ask(self) -> Any:
+        return self.space.draw(self.rng, self.particles)
+
+    def tell(self, proposals: Any, costs: Any) -> None: ...
+
+
+class Baseline(Chance):
+    baseline = True
+
+
+def test_chance_does_not_beat_chance_and_need_not_where_it_says_that_it_is_the_baseline() -> None:
+    names = "sphere_problem", "real_problem"
+
+    def outcomes(factory: Any) -> list[tuple[str, str]]:
+        found = [check.run() for check in optimiser_checks(factory, next_frame="forget") if check.name in names]
+        return [(one.outcome, one.detail) for one in found]
+
+    assert [outcome for outcome, _ in outcomes(Chance)] == ["failed", "failed"]
+    for factory in (Baseline, partial(Baseline, particles=20), registry().optimiser("random")):
+        assert outcomes(factory) == [("skipped", "it is the baseline itself")] * 2
 
 
 @pytest.mark.parametrize("name", ["Sound"])
@@ -68,6 +110,7 @@ def test_it_finds_a_filter_that_forgets() -> None:
 
 
 @pytest.mark.parametrize(("bug", "checks"), planted.PRIORS.items(), ids=lambda one: getattr(one, "__name__", ""))
+@pytest.mark.slow
 def test_it_finds_each_bug_planted_in_a_prior(bug: Any, checks: tuple[str, ...]) -> None:
     assert set(checks) <= {one.name for one in check_prior(bug).of("failed")}
 
@@ -88,7 +131,7 @@ def test_a_skipped_check_is_visible() -> None:
 
 def test_a_report_is_false_where_a_check_failed() -> None:
     assert not check_optimiser(planted.AsksList)
-    assert report("nothing", [])
+    assert run_checks("nothing", [])
 
 
 @parametrize(optimiser_checks(planted.Sound))

@@ -8,9 +8,12 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.statistics.ranks import LEVEL, holm, wilcoxon
-from posefit_experiments.sapso.experiment import BASELINES, METHODS, Results, compact
+from posefit.tracking.measures import BASELINES
+from posefit_experiments.sapso.design import METHODS
+from posefit_experiments.sapso.first_frame import compact_space
 from posefit_experiments.sapso.motions import LABELS
 from posefit_experiments.sapso.numbers import CONVERGED, SMALL_DEGREES, TABLE_2, VARIANCE
+from posefit_experiments.sapso.results import PaperResults
 
 FALLEN = 0.95  # share of the fall of the cost at which a search counts as converged; the paper gives no measure
 SWAPPED = 0.01  # share of frames with left and right swapped that still counts as none
@@ -19,7 +22,7 @@ Verdict = Literal["confirmed", "not confirmed", "not contradicted", "the opposit
 
 
 @dataclass(frozen=True)
-class Claim:
+class PaperClaim:
     """A sentence, and what speaks for it or against it."""
 
     text: str
@@ -36,7 +39,7 @@ class _Pair:
     errors: Array  # (2, views, seeds), of the one that is claimed to be lower, and of the other
 
 
-def claims(results: Results) -> list[Claim]:
+def paper_claims(results: PaperResults) -> list[PaperClaim]:
     """Return every claim with its evidence: the paper's first, those that a paired test can judge before the others."""
     pairs = [pair for motion in TABLE_2 for pair in _paired(results, motion)]
     return [
@@ -49,11 +52,11 @@ def claims(results: Results) -> list[Claim]:
     ]
 
 
-def _judged(pairs: Sequence[_Pair]) -> list[Claim]:
+def _judged(pairs: Sequence[_Pair]) -> list[PaperClaim]:
     """Return the claims of pairs that are adjusted for each other."""
     tests = [wilcoxon(pair.errors)[0] for pair in pairs]
     return [
-        Claim(
+        PaperClaim(
             pair.text,
             pair.source,
             _judgement(test.difference, p, pair.errors[0].size, len(pairs)),
@@ -85,7 +88,7 @@ def _told(good: bool) -> Verdict:
     return "confirmed" if good else "not confirmed"
 
 
-def _paired(results: Results, motion: str) -> list[_Pair]:
+def _paired(results: PaperResults, motion: str) -> list[_Pair]:
     where = f"on the {LABELS[motion]}"
 
     def error(lower: str, other: str, source: str) -> _Pair:
@@ -109,14 +112,14 @@ def _label(name: str) -> str:
     return METHODS[name].label if name in METHODS else f"the {BASELINES[name]}"
 
 
-def _compactness(results: Results) -> list[Claim]:
-    shares = {motion: float(compact(results.cases[motion]).explained.sum()) for motion in TABLE_2}
+def _compactness(results: PaperResults) -> list[PaperClaim]:
+    shares = {motion: float(compact_space(results.motions[motion]).explained.sum()) for motion in TABLE_2}
     told = ", ".join(f"{100 * share:.1f} % of the {LABELS[motion]}" for motion, share in shares.items())
     sentence = f"six components keep {100 * VARIANCE:.0f} % of the variance"
-    return [Claim(sentence, "section 2.1", _told(min(shares.values()) >= VARIANCE), told)]
+    return [PaperClaim(sentence, "section 2.1", _told(min(shares.values()) >= VARIANCE), told)]
 
 
-def _convergence(results: Results) -> list[Claim]:
+def _convergence(results: PaperResults) -> list[PaperClaim]:
     histories = np.array(list(results.histories.values()))  # (runs, swarms, iterations + 1)
     at = min(CONVERGED, histories.shape[2] - 1)
     fall = histories[:, :, 0] - histories[:, :, -1]
@@ -127,13 +130,13 @@ def _convergence(results: Results) -> list[Claim]:
     test = wilcoxon(ends)[0]
     middle = np.median(ends[:, 0], axis=1)
     return [
-        Claim(
+        PaperClaim(
             f"the cost has converged after {at} iterations, {100 * FALLEN:.0f} % of its fall done",
             "figure 6",
             _told(bool((done >= FALLEN).all())),
             f"median share of the fall done: {told}",
         ),
-        Claim(
+        PaperClaim(
             "the number of particles matters little",
             "figure 6",
             "not contradicted" if test.p_value >= LEVEL else "not confirmed",
@@ -143,13 +146,13 @@ def _convergence(results: Results) -> list[Claim]:
     ]
 
 
-def _small(results: Results) -> list[Claim]:
+def _small(results: PaperResults) -> list[PaperClaim]:
     found = []
-    for motion, case in results.cases.items():
-        free = case.test.skeleton.free
+    for motion, one in results.motions.items():
+        free = one.test.skeleton.free
         ours, mean = (results.angle_errors(motion, name)[free] < SMALL_DEGREES for name in ("sapso@pca", "mean_pose"))
         found.append(
-            Claim(
+            PaperClaim(
                 f"most dimensions err by less than {SMALL_DEGREES:.0f} degrees on the {LABELS[motion]}",
                 "figure 7",
                 _told(ours.mean() > 0.5),
@@ -159,8 +162,10 @@ def _small(results: Results) -> list[Claim]:
     return found
 
 
-def _sides(results: Results) -> list[Claim]:
-    shares = {motion: np.mean([run.swapped for run in results.of(motion, "sapso@pca")]) for motion in results.cases}
+def _sides(results: PaperResults) -> list[PaperClaim]:
+    shares = {motion: np.mean([run.swapped for run in results.of(motion, "sapso@pca")]) for motion in results.motions}
     told = ", ".join(f"{100 * share:.0f} % of the frames of the {LABELS[motion]}" for motion, share in shares.items())
     good = bool(max(shares.values()) <= SWAPPED)
-    return [Claim("left and right are never taken for each other", "section 5.3", _told(good), f"swapped in {told}")]
+    return [
+        PaperClaim("left and right are never taken for each other", "section 5.3", _told(good), f"swapped in {told}")
+    ]

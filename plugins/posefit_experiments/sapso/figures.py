@@ -9,9 +9,11 @@ from matplotlib.figure import Figure
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
-from posefit_experiments.sapso.experiment import METHODS, PAPER, Results, Swarm, compact, swarm
+from posefit_experiments.sapso.design import METHODS, PAPER
+from posefit_experiments.sapso.first_frame import WatchedSwarm, compact_space, watched_swarm
 from posefit_experiments.sapso.motions import LABELS
 from posefit_experiments.sapso.numbers import CONVERGED, SHOWN_ITERATIONS, SHOWN_PARTICLES, SMALL_DEGREES
+from posefit_experiments.sapso.results import PaperResults
 
 # Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers too
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -19,28 +21,28 @@ MOTIONS = ("walk", "run")
 _DIM = "0.55"
 
 
-def draw(results: Results, folder: Path) -> list[str]:
+def paper_figures(results: PaperResults, folder: Path) -> list[str]:
     """Write the figures to a folder that is there, and return the names of the files."""
     figures = {
-        "figure-3-latents.png": latents(results),
-        "figure-4-clusters.png": clusters(results),
-        "figure-5-swarm.png": particles(swarm(results.cases["walk"], results.scale, SHOWN_PARTICLES)),
-        "figure-6-convergence.png": convergence(results),
-        "figure-7-dimensions.png": dimensions(results),
-        "figure-9-frames.png": frames(results),
+        "figure-3-latents.png": latent_figure(results),
+        "figure-4-clusters.png": cluster_figure(results),
+        "figure-5-swarm.png": swarm_figure(watched_swarm(results.motions["walk"], results.scale, SHOWN_PARTICLES)),
+        "figure-6-convergence.png": lowest_cost_figure(results),
+        "figure-7-dimensions.png": dimension_figure(results),
+        "figure-9-frames.png": frame_figure(results),
     }
     for name, figure in figures.items():
         figure.savefig(folder / name, dpi=130)
     return list(figures)
 
 
-def latents(results: Results) -> Figure:
+def latent_figure(results: PaperResults) -> Figure:
     """Return the first three latents of the training poses, a colour a clip."""
     figure = Figure(figsize=(10.0, 4.8), layout="constrained")
     for k, motion in enumerate(MOTIONS):
-        case = results.cases[motion]
-        prior, axes = compact(case), _space(figure, k)
-        for clip, colour in zip(case.training, COLOURS, strict=False):
+        followed = results.motions[motion]
+        prior, axes = compact_space(followed), _space(figure, k)
+        for clip, colour in zip(followed.training, COLOURS, strict=False):
             points = prior.transform(clip.poses[:, 3:])
             axes.plot(*points[:, :3].T, ".-", color=colour, markersize=3, linewidth=0.4, label=clip.name)
         kept = 100.0 * prior.explained
@@ -51,13 +53,13 @@ def latents(results: Results) -> Figure:
     return figure
 
 
-def clusters(results: Results) -> Figure:
+def cluster_figure(results: PaperResults) -> Figure:
     """Return the training poses by their nearest centre of K-means, with the centres."""
     figure = Figure(figsize=(10.0, 4.8), layout="constrained")
     for k, motion in enumerate(MOTIONS):
-        case = results.cases[motion]
-        prior, axes = compact(case), _space(figure, k)
-        points = prior.transform(case.angles)
+        followed = results.motions[motion]
+        prior, axes = compact_space(followed), _space(figure, k)
+        points = prior.transform(followed.angles)
         away = np.abs(points[:, None] - prior.centres).mean(axis=2)
         for one, colour in zip(range(len(prior.centres)), COLOURS, strict=False):
             axes.plot(*points[away.argmin(axis=1) == one, :3].T, ".", color=colour, markersize=3)
@@ -75,7 +77,7 @@ def _space(figure: Figure, k: int) -> Any:
     return axes
 
 
-def particles(seen: Swarm) -> Figure:
+def swarm_figure(seen: WatchedSwarm) -> Figure:
     """Return the silhouette, and on it the bones of all particles after some iterations; the best in colour."""
     scene, shown = seen.scene, [k for k in SHOWN_ITERATIONS if k < len(seen.poses)]
     camera, mask = scene.cameras[0], scene.observations[0].silhouettes[0].mask
@@ -103,12 +105,12 @@ def _bones(pixels: Array) -> Array:
     return np.stack([pixels[:, list(PARENTS[1:])], pixels[:, 1:]], axis=2)
 
 
-def convergence(results: Results) -> Figure:
+def lowest_cost_figure(results: PaperResults) -> Figure:
     """Return the lowest cost against the iteration in the first frame, for each N: medians over runs."""
     figure = Figure(figsize=(10.0, 3.8), layout="constrained")
     panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)
     for axes, motion in zip(panels, MOTIONS, strict=True):
-        found = np.array([history for (case, *_), history in results.histories.items() if case == motion])
+        found = np.array([history for key, history in results.histories.items() if key[0] == motion])
         for k, count in enumerate(results.scale.swarms):
             _band(axes, found[:, k], COLOURS[k], f"N = {count}")
         axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
@@ -119,12 +121,12 @@ def convergence(results: Results) -> Figure:
     return figure
 
 
-def dimensions(results: Results) -> Figure:
+def dimension_figure(results: PaperResults) -> Figure:
     """Return the error of each angle, of PCA + SAPSO and of the mean training pose."""
     names = ["root", *(JOINTS[joint] for joint in INNER)]
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
-    panels: Any = figure.subplots(len(results.cases), 1, sharex=True)
-    for axes, motion in zip(panels, results.cases, strict=True):
+    panels: Any = figure.subplots(len(results.motions), 1, sharex=True)
+    for axes, motion in zip(panels, results.motions, strict=True):
         for name, style in (("sapso@pca", "bars"), ("mean_pose", "marks")):
             away = results.angle_errors(motion, name)
             where = np.arange(len(away))
@@ -143,7 +145,7 @@ def dimensions(results: Results) -> Figure:
     return figure
 
 
-def frames(results: Results) -> Figure:
+def frame_figure(results: PaperResults) -> Figure:
     """Return the error of each frame of the paper's three methods: medians over views and seeds, middle halves."""
     figure = Figure(figsize=(10.0, 6.4), layout="constrained")
     panels: Any = figure.subplots(len(MOTIONS), 1)

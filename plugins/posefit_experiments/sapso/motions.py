@@ -7,9 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.footage.masks import Range
+from posefit.footage.scene import Scene, synthetic
 from posefit.footage.source import motion_of
 from posefit.motion import library
 from posefit.motion.motion import Motion
+from posefit_experiments.clips import clip_path
+from posefit_experiments.known import SIZE
 from posefit_experiments.sapso.numbers import TRAINING_FRAMES
 
 FPS = 60.0  # not in the paper; at this rate a clip of a walk has more than the 100 frames, and of a run nearly
@@ -25,7 +29,7 @@ LABELS = {"walk": "walk", "turn": "walk with a turn", "run": "run"}
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class PaperMotion:
     """A motion to follow, and what a prior may learn from."""
 
     name: str
@@ -38,33 +42,35 @@ class Case:
         return np.concatenate([motion.poses[:, 3:] for motion in self.training])
 
 
-def cases(clips: str | Path | None, frames: int) -> dict[str, Case]:
+def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotion]:
     """Return the three motions, each of its first `frames` or as many as there are.
 
     Raises ValueError where `clips` is no folder with the CMU clips that are wanted.
     """
-    made = {name: _built_in(name, frames) if clips is None else _clip(Path(clips), name) for name in CLIPS}
+    made = {name: _built_in(name, frames) if clips is None else _from_clips(clips, name) for name in CLIPS}
     return {name: replace(one, test=one.test.frames(0, min(frames, len(one.test)))) for name, one in made.items()}
 
 
-def _clip(folder: Path, name: str) -> Case:
+def _from_clips(folder: str | Path, name: str) -> PaperMotion:
     test, training = CLIPS[name]
-    for clip in (test, *training):
-        if not (folder / f"{clip}.amc").is_file():
-            raise ValueError(f"clips must be a folder of CMU clips such as {clip}.amc, got {folder}, which has none")
-    motions = [motion_of(folder / f"{clip}.amc", None, FPS) for clip in (test, *training)]
+    motions = [motion_of(path, None, FPS) for path in [clip_path(folder, clip) for clip in (test, *training)]]
     motions = [motion.frames(BROKEN, len(motion)) for motion in motions]
-    return Case(name, motions[0], motions[1:])
+    return PaperMotion(name, motions[0], motions[1:])
 
 
-def _built_in(name: str, frames: int) -> Case:
+def _built_in(name: str, frames: int) -> PaperMotion:
     kind = "run" if name == "run" else "walk"
     styles = library.other_styles(kind)
     test = library.built_in(kind, frames=frames, fps=FPS)
     if name == "turn":
         test = turned(library.built_in(kind, frames=frames, fps=FPS, speed=0.9, phase=0.3), TURN)
     count = round(TRAINING_FRAMES[name] / len(styles))
-    return Case(name, test, [library.built_in(style, frames=count, fps=FPS) for style in styles])
+    return PaperMotion(name, test, [library.built_in(style, frames=count, fps=FPS) for style in styles])
+
+
+def paper_scene(motion: PaperMotion, view: float, frames: Range = (None, None)) -> Scene:
+    """Return a motion as a camera sees it."""
+    return synthetic(motion.test, [view], SIZE, [], frames)
 
 
 def turned(motion: Motion, degrees: float) -> Motion:

@@ -1,7 +1,7 @@
-"""What `posefit reproduce sapso` prints and writes: the paper's tables beside ours, and what becomes of its claims."""
+"""What `posefit reproduce sapso` finds and writes: the paper's tables beside ours, and what becomes of its claims."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import asdict
 from importlib.util import find_spec
@@ -16,22 +16,28 @@ from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, angle_index
-from posefit.tracking.synthetic import SIZE
-from posefit_experiments.sapso.claims import claims
-from posefit_experiments.sapso.experiment import BASELINES, COMPARED, METHODS, Progress, Results, Scale, reproduce
-from posefit_experiments.sapso.motions import FPS, LABELS, cases
-from posefit_experiments.sapso.numbers import FRAMES, TABLE_1, TABLE_1_JOINTS, TABLE_2, TRAINING_FRAMES
+from posefit.tracking.measures import BASELINES
+from posefit_experiments.grid import Progress
+from posefit_experiments.known import SIZE
+from posefit_experiments.sapso.claims import paper_claims
+from posefit_experiments.sapso.design import COMPARED, METHODS, WORKERS, Scale
+from posefit_experiments.sapso.experiment import repeat_paper
+from posefit_experiments.sapso.motions import FPS, LABELS, paper_motions
+from posefit_experiments.sapso.numbers import FRAMES, TABLE_1, TABLE_2, TRAINING_FRAMES
+from posefit_experiments.sapso.results import PaperResults
+from posefit_experiments.sapso.text import paper_text
 
 # LFemur, RFemur, LKnee, RKnee: an Acclaim knee has one angle, the other two are padding
 _ANGLES = np.array([angle_index(JOINTS.index(bone)) for bone in ("lfemur", "rfemur", "ltibia", "rtibia")])
 _ANGLES = (_ANGLES[:, None] + np.arange(3)).ravel()
 
 
-def report(
+def paper_report(
     clips: str | Path | None,
     seeds: int,
     scale: Scale,
     out: str | Path | None,
+    workers: int = WORKERS,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Return tables, claims and what was shortened; with `out`, write them and the figures, whole or not at all.
@@ -41,41 +47,41 @@ def report(
     """
     if out is not None and find_spec("matplotlib") is None:
         raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
-    made = cases(clips, scale.frames)
+    made = paper_motions(clips, scale.frames)
     with nullcontext() if out is None else new_folder(out) as folder:
-        results = reproduce(made, seeds, scale, progress)
+        results = repeat_paper(made, seeds, scale, workers, progress)
         told = {
             "version": posefit.__version__,
-            "motions": {name: _described(results, name) for name in results.cases},
+            "motions": {name: _described(results, name) for name in results.motions},
             "seeds": seeds,
             "views_degrees": list(scale.views),
-            "table_1": {name: _table_1(results, name) for name in results.cases},
-            "table_2": {name: _table_2(results, name) for name in results.cases},
-            "claims": [asdict(one) for one in claims(results)],
-            "shortened": _shortened(results, clips is not None),
+            "table_1": {name: _table_1(results, name) for name in results.motions},
+            "table_2": {name: _table_2(results, name) for name in results.motions},
+            "claims": [asdict(one) for one in paper_claims(results)],
+            "shortened": _shortened(results, clips is not None, workers),
         }
         if folder is not None:
-            from posefit_experiments.sapso.figures import draw
+            from posefit_experiments.sapso.figures import paper_figures
 
-            told["figures"] = draw(results, folder)
+            told["figures"] = paper_figures(results, folder)
             (folder / "report.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-            (folder / "report.txt").write_text(text(told) + "\n", encoding="utf-8")
+            (folder / "report.txt").write_text(paper_text(told) + "\n", encoding="utf-8")
     return told
 
 
-def _described(results: Results, motion: str) -> dict[str, Any]:
-    case = results.cases[motion]
+def _described(results: PaperResults, motion: str) -> dict[str, Any]:
+    one = results.motions[motion]
     return {
-        "test": case.test.name,
-        "train": [one.name for one in case.training],
-        "frames": len(case.test),
-        "training_frames": len(case.angles),
+        "test": one.test.name,
+        "train": [clip.name for clip in one.training],
+        "frames": len(one.test),
+        "training_frames": len(one.angles),
     }
 
 
-def _table_1(results: Results, motion: str) -> dict[str, Any]:
+def _table_1(results: PaperResults, motion: str) -> dict[str, Any]:
     """Return four joints' angles in the middle frame, in degrees, and their mean absolute errors."""
-    truth, scale = results.cases[motion].test.poses, results.scale
+    truth, scale = results.motions[motion].test.poses, results.scale
     frame, view = len(truth) // 2, scale.views.index(scale.shown)
     poses = {name: results.poses(motion, name)[view, 0] for name in ("sapso@pca", *BASELINES)}
     true, found = TABLE_1[motion]
@@ -97,7 +103,7 @@ def _shown(pose: Array) -> list[list[float]]:
     return [[float(angle) for angle in joint] for joint in np.degrees(wrapped(pose[_ANGLES])).reshape(-1, 3)]
 
 
-def _table_2(results: Results, motion: str) -> dict[str, Any]:
+def _table_2(results: PaperResults, motion: str) -> dict[str, Any]:
     """Return what each method and each baseline is worth on a motion: means over views and seeds."""
     mean = float(_by_run(results, motion, "mean_pose").mean())
     rows: dict[str, dict[str, Any]] = {}
@@ -110,26 +116,28 @@ def _table_2(results: Results, motion: str) -> dict[str, Any]:
             "skill": metrics.skill(float(error.mean()), mean),
         }
         if name in METHODS:
-            runs = results.of(motion, name)
+            tracks = results.of(motion, name)
             rows[name] |= {
-                "seconds_per_frame": float(np.mean([run.seconds for run in runs])),
-                "evaluations": float(np.mean([run.evaluations for run in runs])),
-                "swapped": float(np.mean([run.swapped for run in runs])),
-                "lost": float(np.mean([run.lost for run in runs])),
+                "seconds_per_frame": float(np.mean([track.seconds for track in tracks])),
+                "evaluations": float(np.mean([track.evaluations for track in tracks])),
+                "swapped": float(np.mean([track.swapped for track in tracks])),
+                "lost": float(np.mean([track.lost for track in tracks])),
             }
         if name in TABLE_2.get(motion, {}):
             rows[name]["paper"] = TABLE_2[motion][name]._asdict()
     return rows
 
 
-def _by_run(results: Results, motion: str, name: str, measure: Callable[[Array], float] = metrics.mean_error) -> Array:
+def _by_run(
+    results: PaperResults, motion: str, name: str, measure: Callable[[Array], float] = metrics.mean_error
+) -> Array:
     """Return a measure of the errors of each run (views x seeds,)."""
     errors = results.errors(motion, name)
     return np.array([measure(one) for one in errors.reshape(-1, errors.shape[2])])
 
 
-def _shortened(results: Results, clips: bool) -> list[str]:
-    lengths = {name: (len(case.test), len(case.angles)) for name, case in results.cases.items()}
+def _shortened(results: PaperResults, clips: bool, workers: int) -> list[str]:
+    lengths = {name: (len(one.test), len(one.angles)) for name, one in results.motions.items()}
     tests = ", ".join(f"{count} of the {LABELS[name]}" for name, (count, _) in lengths.items())
     trained = ", ".join(
         f"{count} ({TRAINING_FRAMES[name]}) for the {LABELS[name]}" for name, (_, count) in lengths.items()
@@ -142,7 +150,7 @@ def _shortened(results: Results, clips: bool) -> list[str]:
         "left out: figures 8 and 10, which are of real video; `posefit track VIDEO` follows one",
         "the root's translation is given, as the paper has none; the first pose is searched by every method",
         "full space: the range of the training poses; PF is in that space, as far as the paper tells",
-        "every method has the same evaluations a frame, which the paper's had not; two tracks ran at once",
+        f"every method has the same evaluations a frame, which the paper's had not; {_at_once(workers)} ran at once",
     ]
     first = (
         "clips: the first frame of each is left out, for 16_15 begins with a pose that is not of the walk"
@@ -152,63 +160,5 @@ def _shortened(results: Results, clips: bool) -> list[str]:
     return [first, *lines]
 
 
-def text(told: dict[str, Any]) -> str:
-    """Return the report as it is printed."""
-    return "\n".join([*_lines_1(told), "", *_lines_2(told), "", *_lines_claims(told), "", *_lines_shortened(told)])
-
-
-def _lines_1(told: dict[str, Any]) -> Iterator[str]:
-    yield "Table 1: angles in degrees. Ours are x, y, z of an Acclaim skeleton, whose knee has x alone; the paper's"
-    yield "axes are not given. Error: mean of the twelve, in this frame and in all frames"
-    yield f"{'':34} {''.join(f'{name:>24}' for name in TABLE_1_JOINTS)}  error  all frames"
-    for motion, rows in told["table_1"].items():
-        paper = rows["paper"]
-        yield _angles(f"{LABELS[motion]}, the paper's truth", paper["truth"])
-        yield _angles("  the paper's estimate", paper["estimate"], f"{paper['error']:7.2f}")
-        yield _angles(f"  ours, truth of frame {rows['frame']}", rows["truth"])
-        for name in ("sapso@pca", *BASELINES):
-            one = rows[name]
-            errors = f"{one['error']:7.2f} {one['error_all_frames']:11.2f}"
-            yield _angles(f"  {_label(name)}", one["angles"], errors)
-
-
-def _angles(label: str, joints: list[list[float]], errors: str = "") -> str:
-    return f"{label:34} " + "".join(f"{x:8.1f}{y:8.1f}{z:8.1f}" for x, y, z in joints) + errors
-
-
-def _lines_2(told: dict[str, Any]) -> Iterator[str]:
-    yield "Table 2: error in degrees (9), its spread (10) and seconds a frame, the paper's and ours"
-    heads = ("paper", "spread", "s", "ours", "worst", "spread", "s", "skill", "swapped", "lost", "evaluations")
-    for motion, rows in told["table_2"].items():
-        yield f"{LABELS[motion]:34}" + "".join(f"{head:>{12 if head == 'evaluations' else 8}}" for head in heads)
-        for name, one in rows.items():
-            paper = list(one["paper"].values()) if "paper" in one else []
-            cells = [f"{value:8}" for value in paper] or [f"{'-':>8}"] * 3
-            cells += [f"{one[key]:8.2f}" for key in ("error_degrees", "worst_degrees", "spread_degrees")]
-            cells.append(f"{one['seconds_per_frame']:8.4f}" if name in METHODS else f"{'-':>8}")
-            cells.append(f"{'-':>8}" if one["skill"] is None else f"{one['skill']:8.2f}")
-            if name in METHODS:
-                cells += [f"{100 * one[key]:6.0f} %" for key in ("swapped", "lost")]
-                cells.append(f"{one['evaluations']:12,.0f}")
-            yield f"  {_label(name):32}" + "".join(cells)
-
-
-def _label(name: str) -> str:
-    return f"{METHODS[name].label} ({name})" if name in METHODS else BASELINES[name]
-
-
-def _lines_claims(told: dict[str, Any]) -> Iterator[str]:
-    yield "What the paper says. Pairs are views and seeds of one clip: a p-value speaks of that clip alone."
-    for one in told["claims"]:
-        if one["source"]:
-            yield f"  {one['verdict']}: {one['text']} ({one['source']}): {one['evidence']}"
-    yield "What it does not ask"
-    for one in told["claims"]:
-        if not one["source"]:
-            yield f"  {one['verdict']}: {one['text']}: {one['evidence']}"
-
-
-def _lines_shortened(told: dict[str, Any]) -> Iterator[str]:
-    yield f"Against the paper ({told['seeds']} seeds; baselines have the true root, which no method has)"
-    for one in told["shortened"]:
-        yield f"  {one}"
+def _at_once(workers: int) -> str:
+    return {1: "one track", 2: "two tracks"}.get(workers, f"{workers} tracks")

@@ -6,6 +6,7 @@ and view for every seed, that no motion model was fitted to; between them lie a 
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,7 +52,7 @@ TRAINING = tuple(f"{kind}-a" for kind in ("walk", "step", "arms-out", "wave", "j
 
 
 @dataclass(frozen=True, eq=False)
-class Sequence:
+class Film:
     """What was filmed, and the truth."""
 
     truth: Motion
@@ -66,8 +67,9 @@ class Sequence:
         return [k for k in range(1, len(self.labels)) if self.labels[k] != self.labels[k - 1]]
 
 
-def sequence(seed: int) -> Sequence:
-    """Return the sequence of a seed: masks taken from a film of it, by the mean background of the empty scene."""
+@lru_cache(maxsize=1)  # all methods follow the film of one seed before that of the next
+def film_of(seed: int) -> Film:
+    """Return the film of a seed: masks taken from a film of it, by the mean background of the empty scene."""
     rng = np.random.default_rng(seed)
     parts = [
         library.built_in(one.motion, frames=one.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random())
@@ -84,13 +86,13 @@ def sequence(seed: int) -> Sequence:
     truth = Motion("patent", library.average_skeleton(), poses, places, FPS)
     body = Body.of(truth.skeleton)
     camera = Camera.around(np.array([0.0, 1.05, 0.0]), rng.uniform(-SIDEWAYS, SIDEWAYS), DISTANCE, SIZE)
-    empty, film = _film(truth, body, camera, rng)
+    empty, film = _images(truth, body, camera, rng)
     background = mean_background(empty)
     masks = (person(*background.classify(image), None, None) for image in film)
-    return Sequence(truth, body, camera, [Observation([Silhouette.of(one.mask)]) for one in masks], labels)
+    return Film(truth, body, camera, [Observation([Silhouette.of(one.mask)]) for one in masks], labels)
 
 
-def _film(
+def _images(
     truth: Motion, body: Body, camera: Camera, rng: np.random.Generator
 ) -> tuple[Iterator[Image], Iterator[Image]]:
     """Return the frames of the empty scene, and of the person before it; a wall, and clothes of another colour."""

@@ -1,8 +1,12 @@
-"""The experiment of the VSMM patent: model probabilities, joint errors and switches, over seeds."""
+"""The experiment of the VSMM patent: model probabilities, joint errors and switches, over seeds.
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import pairwise
+The film is made for the occasion, by noise and a mean background, and what counts is which models are in force in each
+frame. A cell says and keeps none of it, so the runs are jobs; see `posefit_experiments.grid`.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,8 +18,10 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import library
 from posefit.tracking.method import Choice, prepare
-from posefit_experiments.vsmm import activities
-from posefit_experiments.vsmm.activities import ACTIVITIES, TRAINING
+from posefit_experiments.grid import Progress, check_seeds, each
+from posefit_experiments.vsmm.activities import TRAINING, Film, film_of
+from posefit_experiments.vsmm.switches import switching_figures
+from posefit_experiments.vsmm.told import told_by
 
 # What is compared, by the name under which the figures are given.
 METHODS: dict[str, Choice] = {
@@ -27,20 +33,22 @@ SEARCHES: dict[str, Choice] = {
     "sapso_pca": Choice(optimiser="sapso", prior="pca"),
     "sapso_vsmm": Choice(tracker="sapso+vsmm"),
 }
+SHOWN = 0  # the seed that is drawn
+WORKERS = 1  # what a frame takes is measured, so nothing runs beside it
 ELBOW, HAND = JOINTS.index("rhumerus"), JOINTS.index("rwrist")  # the joints that end in elbow and hand
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """One method on the sequence of one seed."""
+class PatentTrack:
+    """One method on the film of one seed."""
 
-    sequence: activities.Sequence
     frames: Sequence[Frame] = field(repr=False)
     figures: dict[str, Any]
 
 
-def run(choice: Choice, seen: activities.Sequence, seed: int) -> Run:
-    """Follow a sequence with a method and return what it is worth; the first pose is not known."""
+def follow_film(choice: Choice, seed: int) -> PatentTrack:
+    """Follow the film of a seed with a method and return what it is worth; the first pose is not known."""
+    seen = film_of(seed)
     task = Task(
         seen.body,
         [seen.camera],
@@ -53,25 +61,25 @@ def run(choice: Choice, seen: activities.Sequence, seed: int) -> Run:
     )
     with threadpool_limits(1):
         frames = list(prepare(choice, task).tracker(task).track(seen.observations, np.random.default_rng(seed)))
-    return Run(seen, frames, {**errors(seen, frames), **switching(seen, frames)})
+    return PatentTrack(frames, {**patent_errors(seen, frames), **switching_figures(seen, told_by(frames))})
 
 
-def joints(seen: activities.Sequence, frames: Sequence[Frame]) -> tuple[Array, Array]:
+def both_joints(seen: Film, frames: Sequence[Frame]) -> tuple[Array, Array]:
     """Return the true and the found joints (T, 27, 3) in metres."""
     skeleton = seen.body.skeleton
     found = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
     return skeleton.joints(seen.truth.poses, seen.truth.translations), skeleton.joints(*found)
 
 
-def projected_cm(seen: activities.Sequence, truth: Array, found: Array) -> Array:
+def projected_cm(seen: Film, truth: Array, found: Array) -> Array:
     """Return how far found joints are from the true ones in the image, in centimetres at the true one's depth."""
     (pixels, depths), (others, _) = seen.camera.project(truth), seen.camera.project(found)
     return np.asarray(100.0 * np.linalg.norm((pixels - others) / seen.camera.focal, axis=-1) * depths)
 
 
-def errors(seen: activities.Sequence, frames: Sequence[Frame]) -> dict[str, float]:
+def patent_errors(seen: Film, frames: Sequence[Frame]) -> dict[str, float]:
     """Return the errors of right elbow and hand, in the image and in space, and of the whole pose."""
-    truth, found = joints(seen, frames)
+    truth, found = both_joints(seen, frames)
     flat, deep = projected_cm(seen, truth, found), 100.0 * np.linalg.norm(truth - found, axis=-1)
     poses = np.array([frame.pose for frame in frames])
     return {
@@ -88,83 +96,30 @@ def errors(seen: activities.Sequence, frames: Sequence[Frame]) -> dict[str, floa
     }
 
 
-def switching(seen: activities.Sequence, frames: Sequence[Frame]) -> dict[str, Any]:
-    """Return how the models' probabilities and the groups in force fare; nothing where a tracker tells none."""
-    told = [frame.details for frame in frames]
-    if not all("probabilities" in one for one in told):
-        return {}
-    right = [ACTIVITIES[label].models for label in seen.labels]
-    likely = [one["models"][int(np.argmax(one["probabilities"]))] for one in told]
-    delays = [_delay(told, first, seen.labels, right[first]) for first in seen.switches]
-    settled = [k for k, one in enumerate(told) if one["group"] is not None and one["newcomer"] is None]
-    smallest = min(len(told[k]["models"]) for k in settled) if settled else 0
-    steady = [k for k in settled if len(told[k]["models"]) == smallest]
-    return {
-        "dominant_fraction": float(np.mean([one["probabilities"].max() > 0.5 for one in told])),
-        "right_model_fraction": float(np.mean([a in b for a, b in zip(likely, right, strict=True)])),
-        "switch_delay_frames": max(delays),
-        "switch_delays_frames": delays,
-        "filter_ms": 1e3 * float(np.median([told[k]["filter_seconds"] for k in steady or range(len(told))])),
-        "detection_ms": 1e3 * float(np.median([one["detection_seconds"] for one in told])),
-        "activations": sum(_came(before, now) for before, now in pairwise(told)),
-        "wrong_activations": sum(
-            _came(told[k - 1], told[k]) and not right[k] & set(told[k]["groups"][told[k]["newcomer"]])
-            for k in range(1, len(told))
-        ),
-        "wrong_terminations": sum(
-            bool(set(told[k - 1]["models"]) & right[k]) and not set(told[k]["models"]) & right[k]
-            for k in range(1, len(told))
-        ),
-        "repairs": int(told[-1].get("repairs", 0)),
-        "lost_frames": sum(bool(one["lost"]) for one in told),
-    }
-
-
-def _delay(told: Sequence[Mapping[str, Any]], first: int, labels: Sequence[int], right: frozenset[str]) -> int:
-    """Return how many frames after a switch a group with a right model is in force; all of the activity if never."""
-    for k in range(first, len(told)):
-        if labels[k] != labels[first]:
-            return k - first
-        one = told[k]
-        names = [one["newcomer"]] if one["newcomer"] else []
-        names += [one["group"]] if one["group"] else list(one["groups"])  # all of them while a group is chosen
-        if any(right & set(one["groups"][name]) for name in names):
-            return k - first
-    return len(told) - first
-
-
-def _came(before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
-    return now["newcomer"] is not None and now["newcomer"] != before["newcomer"]
-
-
-def mean(rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+def over_seeds(rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the mean of each figure over seeds, and `per_seed` the rows themselves."""
     found = list(rows)
     single = [name for name, value in found[0].items() if not isinstance(value, list)]
     return {**{name: float(np.mean([row[name] for row in found])) for name in single}, "per_seed": found}
 
 
-def reproduce(
-    seeds: int, searches: bool, progress: Callable[[Iterator[Any], int], Iterator[Any]] | None = None
-) -> tuple[dict[str, Any], dict[str, Run]]:
-    """Return the figures, those of `vsmm` outermost and each other method's under its name, and the runs of seed 0.
+def repeat_patent(
+    seeds: int, searches: bool, workers: int = WORKERS, progress: Progress | None = None
+) -> tuple[dict[str, Any], PatentTrack]:
+    """Return the figures, those of `vsmm` outermost and each other method's under its name; and what `vsmm` did first.
 
     Raises ValueError where seeds is no positive number.
     """
-    if seeds < 1:
-        raise ValueError(f"seeds must be at least 1, got {seeds}")
+    check_seeds(seeds)
     methods = METHODS | (SEARCHES if searches else {})
-    cells = ((seed, name) for seed in range(seeds) for name in methods)
-    found: dict[str, list[dict[str, Any]]] = {name: [] for name in methods}
-    shown: dict[str, Run] = {}
-    seen: activities.Sequence | None = None
-    for seed, name in progress(cells, seeds * len(methods)) if progress else cells:
-        if seen is None or name == "vsmm":  # the first of a seed
-            seen = activities.sequence(seed)
-        one = run(methods[name], seen, seed)
-        found[name].append(one.figures)
-        if seed == 0:
-            shown[name] = one
-    figures = {name: mean(rows) for name, rows in found.items()}
+    jobs = {(seed, name): partial(_followed, methods[name], seed) for seed in range(seeds) for name in methods}
+    found = each(jobs, workers, progress)
+    figures = {name: over_seeds(found[seed, name].figures for seed in range(seeds)) for name in methods}
     outer = figures.pop("vsmm")
-    return {"seeds": seeds, **outer, **figures}, shown
+    return {"seeds": seeds, **outer, **figures}, found[SHOWN, "vsmm"]
+
+
+def _followed(choice: Choice, seed: int) -> PatentTrack:
+    """Return a track, without its frames where nobody will look at them."""
+    found = follow_film(choice, seed)
+    return found if seed == SHOWN else replace(found, frames=())

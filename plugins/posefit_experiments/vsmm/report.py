@@ -1,7 +1,7 @@
 """What `posefit reproduce vsmm` prints and writes."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,16 +9,19 @@ from typing import Any
 
 import posefit
 from posefit.files import new_folder
-from posefit_experiments.vsmm.experiment import reproduce
+from posefit_experiments.columns import headed
+from posefit_experiments.grid import Progress
+from posefit_experiments.vsmm.activities import film_of
+from posefit_experiments.vsmm.experiment import SHOWN, WORKERS, repeat_patent
 
 _COLUMNS = (
     ("elbow_cm", "elbow cm", 1),
     ("hand_cm", "hand cm", 1),
     ("elbow_3d_cm", "elbow 3D", 1),
     ("hand_3d_cm", "hand 3D", 1),
-    ("mpjpe_mm", "MPJPE mm", 0),
+    ("mpjpe_mm", headed("mpjpe_mm"), 0),
     ("error_degrees", "degrees", 2),
-    ("iou", "IoU", 2),
+    ("iou", headed("iou"), 2),
     ("dominant_fraction", "dominant", 2),
     ("switch_delay_frames", "delay", 1),
     ("wrong_activations", "wrong act.", 1),
@@ -29,8 +32,12 @@ _COLUMNS = (
 )
 
 
-def report(
-    seeds: int, searches: bool, out: str | Path | None, progress: Callable[[Iterator[Any], int], Iterator[Any]] | None
+def patent_report(
+    seeds: int,
+    searches: bool,
+    out: str | Path | None,
+    workers: int = WORKERS,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Return the experiment's figures; with `out`, write them and the pictures to a new folder, whole or not at all.
 
@@ -40,17 +47,17 @@ def report(
     if out is not None and find_spec("matplotlib") is None:
         raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
     with nullcontext() if out is None else new_folder(out) as folder:
-        figures, shown = reproduce(seeds, searches, progress)
+        figures, shown = repeat_patent(seeds, searches, workers, progress)
         figures["version"] = posefit.__version__
         if folder is not None:
-            from posefit_experiments.vsmm.figures import draw
+            from posefit_experiments.vsmm.figures import patent_figures
 
-            draw(shown["vsmm"], folder)
+            patent_figures(film_of(SHOWN), shown.frames, folder)
             (folder / "report.json").write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     return figures
 
 
-def table(figures: Mapping[str, Any]) -> str:
+def patent_table(figures: Mapping[str, Any]) -> str:
     """Return the figures as a table: a row a method, the means over seeds."""
     rows: dict[str, Mapping[str, Any]] = {"vsmm": figures}
     rows |= {name: one for name, one in figures.items() if isinstance(one, Mapping)}

@@ -40,7 +40,7 @@ class Errors:
 
 
 @lru_cache(maxsize=1)
-def errors() -> Errors:
+def rule_errors() -> Errors:
     """Return the errors that the package carries."""
     stored = json.loads((files("posefit_vsmm.detection") / "joints.json").read_text(encoding="utf-8"))
     bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
@@ -98,7 +98,8 @@ def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Ar
 def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, Array]], int]:
     """Return which end points are hands and feet, and how many are nobody's: the assignment of least distance.
 
-    Distances are counted in gates; the head takes part, since the skeleton line ends in it too.
+    It is a linear sum assignment, as the Hungarian algorithm solves it. Distances are counted in gates; the head takes
+    part, since the skeleton line ends in it too.
     """
     if not len(lines.ends):
         return [], 0

@@ -66,7 +66,7 @@ def _pieces(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _ends(thin: Mask, radii: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Return row and column (n, 2) of the ends of the skeleton line, but for those of spurs."""
+    """Return row and column (n, 2) of the ends of the skeleton line, but for those of spurs, which are pruned."""
     number = cv2.filter2D(thin.astype(np.uint8), -1, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT)
     found = []
     for end in np.argwhere(thin & (number == 2)):

@@ -33,7 +33,7 @@ OUTLIER = 0.16  # legs
 CIRCULAR = 0.25  # legs: the deviation granted to points that are only carried along with the root (Reading V8)
 
 
-def measured(rng: np.random.Generator) -> dict[str, list[Array]]:
+def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
     """Return the errors (2,) in legs of each point where it was detected."""
     found: dict[str, list[Array]] = {name: [] for name in POINTS}
     for name, azimuth in product(MOTIONS, AZIMUTHS):
@@ -57,7 +57,7 @@ def measured(rng: np.random.Generator) -> dict[str, list[Array]]:
 
 def main() -> None:
     """Write joints.json beside the rules."""
-    found = measured(np.random.default_rng(0))
+    found = detection_errors(np.random.default_rng(0))
     frames = len(found["root"])
     stored: dict[str, dict[str, Any]] = {}
     for name in dict.fromkeys(one.removeprefix("left ").removeprefix("right ") for one in POINTS):

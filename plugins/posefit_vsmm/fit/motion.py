@@ -25,7 +25,7 @@ from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit_imm.kernels import minus
 from posefit_vsmm import motion as models
-from posefit_vsmm.motion import FPS, MotionModel, headed, leg_of
+from posefit_vsmm.motion import FPS, MotionModel, leg_of, without_heading
 from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode
 
 ORIGIN = (
@@ -42,7 +42,7 @@ AHEAD = 10  # frames
 OTHER_SIDE = [0, *(1 + HELD.index(MIRROR[joint]) for joint in HELD)]
 
 
-class Clip(NamedTuple):
+class Excerpt(NamedTuple):
     """A clip, or a part of it."""
 
     path: str
@@ -53,18 +53,18 @@ class Clip(NamedTuple):
 class Teaching(NamedTuple):
     """What a model is fitted to, and what it is judged by: another person's clip, or a part kept apart."""
 
-    fitted: tuple[Clip, ...]
-    kept: Clip
+    fitted: tuple[Excerpt, ...]
+    kept: Excerpt
     drawn: tuple[str, ...] = ()  # built-in motions: no clip of ours shows somebody who walks with arms held out
 
 
 TEACHINGS = {
-    "stiff-walk": Teaching((Clip("17/17_03", 0, 330),), Clip("17/17_03", 340)),
-    "walk": Teaching((Clip("02/02_01"), Clip("05/05_01"), Clip("16/16_15")), Clip("16/16_17", 0, 250)),
-    "arms-out": Teaching((Clip("49/49_18", 0, 820),), Clip("49/49_18", 830), ("arms-out-a",)),
-    "jacks": Teaching((Clip("13/13_29", 0, 456),), Clip("14/14_06", 0, 420)),
-    "jump": Teaching((Clip("16/16_03"), Clip("49/49_02")), Clip("16/16_01")),
-    "squat": Teaching((Clip("13/13_29", 3792, 4584),), Clip("14/14_06", 1008, 1572)),
+    "stiff-walk": Teaching((Excerpt("17/17_03", 0, 330),), Excerpt("17/17_03", 340)),
+    "walk": Teaching((Excerpt("02/02_01"), Excerpt("05/05_01"), Excerpt("16/16_15")), Excerpt("16/16_17", 0, 250)),
+    "arms-out": Teaching((Excerpt("49/49_18", 0, 820),), Excerpt("49/49_18", 830), ("arms-out-a",)),
+    "jacks": Teaching((Excerpt("13/13_29", 0, 456),), Excerpt("14/14_06", 0, 420)),
+    "jump": Teaching((Excerpt("16/16_03"), Excerpt("49/49_02")), Excerpt("16/16_01")),
+    "squat": Teaching((Excerpt("13/13_29", 3792, 4584),), Excerpt("14/14_06", 1008, 1572)),
 }
 
 
@@ -76,7 +76,7 @@ class Recorded(NamedTuple):
     fps: float
 
 
-def recorded(root: Path, clip: Clip) -> Recorded:
+def recorded(root: Path, clip: Excerpt) -> Recorded:
     """Return what a clip holds."""
     folder, name = clip.path.split("/")
     motion = read_clip(root / folder / f"{folder}.asf", root / folder / f"{name}.amc")
@@ -90,7 +90,7 @@ def moving(motion: Motion) -> Recorded:
     return Recorded(states, motion.poses, motion.fps)
 
 
-def mirrored(states: Array) -> Array:
+def mirrored_states(states: Array) -> Array:
     """Return states (n, 43) of the mirror image, left for right."""
     other = states.copy()
     other[:, 0] *= -1.0
@@ -105,7 +105,7 @@ def pairs(clip: Recorded) -> tuple[Array, Array]:
     step = round(clip.fps / FPS)  # Reading V6: all pairs of a recording so far apart
     before, after = [], []
     for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
-        back, here = headed(first[3:].reshape(-1, 4))
+        back, here = without_heading(first[3:].reshape(-1, 4))
         turn = Rotation.from_quat(back, scalar_first=True).inv()
         there = second[3:].reshape(-1, 4).copy()
         there[0] = (turn * Rotation.from_quat(there[0], scalar_first=True)).as_quat(scalar_first=True)
@@ -170,7 +170,10 @@ def relied(clips: list[Recorded]) -> dict[str, Any]:
     """Return how the angles of the other joints follow the nine rotations: ridge regression over all clips."""
     inputs, wanted = [], []
     for clip in clips:
-        for states, angles in ((clip.states, clip.angles), (mirrored(clip.states), mirrored_angles(clip.angles))):
+        for states, angles in (
+            (clip.states, clip.angles),
+            (mirrored_states(clip.states), mirrored_angles(clip.angles)),
+        ):
             quaternions = states[::4, 7:].reshape(-1, 4)
             inputs.append(Rotation.from_quat(quaternions, scalar_first=True).as_rotvec().reshape(-1, 3 * len(BONES)))
             wanted.append(angles[::4, OTHER_ANGLES])
@@ -210,7 +213,7 @@ def main(root: Path) -> None:
         clips += [moving(library.built_in(one, frames=DRAWN, fps=AMC_FPS)) for one in teaching.drawn]
         kept = recorded(root, teaching.kept)
         every += clips
-        sides = [pairs(one._replace(states=s)) for one in clips for s in (one.states, mirrored(one.states))]
+        sides = [pairs(one._replace(states=s)) for one in clips for s in (one.states, mirrored_states(one.states))]
         before, after = (np.concatenate(part) for part in zip(*sides, strict=True))
         typicals = typical(before)
         found: dict[str, Any] = {}

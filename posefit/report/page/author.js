@@ -53,7 +53,7 @@ const summary = (m) => {
 const middle = (board) => {
   if (!board) return "";
   const skill = number(board.skill_mean_pose, 2);
-  return `, ${number(board.error, 2)}° in the middle, a skill of ${skill} against the mean pose`;
+  return `, ${number(board.error, 2)}° in the middle, a skill of ${skill} against the ${D.trivial.mean_pose}`;
 };
 
 const tally = (tests) => {
@@ -97,7 +97,7 @@ function author(m) {
     [
       { title: "instance", text: true, value: (row) => row.instance, show: (row) => row.name },
       { title: "all methods", text: true, show: (row) => dots(row.errors, m, most) },
-      { title: "error °", value: (row) => row.mine, show: (row) => number(row.mine, 2) },
+      figure("error", (row) => row.mine),
       { title: "rank", value: (row) => row.rank, show: (row) => `${row.rank} of ${row.of}` },
       {
         title: "best other °",
@@ -105,25 +105,21 @@ function author(m) {
         show: (row) => (given(row.least) ? [number(row.least, 2), make("small", {}, METHODS[row.best])] : "–"),
       },
       { title: "behind it by °", value: (row) => row.gap, show: (row) => number(row.gap, 2), down: true },
-      ...skills.map(([name, title]) => ({
-        title: `skill, ${title}`,
-        down: true,
-        value: (row) => skillOf(row, name),
-        show: (row) => number(skillOf(row, name), 2),
-      })),
+      ...Object.keys(D.trivial).map((name) => figure(`skill_${name}`, (row) => skillOf(row, name))),
     ],
     duels,
     { by: 5, down: true, name: "Instance by instance" },
   );
+  const { lost: gone, swapped } = D.columns;
+  $("lost-note").textContent = `${gone.label}: ${gone.about}; ${swapped.label}: ${swapped.about}.`;
   const lost = range(R.key.length).filter((k) => R.method[k] === m && (R.lost[k] > 0 || R.swapped[k] > 0));
   table(
     $("tracks"),
     [
       { title: "instance", text: true, value: (k) => R.instance[k], show: (k) => INSTANCES[R.instance[k]] },
       { title: "seed", value: (k) => R.seed[k], show: (k) => String(D.seeds[R.seed[k]]) },
-      { title: "lost %", value: (k) => R.lost[k], show: (k) => percent(R.lost[k]), down: true },
-      { title: "swapped %", value: (k) => R.swapped[k], show: (k) => percent(R.swapped[k]), down: true },
-      { title: "error °", value: (k) => R.error[k], show: (k) => number(R.error[k], 2), down: true },
+      ...["lost", "swapped"].map((name) => ({ ...figure(name, (k) => R[name][k]), down: true })),
+      { ...figure("error", (k) => R.error[k]), down: true },
       { title: "", text: true, show: (k) => [...watch(k), again(k)] },
     ],
     lost,

@@ -30,7 +30,12 @@ function fill(node, about) {
 }
 
 const number = (value, digits) => (given(value) ? value.toFixed(digits).replace("-", "−") : "–");
-const percent = (value) => (given(value) ? number(100 * value, 1) : "–");
+// A figure of a run with its digits and without its unit, as D.columns says.
+function shownAs(name, value) {
+  const { factor, digits } = D.columns[name];
+  if (!given(value)) return "–";
+  return digits ? number(factor * value, digits) : whole(factor * value);
+}
 const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
 // A probability in a sentence.
 const stated = (p) => `p ${p < 0.001 ? "" : "= "}${probability(p)}`;

@@ -1,11 +1,7 @@
 // Bodies on a canvas: joints in metres from the scene's origin, seen by a camera of the scene or by one that turns.
 const BONES = D.parents.map((parent, joint) => [parent, joint]).slice(1);
-const SIDE = (joint) =>
-  ["lowerback", "lowerneck", "root"].includes(D.joints[joint])
-    ? "middle"
-    : { l: "left", r: "right" }[D.joints[joint][0]] || "middle";
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const limbs = () => ({ left: ink("--c1"), right: ink("--c0"), middle: ink("--ink") });
+const limbs = () => ({ left: ink("--left"), right: ink("--right"), middle: ink("--ink") });
 
 // Joints of all frames of a picture: a function of the frame that gives 27 points.
 function decoded(text) {
@@ -51,7 +47,7 @@ const seen = (camera, points) =>
 function sticks(pen, pixels, colours, width) {
   for (const [parent, joint] of BONES) {
     if (pixels[parent][2] <= 0.05 || pixels[joint][2] <= 0.05) continue;
-    pen.strokeStyle = typeof colours === "string" ? colours : colours[SIDE(joint)];
+    pen.strokeStyle = typeof colours === "string" ? colours : colours[D.sides[joint]];
     pen.lineWidth = width;
     pen.beginPath();
     pen.moveTo(pixels[parent][0], pixels[parent][1]);
@@ -165,7 +161,7 @@ function still(scene) {
     4 + (y - top) * scale,
   ];
   const svg = draw("svg", { width: size, height: size, "aria-hidden": "true" });
-  const tints = { left: "var(--c1)", right: "var(--c0)", middle: "var(--ink)" };
+  const tints = { left: "var(--left)", right: "var(--right)", middle: "var(--ink)" };
   for (const [parent, joint] of BONES) {
     const [a, b] = [at(flat[parent]), at(flat[joint])].map((one) => one.map((value) => value.toFixed(1)));
     svg.append(
@@ -174,7 +170,7 @@ function still(scene) {
         y1: a[1],
         x2: b[0],
         y2: b[1],
-        style: `stroke: ${tints[SIDE(joint)]}`,
+        style: `stroke: ${tints[D.sides[joint]]}`,
         "stroke-width": 2.5,
         "stroke-linecap": "round",
       }),

@@ -155,7 +155,7 @@ function strip() {
     ),
   );
   track.swapped.forEach((k) =>
-    svg.append(draw("rect", { x: k * step, width: step, y: 41, height: 4, style: "fill: var(--c3)" })),
+    svg.append(draw("rect", { x: k * step, width: step, y: 41, height: 4, style: "fill: var(--swapped)" })),
   );
   svg.append(
     draw("rect", {

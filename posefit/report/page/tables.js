@@ -90,27 +90,19 @@ function table(box, columns, rows, how) {
   show();
 }
 
-const figure = (title, name, shown, about, down) => ({
-  title,
-  about,
-  down,
-  value: (row) => row[name],
-  show: (row) => shown(row[name]),
+// A column of a figure: its title and, where it is pointed at, its meaning; `of` gives the figure of a row.
+const figure = (name, of) => ({
+  ...D.columns[name],
+  value: of,
+  show: (row) => shownAs(name, of(row)),
 });
-const skills = [
-  ["mean_pose", "mean pose"],
-  ["persistence", "first pose held"],
-  ["nearest", "nearest training pose"],
-];
-const skillColumns = skills.map(([name, title]) =>
-  figure(`skill, ${title}`, `skill_${name}`, (value) => number(value, 2), `1 − error / error of the ${title}`, true),
-);
+const FIGURES = Object.keys(D.columns);
 
 function leaderboard() {
   const shown = D.leaderboard.map((row) => ({ ...row, interval: given(row.low) ? row.high - row.low : null }));
   const bases = D.baselines.map((row) => ({
     ...row,
-    name: `baseline: ${skills.find((one) => one[0] === row.baseline)[1]}`,
+    name: `baseline: ${D.trivial[row.baseline]}`,
     base: true,
   }));
   table(
@@ -123,7 +115,7 @@ function leaderboard() {
         show: (row) =>
           row.base ? row.name : [row.name, make("small", {}, D.methods[row.method].settings || "default settings")],
       },
-      figure("error °", "error", (value) => number(value, 2), "Mean over a track's frames and 66 angles"),
+      figure("error", (row) => row.error),
       {
         title: "95 % interval",
         about: "Sorts by its width",
@@ -133,14 +125,13 @@ function leaderboard() {
           return given(row.low) ? `${number(row.low, 2)} – ${number(row.high, 2)}` : "one seed";
         },
       },
-      ...skillColumns,
-      figure("lost %", "lost", percent, "Frames with an MPJPE above 150 mm"),
-      figure("swapped %", "swapped", percent, "Frames nearer to the truth when mirrored"),
-      figure("MPJPE mm", "mpjpe", (value) => number(value, 0)),
-      figure("IoU", "iou", (value) => number(value, 3), null, true),
-      figure("ms a frame", "ms", (value) => number(value, 1)),
-      figure("evaluations a frame", "evaluations", (value) => (given(value) ? whole(value) : "–")),
-      figure("runs", "runs", (value) => (given(value) ? whole(value) : ""), null, true),
+      ...FIGURES.slice(1).map((name) => figure(name, (row) => row[name])),
+      {
+        title: "runs",
+        down: true,
+        value: (row) => row.runs,
+        show: (row) => (given(row.runs) ? whole(row.runs) : ""),
+      },
       {
         title: "failed",
         value: (row) => row.failed,
@@ -159,12 +150,6 @@ function allRows() {
   const rows = range(R.key.length).filter(
     (k) => (method === "" || R.method[k] === +method) && (instance === "" || R.instance[k] === +instance),
   );
-  const column = (title, name, shown, down) => ({
-    title,
-    down,
-    value: (k) => R[name][k],
-    show: (k) => shown(R[name][k]),
-  });
   table(
     $("all-rows"),
     [
@@ -177,15 +162,8 @@ function allRows() {
         show: (k) => D.methods[R.method[k]].settings || "default",
       },
       { title: "instance", text: true, value: (k) => R.instance[k], show: (k) => INSTANCES[R.instance[k]] },
-      column("seed", "seed", (seed) => String(D.seeds[seed])),
-      column("error °", "error", (value) => number(value, 2)),
-      ...skills.map(([name, title]) => column(`skill, ${title}`, `skill_${name}`, (value) => number(value, 2), true)),
-      column("lost %", "lost", percent),
-      column("swapped %", "swapped", percent),
-      column("MPJPE mm", "mpjpe", (value) => number(value, 0)),
-      column("IoU", "iou", (value) => number(value, 3), true),
-      column("ms a frame", "ms", (value) => number(value, 1)),
-      column("evaluations a frame", "evaluations", (value) => (given(value) ? whole(value) : "–")),
+      { title: "seed", value: (k) => R.seed[k], show: (k) => String(D.seeds[R.seed[k]]) },
+      ...FIGURES.map((name) => figure(name, (k) => R[name][k])),
       { title: "key", text: true, value: (k) => R.key[k], show: (k) => R.key[k] },
     ],
     rows,

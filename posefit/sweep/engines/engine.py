@@ -4,21 +4,26 @@ import signal
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 from posefit.sweep.cell import Cell, Measurement
 from posefit.sweep.engines.limits import Limits
 
+J = TypeVar("J")  # a job: a cell, or whatever else its function takes
+R = TypeVar("R")
 Run = Callable[[Cell], Measurement]
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of a cell: a result, or the reason why there is none. With neither it was lost by no fault of its."""
+class Ended(Generic[J, R]):
+    """What became of a job: a result, or the reason why there is none. With neither it was lost by no fault of its."""
 
-    cell: Cell
-    result: Measurement | None = field(default=None, repr=False)
+    cell: J
+    result: R | None = field(default=None, repr=False)
     reason: str | None = None
+
+
+Outcome = Ended[Cell, Measurement]
 
 
 class Engine(Protocol):

@@ -1,0 +1,10 @@
+"""How fast the loop is: `posefit bench`, `posefit bench --json`.
+
+    experiment.py    all figures, from one run
+    kernel.py        the problem, and the same costs drawn by OpenCV
+    optimisers.py    ask and tell of every optimiser
+    environments.py  steps of environments
+    timing.py        jobs take turns, and the fastest run of each counts
+
+Nothing here runs beside anything else, so nothing is given to the sweep engine.
+"""

@@ -1,0 +1,71 @@
+"""The benchmark's problem, and its costs the usual way: drawn by OpenCV into an image of bytes."""
+
+import cv2
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import PARENTS
+from posefit.motion import library
+from posefit.silhouette.cost import mismatch, project
+from posefit.silhouette.mask import Silhouette
+from posefit_priors.pca import PCA
+
+SIZE = (320, 240)
+
+
+def bench_problem(threads: int = 1) -> PoseProblem:
+    """Return the benchmark's problem: one frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
+    motion = library.built_in("walk", frames=1, fps=30.0)
+    body = Body.of(motion.skeleton)
+    styles = [library.built_in(name, frames=60, fps=30.0) for name in library.other_styles("walk")]
+    prior = PCA().fit(np.concatenate([style.poses[:, 3:] for style in styles]))
+    joints = motion.skeleton.joints(motion.poses, motion.translations)[0]
+    camera = Camera.framing(joints, body.joint_radii(), motion.poses[0, 0] + np.radians(45.0), SIZE)
+    space = SearchSpace(
+        prior, np.array([motion.poses[0, 0], 0.0, 0.0]), np.radians([45.0, 15.0, 15.0]), motion.translations[0]
+    )
+    silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
+    return PoseProblem(body, [camera], [silhouette], space, threads=threads)
+
+
+def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:
+    """Return the costs (n,) of proposals the usual way: OpenCV draws every cone into a byte image and counts it.
+
+    Kinematics, prior and outlines are computed for all n poses at once in NumPy; drawing is two circles and a
+    quadrilateral a bone, at 1/16 pixel.
+    """
+    body, camera, silhouette = problem.body, problem.cameras[0], problem.silhouettes[0]
+    poses, translations = problem.decode(proposals)
+    pixels, depths = camera.project(body.skeleton.joints(poses, translations))
+    scale = np.sqrt(camera.focal.prod()) / depths
+    parents = np.array(PARENTS[1:])
+    first, second = pixels[:, parents], pixels[:, 1:]
+    radius0, radius1 = scale[:, parents] * body.radii[:, 0], scale[:, 1:] * body.radii[:, 1]
+    axis = second - first
+    square = (axis**2).sum(axis=-1)
+    along = ((radius0 - radius1) / square)[..., None]
+    across = (np.sqrt(np.maximum(square - (radius0 - radius1) ** 2, 0.0)) / square)[..., None]
+    normal = np.stack([-axis[..., 1], axis[..., 0]], axis=-1)
+    up, down = along * axis + across * normal, along * axis - across * normal
+    r0, r1 = radius0[..., None], radius1[..., None]
+    corners = np.stack([first + r0 * up, second + r1 * up, second + r1 * down, first + r0 * down], axis=2)
+    corners = np.rint((corners - 0.5) * 16).astype(np.int32)
+    a, b = (np.rint((points - 0.5) * 16).astype(int).tolist() for points in (first, second))
+    r, s = (np.rint(radii * 16).astype(int).tolist() for radii in (radius0, radius1))
+    observed = silhouette.mask.view(np.uint8)
+    total = cv2.countNonZero(observed)
+    image = np.zeros_like(observed)
+    areas = np.empty((len(proposals), 3), dtype=np.int64)
+    for i in range(len(proposals)):
+        image[:] = 0
+        for j in range(len(parents)):
+            cv2.fillConvexPoly(image, corners[i, j], 1, cv2.LINE_8, 4)
+            cv2.circle(image, a[i][j], r[i][j], 1, -1, cv2.LINE_8, 4)
+            cv2.circle(image, b[i][j], s[i][j], 1, -1, cv2.LINE_8, 4)
+        overlap = cv2.countNonZero(cv2.bitwise_and(image, observed))
+        areas[i] = total - overlap, cv2.countNonZero(image) - overlap, overlap
+    return mismatch(areas)

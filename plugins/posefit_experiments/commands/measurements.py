@@ -1,0 +1,108 @@
+"""posefit's own measurements: `posefit reproduce accuracy`, `methods`, `views`, `degradation`, `builds`, `footage`."""
+
+import json
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+import click
+
+from posefit.cli.options import box, frame_range
+from posefit.cli.output import progress, say
+from posefit_experiments.commands.options import CLIPS, JSON, LEDGER, seeds, workers
+
+bar = partial(progress, unit="run")
+
+
+@click.command("accuracy")
+@CLIPS
+@click.option("--optimiser", default="sapso", show_default=True, help="See `posefit plugins`.")
+@seeds(5)
+@workers(None)
+@LEDGER
+@JSON
+def accuracy_command(as_json: bool, **asked: Any) -> None:
+    """An optimiser with the prior pca on two walks of CMU, from three sides, beside what anybody reaches."""
+    from posefit_experiments.accuracy import accuracy, accuracy_lines
+
+    _print(accuracy(**asked, say=say), accuracy_lines, as_json)
+
+
+@click.command("methods")
+@CLIPS
+@click.option("--first-pose", default="searched", show_default=True, help="searched, or given (the true one).")
+@seeds(5)
+@workers(2, "Seconds of a frame are those beside so many neighbours.")
+@LEDGER
+@JSON
+def methods_command(as_json: bool, **asked: Any) -> None:
+    """Five optimisers in three priors follow a walk and a run of CMU, from three sides, at one budget."""
+    from posefit_experiments.methods import methods, methods_lines
+
+    _print(methods(**asked, say=say), methods_lines, as_json)
+
+
+@click.command("views")
+@seeds(5)
+@workers(None)
+@JSON
+def views_command(as_json: bool, **asked: Any) -> None:
+    """One camera, two or four, at the same budget of evaluations; built-in motions, whose first pose is searched."""
+    from posefit_experiments.views import views, views_lines
+
+    _print(views(**asked, progress=bar), views_lines, as_json)
+
+
+@click.command("degradation")
+@click.option("--optimiser", default="sapso", show_default=True, help="See `posefit plugins`.")
+@click.option("--prior", default="pca", show_default=True, help="See `posefit plugins`.")
+@seeds(5)
+@workers(None)
+@click.option("--out", metavar="FILE.png", help="New file for the figure; needs posefit[figures].")
+@JSON
+def degradation_command(out: str | None, as_json: bool, **asked: Any) -> None:
+    """Silhouettes with holes, blobs, shadows and more, worse and worse; frames that are missing; another body."""
+    from contextlib import nullcontext
+    from importlib.util import find_spec
+
+    from posefit.files import new_file
+    from posefit_experiments.degradation import degradation, degradation_figure, degradation_lines
+
+    if out and find_spec("matplotlib") is None:  # known before the minutes that the tracks take
+        raise ImportError("the figure needs the library matplotlib: pip install posefit[figures]")
+    with new_file(out) if out else nullcontext() as file:
+        told = degradation(**asked, progress=bar)
+        if file is not None:
+            degradation_figure(told, file)
+    _print(told, degradation_lines, as_json)
+
+
+@click.command("builds")
+@click.option("--motion", default="walk-b", show_default=True, help="The built-in motion that they walk.")
+@click.option("--subjects", type=int, default=8, show_default=True, help="People, each of another build.")
+@workers(None)
+@JSON
+def builds_command(as_json: bool, **asked: Any) -> None:
+    """How far stature and limbs are off, before and after a build is fitted, with one camera, two or four."""
+    from posefit_experiments.builds import builds, builds_lines
+
+    _print(builds(**asked, progress=bar), builds_lines, as_json)
+
+
+@click.command("footage")
+@click.argument("video")
+@click.option("--roi", callback=box, required=True, metavar="X,Y,W,H", help="Where the person is, in pixels.")
+@click.option("--frames", callback=frame_range, metavar="A:B", help="Frames that are followed; by default all.")
+@seeds(5)
+@workers(None)
+@JSON
+def footage_command(as_json: bool, **asked: Any) -> None:
+    """Tracks of a real walk in VIDEO, whose truth nobody knows: overlap, way and steps; and how fast that is."""
+    from posefit_experiments.filmed.experiment import filmed, filmed_lines
+
+    _print(filmed(**asked, progress=bar), filmed_lines, as_json)
+
+
+def _print(told: dict[str, Any], lines: Callable[[dict[str, Any]], Iterable[str]], as_json: bool) -> None:
+    for line in [json.dumps(told)] if as_json else lines(told):
+        click.echo(line)

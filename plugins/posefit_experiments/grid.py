@@ -1,0 +1,91 @@
+"""Grids of runs, in processes of the sweep engine: plans of cells, and jobs that are no cells.
+
+A cell is told by names and numbers, its row holds figures, and a ledger keeps it: `rows` runs a plan of them, and the
+same plan into the same ledger goes on where it was. What a cell cannot say (poses to draw, motions made for the
+occasion, a build to be found) is a job: a function without arguments whose result comes back as it is, by `each`.
+"""
+
+from collections import deque
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import closing, nullcontext
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+from posefit.sweep.cell import run_cell
+from posefit.sweep.command import cores, swept
+from posefit.sweep.engines.limits import Limits
+from posefit.sweep.engines.processes import Processes
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.plan import Plan
+
+PATIENCE = 0.2  # seconds between two looks at whether somebody wants to stop
+
+Progress = Callable[[Iterator[Any], int], Iterator[Any]]
+Say = Callable[[str], None]
+K = TypeVar("K", bound=Hashable)
+T = TypeVar("T")
+
+
+def rows(plan: Plan, workers: int | None, ledger: str | None, say: Say) -> list[dict[str, Any]]:
+    """Return the rows of a plan's cells, in its order, from so many processes; by default one a core.
+
+    They are written to a folder `ledger`, where one is named, and read from it where they are there already. Raises
+    ValueError where a cell failed three times, and KeyboardInterrupt where somebody stopped it.
+    """
+    _check(workers)
+    with nullcontext(ledger) if ledger else TemporaryDirectory() as folder:
+        with closing(Processes(workers or cores(), Limits(), run_cell)) as engine:
+            tally = swept(plan.cells, folder, engine, say)
+        if tally.stopped:
+            again = f": the same command goes on from {ledger}" if ledger else ""
+            say(f"stopped after {tally.done} of {tally.cells} runs{again}")
+            raise KeyboardInterrupt
+        found = Ledger(folder)
+        failed = {one["key"]: one["reasons"][-1] for one in found.quarantined()}
+        for cell in plan:
+            if cell.key in failed:
+                raise ValueError(f"{cell}: {failed[cell.key]}")
+        return [found.row(cell.key) for cell in plan]
+
+
+def each(jobs: Mapping[K, Callable[[], T]], workers: int | None, progress: Progress | None = None) -> dict[K, T]:
+    """Return what every job gives, under its key, from so many processes; by default one a core.
+
+    Jobs and results travel between processes. Raises ValueError where a job fails, and ends the others.
+    """
+    _check(workers)
+    engine: Processes[tuple[K, Callable[[], T]], T] = Processes(min(workers or cores(), len(jobs)), Limits(), _called)
+    with closing(engine):
+        ended = _ended(jobs, engine)
+        found = dict(progress(ended, len(jobs)) if progress else ended)
+    return {key: found[key] for key in jobs}
+
+
+def _ended(jobs: Mapping[K, Callable[[], T]], engine: Processes[tuple[K, Callable[[], T]], T]) -> Iterator[tuple[K, T]]:
+    """Yield the keys and results of jobs as they end."""
+    waiting, running = deque(jobs.items()), 0
+    while waiting or running:
+        while waiting and running < engine.window():
+            engine.submit(waiting.popleft())
+            running += 1
+        for one in engine.wait(PATIENCE):
+            running -= 1
+            key = one.cell[0]
+            if one.result is None:
+                raise ValueError(f"{key}: {one.reason}")
+            yield key, one.result
+
+
+def _called(job: tuple[K, Callable[[], T]]) -> T:
+    return job[1]()
+
+
+def _check(workers: int | None) -> None:
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers}")
+
+
+def check_seeds(seeds: int) -> None:
+    """Return nothing. Raises ValueError where it is no number of seeds."""
+    if seeds < 1:
+        raise ValueError(f"seeds must be at least 1, got {seeds}")

@@ -1,0 +1,71 @@
+"""The report's figures: each has its place in a row, and its words from the one table of a track's figures."""
+
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+from posefit.report.colours import DARK, LIGHT, METHODS, style
+from posefit.report.columns import COLUMNS, FIGURES, SHOWN
+from posefit.sweep.cell import run_cell
+from posefit.tracking.measures import BASELINES, MEASURES
+from tests.sweep.fake import cells
+
+
+@pytest.fixture(scope="module")
+def row():
+    return run_cell(replace(cells(1)[0], method="random@pca", frames=3, size=(80, 60), evaluations=80)).row
+
+
+def test_every_figure_has_its_place_in_a_row(row):
+    for column in COLUMNS.values():
+        assert math.isfinite(column.value(row)), column.name
+    assert COLUMNS["error"].value(row) == row["error_degrees"]["mean"]
+    assert COLUMNS["ms"].value(row) == 1e3 * row["seconds_per_frame"]
+    assert COLUMNS["evaluations"].value(row) == row["evaluations_used"] / 3
+    for name in BASELINES:
+        assert COLUMNS[f"skill_{name}"].value(row) == row["skill"][name]
+        assert COLUMNS[f"baseline_{name}"].value(row) == row["baselines_degrees"][name]
+
+
+def test_a_row_that_lacks_a_figure_has_nan(row):
+    for column in COLUMNS.values():
+        without = {name: value for name, value in row.items() if name != column.path[0]}
+        assert math.isnan(column.value(without)), column.name
+        assert math.isnan(column.value({**row, column.path[0]: None})), column.name
+    assert math.isnan(COLUMNS["skill_nearest"].value({**row, "skill": {"nearest": None}}))
+
+
+def test_labels_and_meanings_are_those_of_the_measures():
+    about = {name: COLUMNS[name].about() for name in SHOWN}
+    for name, measure in {"error": "error_degrees", "lost": "lost_rate", "iou": "iou", "mpjpe": "mpjpe_mm"}.items():
+        assert about[name]["label"] == MEASURES[measure].label
+        assert about[name]["about"] == MEASURES[measure].meaning
+    assert about["error"]["title"] == "error °"
+    assert about["lost"] | {"title": "lost %", "factor": 100.0, "digits": 1} == about["lost"]
+    assert about["ms"] | {"title": "time ms a frame", "factor": 1.0, "digits": 1} == about["ms"]
+    for name, label in BASELINES.items():
+        assert about[f"skill_{name}"]["title"] == f"skill: {label}"
+    assert all(one["about"] for one in about.values())
+    assert COLUMNS["mpjpe"].head == "MPJPE (mm)"
+    assert COLUMNS["lost"].head == "lost"  # a share in files
+
+
+def test_a_page_is_given_a_digit_more_than_it_shows():
+    kept = {name: COLUMNS[name].kept for name in SHOWN}
+    assert kept == {
+        "error": 3, "skill_mean_pose": 3, "skill_persistence": 3, "skill_nearest": 3, "lost": 4, "swapped": 4,
+        "mpjpe": 1, "iou": 4, "ms": 2, "evaluations": 1,
+    }  # fmt: skip
+    assert set(SHOWN) < set(FIGURES)
+
+
+def test_every_colour_of_the_page_is_there_for_light_and_dark_and_no_two_methods_share_one():
+    assert set(LIGHT) == set(DARK)
+    for palette in (LIGHT, DARK):
+        methods = [palette[f"c{k}"] for k in range(len(METHODS))]
+        assert len(set(methods)) == len(METHODS)
+        assert all(re.fullmatch("#[0-9a-f]{3}([0-9a-f]{3})?", colour) for colour in palette.values())
+        assert palette["left"] != palette["right"]
+    assert all(style().count(f"--{name}:") == 2 for name in LIGHT)
