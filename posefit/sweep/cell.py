@@ -71,14 +71,14 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Measurement:
+class CellResult:
     """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
 
     row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
     joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres
 
 
-def run_cell(cell: Cell) -> Measurement:
+def run_cell(cell: Cell) -> CellResult:
     """Return what following the cell's motion by its method measures. Raises ValueError where a file has changed.
 
     And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
@@ -113,7 +113,7 @@ def run_cell(cell: Cell) -> Measurement:
         json.dumps(row, allow_nan=False)
     except ValueError:
         raise ValueError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
-    return Measurement(row, packed_joints(estimate=estimate, truth=truth))
+    return CellResult(row, packed_joints(estimate=estimate, truth=truth))
 
 
 def cell_scene(cell: Cell) -> "Scene":

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from posefit.files import appear, replaced_file
-from posefit.sweep.cell import Cell, Measurement
+from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.ledger import CLAIMS, QUARANTINE, ROWS, Ledger, create
 from posefit.sweep.log import Writer, alive
 
@@ -100,7 +100,7 @@ class Driver:
             self._clear(cell.key)
         return State.QUARANTINED
 
-    def finish(self, claim: Claim, result: Measurement) -> None:
+    def finish(self, claim: Claim, result: CellResult) -> None:
         """Write the row of a claimed cell. Raises OSError where there is no room."""
         self._log.append(claim.cell.key, result.row, result.joints)
         self.ledger.refresh()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from posefit.files import appear
-from posefit.sweep.cell import Cell, Measurement, packed_joints
+from posefit.sweep.cell import Cell, CellResult, packed_joints
 from posefit.sweep.driver import Driver
 from posefit.sweep.ledger import QUARANTINE, ROWS
 from posefit.sweep.log import Writer
@@ -59,10 +59,10 @@ def opened(chromium: Any, path: Path, width: int = 1280, **how: Any) -> Iterator
         context.close()
 
 
-def result(cell: Cell, error: float, **more: Any) -> Measurement:
+def result(cell: Cell, error: float, **more: Any) -> CellResult:
     """Return a result as large as a real one; of four frames, each joint wrong by the error in centimetres."""
     truth = np.random.default_rng(cell.instance).normal(0.0, 0.3, (4, 27, 3))
-    return Measurement(row_of(cell, error, **more), packed_joints(truth=truth, estimate=truth + 0.01 * error))
+    return CellResult(row_of(cell, error, **more), packed_joints(truth=truth, estimate=truth + 0.01 * error))
 
 
 def row_of(cell: Cell, error: float, **more: Any) -> dict[str, Any]:
@@ -85,7 +85,7 @@ def row_of(cell: Cell, error: float, **more: Any) -> dict[str, Any]:
     } | more
 
 
-def ledger(path: Path, results: Iterable[Measurement], failures: list[tuple[Cell, list[str]]] | None = None) -> Path:
+def ledger(path: Path, results: Iterable[CellResult], failures: list[tuple[Cell, list[str]]] | None = None) -> Path:
     """Write a ledger of results and of cells in quarantine with their reasons."""
     with Driver(path):
         pass

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from posefit.report.gallery import LARGEST
-from posefit.sweep.cell import Measurement
+from posefit.sweep.cell import CellResult
 from tests.report.browser import ledger, result, row_of
 from tests.sweep.fake import cells
 
@@ -29,7 +29,7 @@ print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))
 """
 
 
-def rows(instances: int, seeds: int) -> Iterator[Measurement]:
+def rows(instances: int, seeds: int) -> Iterator[CellResult]:
     """Yield results as large as those of real cells; of one picture, whatever the row."""
     first, rng = replace(cells(1)[0], frames=60), np.random.default_rng(0)
     picture = result(first, 1.0).joints
@@ -39,7 +39,7 @@ def rows(instances: int, seeds: int) -> Iterator[Measurement]:
                 cost = [float(f"{20.0 / k + error:.6g}") for k in range(1, 62)]
                 trace: dict[str, Any] = {"evaluations": list(range(40, 2480, 40)), "cost": cost}
                 cell = replace(first, method=f"m{m}@pca", instance=i, seed=s)
-                yield Measurement(row_of(cell, error, trace=trace), picture)
+                yield CellResult(row_of(cell, error, trace=trace), picture)
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads the memory it took from /proc")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from posefit.sweep.cell import Cell, Measurement, packed_joints
+from posefit.sweep.cell import Cell, CellResult, packed_joints
 from posefit.sweep.drive import Tally, drive_cells
 from posefit.sweep.driver import Driver
 from posefit.sweep.engines.cluster import Cluster
@@ -31,7 +31,7 @@ def cells(count: int, frames: int = 60) -> list[Cell]:
     return [Cell("random@pca", "walk", ("walk-a",), seed=seed, frames=frames) for seed in range(count)]
 
 
-def behave(cell: Cell) -> Measurement:
+def behave(cell: Cell) -> CellResult:
     """Return a result that follows from the cell alone, or do harm."""
     if STARTS in os.environ:
         file = os.open(os.environ[STARTS], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -57,7 +57,7 @@ def behave(cell: Cell) -> Measurement:
     return result(cell)
 
 
-def result(cell: Cell) -> Measurement:
+def result(cell: Cell) -> CellResult:
     """Return the result of a cell."""
     numbers = np.random.default_rng(cell.seed).random(3)
     row = {
@@ -71,7 +71,7 @@ def result(cell: Cell) -> Measurement:
         "seconds": time.time(),
     }
     joints = np.full((1, 27, 3), float(cell.seed))
-    return Measurement(row, packed_joints(estimate=joints, truth=joints))
+    return CellResult(row, packed_joints(estimate=joints, truth=joints))
 
 
 def swept(out: Path, chosen: Sequence[Cell], engine: Engine) -> Tally:

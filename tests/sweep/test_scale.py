@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from posefit.sweep.cell import Cell, Measurement
+from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.driver import Claim, Driver
 from posefit.sweep.ledger import ROWS
 from posefit.sweep.log import Writer
@@ -32,7 +32,7 @@ print(json.dumps([len(table), traces, opened, taken, 1024 * int(status["VmHWM"].
 """
 
 
-def real(cell: Cell) -> Measurement:
+def real(cell: Cell) -> CellResult:
     """Return a result as large as that of a real cell."""
     trace = {"evaluations": list(range(40, 2480, 40)), "cost": [float(f"{20.0 / k:.6g}") for k in range(1, 62)]}
     figures = dict.fromkeys(("mpjpe_mm", "pa_mpjpe_mm", "iou", "cost", "swap_rate", "lost_rate"), cell.seed / 7.0)
@@ -41,7 +41,7 @@ def real(cell: Cell) -> Measurement:
         for name in ("skill", "baselines_degrees")
     }
     row = {"key": cell.key, "spec": cell.spec, "status": "done", **figures, **kinds, "warnings": []}
-    return Measurement({**row, "joint_errors_mm": [cell.seed / 3.0] * 27, "trace": trace, "seconds": 1.0}, b"\0" * 1000)
+    return CellResult({**row, "joint_errors_mm": [cell.seed / 3.0] * 27, "trace": trace, "seconds": 1.0}, b"\0" * 1000)
 
 
 def costs(driver: Driver, chosen: Iterator[Cell]) -> float:

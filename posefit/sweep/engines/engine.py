@@ -6,12 +6,12 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
-from posefit.sweep.cell import Cell, Measurement
+from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.engines.limits import Limits
 
 J = TypeVar("J")  # a job: a cell, or whatever else its function takes
 R = TypeVar("R")
-Run = Callable[[Cell], Measurement]
+Run = Callable[[Cell], CellResult]
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Ended(Generic[J, R]):
     reason: str | None = None
 
 
-Outcome = Ended[Cell, Measurement]
+Outcome = Ended[Cell, CellResult]
 
 
 class Engine(Protocol):
