@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from posefit.report.webpage import SCRIPTS, script
+from posefit.report.page.webpage import SCRIPTS, script
 
 LONGEST = 120
 PAGE = files("posefit.report") / "page"

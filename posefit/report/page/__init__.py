@@ -1,7 +1,8 @@
-"""The page of a report, as text: `posefit.report.webpage` puts it together into one file that asks nobody for anything.
+"""The page of a report: its parts as text, and how they become one file that asks nobody for anything.
 
 | looking for | file |
 |---|---|
+| all parts and the data as one document | webpage.py |
 | the sections, empty | report.html |
 | how everything looks; colours of methods and bodies come from `posefit.report.colours` | report.css |
 | what every part uses: elements, numbers in words, the command that runs a row again | base.js |
