@@ -8,7 +8,7 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 
 import generator  # noqa: E402, what stands beside this file
-from generator.prose import restructured  # noqa: E402
+from generator.prose import restructured, shortened  # noqa: E402
 
 import posefit  # noqa: E402
 
@@ -39,7 +39,15 @@ def setup(app: Any) -> None:
     """Write the generated pages, and have docstrings read as the plain text they are."""
     generator.write()
     app.connect("autodoc-process-docstring", _restructure)
+    app.connect("autodoc-process-signature", _shorten)
 
 
 def _restructure(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
     lines[:] = restructured(lines)
+
+
+def _shorten(
+    _app: Any, _what: str, _name: str, _object: Any, _options: Any, *texts: str | None
+) -> tuple[str | None, ...]:
+    """Return a signature, and what it returns, in which arrays are called as the code calls them."""
+    return tuple(None if text is None else shortened(text) for text in texts)

@@ -40,7 +40,7 @@ def page() -> str:
         for tag in (one for one in found if one.source == source):
             code = f"`{tag.code}`".replace("|", "\\|")
             named = "<br>".join(f"`{name}`" for name in tests_of(tag))
-            lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}`, line {tag.line} | {named} |"
+            lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}:{tag.line}` | {named} |"
         parts += lines
     return "\n\n".join(parts) + "\n"
 

@@ -26,7 +26,7 @@ ASKED = {
     "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
     "size": ("pixels", "width and height of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
-    "settings": ("", "settings that differ from their defaults, or all that matter, by the method's parts"),
+    "settings": ("", "what was set, or follows from the budget, of optimiser, prior and tracker"),
     "body": (
         "m",
         "the build that was fitted: `stature` in metres, `factors` on the average and their `spread`; or null",

@@ -4,6 +4,9 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
+_ARRAY = re.compile(
+    r"~?(?:numpy\.)?ndarray\[~?tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?(?:numpy\.)?dtype\[~?(?:numpy\.)?(\w+)\]\]"
+)
 _COLUMNS = re.compile(r"\S {2,}\S")
 _ENTRY = re.compile(r"(?P<name>[A-Za-z_]\w*)(?: \((?P<symbol>[^()]*)\))?: (?P<meaning>.*)")
 SETTINGS = "Settings:"
@@ -19,9 +22,19 @@ class Entry(NamedTuple):
 def restructured(lines: list[str]) -> list[str]:
     """Return the lines of a docstring as reStructuredText."""
     out: list[str] = []
+    literal = False
     for block in _blocks(lines):
-        out += [*_block(block), ""]
+        made = _block(block)
+        goes_on = literal and made[0] == "::"  # an empty line within code
+        literal = made[0] == "::"
+        out += [*(made[2:] if goes_on else made), ""]
     return out
+
+
+def shortened(signature: str) -> str:
+    """Return a signature with `Array` for numpy's longer name of it, and without the defaults that have no text."""
+    named = _ARRAY.sub(lambda one: "Array" if one[1] == "float64" else f"Array[{one[1]}]", signature)
+    return named.replace("<factory>", "...")
 
 
 def without_settings(text: str) -> str:

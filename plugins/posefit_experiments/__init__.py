@@ -18,6 +18,7 @@ Files:
     commands/        the command lines; what a command does is imported when it runs
     grid.py          runs plans of cells, and other jobs, by the engine of `posefit sweep`
     clips.py         names of CMU's clips become paths
+    columns.py       heads and digits of the tables
     known.py         tracks of built-in motions, whose truth is known
     sapso/, vsmm/    the papers' experiments
     accuracy.py, methods.py           plans of cells: `--ledger` keeps the rows for `posefit report`

@@ -1,5 +1,6 @@
 """The accuracy table: one optimiser with `pca` on two walks of CMU from three sides; `posefit reproduce accuracy`."""
 
+from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -9,16 +10,15 @@ import numpy as np
 from posefit.sweep.plan import Plan
 from posefit.tracking.measures import BASELINES
 from posefit_experiments.clips import clip_path
+from posefit_experiments.columns import headed, number
 from posefit_experiments.grid import Say, check_seeds, rows
 
 SEEDS = 5
 VIEWS = (0.0, 45.0, 90.0)
 FRAMES = 60  # at 30 fps
 WALKS = (("16/16_17", ("16/16_15",)), ("16/16_15", ("02/02_01", "05/05_01")))  # the clip, and what it is trained on
-HEADER = (
-    "| trained on | test | view | error median | error max | mean pose | first pose held | best training pose "
-    "| prior's floor | MPJPE mm | PA-MPJPE mm | IoU | swapped % | lost % |"
-)
+MIDDLE = ("prior_floor_degrees", "mpjpe_mm", "pa_mpjpe_mm", "iou")  # medians over seeds
+MEAN = ("swap_rate", "lost_rate")
 
 
 def accuracy(
@@ -66,25 +66,22 @@ def _figures(seen: list[dict[str, Any]]) -> dict[str, Any]:
         "error_degrees": float(np.median(errors)),
         "worst_degrees": max(errors),
         "baselines_degrees": seen[0]["baselines_degrees"],
-        **{key: middle(key) for key in ("prior_floor_degrees", "mpjpe_mm", "pa_mpjpe_mm", "iou")},
-        **{key: float(np.mean([row[key] for row in seen])) for key in ("swap_rate", "lost_rate")},
+        **{key: middle(key) for key in MIDDLE},
+        **{key: float(np.mean([row[key] for row in seen])) for key in MEAN},
     }
 
 
-def accuracy_lines(told: dict[str, Any]) -> list[str]:
-    """Return the table as it is printed."""
-    return [HEADER, "|---|---|" + "---:|" * (HEADER.count("|") - 3), *(_line(row) for row in told["rows"])]
-
-
-def _line(row: dict[str, Any]) -> str:
-    figures = [
-        f"{row['error_degrees']:.2f}",
-        f"{row['worst_degrees']:.2f}",
-        *(f"{row['baselines_degrees'][name]:.2f}" for name in BASELINES),
-        f"{row['prior_floor_degrees']:.2f}",
-        f"{row['mpjpe_mm']:.0f}",
-        f"{row['pa_mpjpe_mm']:.0f}",
-        f"{row['iou']:.3f}",
-        *(f"{100 * row[key]:.0f}" for key in ("swap_rate", "lost_rate")),
-    ]
-    return f"| {' + '.join(row['train'])} | {row['test']} | {row['view_degrees']:.0f} | {' | '.join(figures)} |"
+def accuracy_lines(told: dict[str, Any]) -> Iterator[str]:
+    """Yield the table as it is printed."""
+    errors = [headed("error_degrees", which) for which in ("median", "max")]
+    heads = [*errors, *BASELINES.values(), *(headed(name) for name in (*MIDDLE, *MEAN))]
+    yield f"| trained on | test | view | {' | '.join(heads)} |"
+    yield "|---|---|" + "---:|" * (1 + len(heads))
+    for row in told["rows"]:
+        figures = [
+            number("error_degrees", row["error_degrees"]),
+            number("error_degrees", row["worst_degrees"]),
+            *(number("baselines_degrees", row["baselines_degrees"][name]) for name in BASELINES),
+            *(number(name, row[name]) for name in (*MIDDLE, *MEAN)),
+        ]
+        yield f"| {' + '.join(row['train'])} | {row['test']} | {row['view_degrees']:.0f} | {' | '.join(figures)} |"

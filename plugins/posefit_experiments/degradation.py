@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from posefit.geometry.body import varied
+from posefit.tracking.measures import BASELINES, MEASURES
 from posefit.tracking.method import Choice, prepare
 from posefit.tracking.synthetic import Spoilt
+from posefit_experiments.columns import headed, labelled, number
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.known import follow_known, known_errors, known_scene, known_task, mean_pose_degrees
 
@@ -68,11 +70,14 @@ def degradation_lines(told: Mapping[str, Any]) -> Iterator[str]:
     """Yield the table that the figure shows: medians, least and largest errors over seeds."""
     for kind, rows in told["kinds"].items():
         for strength, row in zip(told["strengths"], rows, strict=True):
-            errors, lost = ([one[key] for one in row] for key in ("error_degrees", "lost"))
-            low, middle, high = min(errors), float(np.median(errors)), max(errors)
-            error = f"error {middle:5.2f} ({low:.2f} to {high:.2f}) degrees"
-            yield f"{kind:16} {strength:4.2f} {error}, lost {100 * np.mean(lost):3.0f} %"
-    yield f"mean training pose: {told['mean_pose_degrees']:.2f} degrees"
+            errors, lost = ([one[key] for one in row] for key in ("error_degrees", "lost_rate"))
+            least, worst = (number("error_degrees", one) for one in (min(errors), max(errors)))
+            error = labelled("error_degrees", float(np.median(errors)), 5)
+            yield (
+                f"{kind:16} {strength:4.2f} {error} ({least} to {worst}), "
+                f"{labelled('lost_rate', float(np.mean(lost)), 3)}"
+            )
+    yield f"{BASELINES['mean_pose']}: {number('error_degrees', told['mean_pose_degrees'])} degrees"
 
 
 def degradation_figure(told: Mapping[str, Any], path: Path) -> None:
@@ -80,19 +85,18 @@ def degradation_figure(told: Mapping[str, Any], path: Path) -> None:
     from matplotlib.figure import Figure
 
     drawn = Figure(figsize=(9.0, 3.6), layout="constrained")
-    for axes, key, label, scale in zip(
-        drawn.subplots(1, 2), ("error_degrees", "lost"), ("error, degrees", "lost frames, %"), (1, 100), strict=True
-    ):
+    for axes, key in zip(drawn.subplots(1, 2), ("error_degrees", "lost_rate"), strict=True):
+        scale = MEASURES[key].factor
         for kind, rows in told["kinds"].items():
             values = scale * np.array([[one[key] for one in row] for row in rows])
             (line,) = axes.plot(told["strengths"], np.median(values, axis=1), marker="o", markersize=3, label=kind)
             low, high = values.min(axis=1), values.max(axis=1)
             axes.fill_between(told["strengths"], low, high, color=line.get_color(), alpha=0.1)
         axes.set_xlabel("strength")
-        axes.set_ylabel(label)
+        axes.set_ylabel(headed(key))
         axes.set_ylim(bottom=0.0)
         axes.spines[["top", "right"]].set_visible(False)
         if key == "error_degrees":
-            axes.axhline(told["mean_pose_degrees"], color="0.5", linestyle=":", label="mean training pose")
+            axes.axhline(told["mean_pose_degrees"], color="0.5", linestyle=":", label=BASELINES["mean_pose"])
             axes.legend(fontsize=7, frameon=False)
     drawn.savefig(path, dpi=120)

@@ -34,10 +34,7 @@ def follow_known(task: Task, choice: Choice, observations: Sequence[Observation]
 
 
 def known_errors(scene: Scene, frames: Sequence[Frame]) -> dict[str, float]:
-    """Return the error in degrees, the MPJPE in millimetres, and the shares of lost and of swapped frames of a track.
-
-    `MPJPE`: mean per-joint position error, both roots at one point.
-    """
+    """Return figures of a track under their names in `posefit.tracking.measures`, but of the error the mean alone."""
     truth = _truth(scene)
     poses = np.array([frame.pose for frame in frames])
     joints = [scene.body.skeleton.joints(p) for p in (truth.poses, poses)]
@@ -45,8 +42,8 @@ def known_errors(scene: Scene, frames: Sequence[Frame]) -> dict[str, float]:
     return {
         "error_degrees": float(metrics.pose_error_degrees(truth.poses, poses).mean()),
         "mpjpe_mm": float(mpjpe.mean()),
-        "lost": float(metrics.lost_rate(mpjpe)),
-        "swapped": float(metrics.swap_rate(*joints)),
+        "lost_rate": float(metrics.lost_rate(mpjpe)),
+        "swap_rate": float(metrics.swap_rate(*joints)),
     }
 
 

@@ -14,6 +14,7 @@ from posefit.footage.masks import FPS
 from posefit.footage.source import motion_of
 from posefit.sweep.plan import Plan
 from posefit_experiments.clips import clip_path
+from posefit_experiments.columns import headed, number
 from posefit_experiments.grid import Say, check_seeds, rows
 
 OPTIMISERS = ("particle", "annealed", "pso", "sapso", "cma")
@@ -27,6 +28,8 @@ VIEWS = (0.0, 45.0, 90.0)
 SEEDS = 5
 FRAMES = 60  # at 30 fps at most; the run has 41
 WORKERS = 2  # the seconds of a frame depend on how many run at once
+
+OF_SEEDS = ("error", "least", "worst")  # median, least and largest error
 
 Key = tuple[str, str, str, float, int]  # optimiser, prior, gait, view, seed
 
@@ -102,19 +105,20 @@ def _row(found: dict[Key, dict[str, Any]], optimiser: str, prior: str, seeds: in
 def methods_lines(told: dict[str, Any]) -> Iterator[str]:
     """Yield the table as it is printed, and what anybody reaches."""
     views = ", ".join(f"{view:.0f}" for view in told["views_degrees"])
-    heads = [f"{gait} {what}" for gait in GAITS for what in ("error", f"at {views}", "skill", "swapped %", "lost %")]
-    yield f"| optimiser | prior | {' | '.join(heads)} | s a frame | evaluations |"
+    heads = [headed("error_degrees"), f"at {views}", headed("skill"), headed("swap_rate"), headed("lost_rate")]
+    heads = [f"{gait} {head}" for gait in GAITS for head in heads]
+    yield f"| optimiser | prior | {' | '.join(heads)} | s a frame | {headed('evaluations')} |"
     yield "|---|---|" + "---:|" * (len(heads) + 2)
     for row in told["rows"]:
         figures = []
         for one in (row[gait] for gait in GAITS):
+            error, least, worst = (number("error_degrees", one[f"{which}_degrees"]) for which in OF_SEEDS)
             figures += [
-                f"{one['error_degrees']:.2f} ({one['least_degrees']:.2f} to {one['worst_degrees']:.2f})",
-                " ".join(f"{error:.2f}" for error in one["by_view_degrees"]),
-                f"{one['skill']:.2f}",
-                *(f"{100 * one[key]:.0f}" for key in ("swap_rate", "lost_rate")),
+                f"{error} ({least} to {worst})",
+                " ".join(number("error_degrees", middle) for middle in one["by_view_degrees"]),
+                *(number(name, one[name]) for name in ("skill", "swap_rate", "lost_rate")),
             ]
-        ends = f"{row['seconds_per_frame']:.3f} | {row['evaluations']:.0f}"
+        ends = f"{row['seconds_per_frame']:.3f} | {number('evaluations', row['evaluations'])}"
         yield f"| {row['optimiser']} | {row['prior']} | {' | '.join(figures)} | {ends} |"
     for gait, one in told["motions"].items():
         yield f"{gait}: {one['baselines_degrees']}, floor of pca {one['pca_floor_degrees']:.2f}"

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from posefit.tracking.measures import BASELINES
 from posefit.tracking.method import Choice, prepare
 from posefit.tracking.opening import RESTARTS, begun, following
+from posefit_experiments.columns import labelled, number
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.known import follow_known, known_errors, known_scene, known_task, mean_pose_degrees
 
@@ -40,7 +42,7 @@ def _errors(motion: str, views_degrees: Sequence[float], seed: int) -> dict[str,
 def _row(motion: str, views_degrees: Sequence[float], found: list[dict[str, float]]) -> dict[str, Any]:
     scene = known_scene(motion, views_degrees)
     error, mpjpe, lost, swapped = (
-        np.array([one[key] for one in found]) for key in ("error_degrees", "mpjpe_mm", "lost", "swapped")
+        np.array([one[key] for one in found]) for key in ("error_degrees", "mpjpe_mm", "lost_rate", "swap_rate")
     )
     return {
         "motion": motion,
@@ -58,9 +60,11 @@ def _row(motion: str, views_degrees: Sequence[float], found: list[dict[str, floa
 def views_lines(told: dict[str, Any]) -> Iterator[str]:
     """Yield the table as it is printed."""
     for row in told["rows"]:
-        yield (
-            f"{row['motion']:8} {len(row['views_degrees'])} views  error {row['error_degrees']:5.2f} "
-            f"({row['least_degrees']:.2f} to {row['worst_degrees']:.2f}) degrees, MPJPE {row['mpjpe_mm']:4.0f} mm, "
-            f"lost {100 * row['lost_rate']:3.0f} %, swapped {100 * row['swap_rate']:3.0f} %; "
-            f"mean pose {row['mean_pose_degrees']:.2f} degrees"
+        least, worst = (number("error_degrees", row[name]) for name in ("least_degrees", "worst_degrees"))
+        others = ", ".join(
+            labelled(name, row[name], width) for name, width in (("mpjpe_mm", 4), ("lost_rate", 3), ("swap_rate", 3))
         )
+        where = f"{row['motion']:8} {len(row['views_degrees'])} views"
+        error = f"{labelled('error_degrees', row['error_degrees'], 5)} ({least} to {worst})"
+        mean = f"{BASELINES['mean_pose']} {number('error_degrees', row['mean_pose_degrees'])} degrees"
+        yield f"{where}  {error}, {others}; {mean}"

@@ -349,6 +349,7 @@ def test_check_reports_every_rule_and_how_many_ran() -> None:
 
 
 @pytest.mark.parametrize("kind", ["optimiser", "prior", "tracker"])
+@pytest.mark.slow
 def test_a_new_plugin_installs_offline_and_passes_its_own_test(kind: str, tmp_path: Path) -> None:
     folder = tmp_path / "mine"
     result = run("plugins", "new", "my-own", "--kind", kind, "--out", folder)

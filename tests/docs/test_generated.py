@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from generator import commands, environments, equations, figures, joints, python, settings
-from generator.prose import restructured, settings_in, without_settings
+from generator.prose import restructured, settings_in, shortened, without_settings
 
 from posefit import track
 from posefit.geometry.skeleton import JOINTS
@@ -147,6 +147,13 @@ def test_the_changelog_names_modules_that_are_there() -> None:
 def test_a_docstring_is_read_as_plain_text() -> None:
     assert restructured(["`a`s and b* and c_ of |d|"])[0] == "``a``\\ s and b\\* and c\\_ of \\|d\\|"
     assert restructured(["So:", "", "    x = 1"])[:5] == ["So:", "", "::", "", "    x = 1"]
+    assert restructured(["    x = 1", "", "    y = 2"]) == ["::", "", "    x = 1", "", "    y = 2", ""]
     assert restructured(["one   first", "two   second"])[0] == "::"
     assert restructured(["| a | b |", "|---|---|", "| 1 | 2 |"])[0] == ".. list-table::"
     assert restructured(["Settings:", "    a (b): c"])[:3] == ["Settings:", "", "* **a (b)**: c"]
+
+
+def test_arrays_are_named_as_the_code_names_them() -> None:
+    long = "(poses: ~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]], more: dict = <factory>)"
+    assert shortened(long) == "(poses: Array, more: dict = ...)"
+    assert shortened("ndarray[tuple[Any, ...], dtype[bool]]") == "Array[bool]"

@@ -45,3 +45,8 @@ def test_the_drawing_shows_every_box_and_only_arrows_that_go_down() -> None:
     arrows, _ = house.grouped(house.reduced(GRAPH))
     height = {box: level for level, row in enumerate(house.levels(arrows)) for box in row}
     assert all(height[box] > height[one] for box, lower in arrows.items() for one in lower)
+
+
+def test_the_page_of_the_house_tells_every_floor() -> None:
+    page = (ROOT / "docs" / "background" / "house.md").read_text("utf-8")
+    assert [box for box in GRAPH if not box.startswith("posefit_") and f"`{box}`" not in page] == []

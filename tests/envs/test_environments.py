@@ -11,6 +11,7 @@ import pytest
 from gymnasium import error, wrappers
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -276,53 +277,83 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
     env: Any = gym.make("posefit/Track-v0", instance=5, frames=3, evaluations_per_frame=4).unwrapped
     env.reset(seed=0)
 
+    populations = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 4, 9))
+
     class Fixed:
-        def __init__(self) -> None:
-            self.rng = np.random.default_rng(1)
+        """Proposes one population, that of its frame, and no more."""
+
+        def __init__(self, population: Any) -> None:
+            self.left = [population]
 
         def ask(self) -> Any:
-            return self.rng.uniform(-1.0, 1.0, (4, 9))
+            return self.left.pop() if self.left else np.empty((0, 9))
 
         def tell(self, proposals: Any, costs: Any) -> None: ...
 
-    shared = Fixed()
+    coming = iter(populations)
     made = instance(env.world, 5, 3, 4)
     frames = list(
-        SynthesisTracker(made.task, env.world.learned, lambda space, rng: shared).track(
+        SynthesisTracker(made.task, env.world.learned, lambda space, rng: Fixed(next(coming))).track(
             made.observations, np.random.default_rng(0)
         )
     )
-    steps = Fixed()
     poses = []
-    for _ in range(3):
-        for proposal in steps.ask():
+    for population in populations:
+        for proposal in population:
             info = env.step(proposal)[4]
         poses.append(info["committed_pose"])
-        steps.tell(None, None)
-        if len(poses) < 3:
-            continue
     assert len(frames) == 3
-    np.testing.assert_array_equal(poses[0], frames[0].pose)
+    for pose, frame in zip(poses, frames, strict=True):
+        np.testing.assert_array_equal(pose, frame.pose)
+    assert len({float(pose[0]) for pose in poses}) == 3  # the box moved on with each frame
 
 
 def test_configure_with_sapsos_own_schedule_finds_what_sapso_finds() -> None:
+    from posefit_swarm.sapso import SAPSO
     from posefit_swarm.swarm import inertia
 
-    costs = []
     for number in range(3):
-        env = gym.make("posefit/Configure-v0", instance=number)
+        env: Any = gym.make("posefit/Configure-v0", instance=number).unwrapped
         env.reset(seed=number)
-        rewards = 0.0
+        search = env._search
+        costs = [search._costs]
         for k in range(60):
+            # the action's numbers stand for 0 to 1.2, 10^-3 to 10^1.5 and 0 to 0.3
             action = [inertia(k, 60) / 0.6 - 1.0, (np.log10(0.95**k) + 3.0) / 2.25 - 1.0, -1.0]
-            state, reward, terminated, _, info = env.step(np.array(action, np.float32))
-            rewards += float(reward)
+            _, _, terminated, _, info = env.step(np.array(action))
+            costs.append(search._costs)
         assert terminated
+
+        # the same draws: an environment's generator begins with the seed, and hands one number on to its search
+        rng, _ = np_random(number)
+        rng = np.random.default_rng(int(rng.integers(2**63)))
+        sapso = SAPSO(search.episode.space, rng, redraws=20)  # of the settings, those differ alone
+        for found in costs:
+            proposals = sapso.ask()
+            paid = search.problem.evaluate(proposals)
+            np.testing.assert_array_equal(paid, found)
+            sapso.tell(proposals, paid)
+        assert not len(sapso.ask())
         assert info["evaluations"] == 2440
-        costs.append(info["best_cost"])
-        assert state[0] == pytest.approx(info["best_cost"] / 100.0, abs=1e-6)
-        assert rewards >= 0.0
-    assert np.median(costs) < 6.0
+        assert info["best_cost"] == np.min(costs)
+
+
+def test_the_third_number_of_configure_kicks_every_particle_by_its_deviation() -> None:
+    # Without inertia and in a first step nothing pulls the leader, whose best is everybody's: it stays where it is.
+    # The third number stands for 0 to 0.3 half-ranges, so -0.8 is a deviation of 0.03.
+    moved = []
+    for third in (-1.0, -0.8):
+        env: Any = gym.make("posefit/Configure-v0", instance=17, particles=2000, prior="full").unwrapped
+        env.reset(seed=0)
+        swarm, leader = env._search._flock, env._search.leader
+        env.step(np.array([-1.0, 0.0, third]))
+        moved.append(swarm.moved)
+    assert (moved[0] == leader).all(axis=1).any()
+    assert not (moved[1] == leader).all(axis=1).any()
+    kick = (moved[1] - moved[0])[np.abs(moved[0]) < 0.8]  # not where a side of the box mirrors it
+    assert len(kick) > 10_000
+    assert kick.std() == pytest.approx(0.03, rel=0.03)
+    assert abs(kick.mean()) < 0.001
 
 
 # mistakes

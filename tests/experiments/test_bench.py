@@ -1,6 +1,7 @@
 """`posefit bench`: what it tells, and what is timed."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,11 @@ from click.testing import CliRunner
 from posefit.arrays import Array
 from posefit.cli import main
 from posefit.fitting.optimiser import minimise
+from posefit.fitting.problem import PoseProblem
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
 from posefit_experiments.bench import experiment, optimisers, timing
+from posefit_experiments.bench.kernel import bench_problem, opencv_costs
 from posefit_experiments.bench.optimisers import Stopwatch
 
 
@@ -34,6 +39,7 @@ def test_a_stopwatch_ends_a_search_after_its_populations() -> None:
     assert watch.seconds > 0.0
 
 
+@pytest.mark.slow
 def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(timing, "ROUNDS", 1)
     monkeypatch.setattr(timing, "TURN", 1e-6)
@@ -63,3 +69,18 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0
     assert CliRunner().invoke(main, ["bench", "--threads", "0"]).exit_code == 2
+
+
+@pytest.mark.parametrize("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])
+def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tuple[float, float]) -> None:
+    usual = bench_problem()
+    camera = replace(usual.cameras[0], focal=usual.cameras[0].focal * stretch)
+    proposals = np.random.default_rng(0).uniform(-0.3, 0.3, (50, usual.space.dimensions))
+    poses, translations = usual.decode(proposals[:1])
+    seen = Silhouette.of(project(usual.body, camera, poses[0], translations[0]))
+    problem = PoseProblem(usual.body, [camera], [seen], usual.space)
+    ours, theirs = problem.evaluate(proposals), opencv_costs(problem, proposals)
+    # OpenCV also sets the pixels that a border merely touches, a ring of half a pixel around limbs 10 pixels wide
+    assert ours[0] == 0.0
+    assert theirs[0] < 4.0
+    assert np.abs(ours - theirs).mean() < 1.0

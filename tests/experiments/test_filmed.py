@@ -10,6 +10,7 @@ from posefit_experiments.filmed.gait import frequency
 from posefit_experiments.filmed.reference import reference
 
 
+@pytest.mark.slow
 def test_a_real_walk_is_followed() -> None:
     video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
     if not video.is_file():

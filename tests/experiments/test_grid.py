@@ -3,17 +3,20 @@
 import json
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from posefit.sweep.driver import Claim, Driver
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit_experiments import grid
 from posefit_experiments.grid import each, rows
-from posefit_experiments.same import differences, same
+from posefit_experiments.same import differences, report_differences
+from tests.sweep.fake import cells, result
 
 PLAN = {
     "defaults": {"motion": "walk", "frames": 2, "evaluations": 80},
@@ -83,10 +86,27 @@ def test_reports_are_the_same_but_for_the_times(tmp_path: Path) -> None:
     after = {"error": [1.5, {"seconds_per_frame": 9.0, "frame_ms": 9.0}], "evaluations_used": 3}
     for name, told in (("before", before), ("after", after)):
         (tmp_path / name).write_text(json.dumps(told))
-    assert same(tmp_path / "before", tmp_path / "after") == []
+    assert report_differences(tmp_path / "before", tmp_path / "after") == []
     assert list(differences(before, {**after, "evaluations_used": 4})) == [".evaluations_used: 3 became 4"]
     assert list(differences({"a": 1.0}, {"a": 1.0 + 2.0**-52})) == [".a: 1.0 became 1.0000000000000002"]
     assert list(differences({"a": [1]}, {"a": [1, 2]})) == [".a: [1] became [1, 2]"]
     assert list(differences({"a": 1}, {})) == [".a: only before"]
     claim = {"text": "one takes less time than another", "evidence": "1"}
     assert list(differences([claim], [{**claim, "evidence": "2"}])) == []
+
+
+def test_ledgers_are_the_same_but_for_the_times(tmp_path: Path) -> None:
+    def ledger(name: str, **change: float) -> Path:
+        with Driver(tmp_path / name) as driver:
+            for cell in cells(2):
+                claim = driver.claim(cell)
+                assert isinstance(claim, Claim)
+                made = result(cell)
+                driver.finish(claim, replace(made, row={**made.row, **change}))
+        return tmp_path / name
+
+    before = ledger("before", seconds=1.0)
+    assert report_differences(before, ledger("after", seconds=2.0)) == []
+    (one, other) = report_differences(before, ledger("other", iou=0.25))
+    assert one.endswith(".iou: only after")
+    assert one != other

@@ -135,7 +135,7 @@ def test_views_say_what_each_number_of_cameras_reaches(monkeypatch: pytest.Monke
     assert (row["motion"], row["views_degrees"]) == ("walk", [90.0])
     assert 0.0 < row["error_degrees"] == row["least_degrees"] == row["worst_degrees"]
     (line,) = views.views_lines(found)
-    assert line.startswith(f"walk     1 views  error {row['error_degrees']:5.2f} (")
+    assert line.startswith(f"walk     1 views  error {row['error_degrees']:5.2f} degrees (")
 
 
 def test_damage_makes_tracks_worse_and_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -99,6 +99,7 @@ def test_a_run_that_is_interrupted_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_folder_holds_report_and_figures(written: tuple[Path, Result], told: dict[str, Any]) -> None:
     out, result = written
     assert result.exit_code == 0, result.stderr
@@ -109,6 +110,7 @@ def test_the_folder_holds_report_and_figures(written: tuple[Path, Result], told:
         assert (out / name).read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_table_2_has_the_papers_numbers_ours_and_every_baseline(told: dict[str, Any]) -> None:
     # table 2, columns walk and run
     walk, run = told["table_2"]["walk"], told["table_2"]["run"]
@@ -123,6 +125,7 @@ def test_table_2_has_the_papers_numbers_ours_and_every_baseline(told: dict[str, 
     assert walk["particle@full"]["evaluations"] == 160
 
 
+@pytest.mark.slow
 def test_table_1_has_the_papers_mean_error(told: dict[str, Any]) -> None:
     # by hand, walk: 1.618 + 2.059 + 5.880 + 0.505 + 3.715 + 0.189 + 0.878 + 2.774 + 2.569 + 0.800 + 3.141 + 2.936
     rows = told["table_1"]["walk"]
@@ -134,6 +137,7 @@ def test_table_1_has_the_papers_mean_error(told: dict[str, Any]) -> None:
         assert rows[name]["error"] == pytest.approx(np.minimum(away, 360.0 - away).mean())
 
 
+@pytest.mark.slow
 def test_it_says_what_was_shortened(told: dict[str, Any], written: tuple[Path, Result]) -> None:
     assert "4 of the walk" in told["shortened"][1]
     assert "the paper has 100 of each" in told["shortened"][1]
@@ -141,6 +145,7 @@ def test_it_says_what_was_shortened(told: dict[str, Any], written: tuple[Path, R
         assert line in written[1].stdout
 
 
+@pytest.mark.slow
 def test_every_claim_of_the_paper_has_a_verdict_on_one_line(told: dict[str, Any], written: tuple[Path, Result]) -> None:
     lines = written[1].stdout.splitlines()
     for one in told["claims"]:
@@ -152,6 +157,7 @@ def test_every_claim_of_the_paper_has_a_verdict_on_one_line(told: dict[str, Any]
     assert all("too few to confirm anything" in one["evidence"] for one in tested)
 
 
+@pytest.mark.slow
 def test_json_is_one_object_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("posefit_experiments.sapso.design.QUICK", TINY)
     result = run("--quick", "--seeds", 1, "--json")

@@ -24,6 +24,7 @@ def experiment() -> PatentTrack:
     return follow_film(METHODS["vsmm"], 0)
 
 
+@pytest.mark.slow
 def test_the_experiment_is_about_as_good_as_the_patents(experiment: PatentTrack) -> None:
     figures = experiment.figures
     assert figures["dominant_fraction"] >= 0.8
@@ -44,6 +45,7 @@ def test_no_motion_of_the_experiment_was_learned_from() -> None:
     assert not tested & {name for teaching in TEACHINGS.values() for name in teaching.drawn}
 
 
+@pytest.mark.slow
 def test_the_figures_are_drawn(tmp_path: Path, experiment: PatentTrack) -> None:
     pytest.importorskip("matplotlib")
     from posefit_experiments.vsmm.figures import patent_figures
@@ -53,6 +55,7 @@ def test_the_figures_are_drawn(tmp_path: Path, experiment: PatentTrack) -> None:
     assert all((tmp_path / name).stat().st_size > 10_000 for name in names)
 
 
+@pytest.mark.slow
 def test_reproduce_prints_the_figures_as_json(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "1", "--json"])
     assert result.exit_code == 0

@@ -210,6 +210,7 @@ def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
     assert "expected a new folder, got one that exists" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_real_walk_is_seen_from_its_first_step_to_its_last(tmp_path: Path) -> None:
     video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
     if not video.is_file():

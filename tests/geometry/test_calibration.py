@@ -118,6 +118,21 @@ def test_the_maps_undo_the_lens(tmp_path: Path, name: str) -> None:
     assert down[y, x] == pytest.approx(239.5 + (y - 239.5) * (1.0 + 0.1 * r2), abs=1e-3)
 
 
+def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
+    (tmp_path / "a.xml").write_text(QUALISYS.replace('radialDistortion3="0"', 'radialDistortion3="0.3"'))
+    (one,) = read_calibrations(tmp_path / "a.xml")
+    across, down = one.maps((640, 480))
+    # Brown's model, as OpenCV's manual writes it: x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and
+    # y (...) + p1 (r^2 + 2 y^2) + 2 p2 x y
+    u, v = 600, 40
+    x, y = (u - 319.5) / 500.0, (v - 239.5) / 510.0
+    r2 = x * x + y * y
+    bent = 1.0 - 0.05 * r2 + 0.1 * r2**2 + 0.3 * r2**3
+    p1, p2 = 0.001, 0.002
+    assert across[v, u] == pytest.approx(319.5 + 500.0 * (x * bent + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)), abs=1e-3)
+    assert down[v, u] == pytest.approx(239.5 + 510.0 * (y * bent + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y), abs=1e-3)
+
+
 def test_several_cameras_stand_in_one_file(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     path.write_text(TOML + TOML.replace("[left]", "[right]").replace('"left"', '"right"').partition("[metadata]")[0])

@@ -190,6 +190,16 @@ def test_loose_angles_are_those_of_limbs_that_move_in_training() -> None:
     assert (np.ptp(poses[:, prior.loose], axis=0) > 0.0).all()
 
 
+def test_a_loose_angle_reaches_as_far_as_every_training_pose_may_still_go() -> None:
+    # the thigh's rx may lie in -160 to 20 degrees (.asf of CMU); in training it goes from -20 to 10. All training poses
+    # may go down by 140 at least, so the setting's 15 degrees bound that side, and up by no more than 20 - 10 = 10.
+    poses, thigh = np.zeros((200, 63)), 3
+    poses[:, thigh] = np.radians(np.linspace(-20.0, 10.0, 200))
+    prior = Loose(components=1, clusters=1, legs_degrees=15.0).fit(poses, library.average_skeleton())
+    assert prior.loose.tolist() == [thigh]
+    assert np.degrees([prior.low[1], prior.high[1]]) == pytest.approx([-15.0, 10.0])
+
+
 def test_what_bends_past_a_joint_limit_is_not_feasible() -> None:
     prior = Loose().fit(angles("walk-a", "walk-b"), library.average_skeleton())
     latents = prior.transform(angles("walk-a")[:1])

@@ -1,5 +1,6 @@
 """The vsmm trackers on what goes wrong: nothing to see, pieces, borders, wrong files; and whole, by name."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from click.testing import CliRunner
 import posefit
 from posefit.cli import main
 from posefit.fitting import metrics
+from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -18,9 +20,12 @@ from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
+from posefit_imm import PLACED
 from posefit_vsmm.course import COAST
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.joined.tracker import joined
+from posefit_vsmm.joined.tracker import Search, joined
+from posefit_vsmm.motion import library as library_of_models
+from posefit_vsmm.state import decode, encode
 from posefit_vsmm.tracker import vsmm
 
 SIZE = (200, 240)
@@ -66,10 +71,34 @@ def iou(frames: list[Frame]) -> np.ndarray:
     return np.array([metrics.iou(frame.areas)[0] for frame in frames])
 
 
-@pytest.mark.parametrize("factory", [vsmm, joined])
+@pytest.mark.parametrize("factory", [vsmm, pytest.param(joined, marks=pytest.mark.slow)])
 def test_it_keeps_the_rules_of_a_tracker(factory: Any) -> None:
     result = check_tracker(factory)
     assert result, str(result)
+
+
+def test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it() -> None:
+    # deviations of the whole body's turn about its x, y and z: upright, these are its pitch, its yaw and its roll
+    task, observations = seen(frames=1)
+    task = replace(task, translation="known")
+    reliance = library_of_models("identity").reliance
+    deviations = np.array([0.3, 0.5, 0.7])
+    spread = np.diag(np.concatenate([np.full(3, 1e-4), deviations**2, np.full(27, 1e-4)]))
+    state = encode(np.zeros((1, 66)), np.zeros((1, 3)))[0]
+    for axis, angle in enumerate(("pitch", "yaw", "roll")):
+        turned, _ = decode(PLACED.plus(state, 0.1 * np.eye(33)[3 + axis])[None], reliance)
+        assert turned[0, :3].argmax() == ("yaw", "pitch", "roll").index(angle)
+    spaces: list[SearchSpace] = []
+
+    def factory(space: SearchSpace, rng: np.random.Generator) -> Any:
+        spaces.append(space)
+        return registry().optimiser("random")(space, rng)
+
+    search = Search(task, reliance, factory, 16, 0.25)
+    search.find(state, spread, observations[0], 200, np.random.default_rng(0))
+    # 3.5 deviations to either side, of the filter's and 4 degrees more
+    yaw, pitch, roll = 3.5 * np.hypot([0.5, 0.3, 0.7], np.radians(4.0))
+    assert spaces[0].half[:3] == pytest.approx([yaw, pitch, roll])
 
 
 def test_both_are_registered() -> None:
@@ -117,7 +146,7 @@ def test_nothing_is_ever_seen() -> None:
     assert all(frame.evaluations == 0 for frame in frames)
 
 
-@pytest.mark.parametrize("factory", [vsmm, joined])
+@pytest.mark.parametrize("factory", [vsmm, pytest.param(joined, marks=pytest.mark.slow)])
 def test_what_is_no_person_is_no_reason_to_fail(factory: Any) -> None:
     task, observations = seen(frames=24)
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
@@ -222,11 +251,13 @@ def test_a_senseless_setting_of_the_joined_tracker_is_one_line(setting: str) -> 
         {"shrink": "zero"},
     ],
 )
+@pytest.mark.slow
 def test_the_patents_own_form_runs(settings: dict[str, Any]) -> None:
     task, observations = seen(frames=60)
     follow(task, observations, **settings)
 
 
+@pytest.mark.slow
 def test_two_cameras_are_better_than_one() -> None:
     motion = library.built_in("squat-b", frames=40)
     body = Body.of(motion.skeleton)

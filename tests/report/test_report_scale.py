@@ -1,4 +1,4 @@
-"""A ledger of 100,000 rows is reported in seconds, in little memory, on a page that a browser still takes."""
+"""A ledger of 100,000 rows is reported in little memory, on a page that a browser still takes."""
 
 import json
 import subprocess
@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 
 from posefit.report.gallery import LARGEST
+from posefit.report.write import write_report
 from posefit.sweep.cell import CellResult
+from tests.effort import effort
 from tests.report.browser import ledger, result, row_of
 from tests.sweep.fake import cells
 
 ROOT = Path(__file__).parents[2]
 METHODS = 10
+counted = pytest.mark.skipif(not Path("/proc/self/io").exists(), reason="reads what it took from /proc")
 REPORT = """
 import json, sys, time
 from posefit.report.write import write_report
@@ -42,9 +45,23 @@ def rows(instances: int, seeds: int) -> Iterator[CellResult]:
                 yield CellResult(row_of(cell, error, trace=trace), picture)
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads the memory it took from /proc")
+@counted
+def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_some_times(tmp_path: Path) -> None:
+    found = []
+    for instances, seeds in ((3, 5), (5, 5), (10, 5), (20, 5)):  # the first imports what the others need
+        made = ledger(tmp_path / f"{instances}", rows(instances, seeds))
+        page = tmp_path / f"{instances}.html"
+        found.append(effort(lambda made=made, page=page: write_report(made, page, say=lambda _: None)))  # type: ignore[misc]
+        size = sum(path.stat().st_size for path in (made / "rows").glob("*.jsonl"))
+        assert instances == 3 or found[-1].read < 6.0 * size
+    calls = [one.calls for one in found]
+    assert calls[3] - calls[2] < 1.2 * 2.0 * (calls[2] - calls[1])
+
+
+@pytest.mark.slow
+@counted
 @pytest.mark.parametrize(("instances", "seeds"), [(100, 100), (5000, 2)])
-def test_100_000_rows_are_reported_in_30_seconds_and_2_gigabytes(tmp_path: Path, instances: int, seeds: int) -> None:
+def test_100_000_rows_are_reported_in_2_gigabytes(tmp_path: Path, instances: int, seeds: int) -> None:
     made = ledger(tmp_path / "ledger", rows(instances, seeds))
     words = [sys.executable, "-c", REPORT, str(made), str(tmp_path / "report.html")]
     told = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
@@ -52,6 +69,5 @@ def test_100_000_rows_are_reported_in_30_seconds_and_2_gigabytes(tmp_path: Path,
     size = (tmp_path / "report.html").stat().st_size
     print(f"{done} rows in {taken:.1f} s, {peak / 1e9:.2f} GB, a page of {size / 1e6:.1f} MB")
     assert done == METHODS * instances * seeds
-    assert taken < 30.0
     assert peak < 2e9
     assert size < LARGEST + 100 * done

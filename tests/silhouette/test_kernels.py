@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -12,7 +13,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import ANGLES, PARENTS, Skeleton
+from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, Skeleton
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.kernels import FAR, NEAR
 from posefit.silhouette.mask import Silhouette
@@ -113,6 +114,30 @@ def test_a_pose_that_is_no_number_draws_nothing_and_spoils_nothing(body: Body, c
     assert found[2].tolist() == [0, 0, silhouette.mask.sum()]
 
 
+def test_radii_are_seen_at_the_mean_of_two_focal_lengths(body: Body) -> None:
+    # All bones are lines without a width, but that the hand's end, 4 m away, is a ball of 0.1 m. With fx = 400 and
+    # fy = 100 it is a disc of sqrt(400 * 100) * 0.1 / 4 = 5 pixels, of 10 by fx alone and of 2.5 by fy alone. Around a
+    # corner of four pixels each quadrant has 5 + 5 + 4 + 4 + 2 = 20 pixel centres that are no farther than 5.
+    hand = JOINTS.index("lhand")
+    radii = np.zeros(body.radii.shape)
+    radii[hand - 1, 1] = 0.1
+    at = body.skeleton.joints(np.zeros(ANGLES))[hand]
+    level = np.diag([1.0, -1.0, -1.0])
+    camera = Camera(64, 48, np.array([400.0, 100.0]), np.array([32.0, 24.0]), level, np.array([0.0, 0.0, 4.0]))
+    drawn = project(Body(body.skeleton, radii), camera, np.zeros(ANGLES), -at)
+    assert [drawn[24 + k, 32:].sum() for k in range(6)] == [5, 5, 4, 4, 2, 0]
+    quadrants = (drawn[24:, 32:], drawn[23::-1, 32:], drawn[24:, 31::-1], drawn[23::-1, 31::-1])
+    assert [quadrant.sum() for quadrant in quadrants] == [20] * 4
+
+
+def test_a_camera_with_two_focal_lengths_equals_the_twin(body: Body) -> None:
+    for focal in ([90.0, 140.0], [140.0, 90.0]):
+        around = Camera.around(np.zeros(3), 0.4, 4.0, (96, 72))
+        camera = replace(around, focal=np.array(focal))
+        for pose in random_poses(np.random.default_rng(18), 10):
+            assert_equals_the_twin(body, camera, pose, np.zeros(3))
+
+
 def test_masks_look_like_opencvs(body: Body) -> None:
     camera = Camera.around(np.zeros(3), 0.4, 3.0, (320, 240))
     for pose in random_poses(np.random.default_rng(7), 20):
@@ -169,7 +194,7 @@ def test_a_forked_child_can_use_threads_too(body: Body, camera: Camera) -> None:
     # a daemon: a child that waits for ever fails this test and does not hold up the end of the run
     child = context.Process(target=_in_a_child, args=(body, camera, mask, poses, queue), daemon=True)
     child.start()
-    np.testing.assert_array_equal(queue.get(timeout=30), here)
+    np.testing.assert_array_equal(queue.get(timeout=600), here)
     child.join(30)
     assert child.exitcode == 0
 

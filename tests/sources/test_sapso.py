@@ -396,6 +396,20 @@ def test_s11_a_refused_move_keeps_or_loses_its_velocity(kind: Any) -> None:
 # Section 4
 
 
+def test_eq_7_velocities_of_the_first_population_keep_within_the_limits() -> None:
+    # v_pred of 3, -3 and 0.1: drawn from U(0, 3) no more than a twentieth lies below the limit 0.15; the rest is
+    # clipped to it. U(0, 0.1) needs no clipping.
+    start = Start(np.zeros(4), np.full(4, 0.1), np.array([3.0, -3.0, 0.1, 0.0]))
+    velocity = SAPSO(line_space(start=start), np.random.default_rng(0), particles=400)._flock.velocity
+    assert velocity.max(axis=0)[[0, 2]].tolist() == [0.15, pytest.approx(0.1, abs=0.005)]
+    assert velocity.min(axis=0)[1] == -0.15
+    assert (np.abs(velocity) <= 0.15).all()
+    assert 0.90 < (velocity[:, 0] == 0.15).mean() < 1.0
+    assert velocity.min(axis=0)[0] >= 0.0  # all between 0 and v_pred, whose sign may be either
+    assert velocity.max(axis=0)[1] <= 0.0
+    assert (velocity[:, 3] == 0.0).all()
+
+
 @pytest.fixture(scope="module")
 def scene(walk: Array) -> tuple[Body, Camera, PCA]:
     body = Body.of(library.average_skeleton())

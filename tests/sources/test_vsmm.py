@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
@@ -207,6 +208,26 @@ def test_quaternions_are_mixed_on_their_manifold() -> None:  # Reading V4
     assert np.linalg.norm(mean) == pytest.approx(1.0)
     spread = sphere.spread(turns, np.zeros((2, 3, 3)), np.array([0.5, 0.5]), mean)
     assert np.degrees(np.sqrt(spread[1, 1])) == pytest.approx(10.0)
+
+
+def test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance() -> None:  # Reading V4
+    def plus(state: Array, error: Array) -> Array:
+        return np.asarray((Rotation.from_quat(state) * Rotation.from_rotvec(error)).as_quat())
+
+    def minus(first: Array, second: Array) -> Array:
+        return np.asarray((Rotation.from_quat(second).inv() * Rotation.from_quat(first)).as_rotvec())
+
+    # quarter turns about x, y and z, alike in every way: the mean turns about (1, 1, 1), by an angle t at which
+    # nothing is left along (1, 1, 1). One step from the first of them comes near it, but not there.
+    turns = Rotation.from_rotvec(0.5 * np.pi * np.eye(3))
+    mean = Manifold(plus, minus).mean(turns.as_quat(), np.full(3, 1.0 / 3.0))
+    diagonal = np.full(3, 1.0 / np.sqrt(3.0))
+
+    def left(t: float) -> float:
+        return float((Rotation.from_rotvec(t * diagonal).inv() * turns).as_rotvec().sum())
+
+    t = brentq(left, 0.1, 2.0, xtol=1e-14)
+    np.testing.assert_allclose(Rotation.from_quat(mean).as_rotvec(), t * diagonal, atol=1e-9)
 
 
 def test_a_covariance_that_is_none_is_repaired_and_counted() -> None:

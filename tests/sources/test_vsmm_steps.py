@@ -468,6 +468,20 @@ def test_the_sequential_test_waits_for_evidence_of_99_to_1() -> None:
     assert decisions == [None] * 4 + ["old"]
 
 
+def test_the_sequential_tests_two_error_rates_are_walds() -> None:
+    # Wald, Sequential Analysis, 1947, section 3.2: with alpha the chance to take the new group though the old one is
+    # right and beta that of the reverse, the new one is taken at (1 - beta) / alpha and the old one at
+    # beta / (1 - alpha). alpha = 0.05, beta = 0.2: 16 and 4 / 19; the other way round they would be 4.75 and 1 / 16.
+    models = ("walk", "jacks")
+
+    def decided(ratios: Sequence[float]) -> list[str | None]:
+        rivalry = Rivalry(SequentialTest(false_alarm=0.05, miss=0.2), old=("walk",), new=("jacks",))
+        return [rivalry.decide(latest([0.5, 0.5], [1.0, ratio]), models) for ratio in ratios]
+
+    assert decided([15.9, 16.1 / 15.9]) == [None, "new"]
+    assert decided([0.22, 0.20 / 0.22]) == [None, "old"]  # 4 / 19 = 0.2105
+
+
 def test_a_rivalry_that_is_never_decided_ends() -> None:
     rivalry = Rivalry(SequentialTest(longest=3), old=("walk",), new=("jacks",))
     models = ("walk", "jacks")

@@ -22,8 +22,8 @@ from posefit.sweep.engines.limits import Limits
 from posefit.sweep.engines.processes import Processes
 
 STARTS = "POSEFIT_STARTS"
-SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND = 1001, 1002, 1003, 1004, 1005, 1006
-LIMITS = Limits(seconds=20.0, gigabytes=1.0)
+SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND, TOGETHER = 1001, 1002, 1003, 1004, 1005, 1006, 1007
+LIMITS = Limits(seconds=300.0, gigabytes=1.0)
 
 
 def cells(count: int, frames: int = 60) -> list[Cell]:
@@ -48,6 +48,9 @@ def behave(cell: Cell) -> CellResult:
             del hoard
         case n if n == RAISE:
             raise ZeroDivisionError("one\nby none")
+        case n if n == TOGETHER:
+            while len(starts(Path(os.environ[STARTS]))) < 2:
+                time.sleep(0.02)
         case n if n == SECOND:
             time.sleep(1.0)
         case n if n == SLOW:
@@ -88,6 +91,8 @@ def starts(path: Path) -> list[tuple[str, int]]:
 
 if __name__ == "__main__":
     where, kind, many = sys.argv[1:4]
-    made: Engine = Cluster(workers=2, limits=LIMITS, run=behave) if kind == "dask" else Processes(2, LIMITS, behave)
+    made: Engine = Processes(2, LIMITS, behave)
+    if kind == "dask":
+        made = Cluster(workers=2, limits=LIMITS, run=behave, patience=300.0)
     tally = swept(Path(where), cells(int(many), SLOW if len(sys.argv) > 4 else 60), made)
     sys.exit(1 if tally.quarantined else 130 if tally.stopped else 0)

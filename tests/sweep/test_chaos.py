@@ -18,7 +18,7 @@ from tests.sweep.fake import LIMITS, STARTS, cells, starts
 
 ROOT = Path(__file__).parents[2]
 CELLS, WORKER_KILLS, DRIVER_KILLS = 300, 5, 2
-ENGINES = ["pebble", "dask"]
+ENGINES = ["pebble", pytest.param("dask", marks=pytest.mark.slow)]
 
 
 @contextmanager
@@ -35,7 +35,7 @@ def driver(folder: Path, engine: str, count: int, *more: str) -> Iterator[subpro
         process.wait()
 
 
-def wait_for(what: Callable[[], bool], seconds: float = 60.0) -> None:
+def wait_for(what: Callable[[], bool], seconds: float = 600.0) -> None:
     until = time.monotonic() + seconds
     while not what():
         assert time.monotonic() < until, "waited too long"
@@ -56,6 +56,7 @@ def claimed(folder: Path) -> set[str]:
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for left-over processes in /proc")
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.slow
 def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: str, tmp_path: Path) -> None:
     if engine == "dask":
         pytest.importorskip("distributed")
@@ -80,7 +81,7 @@ def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: s
                 wait_for(lambda victim=victim: not living(victim))
                 killed.add([key for key, worker in starts(noted) if worker == victim][-1])
             else:
-                assert process.wait(timeout=120) == 0
+                assert process.wait(timeout=600) == 0
                 assert round_ == DRIVER_KILLS
     ledger = Ledger(tmp_path / "ledger")
     keys = [row["key"] for row in ledger.rows()]
@@ -90,13 +91,13 @@ def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: s
     assert not ledger.quarantined()
     runs = Counter(key for key, _ in starts(noted))
     assert {key for key, count in runs.items() if count > 1} <= killed
-    wait_for(lambda: not any(living(worker) for worker in {worker for _, worker in starts(noted)}), 10.0)
+    wait_for(lambda: not any(living(worker) for worker in {worker for _, worker in starts(noted)}))
 
 
 def test_two_drivers_at_once_run_no_cell_twice(tmp_path: Path) -> None:
     with driver(tmp_path, "pebble", 40, "slow") as one, driver(tmp_path, "pebble", 40, "slow") as other:
-        assert one.wait(timeout=120) == 0
-        assert other.wait(timeout=120) == 0
+        assert one.wait(timeout=600) == 0
+        assert other.wait(timeout=600) == 0
     assert len(Ledger(tmp_path / "ledger")) == 40
     runs = starts(tmp_path / "starts")
     assert len(runs) == len({key for key, _ in runs}) == 40
@@ -112,7 +113,7 @@ def test_ctrl_c_finishes_the_running_cells_and_the_next_sweep_goes_on(engine: st
     with driver(tmp_path, engine, 40, "slow") as process:
         wait_for(lambda: len(starts(noted)) > 5)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
-        assert process.wait(timeout=30) == 130
+        assert process.wait(timeout=600) == 130
     rows = {row["key"] for row in Ledger(tmp_path / "ledger").rows()}
     assert rows == {key for key, _ in starts(noted)}  # whatever was begun was finished
     assert len(rows) < 40
@@ -126,7 +127,7 @@ def test_ctrl_c_twice_stops_at_once_and_loses_no_row(tmp_path: Path) -> None:
         for _ in range(2):
             os.killpg(process.pid, signal.SIGINT)
             time.sleep(0.05)
-        assert process.wait(timeout=30) == 130
+        assert process.wait(timeout=600) == 130
     rows = {row["key"] for row in Ledger(tmp_path / "ledger").rows()}
     begun = [key for key, _ in starts(noted)]
     assert set(begun[:-2]) <= rows <= set(begun)  # two cells ran

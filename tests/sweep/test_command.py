@@ -59,6 +59,7 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(pla
     assert Ledger(out).joints(sapso["key"])["estimate"].shape == (2, 27, 3)
 
 
+@pytest.mark.slow
 def test_a_preview_lists_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> None:
     result = run("sweep", plan, "--dry-run", "--workers", 2)
     assert result.exit_code == 0, result.stderr

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import threading
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +131,42 @@ def test_a_damaged_row_is_named_put_aside_and_run_again(harm: Any, tmp_path: Pat
         assert drive_cells(cells(5), driver, Here(), print, lambda _: None).ran == 1
     assert len(said) == 1
     assert sorted(row["key"] for row in Ledger(folder).rows()) == sorted(cell.key for cell in cells(5))
+
+
+def test_of_two_rows_of_one_cell_the_first_counts(tmp_path: Path) -> None:
+    cell, other = cells(2)
+    folder = filled(tmp_path / "ledger", 1)
+    path = the_log(folder)
+
+    def line(cost: float) -> bytes:
+        return log.encoded(cell.key, {"key": cell.key, "cost": cost})
+
+    path.write_bytes(line(1.0) + line(2.0))
+    (path.parent / "later.jsonl").write_bytes(line(3.0))
+    assert path.name < "later.jsonl"
+    assert Ledger(folder).row(cell.key)["cost"] == 1.0
+    assert [row["cost"] for row in Ledger(folder).rows()] == [1.0]
+    # whoever reads a later log first, and the others as they come, sees in the end what everybody sees
+    path.rename(tmp_path / path.name)
+    growing = Ledger(folder)
+    assert growing.row(cell.key)["cost"] == 3.0
+    (tmp_path / path.name).rename(path)
+    growing.refresh()
+    assert growing.row(cell.key)["cost"] == 1.0
+    assert other.key not in growing
+
+
+def test_a_checksum_is_of_the_key_and_the_row() -> None:
+    key = "0123456789abcdef" * 4
+    line = log.encoded(key, {"cost": 1.0})
+    # CRC-32 as zip and PNG have it, of the key's 64 digits and then the row as JSON
+    assert line == b'{"key": "%s", "crc": "%08x", "row": {"cost": 1.0}}\n' % (
+        key.encode(),
+        zlib.crc32(key.encode() + b'{"cost": 1.0}'),
+    )
+    assert log.decoded(line) == (key, b'{"cost": 1.0}')
+    assert log.decoded(line.replace(b"0123", b"0133", 1)) is None  # one digit of the key
+    assert log.decoded(line.replace(b"1.0", b"1.1")) is None
 
 
 def test_a_row_that_was_cut_off_when_its_driver_died_is_no_row(tmp_path: Path) -> None:

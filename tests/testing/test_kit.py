@@ -24,7 +24,7 @@ SHIPPED = ("sapso", "pso", "random", "particle", "annealed", "cma", "scipy", "sc
 ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna")
 
 
-@pytest.mark.parametrize("name", SHIPPED + ADAPTERS)
+@pytest.mark.parametrize("name", [*SHIPPED, *(pytest.param(name, marks=pytest.mark.slow) for name in ADAPTERS)])
 def test_it_passes_every_shipped_optimiser(name: str) -> None:
     offer = registry().offer("optimiser", name)
     result = check_optimiser(offer.factory, next_frame=offer.next_frame)
@@ -35,7 +35,12 @@ def test_it_passes_every_shipped_optimiser(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["pca", "loose", "full", "union", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA"]
+    "name",
+    [
+        "pca",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("loose", "full", "union", "sklearn")),
+        *(pytest.param(f"sklearn:{name}", marks=pytest.mark.slow) for name in ("FactorAnalysis", "FastICA")),
+    ],
 )
 def test_it_passes_every_shipped_prior(name: str) -> None:
     result = check_prior(registry().offer("prior", name).factory)
@@ -48,6 +53,7 @@ def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
     return SynthesisTracker(task, PCA().fit(task.angles), make, prediction=Prediction(floor=floor))
 
 
+@pytest.mark.slow
 def test_it_passes_the_papers_tracker() -> None:
     result = check_tracker(synthesis)
     assert result, str(result)
@@ -104,6 +110,7 @@ def test_it_finds_a_filter_that_forgets() -> None:
 
 
 @pytest.mark.parametrize(("bug", "checks"), planted.PRIORS.items(), ids=lambda one: getattr(one, "__name__", ""))
+@pytest.mark.slow
 def test_it_finds_each_bug_planted_in_a_prior(bug: Any, checks: tuple[str, ...]) -> None:
     assert set(checks) <= {one.name for one in check_prior(bug).of("failed")}
 

@@ -18,7 +18,7 @@ def summaries(cmu: Path, view: float, seeds: range) -> list[dict[str, Any]]:
     ]
 
 
-@pytest.mark.parametrize("view", [0.0, 45.0])
+@pytest.mark.parametrize("view", [pytest.param(0.0, marks=pytest.mark.slow), 45.0])
 def test_walking_is_followed_within_1_9_degrees(cmu: Path, view: float) -> None:
     found = summaries(cmu, view, range(5))
     errors = [summary["error_degrees"]["mean"] for summary in found]
@@ -30,6 +30,7 @@ def test_walking_is_followed_within_1_9_degrees(cmu: Path, view: float) -> None:
         assert summary["lost_rate"] == 0.0
 
 
+@pytest.mark.slow
 def test_a_side_view_is_followed_or_its_loss_is_reported(cmu: Path) -> None:  # Reading S15
     for summary in summaries(cmu, 90.0, range(5)):
         good = summary["error_degrees"]["mean"] <= 1.9

@@ -27,7 +27,7 @@ def paper_figures(results: PaperResults, folder: Path) -> list[str]:
         "figure-3-latents.png": latent_figure(results),
         "figure-4-clusters.png": cluster_figure(results),
         "figure-5-swarm.png": swarm_figure(watched_swarm(results.motions["walk"], results.scale, SHOWN_PARTICLES)),
-        "figure-6-convergence.png": convergence_figure(results),
+        "figure-6-convergence.png": lowest_cost_figure(results),
         "figure-7-dimensions.png": dimension_figure(results),
         "figure-9-frames.png": frame_figure(results),
     }
@@ -105,7 +105,7 @@ def _bones(pixels: Array) -> Array:
     return np.stack([pixels[:, list(PARENTS[1:])], pixels[:, 1:]], axis=2)
 
 
-def convergence_figure(results: PaperResults) -> Figure:
+def lowest_cost_figure(results: PaperResults) -> Figure:
     """Return the lowest cost against the iteration in the first frame, for each N: medians over runs."""
     figure = Figure(figsize=(10.0, 3.8), layout="constrained")
     panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)

@@ -9,6 +9,7 @@ from typing import Any
 
 import posefit
 from posefit.files import new_folder
+from posefit_experiments.columns import headed
 from posefit_experiments.grid import Progress
 from posefit_experiments.vsmm.activities import film_of
 from posefit_experiments.vsmm.experiment import SHOWN, WORKERS, repeat_patent
@@ -18,9 +19,9 @@ _COLUMNS = (
     ("hand_cm", "hand cm", 1),
     ("elbow_3d_cm", "elbow 3D", 1),
     ("hand_3d_cm", "hand 3D", 1),
-    ("mpjpe_mm", "MPJPE mm", 0),
+    ("mpjpe_mm", headed("mpjpe_mm"), 0),
     ("error_degrees", "degrees", 2),
-    ("iou", "IoU", 2),
+    ("iou", headed("iou"), 2),
     ("dominant_fraction", "dominant", 2),
     ("switch_delay_frames", "delay", 1),
     ("wrong_activations", "wrong act.", 1),

@@ -1,0 +1,20 @@
+"""How the tables call and show figures: by the labels, units and digits of `posefit.tracking.measures`."""
+
+from posefit.tracking.measures import MEASURES
+
+
+def headed(name: str, which: str = "") -> str:
+    """Return the head of a figure's column: which of its values (such as median), its label, and its unit."""
+    measure = MEASURES[name]
+    return " ".join(word for word in (which, measure.label, measure.unit) if word)
+
+
+def number(name: str, value: float | None) -> str:
+    """Return a value with a figure's digits, in its unit."""
+    return MEASURES[name].number(value)
+
+
+def labelled(name: str, value: float | None, width: int = 0) -> str:
+    """Return a value with a figure's label and unit, the number right in so many columns: `MPJPE   18 mm`."""
+    measure = MEASURES[name]
+    return " ".join(word for word in (measure.label, measure.number(value).rjust(width), measure.unit) if word)

@@ -1,0 +1,230 @@
+"""Mutants of the program, and the test that each must fail: `python -m tests.mutants [WORD ...]`.
+
+The program is copied into a temporary folder. Its tests pass there as it is; then one mutant after the other is put
+into the copy as a replacement of text, its own test is run and has to fail. Prints a table, and exits with 1 where a
+mutant lives; with 2 where a text that a mutant replaces is no longer there, or stands there more than once. Words
+choose the mutants whose descriptions hold one of them.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+COPIED = ("posefit", "plugins", "envs", "tests", "pyproject.toml")
+PATHS = (".", "plugins", "envs")
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A change that a test has to notice: in the file at `path`, texts become others."""
+
+    what: str
+    path: str
+    changes: tuple[tuple[str, str], ...]
+    test: str
+
+
+MUTANTS = (
+    Mutant(
+        "velocities of SAPSO (7) are not clipped to the limits",
+        "plugins/posefit_swarm/flock.py",
+        (("return np.clip(drawn, *self._limits)", "return drawn"),),
+        "tests/sources/test_sapso.py::test_eq_7_velocities_of_the_first_population_keep_within_the_limits",
+    ),
+    Mutant(
+        "Wald's two error rates are swapped",
+        "plugins/posefit_vsmm/switching.py",
+        (
+            ("np.log((1.0 - how.miss) / how.false_alarm)", "np.log((1.0 - how.false_alarm) / how.miss)"),
+            ("np.log(how.miss / (1.0 - how.false_alarm))", "np.log(how.false_alarm / (1.0 - how.miss))"),
+        ),
+        "tests/sources/test_vsmm_steps.py::test_the_sequential_tests_two_error_rates_are_walds",
+    ),
+    Mutant(
+        "the mean of several turns is sought in one step instead of ten",
+        "plugins/posefit_imm/filter.py",
+        (("\nTURNS = 10 ", "\nTURNS = 1 "),),
+        "tests/sources/test_vsmm.py::test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance",
+    ),
+    Mutant(
+        "the joint tracker's yaw and pitch ranges are permuted",
+        "plugins/posefit_vsmm/joined/tracker.py",
+        (("[[*YAW_PITCH_ROLL]]", "[[*YAW_PITCH_ROLL]][[1, 0, 2]]"),),
+        "tests/plugins/test_vsmm.py::test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it",
+    ),
+    Mutant(
+        "of two equal rows of a ledger the later counts",
+        "posefit/sweep/ledger.py",
+        (("min((name, offset), self._places.get(found[0], (name, offset)))", "(name, offset)"),),
+        "tests/sweep/test_ledger.py::test_of_two_rows_of_one_cell_the_first_counts",
+    ),
+    Mutant(
+        "of two equal rows of a ledger the one that was read first counts, whichever that is",
+        "posefit/sweep/ledger.py",
+        (
+            (
+                "min((name, offset), self._places.get(found[0], (name, offset)))",
+                "self._places.get(found[0], (name, offset))",
+            ),
+        ),
+        "tests/sweep/test_ledger.py::test_of_two_rows_of_one_cell_the_first_counts",
+    ),
+    Mutant(
+        "a row's checksum leaves out the key",
+        "posefit/sweep/log.py",
+        (
+            ("zlib.crc32(key.encode() + text)", "zlib.crc32(text)"),
+            ("zlib.crc32(found[1] + found[3])", "zlib.crc32(found[3])"),
+        ),
+        "tests/sweep/test_ledger.py::test_a_checksum_is_of_the_key_and_the_row",
+    ),
+    Mutant(
+        "the improvement interval lacks sqrt(n / (n - 1)), by hand",
+        "posefit/statistics/improvement.py",
+        (("np.sqrt(seeds / (seeds - 1)) * ", ""),),
+        "tests/statistics/test_improvement.py::test_the_interval_of_three_seeds_by_going_through_all_27_resamples",
+    ),
+    Mutant(
+        "the improvement interval lacks sqrt(n / (n - 1)), by 1000 studies",
+        "posefit/statistics/improvement.py",
+        (("np.sqrt(seeds / (seeds - 1)) * ", ""),),
+        "tests/statistics/test_improvement.py::test_intervals_hold_the_truth_in_93_to_98_percent_of_1000_studies[3]",
+    ),
+    Mutant(
+        "Qualisys' k3 stands before the tangential numbers",
+        "posefit/geometry/calibration.py",
+        (
+            ('"radialDistortion2", "tangentalDistortion1"', '"radialDistortion2", "radialDistortion3"'),
+            ('"tangentalDistortion2")\n', '"tangentalDistortion1")\n'),
+            ('(*names, "radialDistortion3")', '(*names, "tangentalDistortion2")'),
+        ),
+        "tests/geometry/test_calibration.py::test_qualisys_third_radial_number_is_opencvs_fifth",
+    ),
+    Mutant(
+        "the kernel's radii ignore fy",
+        "posefit/silhouette/kernels.py",
+        (("math.sqrt(view.focal[0] * view.focal[1])", "view.focal[0]"),),
+        "tests/silhouette/test_kernels.py::test_radii_are_seen_at_the_mean_of_two_focal_lengths",
+    ),
+    Mutant(
+        "the slow twin's radii ignore fy",
+        "tests/silhouette/twin.py",
+        (("np.sqrt(camera.focal[0] * camera.focal[1])", "camera.focal[0]"),),
+        "tests/silhouette/test_kernels.py::test_a_camera_with_two_focal_lengths_equals_the_twin",
+    ),
+    Mutant(
+        "the OpenCV twin's radii ignore fy",
+        "plugins/posefit_experiments/bench/kernel.py",
+        (("np.sqrt(camera.focal.prod())", "camera.focal[0]"),),
+        "tests/experiments/test_bench.py::test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths",
+    ),
+    Mutant(
+        "the upper reach of `loose` is taken from the least training angle",
+        "plugins/posefit_priors/loose.py",
+        (("self.angles_high - most[self.loose]", "self.angles_high - least[self.loose]"),),
+        "tests/plugins/test_priors.py::test_a_loose_angle_reaches_as_far_as_every_training_pose_may_still_go",
+    ),
+    Mutant(
+        "Configure ignores its kick",
+        "envs/posefit_envs/configure.py",
+        (("if spread > 0.0:", "if spread > 1.0:"),),
+        "tests/envs/test_environments.py::test_the_third_number_of_configure_kicks_every_particle_by_its_deviation",
+    ),
+    Mutant(
+        "Configure's swarm is not SAPSO's: another inertia",
+        "envs/posefit_envs/configure.py",
+        (("flock.fly(inertia, ACCELERATION", "flock.fly(0.999 * inertia, ACCELERATION"),),
+        "tests/envs/test_environments.py::test_configure_with_sapsos_own_schedule_finds_what_sapso_finds",
+    ),
+    Mutant(
+        "Track's next box is not centred on what was committed",
+        "envs/posefit_envs/track.py",
+        (("self._follower.commit(proposal)", "self._follower.commit(0.5 * proposal)"),),
+        "tests/envs/test_environments.py::test_track_proposals_mean_what_the_tracker_makes_of_them",
+    ),
+)
+
+
+def changed(text: str, mutant: Mutant) -> str:
+    """Return a file's text with a mutant in it. Raises ValueError where what it replaces is not there just once."""
+    for old, new in mutant.changes:
+        if (found := text.count(old)) != 1:
+            raise ValueError(f"{mutant.path}: expected {old!r} once, found it {found} times: {mutant.what}")
+        text = text.replace(old, new)
+    return text
+
+
+def passes(root: Path, tests: Sequence[str], cache: Path) -> bool:
+    """Return whether all tests pass, run in a copy of the program. Raises RuntimeError where they could not be run.
+
+    A compiled loop that is in the cache keeps what it called in other files when it was compiled, so a mutant needs a
+    cache of its own.
+    """
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(str(root / path) for path in PATHS),
+        "PYTHONDONTWRITEBYTECODE": "1",  # a mutant of the same length and second would be taken from the bytecode
+        "NUMBA_CACHE_DIR": str(cache),
+    }
+    words = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "--all",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:xdist",
+        "-o",
+        "addopts=",
+    ]
+    words += ["--import-mode=importlib", *tests]
+    ran = subprocess.run(words, cwd=root, env=environment, capture_output=True, text=True)
+    if ran.returncode > 1 or "skipped" in ran.stdout.splitlines()[-1]:
+        raise RuntimeError(f"expected tests that pass or fail, got\n{ran.stdout}{ran.stderr}")
+    return ran.returncode == 0
+
+
+def main(words: Sequence[str]) -> int:
+    """Try the mutants, all or those that a word chooses; return the exit status."""
+    chosen = [mutant for mutant in MUTANTS if not words or any(word in mutant.what for word in words)]
+    try:
+        for mutant in chosen:
+            changed((ROOT / mutant.path).read_text("utf-8"), mutant)
+    except (OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    lived = 0
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder) / "copy"
+        for name in COPIED:
+            if (ROOT / name).is_dir():
+                shutil.copytree(ROOT / name, root / name, ignore=shutil.ignore_patterns("__pycache__"))
+            else:
+                shutil.copy(ROOT / name, root / name)
+        clean = Path(folder) / "cache"
+        if not passes(root, [mutant.test for mutant in chosen], clean):
+            print("expected the tests to pass without a mutant, but one fails", file=sys.stderr)
+            return 2
+        for mutant in chosen:
+            file = root / mutant.path
+            text = file.read_text("utf-8")
+            file.write_text(changed(text, mutant), "utf-8")
+            compiled = "@jit" in text
+            killed = not passes(root, [mutant.test], Path(folder) / "its own" if compiled else clean)
+            file.write_text(text, "utf-8")
+            lived += not killed
+            print(f"{'killed' if killed else 'LIVES '}  {mutant.what}\n        {mutant.test}", flush=True)
+    print(f"{len(chosen) - lived} of {len(chosen)} mutants killed")
+    return int(lived > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
