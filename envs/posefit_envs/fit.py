@@ -68,7 +68,7 @@ class FitEnv(gym.Env[Image, Any]):
     - `target_cost=2.0`, `max_evaluations=200`.
 
     ## Version History
-    - v0: first version. After posefit 0.1.0 its instances changed: number n is now the motion, speed, phase and view of
+    - v0: first version. Before its release its instances changed: number n is now the motion, speed, phase and view of
       a sweep's instance n, and 0 the motion as it is. Results from before cannot be compared with later ones.
     """
 

@@ -53,7 +53,7 @@ class TrackEnv(gym.Env[Image, Any]):
     As in `Fit-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `target_cost` and `max_evaluations`.
 
     ## Version History
-    - v0: first version. After posefit 0.1.0 its instances changed: number n is now the motion, speed, phase and view of
+    - v0: first version. Before its release its instances changed: number n is now the motion, speed, phase and view of
       a sweep's instance n, and 0 the motion as it is. Results from before cannot be compared with later ones.
     """
 

@@ -384,6 +384,7 @@ def test_a_new_plugin_installs_offline_and_passes_its_own_test(kind: str, tmp_pa
     assert "my-own" in json.loads(used.stdout)["method"]
 
 
+@pytest.mark.slow
 def test_a_new_command_installs_offline_and_passes_its_own_test(tmp_path: Path) -> None:
     folder = tmp_path / "mine"
     result = run("plugins", "new", "how-far", "--kind", "command", "--out", folder)

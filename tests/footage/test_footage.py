@@ -227,6 +227,7 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     assert "going on from frame 4 of 20" in said
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", masks=np.stack(truth()[10:30]).astype(np.uint8))
     script = (

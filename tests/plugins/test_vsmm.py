@@ -71,7 +71,8 @@ def iou(frames: list[Frame]) -> np.ndarray:
     return np.array([metrics.iou(frame.areas)[0] for frame in frames])
 
 
-@pytest.mark.parametrize("factory", [vsmm, pytest.param(joined, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("factory", [vsmm, joined])
 def test_it_keeps_the_rules_of_a_tracker(factory: Any) -> None:
     result = check_tracker(factory)
     assert result, str(result)

@@ -97,6 +97,7 @@ def test_a_bone_behind_or_too_near_the_camera_is_not_drawn(body: Body, camera: C
     assert not project(body, camera, np.zeros(ANGLES), 9.0 * towards).any()
 
 
+@pytest.mark.slow
 def test_full_hd_is_drawn(body: Body) -> None:
     camera = Camera.around(np.zeros(3), 0.7, 2.6, (1920, 1080))
     for pose in random_poses(np.random.default_rng(5), 3):

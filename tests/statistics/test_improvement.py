@@ -38,6 +38,7 @@ def test_the_interval_has_the_same_value_and_holds_it():
 
 
 @pytest.mark.parametrize("seeds", [3, 10])
+@pytest.mark.slow
 def test_intervals_hold_the_truth_in_93_to_98_percent_of_1000_studies(seeds: int):
     # normal runs, the second method worse by d: P = Phi(d / sqrt(2)) on each of eight instances
     rng, worse = np.random.default_rng(6), np.linspace(0.0, 1.2, 8)[:, None]

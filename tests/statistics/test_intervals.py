@@ -21,6 +21,7 @@ def coverage(kind: str, seeds: int, count: int = COUNT) -> float:
     return held / count
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_in_93_to_97_percent_of_1000_studies():
     assert 0.93 <= coverage("with lost runs", 10) <= 0.97
 

@@ -81,6 +81,7 @@ def test_times_are_told_as_people_say_them() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_cell_that_fails_is_quarantined_and_the_exit_status_says_so(plan: Path, tmp_path: Path) -> None:
     plan.write_text(PLAN + '\n[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nsettings.pca.components = -1\n')
     out = tmp_path / "out"

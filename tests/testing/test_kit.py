@@ -20,11 +20,12 @@ from posefit_priors.pca import PCA
 from posefit_swarm.sapso import SAPSO
 from tests.testing import planted
 
-SHIPPED = ("sapso", "pso", "random", "particle", "annealed", "cma", "scipy", "scipy:dual_annealing")
+QUICK = ("sapso", "random", "cma")
+SLOW = ("pso", "particle", "annealed", "scipy", "scipy:dual_annealing")
 ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna")
 
 
-@pytest.mark.parametrize("name", [*SHIPPED, *(pytest.param(name, marks=pytest.mark.slow) for name in ADAPTERS)])
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW + ADAPTERS)])
 def test_it_passes_every_shipped_optimiser(name: str) -> None:
     offer = registry().offer("optimiser", name)
     result = check_optimiser(offer.factory, next_frame=offer.next_frame)
@@ -103,6 +104,7 @@ def test_it_finds_each_bug_planted_in_an_optimiser(bug: Any, checks: tuple[str, 
         assert result.outcome == "failed", result
 
 
+@pytest.mark.slow
 def test_it_finds_a_filter_that_forgets() -> None:
     result = check_optimiser(planted.ForgetsParticles, next_frame="carry")
     assert "next_frame" in {one.name for one in result.of("failed")}
