@@ -1,1 +1,5 @@
 """`python -m posefit` is `posefit`."""
+
+from posefit.cli import main
+
+main()

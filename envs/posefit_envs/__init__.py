@@ -1,9 +1,27 @@
 """Gymnasium environments of posefit: `gym.make("posefit_envs:posefit/Fit-v0")`.
 
+    import gymnasium as gym
+
+    env = gym.make("posefit_envs:posefit/Fit-v0", motion="run", instance=17)
+    observation, info = env.reset(seed=0)
+    observation, cost, ended, cut, info = env.step(env.action_space.sample())      # the reward is minus the cost
+
 `Fit-v0` is a search for the pose in one silhouette; `Track-v0` follows a sequence; `Configure-v0` steers a running
-swarm. Importing this package registers them; the environments themselves are imported when they are made. `drive` runs
-an optimiser against a vector environment, `to_sb3_vec_env` hands one to Stable-Baselines3, and `check_vector_env`
-compares any vector environment with single ones.
+swarm. Their docstrings are their manual. Importing this package registers them; the environments themselves are
+imported when they are made. `drive` runs an optimiser against a vector environment, `to_sb3_vec_env` hands one to
+Stable-Baselines3, and `check_vector_env` compares any vector environment with single ones.
+
+| looking for | file |
+|---|---|
+| Fit-v0, alone and many at once | fit.py, fit_vector.py |
+| Track-v0, alone and many at once | track.py, track_vector.py |
+| Configure-v0: dynamic algorithm configuration | configure.py |
+| the arguments; what an instance's number stands for (as in sweeps: `posefit.footage.instance`) | instance.py |
+| proposals become poses, costs and pictures; actions that are not allowed | search.py |
+| what is rendered | drawing.py |
+| seeds and masks of vector environments | batch.py |
+| optimisers that search an environment; Stable-Baselines3 | driving.py, sb3.py |
+| a checker for vector environments | checker.py |
 """
 
 from importlib import import_module

@@ -45,7 +45,7 @@ def save(figure: "Figure", path: str | Path) -> None:
         figure.savefig(building, dpi=200, bbox_inches="tight", metadata=metadata)  # long names too
 
 
-def convergence_figure(
+def curves_figure(
     methods: Sequence[str], evaluations: Array, curves: Sequence[Intervals], label: str = "best cost"
 ) -> "Figure":
     """Return curves over evaluations (p,), each with its band: of each method the intervals of p values."""

@@ -49,7 +49,7 @@ def write_portfolio(runs: Runs, path: str | Path) -> None:
         (name, one) for name, one in zip(names, convergence(contest, evaluations), strict=True) if one is not None
     ]
     if curves:
-        drawn["convergence"] = figures.convergence_figure(
+        drawn["convergence"] = figures.curves_figure(
             [name for name, _ in curves], evaluations, [one for _, one in curves]
         )
         drawn["attainment"] = figures.attainment_figure(names, evaluations, reached(contest, evaluations))

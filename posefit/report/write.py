@@ -8,8 +8,8 @@ from typing import Any
 from posefit.files import replaceable, replaced_file
 from posefit.geometry.skeleton import ANGLES
 from posefit.report.content import data_of
+from posefit.report.page.webpage import MARK, document, plain
 from posefit.report.runs import runs_of
-from posefit.report.webpage import MARK, document, plain
 from posefit.sweep.ledger import Ledger
 
 Say = Callable[[str], None]

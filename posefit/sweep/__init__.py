@@ -6,8 +6,20 @@
     plan = Plan.read("plan.toml")                     # or Plan.of({...}); every mistake is found here
     frame = Ledger("results").frame()                 # what `posefit sweep plan.toml --out results` measured
 
-`plan` says which cells there are, `cell` what a cell is and runs it, `ledger` keeps what cells measured, `driver` is a
-process's right to write to a ledger, `engines` run cells in processes of this machine or on a Dask cluster, and `drive`
-is the loop. `reporting` writes the page that shows what was found: `runs` are the rows as numbers, `contest` holds
-methods against each other, `curves` and `gallery` are what is drawn, and the folder `page` is the page itself.
+| looking for | file |
+|---|---|
+| what `posefit sweep` does: the engine, the bar, the exit status, the preview | command.py |
+| which cells there are; every field of a plan | plan.py |
+| what is wrong with a cell, before it runs | check.py |
+| what a cell is, how it runs and what it measures | cell.py |
+| the loop: claim, run, write the row, until nothing is left | drive.py |
+| a process's right to write to a ledger: claims, attempts, quarantine | driver.py |
+| the folder of finished rows; the log of one driver, and what a damaged line is | ledger.py, log.py |
+| rows as a table of pandas | table.py |
+| how long a plan will take | estimate.py |
+| where cells run: processes, a Dask cluster, their limits | engines/ |
+
+A row is written once, whole, with a checksum, and never changed. What is seen in a cell follows from its motion and
+instance (`posefit.footage.instance`), so that methods are paired: all see the same. `posefit.report` says what was
+found.
 """

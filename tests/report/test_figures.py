@@ -33,7 +33,7 @@ def every():
     """Return one figure of each kind."""
     shares = np.array([[0.1, 0.5, 1.0], [0.0, 0.3, 0.9], [0.0, 0.0, 0.2]])
     return {
-        "convergence": figures.convergence_figure(METHODS, GRID, [band([9, 5, 3]), band([9, 8, 7]), band([9, 9, 9])]),
+        "convergence": figures.curves_figure(METHODS, GRID, [band([9, 5, 3]), band([9, 8, 7]), band([9, 9, 9])]),
         "attainment": figures.attainment_figure(METHODS, GRID, shares),
         "profile": figures.profile_figure(METHODS, np.array([1.0, 2.0, 3.0]), shares),
         "joint_errors": figures.joint_errors_figure(

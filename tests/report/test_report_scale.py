@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from posefit.report.gallery import LARGEST
-from posefit.report.write import report
+from posefit.report.write import write_report
 from posefit.sweep.cell import CellResult
 from tests.effort import effort
 from tests.report.browser import ledger, result, row_of
@@ -52,7 +52,7 @@ def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_some_times(t
     for instances, seeds in ((3, 5), (5, 5), (10, 5), (20, 5)):  # the first imports what the others need
         made = ledger(tmp_path / f"{instances}", rows(instances, seeds))
         page = tmp_path / f"{instances}.html"
-        found.append(effort(lambda made=made, page=page: report(made, page, say=lambda _: None)))  # type: ignore[misc]
+        found.append(effort(lambda made=made, page=page: write_report(made, page, say=lambda _: None)))  # type: ignore[misc]
         size = sum(path.stat().st_size for path in (made / "rows").glob("*.jsonl"))
         assert instances == 3 or found[-1].read < 6.0 * size
     calls = [one.calls for one in found]

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from posefit.report.content import data_of
+from posefit.report.page.webpage import MARK, embedded, plain
 from posefit.report.runs import runs_of
-from posefit.report.webpage import MARK, embedded, plain
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import fails, run
 from tests.report.browser import ledger, result
