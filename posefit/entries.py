@@ -25,6 +25,7 @@ from posefit.limits import timed
 PROJECT = "posefit"
 LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
 PATIENCE = "POSEFIT_LOAD_SECONDS"
+GRACE = 1.0  # seconds after the limit until somebody is told that it does not hold
 SECONDS = 60.0  # as large libraries need on a slow disk
 
 T = TypeVar("T")
@@ -120,8 +121,8 @@ def _seconds(variables: Mapping[str, str]) -> float:
 @contextmanager
 def _told_late(label: str, seconds: float) -> Iterator[None]:
     """Say on stderr whose loading does not end where nothing can end it: in other threads, and in compiled code."""
-    message = f"posefit: {label} is still loading after {seconds + 1.0:g} s; {BLOCK} leaves it out\n"
-    timer = threading.Timer(seconds + 1.0, sys.stderr.write, (message,))
+    message = f"posefit: {label} is still loading after {seconds + GRACE:g} s; {BLOCK} leaves it out\n"
+    timer = threading.Timer(seconds + GRACE, lambda: sys.stderr.write(message))
     timer.daemon = True
     timer.start()
     try:

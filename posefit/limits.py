@@ -42,8 +42,8 @@ def timed(limit: float | None) -> Iterator[None]:
     signal.setitimer(signal.ITIMER_REAL, limit, AGAIN)
     try:
         yield
-    except _OvertimeError:
-        raise TimeoutError from None
+    except _OvertimeError as overtime:
+        raise TimeoutError from overtime  # whose traceback says where it was
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

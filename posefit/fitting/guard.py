@@ -15,11 +15,11 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import BudgetError, Optimiser
-from posefit.fitting.problem import combined
+from posefit.fitting.problem import over_views
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
 from posefit.limits import timed
 from posefit.silhouette.cost import areas
-from posefit.silhouette.drawn import Drawn
+from posefit.silhouette.drawn import PoseCount, uncounted
 
 LEEWAY = 10  # ours: poses a frame that may be drawn beyond the evaluations, as to draw once more what was found
 NEAR = 1e-6  # ours: how far a cost may be off, as it is rounded where it is added up in another order
@@ -146,7 +146,7 @@ class GuardedTracker:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield the tracker's frame for each observation. Raises BrokenRuleError where it is none, or misses."""
-        drawn = Drawn()
+        drawn = PoseCount()
         stream = _Stream(observations, drawn)
         passed = (BrokenRuleError, ImportError, GeneratorExit)
         said = given = 0
@@ -208,7 +208,7 @@ class GuardedTracker:
         if not np.array_equal(true, frame.areas):
             self._audit.note("areas", f"{label} must have its pose's areas, {true.tolist()}, got {_told(frame.areas)}")
             frame = replace(frame, areas=true)
-        cost = float(combined(counts, observation.silhouettes, self._beta)[0])
+        cost = float(over_views(counts, observation.silhouettes, self._beta)[0])
         if not (isinstance(frame.cost, float | int | np.number) and abs(frame.cost - cost) <= NEAR):
             self._audit.note("cost", f"{label} must have its pose's cost, {cost:.6g}, got {_told(frame.cost)}")
             frame = replace(frame, cost=cost, history=np.array([cost]), spent=None)
@@ -221,7 +221,7 @@ class GuardedTracker:
 class _Stream:
     """The observations that a tracker takes, with silhouettes of its own, so that what it draws of them is known."""
 
-    def __init__(self, observations: Iterable[Observation], drawn: Drawn) -> None:
+    def __init__(self, observations: Iterable[Observation], drawn: PoseCount) -> None:
         self._rest, self._drawn = iter(observations), drawn
         self.count = 0
         self.waiting: deque[Observation] = deque()  # those whose frames are still to come
@@ -232,7 +232,8 @@ class _Stream:
 
     def __next__(self) -> Observation:
         try:
-            observation = next(self._rest)
+            with uncounted():  # to render a motion is no evaluation
+                observation = next(self._rest)
         except StopIteration:
             raise
         except Exception as error:

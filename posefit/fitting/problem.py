@@ -55,7 +55,7 @@ class PoseProblem:
 
     def combined(self, counts: Sequence[Areas]) -> Array:
         """Return the cost (n,) of areas R, B, Y (n, 3), one array a view."""
-        return combined(counts, self.silhouettes, self.beta)
+        return over_views(counts, self.silhouettes, self.beta)
 
     def areas(self, poses: Array, translations: Array) -> list[Areas]:
         """Return R, B, Y (n, 3) of each view."""
@@ -65,7 +65,7 @@ class PoseProblem:
         ]
 
 
-def combined(counts: Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:
+def over_views(counts: Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:
     """Return the cost (n,) of areas R, B, Y (n, 3), one array a view; one of which nothing is known has no say."""
     known = [view for view, silhouette in zip(counts, silhouettes, strict=True) if silhouette.known]
     counts = known or counts

@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 from posefit.silhouette.mask import Silhouette
 
 
-class Drawn:
+class PoseCount:
     """Counts the poses that are drawn within `counting`, and in any thread those compared with its `own` silhouettes.
 
     Several count at once and each its own, in one thread or in many. A thread that others start is known by the
@@ -46,11 +46,21 @@ class Drawn:
         return mine
 
 
-_current: ContextVar[Drawn | None] = ContextVar("drawn", default=None)
-_owners: WeakKeyDictionary[Silhouette, Drawn] = WeakKeyDictionary()
+_current: ContextVar[PoseCount | None] = ContextVar("drawn", default=None)
+_owners: WeakKeyDictionary[Silhouette, PoseCount] = WeakKeyDictionary()
 
 
-def count(poses: int, silhouette: Silhouette | None = None) -> None:
+@contextmanager
+def uncounted() -> Iterator[None]:
+    """Count nothing in the body, though it is called within `counting`."""
+    token = _current.set(None)
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
+def count_poses(poses: int, silhouette: Silhouette | None = None) -> None:
     """Count poses that are drawn now, for whoever counts them."""
     counted = _current.get()
     if counted is None and _owners and silhouette is not None:

@@ -19,8 +19,6 @@ from typing import Any
 
 from posefit import testing
 from posefit.limits import memory
-from posefit.registry import Kind, registry
-from posefit.settings import parse
 from posefit.testing import results
 from posefit.testing.fresh import apart_from_prints
 from posefit.testing.results import Check, Report, Result, Results
@@ -31,19 +29,19 @@ STARTING = 120.0  # seconds until the process has loaded the plugin
 LEAVING = 0.5  # seconds that it has to end by itself
 
 
-def check_apart(kind: Kind, name: str, settings: Sequence[str] = (), only: Sequence[str] = ()) -> Report:
+def check_apart(kind: Any, name: str, settings: Sequence[str] = (), only: Sequence[str] = ()) -> Report:
     """Return what the checks, or `only` those named, say of an installed plugin with settings such as `particles=20`.
 
     Raises ValueError where a setting or a check is wrong, or the plugin cannot be loaded.
     """
-    label, found = registry().offer(kind, name).label, Results()
-    wanted: list[str] | None = None
+    found, wanted, label = Results(), None, ""
     while wanted is None or wanted:
         with _process(kind, name, settings, only if wanted is None else wanted) as process:
-            names = _Conversation(process, label).run(found)
-        left = names if wanted is None else wanted
+            conversation = _Conversation(process, f"{kind} {name!r}")
+            left = conversation.run(found)
+        label = conversation.label
         done = {one.name for one in found.all}
-        wanted = [name for name in left if name not in done]
+        wanted = [rule for rule in left if rule not in done]
         while wanted and (skipped := found.not_run(wanted[0])):
             found.add(skipped)
             wanted.pop(0)
@@ -54,7 +52,8 @@ class _Conversation:
     """What one process says, until it has no more to say or is ended."""
 
     def __init__(self, process: "subprocess.Popen[bytes]", label: str) -> None:
-        self._process, self._label, self._rest, self._late = process, label, b"", False
+        self._process, self._rest, self._late = process, b"", False
+        self.label = label  # how an error names the plugin
 
     def run(self, found: Results) -> list[str]:
         """Return the names of the checks that it was about to run; add the results of those that it ran."""
@@ -64,7 +63,7 @@ class _Conversation:
             if "mistake" in word:
                 raise ValueError(word["mistake"])
             if "checks" in word:
-                names = word["checks"]
+                names, self.label = word["checks"], word["label"]
             elif "begins" in word:
                 running, patience = word["begins"], results.SECONDS + GRACE
             elif "name" in word:
@@ -73,7 +72,7 @@ class _Conversation:
             if "ends" in word or found.not_run(""):
                 return names or []
         if names is None:
-            raise ValueError(f"{self._label}: it must load in a process of its own; {self._end()}")
+            raise ValueError(f"{self.label}: it must load in a process of its own; {self._end()}")
         done = {one.name for one in found.all}
         found.add(Result(running or next(name for name in names if name not in done), "failed", self._end()))
         return names
@@ -104,18 +103,16 @@ class _Conversation:
 
 
 @contextmanager
-def _process(
-    kind: Kind, name: str, settings: Sequence[str], only: Sequence[str]
-) -> Iterator["subprocess.Popen[bytes]"]:
+def _process(kind: Any, name: str, settings: Sequence[str], only: Sequence[str]) -> Iterator["subprocess.Popen[bytes]"]:
     """Start a process that checks a plugin; afterwards neither it nor what it started is left."""
-    what = {"path": sys.path, "kind": kind, "name": name, "settings": list(settings), "only": list(only)}
-    what["seconds"] = results.SECONDS
+    what: dict[str, Any] = {"kind": kind, "name": name, "settings": list(settings), "only": list(only)}
+    what |= {"path": sys.path, "seconds": results.SECONDS}
     process = subprocess.Popen(
         [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
     )
+    assert process.stdin is not None
+    assert process.stdout is not None
     try:
-        assert process.stdin is not None
-        assert process.stdout is not None
         process.stdin.write(json.dumps(what).encode())
         process.stdin.close()
         yield process
@@ -141,11 +138,11 @@ def main() -> None:
     sys.path[:] = asked["path"]
     results.SECONDS = asked["seconds"]
     try:
-        checks = _checks(asked["kind"], asked["name"], asked["settings"], asked["only"])
+        label, checks = _checks(asked["kind"], asked["name"], asked["settings"], asked["only"])
     except (ValueError, ImportError) as mistake:
         say(mistake=str(mistake))
         return
-    say(checks=[check.name for check in checks])
+    say(checks=[check.name for check in checks], label=label)
     with memory(GIGABYTES):
         for check in checks:
             say(begins=check.name)
@@ -153,7 +150,11 @@ def main() -> None:
     say(ends=True)
 
 
-def _checks(kind: Kind, name: str, texts: Sequence[str], only: Sequence[str]) -> list[Check]:
+def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> tuple[str, list[Check]]:
+    """Return how an error names a plugin, and its checks; here, as what they import takes its time."""
+    from posefit.registry import registry
+    from posefit.settings import parse
+
     offer = registry().offer(kind, name)
     given = {}
     for text in texts:
@@ -173,7 +174,7 @@ def _checks(kind: Kind, name: str, texts: Sequence[str], only: Sequence[str]) ->
     for one in only:
         if one not in names:
             raise ValueError(f"--only must be one of {', '.join(names)}, got {one!r}")
-    return [check for check in checks if not only or check.name in only]
+    return offer.label, [check for check in checks if not only or check.name in only]
 
 
 if __name__ == "__main__":

@@ -55,7 +55,9 @@ class Check:
         except BrokenError as broken:
             return Result(self.name, "failed", str(broken))
         except TimeoutError as error:
-            return Result(self.name, "failed", f"it must end within {SECONDS:g} s, and did not", _theirs(error))
+            return Result(
+                self.name, "failed", f"it must end within {SECONDS:g} s, and did not", _theirs(error.__cause__ or error)
+            )
         except SystemExit as error:
             return Result(
                 self.name, "failed", f"it must not end the program, got SystemExit: {error.code}", _theirs(error)

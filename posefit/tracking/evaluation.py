@@ -41,7 +41,8 @@ class Evaluation:
     """Collects a row a frame. Baselines have the true root and translation, which a tracker has not.
 
     They are `mean_pose`, the mean of the training poses; `persistence`, the true pose of the first frame, held;
-    `nearest`, the training pose of least cost in each frame; `prior_floor`, the truth's own projection into the prior.
+    `nearest`, the training pose of least cost in each frame. `prior_floor` is the truth's own projection into the
+    prior, which is no floor where a prior is not linear.
     """
 
     def __init__(self, scene: Scene, prior: Prior | None, training: Array, beta: float) -> None:

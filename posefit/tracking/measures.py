@@ -104,7 +104,11 @@ class Measures:
     )
     prior_floor_degrees: float | None = field(
         metadata=_about(
-            "floor of the prior", "degrees", 2, "error of the truth's own projection into the prior and back"
+            "truth projected into the prior",
+            "degrees",
+            2,
+            "error of the true poses put into the prior and taken out again; no floor, as a prior that is "
+            "not linear may hold nearer ones",
         )
     )
     seconds_per_frame: float = field(metadata=_about("time", "ms a frame", 1, "wall time a frame", 1e3))

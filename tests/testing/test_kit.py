@@ -89,10 +89,34 @@ def test_chance_does_not_beat_chance_and_need_not_where_it_says_that_it_is_the_b
         assert outcomes(factory) == [("skipped", "it is the baseline itself")] * 2
 
 
-@pytest.mark.parametrize("name", ["Sound"])
-def test_it_passes_a_sound_plugin(name: str) -> None:
-    result = check_optimiser(getattr(planted, name))
+@pytest.mark.parametrize("right", planted.RIGHT)
+def test_it_passes_a_sound_plugin(right: Any) -> None:
+    result = check_optimiser(right)
     assert result, str(result)
+
+
+def test_one_cause_is_told_once_with_the_authors_traceback_and_ends_the_checks() -> None:
+    result = check_optimiser(planted.WrongSignature)
+    construction, shape, dtype = result.of("failed")
+    assert (construction.name, shape.name, dtype.name) == ("construction", "shape", "dtype")
+    assert shape.detail == dtype.detail
+    assert {one.detail for one in result.of("skipped")} == {"not run: shape and dtype fail alike"}
+    assert len(result.results) == len(optimiser_checks(planted.WrongSignature))
+    assert str(result).count("takes 2 positional arguments but 3") == 3  # a line each, and one traceback
+
+
+def test_a_traceback_begins_in_the_plugins_own_code() -> None:
+    check = next(one for one in optimiser_checks(planted.DividesByTheRange) if one.name == "equal_costs")
+    told = check.run().traceback
+    assert told.splitlines()[1].strip().startswith(f'File "{planted.__file__}"')
+    assert 'assert not np.isnan(rank).any(), "costs are all equal"' in told
+
+
+def test_a_prior_that_takes_its_time_learns_twice_and_where_input_is_wrong() -> None:
+    planted.Unhurried.fits = 0
+    assert check_prior(planted.Unhurried)
+    # once for all rules, once more for `same_again`, three times for what `bad_input` has refused
+    assert planted.Unhurried.fits <= 5
 
 
 @pytest.mark.parametrize(("bug", "checks"), planted.OPTIMISERS.items(), ids=lambda one: getattr(one, "__name__", ""))
