@@ -12,8 +12,8 @@ or one test a rule:
         check()
 
 The same checks run for an installed plugin as `posefit check optimiser NAME`, in a process of its own: there a plugin
-that ends or hangs its process has failed a check, where here it ends or hangs the caller's. A factory with the attribute
-`baseline = True` is chance itself, and is not asked to beat it.
+that ends or hangs its process has failed a check, where here it ends or hangs the caller's. A factory with the
+attribute `baseline = True` is chance itself, and is not asked to beat it.
 """
 
 from collections.abc import Callable
