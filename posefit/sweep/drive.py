@@ -172,7 +172,7 @@ class _Sweep:
             if outcome.reason is None:
                 self._driver.release(claim)
             else:
-                self._driver.fail(claim, outcome.reason)
+                self._driver.fail(claim, outcome.reason, outcome.own)
                 self.tally.failed += 1
             self._waiting.append(outcome.cell)
         del self._running[outcome.cell.key]
