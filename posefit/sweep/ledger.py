@@ -79,6 +79,11 @@ class Ledger:
         """Return whether a cell is in quarantine."""
         return (self.path / QUARANTINE / f"{key}.json").exists()
 
+    def sentenced(self) -> set[str]:
+        """Return the keys of all cells in quarantine that have no row."""
+        names = (entry.name.removesuffix(".json") for entry in os.scandir(self.path / QUARANTINE))
+        return {name for name in names if name not in self}
+
     def quarantined(self) -> list[dict[str, Any]]:
         """Return the cells in quarantine: key, spec, status, and the reason of each attempt."""
         paths = sorted((self.path / QUARANTINE).glob("*.json"))
