@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from posefit.tracking.opening import Opening
 
 POINTS = 64  # of an anytime trace at most
-TIMES = ("seconds", "seconds_per_frame")  # what two runs of a cell do not have in common
+TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # what two runs of a cell do not have in common
 DROPPED = "dropped"  # the corruption that takes whole frames away, a share of them
 UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
 
