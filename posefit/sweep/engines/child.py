@@ -34,10 +34,12 @@ class Child:
 
     def call(self, run: Callable[[T], R], task: T, limits: Limits) -> R:
         """Return what `run` makes of a task; see `limited`. Raises Died where the process ends before."""
+        import cloudpickle  # Dask's own: what came from a driver's main module is in no module here
+
         assert self._process.stdout is not None
         try:
             # one message, and no other before its answer: a reader that reads ahead takes nothing of the next
-            self._send((sys.path, pickle.dumps((run, task, limits))))
+            self._send((sys.path, cloudpickle.dumps((run, task, limits))))
             if not _readable(self._process.stdout, limits.seconds + STARTING):
                 raise TimeoutError
             result, error = pickle.load(self._process.stdout)
@@ -122,8 +124,11 @@ def main() -> None:
             answer = limited(run, task, limits, grace=0.0), None
         except (MemoryError, Failed) as error:
             answer = None, error
-        answers.write(pickle.dumps(answer))
-        answers.flush()
+        try:
+            answers.write(pickle.dumps(answer))
+            answers.flush()
+        except BrokenPipeError:  # the worker is gone
+            os._exit(1)
 
 
 def _readable(file: IO[bytes], seconds: float) -> bool:
