@@ -49,7 +49,7 @@ class Frame:
     # (populations,) evaluations so far after each, where a tracker says
     spent: NDArray[np.int64] | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
-    # of all threads of the process, where a tracker says: unlike `seconds` it does not grow while others use the machine
+    # of all threads of the process, where a tracker says: unlike `seconds` it does not grow on a busy machine
     cpu_seconds: float | None = None
 
 
@@ -223,7 +223,9 @@ class SynthesisTracker:
         )
         counts = problem.areas(poses, places)
         areas = np.stack([one[0] for one in counts])
-        return Frame(poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0), cpu_seconds=0.0)
+        return Frame(
+            poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0), cpu_seconds=0.0
+        )
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
         """Return the optimiser of the next frame, as `next_frame` asks."""

@@ -130,7 +130,7 @@ class _Table:
             seeds=tuple(ranks),
             keys=tuple(self.keys[k] for k in order),
             figures=dict(zip(FIGURES, figures[order].T, strict=True)),
-            joint_errors=np.array(self.joints, dtype=np.float32).reshape(-1, len(JOINTS))[order],
+            joint_errors=np.asarray(np.reshape(self.joints, (-1, len(JOINTS)))[order]),
             traces=tuple(self.traces[k] for k in order),
             failures=tuple(_failure(one) for one in quarantined),
             failed=tuple(lost[text] for text in (list(self.variants)[m] for m in best)),

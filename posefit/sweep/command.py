@@ -4,13 +4,13 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from posefit.sweep.cell import Cell, run_cell, settings_text
-from posefit.sweep.drive import Tally, drive_cells, keys_of, progress_of
+from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of, progress_of
 from posefit.sweep.driver import Driver
 from posefit.sweep.engines.engine import Engine
 from posefit.sweep.engines.limits import Limits
@@ -22,9 +22,18 @@ DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 Say = Callable[[str], None]
 
 
-def run_plan(
-    plan: str, out: str, *, where: "Where", retry_quarantined: bool = False, say: Say
-) -> tuple[Tally, int]:
+@dataclass(frozen=True)
+class Where:
+    """In which place cells run, and how much each may take: processes of this machine, or Dask workers."""
+
+    workers: int | None = None
+    scheduler: str | None = None
+    dask_local: int | None = None
+    dask_dashboard: bool = False
+    limits: Limits = field(default_factory=Limits)
+
+
+def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = False, say: Say) -> tuple[Tally, int]:
     """Return how the sweep of a plan to a folder ended, and the exit status that says so."""
     cells = Plan.read(plan)
     start = engine(where)
@@ -33,9 +42,7 @@ def run_plan(
     return tally, STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
 
 
-def swept(
-    cells: Collection[Cell], out: str | Path, running: Engine, say: Say, retry_quarantined: bool = False
-) -> Tally:
+def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quarantined: bool = False) -> Tally:
     """Return how cells ended that an engine ran into the ledger in a folder, with a bar on stderr."""
     from tqdm import tqdm
 
@@ -43,7 +50,7 @@ def swept(
         if retry_quarantined:
             lost = driver.ledger.sentenced()
             again = sum(driver.pardon(key) for key in keys_of(cells) if key in lost)
-            say(f"{again} cells are out of quarantine, to be tried again")
+            say(f"{again} {'cell is' if again == 1 else 'cells are'} out of quarantine, to be tried again")
         bar = tqdm(total=len(cells), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
 
         def beside(message: str) -> None:
@@ -54,7 +61,7 @@ def swept(
             return drive_cells(cells, driver, running, beside, progress_of(bar, say))
 
 
-def preview(plan: str, out: str | None, *, where: "Where", as_json: bool) -> Iterator[str]:
+def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Iterator[str]:
     """Yield the lines that show the cells of a plan, which are done already, and about how long the others take.
 
     Or those of one JSON object that says the same. A million cells are never in memory together.
@@ -90,17 +97,6 @@ def preview(plan: str, out: str | None, *, where: "Where", as_json: bool) -> Ite
     yield f"{len(cells)} cells, {len(left)} of them to run{takes}"
 
 
-@dataclass(frozen=True)
-class Where:
-    """In which place cells run, and how much each may take: processes of this machine, or Dask workers."""
-
-    workers: int | None = None
-    scheduler: str | None = None
-    dask_local: int | None = None
-    dask_dashboard: bool = False
-    limits: Limits = field(default_factory=Limits)
-
-
 def engine(where: Where) -> Callable[[], Engine]:
     """Return what starts the engine that was asked for. Raises ValueError where more than one was."""
     places = (("workers", where.workers), ("scheduler", where.scheduler), ("dask-local", where.dask_local))
@@ -117,9 +113,7 @@ def engine(where: Where) -> Callable[[], Engine]:
         if where.scheduler is not None or where.dask_local is not None:
             from posefit.sweep.engines.cluster import Cluster
 
-            return Cluster(
-                where.scheduler, where.dask_local, where.limits, run_cell, dashboard=where.dask_dashboard
-            )
+            return Cluster(where.scheduler, where.dask_local, where.limits, run_cell, dashboard=where.dask_dashboard)
         from posefit.sweep.engines.processes import Processes
 
         return Processes(where.workers or cores(), where.limits, run_cell)

@@ -4,7 +4,7 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +18,7 @@ PATIENCE = 0.2  # seconds between two looks at whether somebody wants to stop
 ELSEWHERE = 0.5  # seconds between two looks at cells that other drivers run
 
 Say = Callable[[str], None]
+Cells = Plan | Sequence[Cell]
 
 
 @dataclass
@@ -60,7 +61,7 @@ class _Stop:
 
 
 def drive_cells(
-    cells: Collection[Cell],
+    cells: Cells,
     driver: Driver,
     engine: Engine,
     say: Say,
@@ -93,7 +94,7 @@ class _Sweep:
 
     def __init__(
         self,
-        cells: Collection[Cell],
+        cells: Cells,
         driver: Driver,
         engine: Engine,
         stop: _Stop,
@@ -202,7 +203,7 @@ class _Sweep:
         return state in (State.DONE, State.QUARANTINED)
 
 
-def keys_of(cells: Collection[Cell]) -> Iterator[str]:
+def keys_of(cells: Cells) -> Iterator[str]:
     """Return the keys of cells; a plan gives them without making its cells."""
     return cells.keys() if isinstance(cells, Plan) else (cell.key for cell in cells)
 

@@ -12,7 +12,6 @@ as other cells get done. Only `LOSSES` of them, with no row between the first an
 import json
 import os
 import socket
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass

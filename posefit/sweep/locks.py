@@ -27,7 +27,7 @@ def locked(file: int, path: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        raise _useless(path, error.strerror) from None
+        raise _useless(path, error.strerror or str(error)) from None
     if not is_locked(path):
         raise _useless(path, "one that forgets them")
 

@@ -1,4 +1,4 @@
-"""The cells of a product, one after the other: a million of them are never in memory together, and none is checked twice.
+"""The cells of a product, one after the other: a million are never in memory together, and none is checked twice.
 
 Fields that are checked with each other are checked once for each of their combinations; every other value once. A
 cell's key is the SHA-256 of its fields as JSON, and so of pieces that many cells have in common.

@@ -5,6 +5,7 @@ became of them; what a cell prints goes to the worker's standard error. Dask's w
 `multiprocessing`, so it is started as any other program.
 """
 
+import importlib
 import os
 import pickle
 import select
@@ -14,8 +15,8 @@ import threading
 from collections.abc import Callable
 from typing import IO, TypeVar
 
-from posefit.sweep.engines.engine import Died, reason_of
-from posefit.sweep.engines.limits import Failed, Limits, alone, limited
+from posefit.sweep.engines.engine import DiedError, reason_of
+from posefit.sweep.engines.limits import FailedError, Limits, alone, limited
 
 IDLE = 60.0  # seconds after which a process ends that nobody gives a task
 STARTING = 60.0  # seconds that it may take to start, which are not the cell's
@@ -33,18 +34,16 @@ class Child:
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
     def call(self, run: Callable[[T], R], task: T, limits: Limits) -> R:
-        """Return what `run` makes of a task; see `limited`. Raises Died where the process ends before."""
-        import cloudpickle  # Dask's own: what came from a driver's main module is in no module here
-
+        """Return what `run` makes of a task; see `limited`. Raises DiedError where the process ends before."""
         assert self._process.stdout is not None
         try:
             # one message, and no other before its answer: a reader that reads ahead takes nothing of the next
-            self._send((sys.path, cloudpickle.dumps((run, task, limits))))
+            self._send((sys.path, _pickled((run, task, limits))))
             if not _readable(self._process.stdout, limits.seconds + STARTING):
                 raise TimeoutError
             result, error = pickle.load(self._process.stdout)
         except (EOFError, pickle.UnpicklingError, BrokenPipeError):
-            raise Died(self._process.wait()) from None
+            raise DiedError(self._process.wait()) from None
         if error is not None:
             raise error
         found: R = result
@@ -76,15 +75,14 @@ class Children:
     def call(self, run: Callable[[T], R], task: T, limits: Limits) -> tuple[R | None, str | None, bool]:
         """Return what `run` makes of a task, or why it made nothing and whether that is the task's own fault."""
         child = self._one()
+        failure: tuple[str, bool] | None = None
         try:
             result = child.call(run, task, limits)
         except Exception as error:
-            if not isinstance(error, Failed):
+            if not isinstance(error, FailedError):
                 child.end()
                 return None, *reason_of(error, limits)
             failure = reason_of(error, limits)
-        else:
-            failure = None
         with self._lock:
             self._idle.append(child)
         return (result, None, True) if failure is None else (None, *failure)
@@ -122,13 +120,19 @@ def main() -> None:
         answer: tuple[object, Exception | None]
         try:
             answer = limited(run, task, limits, grace=0.0), None
-        except (MemoryError, Failed) as error:
+        except (MemoryError, FailedError) as error:
             answer = None, error
         try:
             answers.write(pickle.dumps(answer))
             answers.flush()
         except BrokenPipeError:  # the worker is gone
             os._exit(1)
+
+
+def _pickled(what: object) -> bytes:
+    """Return a pickle of anything that Dask brought here, functions of a driver's main module among them."""
+    pickled: bytes = importlib.import_module("cloudpickle").dumps(what)  # Dask's own
+    return pickled
 
 
 def _readable(file: IO[bytes], seconds: float) -> bool:

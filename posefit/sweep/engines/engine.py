@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
 from posefit.sweep.cell import Cell, CellResult
-from posefit.sweep.engines.limits import Failed, Limits, text_of
+from posefit.sweep.engines.limits import FailedError, Limits, text_of
 
 J = TypeVar("J")  # a job: a cell, or whatever else its function takes
 R = TypeVar("R")
 Run = Callable[[Cell], CellResult]
-# Signals that nothing in a cell brings about by mistake: somebody or something outside sent them. So did the kernel
-# that ran out of memory; a cell's own limit of memory ends it before that, where the machine has as much as was promised.
+# Signals that nothing in a cell brings about by mistake: somebody or something outside sent them. So does the kernel
+# where memory runs out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
 OUTSIDE = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGPWR")
 
 
@@ -57,7 +57,7 @@ class EngineError(ValueError):
     """An engine cannot go on."""
 
 
-class Died(Exception):
+class DiedError(Exception):
     """A process ended before its cell did, with this status; a negative one is the signal that ended it."""
 
     def __init__(self, exitcode: int) -> None:
@@ -73,9 +73,9 @@ def reason_of(error: BaseException, limits: Limits) -> tuple[str, bool]:
         return f"it wanted more memory than its limit of {limits.gigabytes:g} GB", True
     if isinstance(error, BrokenProcessPool):  # it had not begun
         return "its process died before the cell began", False
-    if isinstance(error, Failed):
+    if isinstance(error, FailedError):
         return str(error), True
-    code = getattr(error, "exitcode", None)  # of `Died`, and of pebble's ProcessExpired
+    code = getattr(error, "exitcode", None)  # of `DiedError`, and of pebble's ProcessExpired
     if isinstance(code, int) and code < 0:
         name = _signal(-code)
         if name == "SIGALRM":  # the timer that `limited` sets for when nobody else notices

@@ -33,7 +33,7 @@ class Limits:
                 raise ValueError(f"the limit of {name} must be above 0, got {getattr(self, name)}")
 
 
-class Failed(Exception):
+class FailedError(Exception):
     """A cell raised something, told in one line: what a plugin raises need not survive the way to another process."""
 
 
@@ -45,7 +45,7 @@ def text_of(error: BaseException) -> str:
 def limited(run: Callable[[T], R], cell: T, limits: Limits, grace: float = GRACE) -> R:
     """Return what `run` makes of a cell.
 
-    Raises MemoryError where it wants more memory than it may have, and Failed where it raises anything else. A process
+    Raises MemoryError where it wants more memory than it may have, and FailedError where it raises anything else. A process
     that is still at it `grace` seconds after its time is ended by the operating system, whatever it does.
     """
     with _one_at_a_time, _memory(limits.gigabytes):
@@ -57,7 +57,7 @@ def limited(run: Callable[[T], R], cell: T, limits: Limits, grace: float = GRACE
         except MemoryError:
             failed: Exception = MemoryError()  # a new one: that one holds on to everything that filled the memory
         except BaseException as error:  # an exit and an interrupt too: they are the cell's, and end nothing else
-            failed = Failed(text_of(error))
+            failed = FailedError(text_of(error))
         finally:
             if timer is not None:
                 timer(signal.ITIMER_REAL, 0.0)

@@ -10,13 +10,13 @@ from typing import Generic, Self
 
 from pebble import ProcessExpired, ProcessPool
 
-from posefit.sweep.engines.engine import Died, Ended, J, R, reason_of
+from posefit.sweep.engines.engine import DiedError, Ended, J, R, reason_of
 from posefit.sweep.engines.limits import Limits, alone, limited
 
 LOOK = 1.0  # seconds that count at most between two looks: a driver that was stopped for an hour lets its cells finish
 CAME, BEGAN = "came", "began"  # what a worker says: that it is there, and that a cell begins
 
-_said: "list[Connection[Any, Any]]" = []  # of a worker: where it says so
+_said: list[Connection] = []  # of a worker: where it says so
 
 
 class Processes(Generic[J, R]):
@@ -70,7 +70,7 @@ class Processes(Generic[J, R]):
         if future.done():
             error = future.exception()
         elif worker.replaced:  # which pebble says nothing of where the first one ended with status 0
-            error = Died(0)
+            error = DiedError(0)
         elif worker.spent > self._limits.seconds:
             error = TimeoutError()
         else:
