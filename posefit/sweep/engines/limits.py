@@ -45,7 +45,7 @@ def text_of(error: BaseException) -> str:
 def limited(run: Callable[[T], R], cell: T, limits: Limits, grace: float = GRACE) -> R:
     """Return what `run` makes of a cell.
 
-    Raises MemoryError where it wants more memory than it may have, and FailedError where it raises anything else. A process
+    Raises MemoryError where it wants more memory than it may have, FailedError where it raises anything else. A process
     that is still at it `grace` seconds after its time is ended by the operating system, whatever it does.
     """
     with _one_at_a_time, _memory(limits.gigabytes):
