@@ -1,13 +1,15 @@
 """`posefit sweep` and `posefit report`."""
 
 import json
+from collections.abc import Iterator
+from contextlib import nullcontext
 from itertools import islice
 from typing import Any
 
 import click
 
 from posefit.cli.options import ENGINE, options
-from posefit.cli.output import say
+from posefit.cli.output import results_alone, say
 
 LINES = 1000  # that are printed at a time
 
@@ -43,14 +45,21 @@ def sweep(
     where = command.Where(**places, limits=limits)
     if dry_run:
         lines = command.preview(plan, out, where=where, as_json=as_json)
-        while some := "\n".join(islice(lines, LINES)):
+        while some := _next(lines, as_json):
             click.echo(some)
         return
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
-    tally, status = command.run_plan(plan, out, where=where, retry_quarantined=retry_quarantined, say=say)
+    with results_alone() if as_json else nullcontext():
+        tally, status = command.run_plan(plan, out, where=where, retry_quarantined=retry_quarantined, say=say)
     click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
     context.exit(status)
+
+
+def _next(lines: Iterator[str], as_json: bool) -> str:
+    """Return the next lines as one text, "" at their end; what a plugin prints meanwhile is none of them."""
+    with results_alone() if as_json else nullcontext():
+        return "\n".join(islice(lines, LINES))
 
 
 @click.command()

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-import posefit
 from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
@@ -18,6 +17,7 @@ from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, opened, task_of
 from posefit.tracking.outputs import Nowhere, Output
+from posefit.version import __version__
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +59,12 @@ def follow(
         method = prepare(choice, task)
         task, shape = opened(scene, method, task, opening, seed, listener)
         scene = replace(scene, body=task.body)
+        method.audit.forget()  # what was tried before the first frame is in no row
         output = output or Nowhere()
         found = _found(scene, method, task, output, seed, listener)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
+        for warning in method.audit.warnings:
+            listener.say(f"warning: {warning}")
         for frame, observation in zip(found, scene.observations, strict=True):
             evaluation.add(frame, observation)
         rows, measures = evaluation.close()
@@ -81,7 +84,7 @@ def follow(
             **measures.as_dict(),
             **({"history": found[0].history.tolist()} if len(found) == 1 else {}),
             "evaluations_per_frame": task.evaluations,
-            "version": posefit.__version__,
+            "version": __version__,
             "train": [motion.name for motion in training],
             "translation": task.translation,
             "first_pose": opening.first_pose,
@@ -91,7 +94,7 @@ def follow(
             "fps": scene.fps,
             "settings": method.settings,
             "body": None if shape is None else _described(shape),
-            "warnings": list(scene.warnings),
+            "warnings": [*scene.warnings, *method.audit.warnings],
         }
         output.finish(scene, estimate, found, rows, summary)
     return Track(estimate, scene.truth, measures, rows, summary, found)
