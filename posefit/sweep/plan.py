@@ -33,7 +33,7 @@ import numpy as np
 
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import FIELDS, cell_of, flattened, names_of
-from posefit.sweep.product import Product
+from posefit.sweep.product import Entries, Product
 
 LISTS = {
     "methods": "method",
@@ -155,7 +155,7 @@ class _Shared:
             )
 
 
-def _lists(tables: Any) -> list[list[dict[str, Any]]] | None:
+def _lists(tables: Any) -> list[Entries] | None:
     """Return the entries of each list of a product; None where there is no product."""
     if tables is None:
         return None
@@ -186,19 +186,19 @@ def _repeated(digests: bytes) -> str | None:
     return None
 
 
-def _entries(name: str, values: Any) -> list[dict[str, Any]]:
+def _entries(name: str, values: Any) -> Entries:
     """Return the fields that each entry of one list of a product stands for."""
     field = LISTS[name]
     if field in ("instance", "seed") and type(values) is int:
         if values > MOST:
             raise ValueError(f"product.{name} must be at most {MOST:,}, got {values:,}")
-        values = list(range(values))
-    if not isinstance(values, list | tuple):
+        values = range(values)
+    if not isinstance(values, list | tuple | range):
         raise ValueError(f"product.{name} must be a list, got {values!r}")
     if not values:
         raise ValueError(f"product.{name} must hold at least one, got none: an empty product has no cells")
     whole = field == "corruption"  # whose value is itself a table
-    return [dict(one) if isinstance(one, Mapping) and not whole else {field: one} for one in values]
+    return Entries(field, values, whole)
 
 
 def _mapping(name: str, value: Any) -> dict[str, Any]:

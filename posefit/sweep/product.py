@@ -8,7 +8,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations, product
 from math import prod
-from typing import Any
+from typing import Any, overload
 
 from posefit.sweep.cell import NAMES, Cell, json_of
 from posefit.sweep.check import FIELDS, checked
@@ -17,6 +17,43 @@ CROSSED = ("method", "motion", "train", "settings", "frames", "fps", "evaluation
 KEPT = 4096  # combinations of these that are kept, to be met again
 
 Entry = Mapping[str, Any]
+
+
+class Entries(Sequence[Entry]):
+    """The fields that each value of a list stands for: those of a table, or `field`; a `whole` one is itself a table."""
+
+    def __init__(self, field: str, values: Sequence[Any], whole: bool = False) -> None:
+        self._field, self._values, self._whole = field, values, whole
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    @overload
+    def __getitem__(self, k: int) -> Entry: ...
+    @overload
+    def __getitem__(self, k: slice) -> Sequence[Entry]: ...
+    def __getitem__(self, k: int | slice) -> Entry | Sequence[Entry]:
+        """Return the fields of the kth value."""
+        if isinstance(k, slice):
+            return Entries(self._field, self._values[k], self._whole)
+        value = self._values[k]
+        return dict(value) if isinstance(value, Mapping) and not self._whole else {self._field: value}
+
+
+class _Loose:
+    """The entries of a list whose fields are checked by themselves, once each; of very many when they come."""
+
+    def __init__(self, entries: Sequence[Entry]) -> None:
+        self._entries = entries
+        self._known = [self._made(k) for k in range(len(entries))] if len(entries) <= KEPT else []
+
+    def __getitem__(self, k: int) -> tuple[Entry, list[tuple[int, str]]]:
+        """Return the checked fields of an entry; and, as JSON, with their places among all fields."""
+        return self._known[k] if self._known else self._made(k)
+
+    def _made(self, k: int) -> tuple[Entry, list[tuple[int, str]]]:
+        fields = checked(self._entries[k])
+        return fields, [(NAMES.index(name), _piece(name, value)) for name, value in fields.items()]
 
 
 class Product:
@@ -31,15 +68,9 @@ class Product:
                 raise ValueError(f"product must say {min(twice)} in one list, got it in two")
         self._lists, self._make = lists, make
         loose = set(FIELDS) - set(CROSSED)
-        self._loose = [all(loose.issuperset(entry) for entry in entries) for entries in lists]
-        self._checked = [
-            [checked(entry) if is_loose else {} for entry in entries]
-            for entries, is_loose in zip(lists, self._loose, strict=True)
-        ]
-        self._pieces = [
-            [[(NAMES.index(name), _piece(name, value)) for name, value in fields.items()] for fields in entries]
-            for entries in self._checked
-        ]
+        self._loose = {
+            n: _Loose(entries) for n, entries in enumerate(lists) if all(loose.issuperset(entry) for entry in entries)
+        }
         self._known: dict[tuple[int, ...], tuple[Cell, list[str]]] = {}
 
     def __len__(self) -> int:
@@ -48,8 +79,8 @@ class Product:
     def __iter__(self) -> Iterator[Cell]:
         for chosen, cell, key in self._combined():
             fields = {name: getattr(cell, name) for name in NAMES}
-            for entries, k in zip(self._checked, chosen, strict=True):
-                fields |= entries[k]
+            for n, entries in self._loose.items():
+                fields |= entries[chosen[n]][0]
             found = Cell(**fields)
             vars(found)["key"] = key.hex()  # what it would work out
             yield found
@@ -63,14 +94,14 @@ class Product:
         for chosen in product(*(range(len(entries)) for entries in self._lists)):
             cell, common = self._common(chosen)
             pieces = common.copy()
-            for entries, k in zip(self._pieces, chosen, strict=True):
-                for place, piece in entries[k]:
+            for n, entries in self._loose.items():
+                for place, piece in entries[chosen[n]][1]:
                     pieces[place] = piece
             yield chosen, cell, hashlib.sha256(f"{{{','.join(pieces)}}}".encode()).digest()
 
     def _common(self, chosen: tuple[int, ...]) -> tuple[Cell, list[str]]:
         """Return a cell with the crossed fields of some entries, and its fields as JSON."""
-        crossed = tuple(-1 if is_loose else k for is_loose, k in zip(self._loose, chosen, strict=True))
+        crossed = tuple([-1 if n in self._loose else k for n, k in enumerate(chosen)])
         found = self._known.get(crossed)
         if found is None:
             spec: dict[str, Any] = {}
