@@ -11,6 +11,8 @@ from posefit.geometry.skeleton import ANGLES, Skeleton
 
 # Share of a frame within which two times count as the same one.
 SAME_TIME = 1e-6
+LONGEST = 200_000  # frames of a file, or of a motion that is made or resampled: 28 minutes at 120 a second
+RATES = (1e-3, 1e6)  # frames a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,9 @@ class Motion:
         if step >= 1 and abs(ratio - step) < 1e-9 * step:
             return Motion(self.name, self.skeleton, self.poses[::step], self.translations[::step], fps)
         last = len(self) - 1
+        if last / ratio >= LONGEST:
+            came = f"{last / ratio:.3g} frames at {fps:g} fps"
+            raise ValueError(f"{self.name} must have at most {LONGEST} frames when it is resampled, got {came}")
         # in frames of this motion; the last time may be off by rounding
         times = np.minimum(np.arange(int(last / ratio + SAME_TIME) + 1) * ratio, last)
         if last == 0:
@@ -82,4 +87,6 @@ class Motion:
 def _rate(fps: float) -> float:
     if not (np.isfinite(fps) and fps > 0.0):
         raise ValueError(f"fps must be a positive number, got {fps}")
+    if not RATES[0] <= fps <= RATES[1]:
+        raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {fps:g}")
     return float(fps)

@@ -19,8 +19,9 @@ from posefit.fitting import metrics
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.footage.extract import extract
-from posefit.footage.masks import LazyMasks, Straight, Views
+from posefit.footage.masks import Straight, Views
 from posefit.footage.segmentation import Extraction
+from posefit.footage.stacks import StackMasks
 from posefit.geometry.rotation import wrapped
 from posefit.motion import library
 from posefit.motion.amc import read_clip
@@ -126,7 +127,7 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path
     usable = np.array([True, True, False, True, True, True])
     np.savez(tmp_path / "a.npz", masks=side, usable=usable)
     np.savez(tmp_path / "b.npz", masks=front)
-    views = Views([LazyMasks.of(tmp_path / name, (None, None)) for name in ("a.npz", "b.npz")])
+    views = Views([StackMasks.of(tmp_path / name, (None, None)) for name in ("a.npz", "b.npz")])
     assert [views[k].usable for k in range(6)] == [True] * 6
     assert not views[2].silhouettes[0].valid.any()
     assert views[2].silhouettes[1].valid.all()
@@ -154,7 +155,7 @@ def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path:
     undone = cv2.undistortPoints(bent, one.matrix, one.distortion, P=one.matrix).reshape(SIZE[1], SIZE[0], 2)
     seen = cv2.remap(straight.astype(np.uint8), undone.astype(np.float32), None, cv2.INTER_NEAREST)
     np.savez(tmp_path / "a.npz", masks=seen[None])
-    masks = Straight(LazyMasks.of(tmp_path / "a.npz", (None, None)), one.maps(SIZE))
+    masks = Straight(StackMasks.of(tmp_path / "a.npz", (None, None)), one.maps(SIZE))
     found = masks.silhouette(0)
     both = (found.mask & straight).sum() / (found.mask | straight).sum()
     without = ((seen > 0) & straight).sum() / ((seen > 0) | straight).sum()
