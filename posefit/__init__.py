@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from pluggy import HookimplMarker
 
+from posefit.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from posefit.fitting.box import Space as Space
     from posefit.fitting.box import Start as Start
@@ -40,7 +42,6 @@ if TYPE_CHECKING:
     from posefit.tracking.front import track as track
     from posefit.tracking.run import Track as Track
 
-__version__ = "0.1.0"
 hookimpl = HookimplMarker("posefit")
 
 _HOMES = {

@@ -63,14 +63,14 @@ class Stored:
     _start: int = field(repr=False)  # bytes before the array
 
     @property
-    def bytes(self) -> int:
+    def size(self) -> int:
         """How many bytes it unpacks to."""
         return math.prod(self.shape) * self.dtype.itemsize
 
     def read(self) -> NDArray[Any]:
         """Return the array."""
         with self._opened() as member:
-            content = _exactly(member, self.bytes)
+            content = _exactly(member, self.size)
             _exactly(member, 0)
         array = np.frombuffer(content, self.dtype)
         return array.reshape(self.shape, order="F" if self.fortran else "C")
@@ -78,7 +78,7 @@ class Stored:
     def rows(self) -> Iterator[NDArray[Any]]:
         """Yield one row after the other, so that only one of them is in memory."""
         if self.fortran:
-            if self.bytes > TURNED:
+            if self.size > TURNED:
                 raise ValueError(f"{self._path}: expected {self.name} row by row, got it column by column")
             yield from self.read()
             return
@@ -110,7 +110,7 @@ def opened(path: Path, names: Sequence[str], what: str, most: int, packed: int) 
             archive = stack.enter_context(zipfile.ZipFile(file))
             there = set(archive.namelist())
             found = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in there}
-            asked = sum(one.bytes for one in found.values())
+            asked = sum(one.size for one in found.values())
             if asked > most:
                 raise _RefusedError(f"{asked / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most")
         yield found
@@ -167,7 +167,7 @@ def _stored(path: Path, what: str, archive: zipfile.ZipFile, name: str) -> Store
     stored = Stored(name, shape, dtype, fortran, path, what, archive, start)
     if dtype.kind not in KINDS or not dtype.itemsize:
         raise _RefusedError(f"{name} of {cut(str(dtype))}")
-    if any(side < 0 for side in shape) or stored.bytes != info.file_size - start:
+    if any(side < 0 for side in shape) or stored.size != info.file_size - start:
         raise _RefusedError(f"{name} of {info.file_size - start} bytes for shape {shown(shape)}")
     return stored
 

@@ -1,8 +1,10 @@
 """The rules that the house is built by, as far as they can be counted."""
 
+import ast
 import re
 import tomllib
 from collections import Counter
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -59,9 +61,9 @@ def test_the_version_stands_in_one_place() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     assert "version" not in project["project"]
     assert "version" in project["project"]["dynamic"]
-    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "posefit.__version__"}
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "posefit.version.__version__"}
     literal = f'"{posefit.__version__}"'
-    assert [shown(path) for path in FILES if literal in path.read_text("utf-8")] == ["posefit/__init__.py"]
+    assert [shown(path) for path in FILES if literal in path.read_text("utf-8")] == ["posefit/version.py"]
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.what)
@@ -69,3 +71,30 @@ def test_what_a_mutant_changes_is_still_there_and_so_is_its_test(mutant: Mutant)
     assert changed((ROOT / mutant.path).read_text("utf-8"), mutant)
     file, _, name = mutant.test.partition("::")
     assert f"\ndef {name.partition('[')[0]}(" in (ROOT / file).read_text("utf-8")
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    grimp = pytest.importorskip("grimp", reason="import-linter, of posefit[dev], brings it along")
+    graph = grimp.build_graph(
+        *sorted({package.name for package in PACKAGES}), cache_dir=None, exclude_type_checking_imports=False
+    )
+    below = {module: sorted(graph.find_modules_directly_imported_by(module)) for module in graph.modules}
+    TopologicalSorter(below).prepare()  # CycleError names a circle
+
+
+# Commands are called like the functions they stand for; rules of the kit are called like what they check.
+TWICE = {"track", "fit", "extract", "check", "main"}
+
+
+def test_no_public_name_stands_for_two_things() -> None:
+    homes: dict[str, list[str]] = {}
+    for path in FILES:
+        if path.parent.name == "testing":
+            continue
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith(
+                ("_", "posefit_register_")
+            ):
+                homes.setdefault(node.name, []).append(shown(path))
+    assert {name: found for name, found in homes.items() if len(found) > 1 and name not in TWICE} == {}
+    assert {name for name, found in homes.items() if len(found) > 1} == TWICE

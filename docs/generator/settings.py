@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from generator.prose import Entry, settings_in, without_settings
+from generator.prose import settings_in, without_settings
 from posefit.entries import PROJECT
 from posefit.fitting.tracker import Prediction
 from posefit.registry import KINDS, Offer, registry
@@ -29,14 +29,14 @@ def _method(offer: Offer) -> str:
 
 
 def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
-    """Return what a docstring says of a method, and the table of its settings."""
+    """Return what a docstring says of a method, and the table of its settings. Raises KeyError where it lacks one."""
     text = inspect.getdoc(factory) or ""
     said, settings = settings_in(text), settings_of(factory)
     if not settings:
         return f"{text}{more}\n\nIt has no settings."
     lines = ["| `--set` | symbol | type | default | meaning and source |", "|---|---|---|---|---|"]
     for setting in settings:
-        symbol, meaning = said.get(setting.name, Entry("", "see the text above"))
+        symbol, meaning = said[setting.name]
         default = (
             "" if setting.default is inspect.Parameter.empty else f"`{setting_text(setting.default) or chr(39) * 2}`"
         )

@@ -10,7 +10,7 @@ import numpy as np
 from posefit.sweep.plan import Plan
 from posefit.tracking.measures import BASELINES
 from posefit_experiments.clips import clip_path
-from posefit_experiments.columns import headed, number
+from posefit_experiments.columns import head_of, number
 from posefit_experiments.grid import Say, check_seeds, rows
 
 SEEDS = 5
@@ -73,8 +73,8 @@ def _figures(seen: list[dict[str, Any]]) -> dict[str, Any]:
 
 def accuracy_lines(told: dict[str, Any]) -> Iterator[str]:
     """Yield the table as it is printed."""
-    errors = [headed("error_degrees", which) for which in ("median", "max")]
-    heads = [*errors, *BASELINES.values(), *(headed(name) for name in (*MIDDLE, *MEAN))]
+    errors = [head_of("error_degrees", which) for which in ("median", "max")]
+    heads = [*errors, *BASELINES.values(), *(head_of(name) for name in (*MIDDLE, *MEAN))]
     yield f"| trained on | test | view | {' | '.join(heads)} |"
     yield "|---|---|" + "---:|" * (1 + len(heads))
     for row in told["rows"]:

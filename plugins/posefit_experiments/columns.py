@@ -3,7 +3,7 @@
 from posefit.tracking.measures import MEASURES
 
 
-def headed(name: str, which: str = "") -> str:
+def head_of(name: str, which: str = "") -> str:
     """Return the head of a figure's column: which of its values (such as median), its label, and its unit."""
     measure = MEASURES[name]
     return " ".join(word for word in (which, measure.label, measure.unit) if word)

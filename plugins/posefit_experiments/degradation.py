@@ -16,7 +16,7 @@ from posefit.geometry.body import varied
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit.tracking.method import Choice, prepare
 from posefit.tracking.synthetic import Spoilt
-from posefit_experiments.columns import headed, labelled, number
+from posefit_experiments.columns import head_of, labelled, number
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.known import follow_known, known_errors, known_scene, known_task, mean_pose_degrees
 
@@ -93,7 +93,7 @@ def degradation_figure(told: Mapping[str, Any], path: Path) -> None:
             low, high = values.min(axis=1), values.max(axis=1)
             axes.fill_between(told["strengths"], low, high, color=line.get_color(), alpha=0.1)
         axes.set_xlabel("strength")
-        axes.set_ylabel(headed(key))
+        axes.set_ylabel(head_of(key))
         axes.set_ylim(bottom=0.0)
         axes.spines[["top", "right"]].set_visible(False)
         if key == "error_degrees":

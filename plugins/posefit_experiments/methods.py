@@ -14,7 +14,7 @@ from posefit.footage.masks import FPS
 from posefit.footage.source import motion_of
 from posefit.sweep.plan import Plan
 from posefit_experiments.clips import clip_path
-from posefit_experiments.columns import headed, number
+from posefit_experiments.columns import head_of, number
 from posefit_experiments.grid import Say, check_seeds, rows
 
 OPTIMISERS = ("particle", "annealed", "pso", "sapso", "cma")
@@ -105,9 +105,9 @@ def _row(found: dict[Key, dict[str, Any]], optimiser: str, prior: str, seeds: in
 def methods_lines(told: dict[str, Any]) -> Iterator[str]:
     """Yield the table as it is printed, and what anybody reaches."""
     views = ", ".join(f"{view:.0f}" for view in told["views_degrees"])
-    heads = [headed("error_degrees"), f"at {views}", headed("skill"), headed("swap_rate"), headed("lost_rate")]
+    heads = [head_of("error_degrees"), f"at {views}", head_of("skill"), head_of("swap_rate"), head_of("lost_rate")]
     heads = [f"{gait} {head}" for gait in GAITS for head in heads]
-    yield f"| optimiser | prior | {' | '.join(heads)} | s a frame | {headed('evaluations')} |"
+    yield f"| optimiser | prior | {' | '.join(heads)} | s a frame | {head_of('evaluations')} |"
     yield "|---|---|" + "---:|" * (len(heads) + 2)
     for row in told["rows"]:
         figures = []

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from posefit import __version__
 from posefit.cli import following, plugins, sweeping
+from posefit.version import __version__
 
 BUILT_IN = (
     following.track,

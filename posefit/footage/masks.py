@@ -56,8 +56,8 @@ class FolderMasks:
         return len(self.files)
 
     def is_usable(self, k: int) -> bool:
-        """Return that mask k shows enough of the person to be searched: images do not say otherwise."""
-        return True
+        """Return that there is a mask k: that too little of the person is seen, a folder cannot say."""
+        return k < len(self)
 
     def label(self, k: int) -> str:
         """Return the file of mask k."""

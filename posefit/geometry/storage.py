@@ -55,7 +55,7 @@ def stored_values(text: str) -> dict[str, Any]:
 
 
 def numbers_of(value: Any) -> Array:
-    """Return numbers, in lists or in lists of lists, as an array. Raises ValueError where they are none, or too many."""
+    """Return numbers, or lists of lists of them, as an array. Raises ValueError where they are none, or too many."""
     if isinstance(value, str):
         value = value[: 40 * NUMBERS].split()
     rows = value if isinstance(value, list) else [value]

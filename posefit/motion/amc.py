@@ -15,7 +15,7 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
 )
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton, angle_index
-from posefit.motion.asf import LARGEST, METRES_PER_UNIT, mistake, parse_asf, positive
+from posefit.motion.asf import LARGEST, METRES_PER_UNIT, mistake, parse_asf, unit_length
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import SHOWN, check_size, cut
 
@@ -45,7 +45,7 @@ def read_amc(
     of bones outside the 27 joints are read and left out. All angles are unwrapped along time. Every frame must give
     all channels of `skeleton`, in any order. Raises ValueError with file and line.
     """
-    path, unit = Path(path), positive("metres_per_unit", metres_per_unit)
+    path, unit = Path(path), unit_length("metres_per_unit", metres_per_unit)
     check_size(path, SIZE_LIMIT)
     spans, columns, targets = _layout(skeleton)
     values, radians = _frames(path, spans, skeleton.name)
@@ -151,7 +151,7 @@ def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METR
     Channels that a pose does not hold, such as fingers, are written as 0. Raises ValueError where the motion turns a
     joint about an axis that its skeleton has no channel for, as the file could not hold that.
     """
-    unit = positive("metres_per_unit", metres_per_unit)
+    unit = unit_length("metres_per_unit", metres_per_unit)
     lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)
     if lost > 1e-9:
         raise ValueError(f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one")

@@ -25,7 +25,7 @@ def mistake(path: Path, line: int, expected: str, got: str) -> ValueError:
     return ValueError(f"{path}:{line}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
 
 
-def positive(name: str, value: float) -> float:
+def unit_length(name: str, value: float) -> float:
     """Return a value that must be positive and finite. Raises ValueError with its name otherwise."""
     if not (np.isfinite(value) and value > 0.0):
         raise ValueError(f"{name} must be a positive number, got {value}")
@@ -248,7 +248,7 @@ def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = 
 
     Bones of which only the channels are known, such as fingers, get the length 0.
     """
-    unit = positive("metres_per_unit", metres_per_unit)
+    unit = unit_length("metres_per_unit", metres_per_unit)
     axes = np.rad2deg(joint_angles_from_rotation(skeleton.axes))
     header = (
         f":version 1.10\n:name {'_'.join(skeleton.name.split()) or 'skeleton'}\n:units\n  mass 1.0\n"

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posefit import __version__
 from posefit.files import new_file, new_folder
 from posefit.silhouette.cost import SCALE
 from posefit.statistics.profiles import Trace, trace
+from posefit.version import __version__
 
 FORMAT = "0.3.18"  # the IOHexperimenter that the layout is of
 SUITE = "posefit"

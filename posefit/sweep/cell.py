@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import posefit
+from posefit.version import __version__
 
 if TYPE_CHECKING:
     from posefit.arrays import Array
@@ -52,7 +52,7 @@ class Cell:
     first_pose: str = "searched"
     seed: int = 0
     files: Mapping[str, str] = field(default_factory=dict)
-    version: str = posefit.__version__  # of posefit, and of plugins that are not its own
+    version: str = __version__  # of posefit, and of plugins that are not its own
 
     @cached_property
     def spec(self) -> dict[str, Any]:
@@ -88,8 +88,8 @@ def run_cell(cell: Cell) -> CellResult:
     from posefit.tracking.run import follow
 
     began = time.perf_counter()
-    if (planned := cell.version.partition(",")[0]) != posefit.__version__:
-        raise ValueError(f"a worker must have posefit {planned}, got {posefit.__version__}")
+    if (planned := cell.version.partition(",")[0]) != __version__:
+        raise ValueError(f"a worker must have posefit {planned}, got {__version__}")
     for path, digest in cell.files.items():
         if (found := digest_of(path)) != digest:
             raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-import posefit
 from posefit.entries import PROJECT
 from posefit.fitting.space import TRANSLATIONS
 from posefit.footage.masks import FPS
@@ -20,6 +19,7 @@ from posefit.settings import planned
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import DROPPED, Cell, digest_of, parts, settings_text
 from posefit.tracking.method import parse_settings
+from posefit.version import __version__
 
 FIELDS = tuple(one.name for one in fields(Cell) if one.name not in ("files", "version"))
 LARGEST = 16_384  # pixels
@@ -46,7 +46,7 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
         raise ValueError(f"train must not contain the motion itself, got {values['motion']}")
     files = {path: digest for one in (values["motion"], *train) for path, digest in _files(one)}
     foreign = sorted({f"{offer.distribution} {offer.version}" for offer in offers if offer.distribution != PROJECT})
-    version = ", ".join([posefit.__version__, *foreign])
+    version = ", ".join([__version__, *foreign])
     cell = Cell(**{**values, "settings": dict(settings), "train": train, "files": files, "version": version})
     if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
         raise ValueError(f"evaluations must hold one population of {size}, got {cell.evaluations}")

@@ -16,10 +16,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import posefit
 from posefit.files import appear
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
 from posefit.sweep.table import dataframe
+from posefit.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,13 +145,13 @@ def create(path: Path) -> None:
                 raise ValueError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
             for name in FOLDERS:
                 (path / name).mkdir(parents=True, exist_ok=True)
-            appear(path / INDEX, {"format": FORMAT, "version": posefit.__version__})
+            appear(path / INDEX, {"format": FORMAT, "version": __version__})
     except OSError as error:
         raise ValueError(f"{path}: expected a folder that can be written to, got {error.strerror}") from None
     version = _version(path)
-    if version != posefit.__version__:
+    if version != __version__:
         raise ValueError(
-            f"{path}: expected a ledger of posefit {posefit.__version__}, got one of {version}; its rows are kept "
+            f"{path}: expected a ledger of posefit {__version__}, got one of {version}; its rows are kept "
             "apart: choose another folder"
         )
 

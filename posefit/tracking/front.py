@@ -8,7 +8,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-import posefit
 from posefit.arrays import Array
 from posefit.fitting.optimiser import OptimiserFactory
 from posefit.fitting.prior import Prior
@@ -28,6 +27,7 @@ from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
 from posefit.tracking.outputs import Nowhere, OutputFolder
 from posefit.tracking.run import Track, follow
+from posefit.version import __version__
 
 _FILES = ("source", "train", "asf", "cameras", "extraction")  # what may name files, whose content counts
 
@@ -210,7 +210,7 @@ def _told(
     sources: Sequence[Source], train: Sequence[Source], viewing: Viewing, choice: Choice, opening: Opening, seed: int
 ) -> dict[str, Told]:
     """Return what a track has to have in common with one that it goes on with."""
-    told: dict[str, Any] = {"source": sources, "train": train, "seed": seed, "version": posefit.__version__}
+    told: dict[str, Any] = {"source": sources, "train": train, "seed": seed, "version": __version__}
     for group in (viewing, choice, opening):
         told |= {one.name: getattr(group, one.name) for one in fields(group)}
     if kind_of(sources[0]) == "motion" and sources[0] in library.names():

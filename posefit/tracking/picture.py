@@ -122,7 +122,7 @@ def draw_body(image: Image, body: Body, camera: Camera, pose: Array, translation
     """Draw the body into an image of a camera's size, far bones first: left limbs orange, right ones blue."""
     joints = body.skeleton.joints(pose, translation)
     pixels, depths = camera.project(joints)
-    scale = camera.focal[0] / depths
+    scale = np.sqrt(camera.focal.prod()) / depths  # as in the cost, where the two focal lengths differ
     parents = np.array(PARENTS[1:])
     for bone in np.argsort(-(depths[parents] + depths[1:])):
         ends = [int(parents[bone]), int(bone) + 1]

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-import posefit
 from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
@@ -18,6 +17,7 @@ from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, opened, task_of
 from posefit.tracking.outputs import Nowhere, Output
+from posefit.version import __version__
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ def follow(
             **measures.as_dict(),
             **({"history": found[0].history.tolist()} if len(found) == 1 else {}),
             "evaluations_per_frame": task.evaluations,
-            "version": posefit.__version__,
+            "version": __version__,
             "train": [motion.name for motion in training],
             "translation": task.translation,
             "first_pose": opening.first_pose,

@@ -82,7 +82,7 @@ def test_the_other_styles_of_a_motion_never_contain_it() -> None:
         others = library.other_styles(name)
         assert others
         assert name not in others
-        assert {library.kind_of(other) for other in others} == {library.kind_of(name)}
+        assert {library.activity_of(other) for other in others} == {library.activity_of(name)}
 
 
 @each
@@ -140,7 +140,7 @@ def test_an_arm_swings_with_the_leg_of_the_other_side(name: str) -> None:
     motion = cycle(name)
     ahead = joints(motion)[..., 2] - motion.translations[:, None, 2]
     for arm, leg in (("lwrist", "rfoot"), ("rwrist", "lfoot")):
-        if arm[0] in DRAWN.get(library.kind_of(name), ""):
+        if arm[0] in DRAWN.get(library.activity_of(name), ""):
             continue
         assert np.corrcoef(ahead[:, JOINTS.index(arm)], ahead[:, JOINTS.index(leg)])[0, 1] > 0.5
 
@@ -274,7 +274,7 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
         poses[:, 0] -= np.angle(np.exp(1j * poses[:, 0]).mean())
 
     same = np.ones(66, dtype=bool)
-    for side in DRAWN.get(library.kind_of(name), ""):
+    for side in DRAWN.get(library.activity_of(name), ""):
         shoulder, elbow = (angle_index(JOINTS.index(side + bone)) for bone in ("humerus", "radius"))
         same[[shoulder, shoulder + 1, shoulder + 2, elbow]] = False
 
@@ -285,7 +285,7 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
         return float(np.degrees(off[:, same].mean()))
 
     least = min(error(phase) for phase in np.arange(400) / 400)
-    assert least < RESIDUAL_DEGREES[library.kind_of(name)]
+    assert least < RESIDUAL_DEGREES[library.activity_of(name)]
     assert least == pytest.approx(model["residual_degrees"], abs=0.05 if same.all() else 0.3)
 
 

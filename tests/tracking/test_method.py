@@ -134,11 +134,11 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
 ) -> None:
     monkeypatch.setattr(opening, "COMPILING", 0.0)
     installed("optimiser", factory)
-    settings = {**QUICK, "ask_seconds": 0.3}
+    settings = {**QUICK, "ask_seconds": 0.3} if factory is NeverReturns else QUICK
     if rule is not None:
         with pytest.raises(BrokenRuleError, match=f"^optimiser 'bad' of posefit-bad 1.0: {rule}$"):
             posefit.track("walk", optimiser="bad", **settings)
-    assert posefit.track("walk", **settings).summary["frames"] == 3
+    assert posefit.track("walk", **QUICK).summary["frames"] == 3
 
 
 @pytest.mark.parametrize(

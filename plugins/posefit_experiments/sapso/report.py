@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-import posefit
 from posefit.arrays import Array
 from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, angle_index
 from posefit.tracking.measures import BASELINES
+from posefit.version import __version__
 from posefit_experiments.grid import Progress
 from posefit_experiments.known import SIZE
 from posefit_experiments.sapso.claims import paper_claims
@@ -51,7 +51,7 @@ def paper_report(
     with nullcontext() if out is None else new_folder(out) as folder:
         results = repeat_paper(made, seeds, scale, workers, progress)
         told = {
-            "version": posefit.__version__,
+            "version": __version__,
             "motions": {name: _described(results, name) for name in results.motions},
             "seeds": seeds,
             "views_degrees": list(scale.views),

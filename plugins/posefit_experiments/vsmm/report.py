@@ -7,9 +7,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import posefit
 from posefit.files import new_folder
-from posefit_experiments.columns import headed
+from posefit.version import __version__
+from posefit_experiments.columns import head_of
 from posefit_experiments.grid import Progress
 from posefit_experiments.vsmm.activities import film_of
 from posefit_experiments.vsmm.experiment import SHOWN, WORKERS, repeat_patent
@@ -19,9 +19,9 @@ _COLUMNS = (
     ("hand_cm", "hand cm", 1),
     ("elbow_3d_cm", "elbow 3D", 1),
     ("hand_3d_cm", "hand 3D", 1),
-    ("mpjpe_mm", headed("mpjpe_mm"), 0),
+    ("mpjpe_mm", head_of("mpjpe_mm"), 0),
     ("error_degrees", "degrees", 2),
-    ("iou", headed("iou"), 2),
+    ("iou", head_of("iou"), 2),
     ("dominant_fraction", "dominant", 2),
     ("switch_delay_frames", "delay", 1),
     ("wrong_activations", "wrong act.", 1),
@@ -48,7 +48,7 @@ def patent_report(
         raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
     with nullcontext() if out is None else new_folder(out) as folder:
         figures, shown = repeat_patent(seeds, searches, workers, progress)
-        figures["version"] = posefit.__version__
+        figures["version"] = __version__
         if folder is not None:
             from posefit_experiments.vsmm.figures import patent_figures
 
