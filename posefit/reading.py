@@ -46,7 +46,7 @@ def check_size(path: Path, most: int) -> None:
         raise ValueError(f"{path}: expected at most {allowed}, got {came}")
 
 
-def read_text(path: str | Path, most: int) -> str:
+def read_text(path: str | Path, most: int, what: str = "text") -> str:
     """Return the text of a file of at most so many bytes, without a byte-order mark.
 
     Raises ValueError naming the file where it is larger, is no UTF-8 or cannot be read, and FileNotFoundError.
@@ -64,7 +64,7 @@ def read_text(path: str | Path, most: int) -> str:
     except OSError as error:
         raise ValueError(f"{path}: expected a file that can be read, got {error.strerror or error}") from None
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: expected text in UTF-8, got byte 0x{content[error.start]:02x}") from None
+        raise ValueError(f"{path}: expected {what} in UTF-8, got byte 0x{content[error.start]:02x}") from None
 
 
 def toml_of(text: str) -> dict[str, Any]:

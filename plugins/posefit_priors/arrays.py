@@ -34,8 +34,8 @@ def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Arra
     arrays: dict[str, Array] = {}
     for name in shapes:
         if name not in stored or stored[name].dtype.kind not in "biuf":
-            came = "none" if name not in stored else f"one of {stored[name].dtype}"
-            raise ValueError(f"{path}: expected an .npz file with {', '.join(shapes)}, got {came} for {name}")
+            kind = "none" if name not in stored else f"one of {stored[name].dtype}"
+            raise ValueError(f"{path}: expected an .npz file with {', '.join(shapes)}, got {kind} for {name}")
         arrays[name] = np.array(stored[name], dtype=np.float64)
     sizes: dict[str, int] = {}
     for name, shape in shapes.items():

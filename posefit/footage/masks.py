@@ -75,7 +75,7 @@ class FolderMasks:
 
 def drawn(mask: NDArray[Any]) -> Mask:
     """Return where a person is: above 127 where values go beyond 1, else above 0."""
-    return np.greater(mask, 127 if mask.max() > 1 else 0)
+    return np.asarray(np.greater(mask, 127 if mask.max() > 1 else 0))
 
 
 def shown_person(person: Mask, known: NDArray[Any] | None, label: str) -> Silhouette:

@@ -21,7 +21,6 @@ An entry of a list of the product is the value of a cell's field, or a table of 
 """
 
 import sys
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -29,6 +28,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Self
 
+from posefit.reading import SHOWN, read_text, shown, toml_of
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import FIELDS, cell_of, flattened, names_of
 
@@ -44,6 +44,7 @@ TABLES = ("defaults", "product", "cells")
 DEFAULT = "default"  # the name of the plan that posefit brings along
 INPUT = "-"  # the name of a plan that is read from standard input
 MOST = 1_000_000  # cells
+LARGEST_FILE = 1_000_000  # bytes
 
 
 @dataclass(frozen=True)
@@ -70,16 +71,13 @@ class Plan:
         if str(path) == DEFAULT:
             text = (files("posefit.sweep") / "default.toml").read_text(encoding="utf-8")
         elif str(path) == INPUT:
-            text = sys.stdin.read()
+            text = _stdin()
         elif not Path(path).is_file():
             raise ValueError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {_what(Path(path))}")
         else:
-            try:
-                text = Path(path).read_text(encoding="utf-8")
-            except (OSError, UnicodeDecodeError) as error:
-                raise ValueError(f"{path}: expected a plan in TOML, got {error}") from None
+            text = read_text(path, LARGEST_FILE, "a plan in TOML")
         try:
-            return cls.of(tomllib.loads(text))
+            return cls.of(toml_of(text))
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
@@ -92,14 +90,14 @@ class Plan:
         """
         for name in tables:
             if name not in TABLES:
-                raise ValueError(f"a plan must hold {', '.join(TABLES)}, got {name!r}")
+                raise ValueError(f"a plan must hold {', '.join(TABLES)}, got {shown(name)}")
         defaults = _mapping("defaults", tables.get("defaults", {}))
         for name in defaults:
             if name not in FIELDS:
-                raise ValueError(f"defaults must be of {', '.join(FIELDS)}, got {name!r}")
+                raise ValueError(f"defaults must be of {', '.join(FIELDS)}, got {shown(name)}")
         listed = tables.get("cells", [])
         if not isinstance(listed, list | tuple):
-            raise ValueError(f"cells must be a list of tables, got {listed!r}")
+            raise ValueError(f"cells must be a list of tables, got {shown(listed)}")
         specs = [*_combined(tables.get("product")), *(_mapping("cells", one) for one in listed)]
         shared = _settings(defaults.get("settings", {}), specs, defaults)
         return cls(
@@ -120,7 +118,7 @@ def _combined(tables: Any) -> list[dict[str, Any]]:
     lists = _mapping("product", tables)
     for name in lists:
         if name not in LISTS:
-            raise ValueError(f"product must hold {', '.join(LISTS)}, got {name!r}")
+            raise ValueError(f"product must hold {', '.join(LISTS)}, got {shown(name)}")
     entries = [_entries(name, values) for name, values in lists.items()]
     count = 1
     for one in entries:
@@ -143,10 +141,10 @@ def _entries(name: str, values: Any) -> list[dict[str, Any]]:
     field = LISTS[name]
     if field in ("instance", "seed") and type(values) is int:
         if values > MOST:
-            raise ValueError(f"product.{name} must be at most {MOST:,}, got {values:,}")
+            raise ValueError(f"product.{name} must be at most {MOST:,}, got {_written(values)}")
         values = list(range(values))
     if not isinstance(values, list | tuple):
-        raise ValueError(f"product.{name} must be a list, got {values!r}")
+        raise ValueError(f"product.{name} must be a list, got {shown(values)}")
     if not values:
         raise ValueError(f"product.{name} must hold at least one, got none: an empty product has no cells")
     whole = field == "corruption"  # whose value is itself a table
@@ -174,8 +172,19 @@ def _settings(shared: Any, specs: Sequence[Mapping[str, Any]], defaults: Mapping
 
 def _mapping(name: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a table, got {value!r}")
+        raise ValueError(f"{name} must be a table, got {shown(value)}")
     return dict(value)
+
+
+def _written(number: int) -> str:
+    return f"{number:,}" if number < 10**SHOWN else shown(number)
+
+
+def _stdin() -> str:
+    try:
+        return sys.stdin.read(LARGEST_FILE).removeprefix("\ufeff")
+    except UnicodeDecodeError:
+        raise ValueError(f"{INPUT}: expected a plan in UTF-8, got other bytes") from None
 
 
 def _what(path: Path) -> str:

@@ -201,7 +201,7 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path, optimiser: str) -> None:
     again = posefit.track(path, out=tmp_path / "out", resume=True, say=said.append, **settings)
     assert "going on from frame 11 of 20" in said
     assert {one.name for one in (tmp_path / "out").iterdir()} == {one.name for one in (tmp_path / "whole").iterdir()}
-    assert not (tmp_path / ".out.partial").exists()
+    assert not list(tmp_path.glob(".out.*"))
     np.testing.assert_array_equal(again.motion.poses[:12], whole.motion.poses[:12])  # frame 11 is held
     if optimiser == "sapso":  # a filter's particles are not kept: it goes on around the last pose
         np.testing.assert_array_equal(again.motion.poses, whole.motion.poses)
@@ -221,11 +221,20 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="seed must be 0, as before, to resume, got 1"):
         posefit.track(path, resume=True, seed=1, **settings)
     # a line that was half written does not count
-    found = tmp_path / ".out.partial" / "found.jsonl"
+    (found,) = tmp_path.glob(".out.*/found.jsonl")
     found.write_text(found.read_text()[:-40])
     said: list[str] = []
     posefit.track(path, resume=True, say=said.append, **settings)
     assert "going on from frame 4 of 20" in said
+
+
+def test_a_track_removes_nobody_elses_hidden_folder(tmp_path: Path) -> None:
+    theirs = tmp_path / ".out.partial"
+    theirs.mkdir()
+    (theirs / "found.jsonl").write_text("theirs")
+    posefit.track("walk", frames=(0, 2), evaluations=80, out=tmp_path / "out")
+    assert (theirs / "found.jsonl").read_text() == "theirs"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".out.partial", "out"]
 
 
 @pytest.mark.slow
