@@ -4,20 +4,29 @@ A plugin that cannot be imported, misspells a hook, fails inside one or takes a 
 warned of, with its distribution; the others work. Environment variables, as in other plugin hosts:
 POSEFIT_LOAD_PLUGINS names the only ones to load beside the built-ins (none where it is empty), POSEFIT_BLOCK_PLUGINS
 those to leave out, each by plugin or distribution and separated by commas; POSEFIT_STRICT_PLUGINS=1 turns the warning
-into an error.
+into an error; POSEFIT_LOAD_SECONDS is how long each may take to load, 60 where nothing is said.
 """
 
 import os
+import sys
+import threading
+import traceback
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from typing import Any, Generic, Literal, TypeVar
 
 import pluggy
 
+from posefit.limits import timed
+
 PROJECT = "posefit"
 LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
+PATIENCE = "POSEFIT_LOAD_SECONDS"
+GRACE = 1.0  # seconds after the limit until somebody is told that it does not hold
+SECONDS = 60.0  # as large libraries need on a slow disk
 
 T = TypeVar("T")
 
@@ -32,6 +41,7 @@ class Plugin(Generic[T]):
     state: Literal["loaded", "broken", "left out"]
     cause: str = ""
     offers: tuple[T, ...] = ()
+    traceback: str = ""  # of what broke it
 
 
 def load(
@@ -75,19 +85,51 @@ def _plugin(
     if reason:
         return Plugin(point.name, distribution, version, "left out", reason)
     mine: dict[str, T] = {}
+    seconds = _seconds(variables)
     try:
-        manager = pluggy.PluginManager(PROJECT)
-        manager.add_hookspecs(specs)
-        manager.register(point.load(), point.name)
-        manager.check_pending()
-        for offer in collected(manager.hook, distribution, version):
-            name = named(offer)
-            if name in owners or name in mine:
-                raise ValueError(f"{name} is already registered by {owners.get(name, distribution)}")
-            mine[name] = offer
+        with _told_late(f"plugin {point.name!r} of {distribution} {version}", seconds), timed(seconds):
+            manager = pluggy.PluginManager(PROJECT)
+            manager.add_hookspecs(specs)
+            manager.register(point.load(), point.name)
+            manager.check_pending()
+            for offer in collected(manager.hook, distribution, version):
+                name = named(offer)
+                if name in owners or name in mine:
+                    raise ValueError(f"{name} is already registered by {owners.get(name, distribution)}")
+                mine[name] = offer
     except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
-        return Plugin(point.name, distribution, version, "broken", f"{type(error).__name__}: {error}")
+        cause = f"{type(error).__name__}: {error}"
+        if isinstance(error, TimeoutError) and not error.args:
+            cause = f"it must load within {seconds:g} s, and did not"
+        told = "".join(traceback.format_exception(error))
+        return Plugin(point.name, distribution, version, "broken", cause, traceback=told)
     return Plugin(point.name, distribution, version, "loaded", offers=tuple(mine.values()))
+
+
+def _seconds(variables: Mapping[str, str]) -> float:
+    """Return how long a plugin may take to load. Raises ValueError where the variable is no number above 0."""
+    text = variables.get(PATIENCE, "")
+    try:
+        seconds = float(text or SECONDS)
+    except ValueError:
+        seconds = 0.0
+    if not seconds > 0.0:
+        raise ValueError(f"{PATIENCE} must be a number of seconds above 0, got {text!r}")
+    return seconds
+
+
+@contextmanager
+def _told_late(label: str, seconds: float) -> Iterator[None]:
+    """Say on stderr whose loading does not end where nothing can end it: in other threads, and in compiled code."""
+    message = f"posefit: {label} is still loading after {seconds + GRACE:g} s; {BLOCK} leaves it out\n"
+    timer = threading.Timer(seconds + GRACE, lambda: sys.stderr.write(message))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
 
 
 def _built_ins_first(point: EntryPoint) -> tuple[bool, str]:

@@ -4,13 +4,18 @@ The commands stand in `following`, `sweeping` and `plugins`; plugins add others,
 is imported when it runs.
 """
 
+import traceback
+from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 import click
 
 from posefit.cli import following, plugins, sweeping
+from posefit.limits import exits_told
 from posefit.version import __version__
 
+MISTAKE = 2  # the exit status of everything that is told in one line
 BUILT_IN = (
     following.track,
     following.fit,
@@ -39,10 +44,10 @@ class _Commands(click.Group):
             return super().invoke(context)
         except click.UsageError as error:
             click.echo(f"posefit: {' '.join(error.format_message().split())}", err=True)
-            context.exit(2)
+            context.exit(MISTAKE)
         except (ValueError, FileNotFoundError, PermissionError, ImportError) as error:
             click.echo(f"posefit: {' '.join(str(error).split())}", err=True)
-            context.exit(2)
+            context.exit(MISTAKE)
 
 
 def _added() -> dict[str, click.Command]:
@@ -59,5 +64,24 @@ def main() -> None:
     """Recover a person's 3D pose from silhouettes, by searching."""
 
 
+def _unended(callback: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a command of posefit's own as one that nothing ends but itself: a plugin that tries is a mistake."""
+
+    @wraps(callback)
+    def run(*arguments: Any, **options: Any) -> Any:
+        try:
+            with exits_told(MISTAKE):
+                return callback(*arguments, **options)
+        except SystemExit as error:
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            raise ValueError(
+                f"nothing may end the program, got SystemExit: {error.code} in {where.filename}:{where.lineno}"
+            ) from error
+
+    return run
+
+
 for _command in BUILT_IN:
+    assert _command.callback is not None
+    _command.callback = _unended(_command.callback)
     main.add_command(_command)

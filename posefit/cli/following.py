@@ -1,12 +1,13 @@
 """`posefit track`, `fit` and `extract`."""
 
 import json
+from contextlib import nullcontext
 from typing import Any
 
 import click
 
 from posefit.cli.options import EXTRACTION, TRACK, frame_range, options
-from posefit.cli.output import progress, say
+from posefit.cli.output import progress, results_alone, say
 
 
 @click.command()
@@ -24,7 +25,8 @@ def track(as_json: bool, **options: Any) -> None:
     """
     from posefit.tracking.front import track as run
 
-    result = run(progress=progress, say=say, **_arguments(options))
+    with results_alone() if as_json else nullcontext():
+        result = run(progress=progress, say=say, **_arguments(options))
     if as_json:
         click.echo(json.dumps(result.summary))
         return
@@ -42,7 +44,8 @@ def fit(as_json: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE."""
     from posefit.tracking.front import fit as run
 
-    result = run(say=say, **_arguments(options))
+    with results_alone() if as_json else nullcontext():
+        result = run(say=say, **_arguments(options))
     if as_json:
         click.echo(json.dumps({**result.summary, "pose_degrees": _degrees(result.pose)}))
         return

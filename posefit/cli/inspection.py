@@ -10,9 +10,7 @@ from typing import Any
 import click
 
 from posefit.entries import BLOCK, LOAD, STRICT, Plugin
-from posefit.registry import KINDS, Kind, Offer, Registry, registry
-from posefit.settings import parse
-from posefit.testing import Report, optimiser_checks, prior_checks, run_checks, tracker_checks
+from posefit.registry import KINDS, Offer, Registry
 
 
 def described(offer: Offer) -> dict[str, Any]:
@@ -49,12 +47,17 @@ def listing(found: Registry) -> Iterator[str]:
             yield from textwrap.wrap(settings, width, initial_indent="    --set ", subsequent_indent="          ")
 
 
-def diagnosis(found: Registry, added: Sequence[Plugin[click.Command]] = ()) -> tuple[list[str], bool]:
-    """Return what `posefit plugins doctor` says, and whether all is well; `added` are the plugins with commands."""
+def diagnosis(
+    found: Registry, added: Sequence[Plugin[click.Command]] = (), verbose: bool = False
+) -> tuple[list[str], bool]:
+    """Return what `posefit plugins doctor` says, and whether all is well; `added` are the plugins with commands.
+
+    Where it is to be `verbose`, the traceback of what could not be loaded follows its line.
+    """
     lines = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ]
     for plugin in found.plugins:
         names = ", ".join(f"{offer.kind} {offer.name}" for offer in plugin.offers) or "nothing"
-        lines.append(_state(plugin, plugin.cause or f"offers {names}"))
+        lines += _state(plugin, f"offers {names}", verbose)
         for offer in plugin.offers:
             if offer.missing:
                 lines.append(f"          {offer.name} is not usable yet: python -m pip install '{offer.missing}'")
@@ -62,32 +65,14 @@ def diagnosis(found: Registry, added: Sequence[Plugin[click.Command]] = ()) -> t
                 lines.append(f"          {offer.name} has no docstring to be listed with")
     for more in added:
         names = ", ".join(f"command {command.name}" for command in more.offers) or "nothing"
-        lines.append(_state(more, more.cause or f"offers {names}"))
+        lines += _state(more, f"offers {names}", verbose)
     states = [*(plugin.state for plugin in found.plugins), *(plugin.state for plugin in added)]
     well = "broken" not in states
-    lines.append("all plugins work" if well else "broken plugins are left out; the others work")
+    more_told = "" if verbose else "; -v shows where they fail"
+    lines.append("all plugins work" if well else f"broken plugins are left out; the others work{more_told}")
     return lines, well
 
 
-def _state(plugin: Plugin[Any], said: str) -> str:
-    return f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {said}"
-
-
-def checked(kind: Kind, name: str, texts: Sequence[str]) -> Report:
-    """Return what the checks say of an installed plugin, with settings given as `SETTING=VALUE`."""
-    offer = registry().offer(kind, name)
-    given = {}
-    for text in texts:
-        setting, equals, value = text.partition("=")
-        if not equals:
-            raise ValueError(f"--set must be SETTING=VALUE such as particles=20, got {text!r}")
-        given[setting.rpartition(".")[2]] = value
-    settings = parse(offer.name, offer.factory, given)
-    if kind == "prior" and settings:
-        offer.factory(**settings)  # a value that makes no sense is one mistake, not one a check
-    checks = {
-        "optimiser": lambda: optimiser_checks(offer.factory, next_frame=offer.next_frame, settings=settings),
-        "prior": lambda: prior_checks(offer.factory, settings=settings),
-        "tracker": lambda: tracker_checks(offer.factory, settings=settings),
-    }[kind]()
-    return run_checks(offer.label, checks)
+def _state(plugin: Plugin[Any], offers: str, verbose: bool) -> list[str]:
+    said = f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {plugin.cause or offers}"
+    return [said, *(f"          {line}" for line in plugin.traceback.splitlines() if verbose)]

@@ -1,7 +1,9 @@
 """Where commands say what they do: messages and progress go to stderr, results alone to stdout."""
 
+import os
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from typing import Any
 
 import click
@@ -17,3 +19,17 @@ def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[
     from tqdm import tqdm
 
     return iter(tqdm(steps, total=count, unit=unit, file=sys.stderr, dynamic_ncols=True))
+
+
+@contextmanager
+def results_alone() -> Iterator[None]:
+    """Send to stderr what anything prints in the body, compiled code and other processes too: stdout is for results."""
+    sys.stdout.flush()
+    with redirect_stdout(sys.stderr):
+        kept = os.dup(1)
+        os.dup2(2, 1)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 1)
+            os.close(kept)

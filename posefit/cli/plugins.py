@@ -5,6 +5,8 @@ from typing import Any
 
 import click
 
+from posefit.cli.output import results_alone
+
 
 @click.group(invoke_without_command=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
@@ -16,8 +18,9 @@ def plugins(context: click.Context, as_json: bool) -> None:
     from posefit.cli.inspection import described, listing
     from posefit.registry import KINDS, registry
 
-    if as_json:
+    with results_alone():
         offers = registry().offers
+    if as_json:
         click.echo(json.dumps([described(offer) for kind in KINDS for offer in offers[kind].values()]))
         return
     for line in listing(registry()):
@@ -25,8 +28,9 @@ def plugins(context: click.Context, as_json: bool) -> None:
 
 
 @plugins.command()
+@click.option("-v", "--verbose", is_flag=True, help="Show where a plugin fails, too: its traceback.")
 @click.pass_context
-def doctor(context: click.Context) -> None:
+def doctor(context: click.Context, verbose: bool) -> None:
     """Say of every plugin whether it works, and what to do where it does not; exit status 1 where one is broken."""
     import warnings
 
@@ -36,7 +40,7 @@ def doctor(context: click.Context) -> None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the same is said below
-        lines, well = diagnosis(registry(), installed(_own(context)))
+        lines, well = diagnosis(registry(), installed(_own(context)), verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 
@@ -58,15 +62,26 @@ def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> Non
 @click.argument("kind", type=click.Choice(["optimiser", "prior", "tracker"]))
 @click.argument("name")
 @click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Check it with this setting.")
+@click.option("--only", multiple=True, metavar="RULE", help="Check this rule alone; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
-def check(context: click.Context, kind: Any, name: str, settings: tuple[str, ...], as_json: bool) -> None:
-    """Check that an installed plugin keeps the rules of its kind; exit status 1 where it breaks one."""
-    from posefit.cli.inspection import checked
+def check(
+    context: click.Context, kind: Any, name: str, settings: tuple[str, ...], only: tuple[str, ...], as_json: bool
+) -> None:
+    """Check that an installed plugin keeps the rules of its kind; exit status 1 where it breaks one.
 
-    report = checked(kind, name, settings)
+    The rules are checked in a process of their own; what the plugin prints goes to stderr. Once two rules fail for the
+    same cause, the others are not checked.
+    """
+    with results_alone():
+        from posefit.testing.apart import check_apart
+
+        report = check_apart(kind, name, settings, only)
     if as_json:
-        results = [{"check": one.name, "outcome": one.outcome, "detail": one.detail} for one in report.results]
+        results = [
+            {"check": one.name, "outcome": one.outcome, "detail": one.detail, "traceback": one.traceback}
+            for one in report.results
+        ]
         click.echo(json.dumps({"plugin": report.plugin, "summary": report.summary, "results": results}))
     else:
         click.echo(str(report))

@@ -1,12 +1,13 @@
 """`posefit sweep` and `posefit report`."""
 
 import json
+from contextlib import nullcontext
 from typing import Any
 
 import click
 
 from posefit.cli.options import ENGINE, options
-from posefit.cli.output import say
+from posefit.cli.output import results_alone, say
 
 
 @click.command()
@@ -28,7 +29,8 @@ def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, 
 
     limits = Limits(where.pop("cell_seconds"), where.pop("cell_gigabytes"))
     if dry_run:
-        found = command.preview(plan, out, limits=limits, **where)
+        with results_alone() if as_json else nullcontext():
+            found = command.preview(plan, out, limits=limits, **where)
         if as_json:
             click.echo(json.dumps(found))
             return
@@ -37,7 +39,8 @@ def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, 
         return
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
-    tally, status = command.run_plan(plan, out, limits=limits, say=say, **where)
+    with results_alone() if as_json else nullcontext():
+        tally, status = command.run_plan(plan, out, limits=limits, say=say, **where)
     click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
     context.exit(status)
 

@@ -3,6 +3,8 @@
 import re
 from collections.abc import Sequence
 from importlib.resources import files
+from importlib.util import find_spec
+from keyword import iskeyword
 from pathlib import Path
 from string import Template
 from typing import Literal
@@ -13,6 +15,7 @@ from posefit.files import new_folder
 from posefit.registry import KINDS, Kind, registry
 
 COMMAND: Literal["command"] = "command"  # a kind of plugin that registers no method
+TAKEN = {"Frame"}  # names that a template's module has already
 
 
 def write_plugin(
@@ -30,6 +33,14 @@ def write_plugin(
     if name in (known := _taken(kind, own)):
         raise ValueError(f"name must be a new one, got {name!r}, which {known[name]} registers already")
     module = name.replace("-", "_")
+    if (there := find_spec(f"{PROJECT}_{module}")) is not None:
+        raise ValueError(
+            f"name must make a new module, got {name!r}: its module {there.name} would hide the one of that name in "
+            f"{there.origin or 'sys.path'}"
+        )
+    class_name = "".join(part.capitalize() for part in module.split("_"))
+    if class_name in TAKEN or iskeyword(class_name):
+        class_name += kind.capitalize()
     usage = [f"posefit {name}"]
     if kind != COMMAND:
         usage = [f"posefit check {kind} {name}", f"posefit track walk --{kind} {name}"]
@@ -38,7 +49,7 @@ def write_plugin(
         "kind": kind,
         "module": module,
         "dashed": name.replace("_", "-"),
-        "class_name": "".join(part.capitalize() for part in module.split("_")),
+        "class_name": class_name,
         "group": f'"{GROUP}"' if kind == COMMAND else PROJECT,
         "usage": "\n".join(usage),
     }

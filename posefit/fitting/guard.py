@@ -1,16 +1,28 @@
-"""Watches over an optimiser that somebody else wrote: whatever it does wrong ends the search with one line."""
+"""Watches over optimisers and trackers that somebody else wrote.
 
-import signal
-import threading
-from collections.abc import Iterator
+Whatever they do wrong ends the search with one line; and what a tracker says of its frames is held against what the
+host counts and computes itself.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from types import FrameType
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space
-from posefit.fitting.optimiser import Optimiser
+from posefit.fitting.optimiser import BudgetError, Optimiser
+from posefit.fitting.problem import over_views
+from posefit.fitting.tracker import Frame, Observation, Task, Tracker
+from posefit.limits import timed
+from posefit.silhouette.cost import areas
+from posefit.silhouette.drawn import PoseCount, uncounted
+
+LEEWAY = 10  # ours: poses a frame that may be drawn beyond the evaluations, as to draw once more what was found
+NEAR = 1e-6  # ours: how far a cost may be off, as it is rounded where it is added up in another order
 
 
 class BrokenRuleError(ValueError):
@@ -20,16 +32,25 @@ class BrokenRuleError(ValueError):
 class Guarded:
     """An optimiser whose every answer is checked; `name` says whose it is in the error.
 
-    `limit` is how many seconds an `ask` or a `tell` may take. It is kept where the operating system has timers and the
-    search runs in the main thread, as in a sweep's workers; elsewhere it is not.
+    `limit` is how many seconds an `ask` or a `tell` may take; see `posefit.limits.timed` for where it is kept, which
+    is in a sweep's workers and on the command line. `evaluations` is the budget of a search, which has to hold the
+    first population.
     """
 
-    def __init__(self, optimiser: Optimiser, space: Space, name: str, limit: float | None = None) -> None:
+    def __init__(
+        self,
+        optimiser: Optimiser,
+        space: Space,
+        name: str,
+        limit: float | None = None,
+        evaluations: int | None = None,
+    ) -> None:
         self._optimiser, self._space, self._name, self._limit = optimiser, space, name, limit
+        self._evaluations, self._first = evaluations, True
 
     def ask(self) -> Array:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
-        with self._watched("ask"):
+        with blamed(self._name, "ask", self._limit):
             proposals = self._optimiser.ask()
         shape = getattr(proposals, "shape", None)
         if not isinstance(proposals, np.ndarray) or proposals.shape[1:] != (self._space.dimensions,):
@@ -37,6 +58,8 @@ class Guarded:
             raise self._broken(f"ask must return an array of shape (n, {self._space.dimensions}), got {came}")
         if proposals.dtype.kind != "f":
             raise self._broken(f"ask must return numbers of type float64, got {proposals.dtype}")
+        if self._first:
+            self._check_first(len(proposals))
         if proposals.size:
             reach = np.abs(proposals).max()
             if np.isnan(reach):
@@ -49,43 +72,178 @@ class Guarded:
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Pass the costs on."""
-        with self._watched("tell"):
+        self._first = False
+        with blamed(self._name, "tell", self._limit):
             self._optimiser.tell(proposals, costs)
 
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
-        self._space = space
-        with self._watched("advance"):
+        self._space, self._first = space, True
+        with blamed(self._name, "advance", self._limit):
             self._optimiser.advance(space)  # type: ignore[attr-defined]
 
-    @contextmanager
-    def _watched(self, what: str) -> Iterator[None]:
-        try:
-            with timed(self._limit):
-                yield
-        except TimeoutError:
-            raise self._broken(f"{what} must return within {self._limit:g} s, and did not") from None
-        except Exception as error:  # a plugin may raise anything
-            raise self._broken(f"{what} must not fail, got {type(error).__name__}: {error}") from error
+    def _check_first(self, count: int) -> None:
+        if not count:
+            raise self._broken("ask must return a first population of one proposal or more, got none")
+        if self._evaluations is not None and count > self._evaluations:
+            raise BudgetError(f"{self._name}: evaluations must hold one population of {count}, got {self._evaluations}")
 
     def _broken(self, rule: str) -> BrokenRuleError:
         return BrokenRuleError(f"{self._name}: {rule}")
 
 
 @contextmanager
-def timed(limit: float | None) -> Iterator[None]:
-    """Raise TimeoutError in the body once it has run for `limit` seconds."""
-    if limit is None or not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
+def blamed(
+    name: str, what: str, limit: float | None = None, passed: tuple[type[BaseException], ...] = ()
+) -> Iterator[None]:
+    """Raise BrokenRuleError for whatever a plugin raises in the body, but for what is `passed`.
 
-    def stop(_: int, __: FrameType | None) -> None:
-        raise TimeoutError
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, limit)
+    It may try to end the program, too.
+    """
     try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        with timed(limit):
+            yield
+    except passed:
+        raise
+    except SystemExit as error:
+        raise BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}") from error
+    except Exception as error:
+        if limit is not None and isinstance(error, TimeoutError):
+            raise BrokenRuleError(f"{name}: {what} must return within {limit:g} s, and did not") from None
+        raise BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}") from error
+
+
+@dataclass(eq=False)
+class Audit:
+    """What trackers said of their frames that is not so; `warnings` tells it, a line for each kind."""
+
+    _findings: dict[str, tuple[str, int]] = field(default_factory=dict)  # by kind: the first of them, and how many
+
+    @property
+    def warnings(self) -> list[str]:
+        """One line for each kind of thing that was not so."""
+        return [f"{first} ({count} such frame{'s' if count > 1 else ''})" for first, count in self._findings.values()]
+
+    def forget(self) -> None:
+        """Start anew."""
+        self._findings.clear()
+
+    def note(self, kind: str, what: str) -> None:
+        """Keep something that was not so; only the first of a kind is told in full."""
+        first, count = self._findings.get(kind, (what, 0))
+        self._findings[kind] = first, count + 1
+
+
+class GuardedTracker:
+    """A tracker whose every frame is checked, and audited: what the host finds otherwise, it notes and puts right.
+
+    Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed anew from the
+    pose. Where a frame says the same it stays as it is.
+    """
+
+    def __init__(self, tracker: Tracker, task: Task, name: str, beta: float, audit: Audit) -> None:
+        self._tracker, self._task, self._name, self._beta, self._audit = tracker, task, name, beta, audit
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield the tracker's frame for each observation. Raises BrokenRuleError where it is none, or misses."""
+        drawn = PoseCount()
+        stream = _Stream(observations, drawn)
+        passed = (BrokenRuleError, ImportError, GeneratorExit)
+        said = given = 0
+        with blamed(self._name, "it", passed=passed):
+            frames = iter(self._tracker.track(stream, rng))
+        while True:
+            try:
+                with drawn.counting(), blamed(self._name, "it", passed=passed):
+                    frame = next(frames, None)
+            except BrokenRuleError as broken:
+                if stream.error is not None and broken.__cause__ is stream.error:
+                    raise stream.error from None  # what could not be read is not the tracker's fault
+                raise
+            if frame is None:
+                break
+            given += 1
+            if given > stream.count:
+                raise self._broken(f"track must yield a frame for each observation, got {given} for {given - 1}")
+            self._check(frame)
+            # what it may have drawn already for observations that it looks at ahead
+            ahead = self._task.evaluations * (stream.count - given)
+            counted = math.ceil(drawn.poses / len(self._task.cameras)) - said - ahead
+            frame = self._counted(frame, given - 1, counted, LEEWAY * stream.count)
+            frame = self._computed(frame, given - 1, stream.waiting.popleft())
+            said += frame.evaluations
+            yield frame
+        if given < stream.count or next(stream, None) is not None:
+            raise self._broken(f"track must yield a frame for each observation, got {given} and then no more")
+
+    def _check(self, frame: Frame) -> None:
+        if np.shape(frame.pose) != (66,) or not np.isfinite(frame.pose).all():
+            raise self._broken(f"a pose must be 66 finite angles, got shape {np.shape(frame.pose)}")
+        if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
+            raise self._broken(f"a translation must be 3 finite metres, got {frame.translation}")
+        if not isinstance(frame.evaluations, int | np.integer) or frame.evaluations < 0:
+            raise self._broken(f"evaluations must be a whole number, 0 or more, got {frame.evaluations!r}")
+        if not isinstance(frame.seconds, float | int | np.number) or not 0.0 <= frame.seconds < math.inf:
+            raise self._broken(f"seconds must be a number, 0 or more, got {frame.seconds!r}")
+
+    def _counted(self, frame: Frame, number: int, counted: int, leeway: int) -> Frame:
+        """Return the frame with the evaluations that were counted, where it says fewer, and note it."""
+        label, budget = f"{self._name}: frame {number}", self._task.evaluations
+        if counted > frame.evaluations + leeway:
+            self._audit.note("said", f"{label} must say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
+            frame = replace(frame, evaluations=counted, spent=None)
+        if frame.evaluations > budget:
+            self._audit.note("budget", f"{label} must use at most {budget:,} evaluations, got {frame.evaluations:,}")
+        return frame
+
+    def _computed(self, frame: Frame, number: int, observation: Observation) -> Frame:
+        """Return the frame with the areas and the cost of its pose, and note where it says others."""
+        label = f"{self._name}: frame {number}"
+        pose, place = np.asarray(frame.pose, np.float64)[None], np.asarray(frame.translation, np.float64)[None]
+        counts = [
+            areas(self._task.body, camera, silhouette, pose, place)
+            for camera, silhouette in zip(self._task.cameras, observation.silhouettes, strict=True)
+        ]
+        true = np.concatenate(counts)
+        if not np.array_equal(true, frame.areas):
+            self._audit.note("areas", f"{label} must have its pose's areas, {true.tolist()}, got {_told(frame.areas)}")
+            frame = replace(frame, areas=true)
+        cost = float(over_views(counts, observation.silhouettes, self._beta)[0])
+        if not (isinstance(frame.cost, float | int | np.number) and abs(frame.cost - cost) <= NEAR):
+            self._audit.note("cost", f"{label} must have its pose's cost, {cost:.6g}, got {_told(frame.cost)}")
+            frame = replace(frame, cost=cost, history=np.array([cost]), spent=None)
+        return frame
+
+    def _broken(self, rule: str) -> BrokenRuleError:
+        return BrokenRuleError(f"{self._name}: {rule}")
+
+
+class _Stream:
+    """The observations that a tracker takes, with silhouettes of its own, so that what it draws of them is known."""
+
+    def __init__(self, observations: Iterable[Observation], drawn: PoseCount) -> None:
+        self._rest, self._drawn = iter(observations), drawn
+        self.count = 0
+        self.waiting: deque[Observation] = deque()  # those whose frames are still to come
+        self.error: Exception | None = None
+
+    def __iter__(self) -> "_Stream":
+        return self
+
+    def __next__(self) -> Observation:
+        try:
+            with uncounted():  # to render a motion is no evaluation
+                observation = next(self._rest)
+        except StopIteration:
+            raise
+        except Exception as error:
+            self.error = error
+            raise
+        self.count += 1
+        self.waiting.append(observation)
+        return replace(observation, silhouettes=self._drawn.own(observation.silhouettes))
+
+
+def _told(value: object) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(np.asarray(value).tolist())
+    return text if len(text) <= 80 else text[:77] + "..."

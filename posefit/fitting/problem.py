@@ -57,13 +57,8 @@ class PoseProblem:
         return self.combined(self.areas(poses, translations))
 
     def combined(self, counts: Sequence[Areas]) -> Array:
-        """Return the cost (n,) of areas R, B, Y (n, 3), one array a view; one of which nothing is known has no say."""
-        known = [view for view, silhouette in zip(counts, self.silhouettes, strict=True) if silhouette.known]
-        counts = known or counts
-        costs = mismatch(counts[0], self.beta)
-        for more in counts[1:]:
-            costs += mismatch(more, self.beta)
-        return costs if len(counts) == 1 else costs / len(counts)
+        """Return the cost (n,) of areas R, B, Y (n, 3), one array a view."""
+        return over_views(counts, self.silhouettes, self.beta)
 
     def areas(self, poses: Array, translations: Array) -> list[Areas]:
         """Return R, B, Y (n, 3) of each view."""
@@ -71,3 +66,13 @@ class PoseProblem:
             areas(self.body, camera, silhouette, poses, translations, self.threads)
             for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
         ]
+
+
+def over_views(counts: Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:
+    """Return the cost (n,) of areas R, B, Y (n, 3), one array a view; one of which nothing is known has no say."""
+    known = [view for view, silhouette in zip(counts, silhouettes, strict=True) if silhouette.known]
+    counts = known or counts
+    costs = mismatch(counts[0], beta)
+    for more in counts[1:]:
+        costs += mismatch(more, beta)
+    return costs if len(counts) == 1 else costs / len(counts)

@@ -31,7 +31,8 @@ class Video:
         """Return a video. Raises ValueError where the file is missing, cannot be read or has no frame."""
         path = Path(path)
         if not path.is_file():
-            raise ValueError(f"{path}: expected a video file, got nothing of that name")
+            came = "a folder" if path.is_dir() else "nothing of that name"
+            raise ValueError(f"{path}: expected a video file, got {came}")
         capture = cv2.VideoCapture(str(path))
         try:
             wide, tall = (capture.get(one) for one in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))

@@ -13,7 +13,7 @@ from posefit.arrays import Array, writeable
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
-from posefit.silhouette import kernels
+from posefit.silhouette import drawn, kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
 
 SCALE = 100.0  # S
@@ -45,6 +45,7 @@ def areas(
         raise ValueError(f"translations must have shape {(n, 3)}, got {translations.shape}")
     if silhouette.mask.shape != (camera.height, camera.width):
         raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
+    drawn.count_poses(n, silhouette)
     out = np.empty((n, 3), dtype=np.int64)
     chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
     observed, valid = silhouette.bits
@@ -84,6 +85,7 @@ def paint(
         raise ValueError(f"poses must have shape (n, {ANGLES}) with translations (n, 3), got {poses.shape}")
     if silhouette.mask.shape != shape or pixels.shape != (n, *shape):
         raise ValueError(f"mask and pixels must have shape {shape}, got {silhouette.mask.shape}, {pixels.shape[1:]}")
+    drawn.count_poses(n, silhouette)
     out = np.empty((n, 3), dtype=np.int64)
     observed, valid = silhouette.bits
     kernels.count_areas(
@@ -113,6 +115,7 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
     if np.shape(pose) != (ANGLES,) or np.shape(translation) != (3,):
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise ValueError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
+    drawn.count_poses(1)
     bits = kernels.draw_bits(
         body.skeleton.chain,
         body.radii,

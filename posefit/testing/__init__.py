@@ -16,12 +16,12 @@ The same checks run for an installed plugin as `posefit check optimiser NAME`. A
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from posefit.fitting.optimiser import NextFrame
-from posefit.testing import prior_rules, protocol_rules, repeat_rules, search_rules, tracker_rules
-from posefit.testing.case import OptimiserCase, checklist
 from posefit.testing.results import Check, Report, Result, parametrize, run_checks
+
+if TYPE_CHECKING:
+    from posefit.fitting.optimiser import NextFrame
 
 __all__ = [
     "Check",
@@ -36,18 +36,21 @@ __all__ = [
     "run_checks",
     "tracker_checks",
 ]
-_LISTS = protocol_rules, repeat_rules, search_rules  # importing them fills the list
 
 
 def optimiser_checks(
-    factory: Callable[..., Any], *, next_frame: NextFrame = "start", settings: dict[str, Any] | None = None
+    factory: Callable[..., Any], *, next_frame: "NextFrame" = "start", settings: dict[str, Any] | None = None
 ) -> list[Check]:
     """Return the checks of an optimiser's factory; `next_frame` as it is registered."""
+    from posefit.testing import protocol_rules, repeat_rules, search_rules
+    from posefit.testing.case import OptimiserCase, checklist
+
+    del protocol_rules, repeat_rules, search_rules  # importing them has filled the list
     return checklist.of(OptimiserCase(factory, next_frame, settings or {}))
 
 
 def check_optimiser(
-    factory: Callable[..., Any], *, next_frame: NextFrame = "start", settings: dict[str, Any] | None = None
+    factory: Callable[..., Any], *, next_frame: "NextFrame" = "start", settings: dict[str, Any] | None = None
 ) -> Report:
     """Return what the checks say of an optimiser's factory: true where none failed."""
     return run_checks(_name(factory), optimiser_checks(factory, next_frame=next_frame, settings=settings))
@@ -55,6 +58,8 @@ def check_optimiser(
 
 def prior_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a prior's factory."""
+    from posefit.testing import prior_rules
+
     return prior_rules.checklist.of(prior_rules.PriorCase(factory, settings or {}))
 
 
@@ -65,6 +70,8 @@ def check_prior(factory: Callable[..., Any], *, settings: dict[str, Any] | None 
 
 def tracker_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a tracker's factory."""
+    from posefit.testing import tracker_rules
+
     return tracker_rules.checklist.of(tracker_rules.TrackerCase(factory, settings or {}))
 
 

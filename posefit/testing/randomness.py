@@ -3,6 +3,7 @@
 import random
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,12 +20,27 @@ def _state() -> tuple[object, ...]:
     )
 
 
+@dataclass
+class Watched:
+    """Whether the global random generators were left as they were."""
+
+    kept: bool = True
+
+
+@contextmanager
+def watched() -> Iterator[Watched]:
+    """Give what says, after the body, whether it left the global random generators as they were."""
+    before, found = _state(), Watched()
+    yield found
+    found.kept = _state() == before
+
+
 @contextmanager
 def left_alone() -> Iterator[None]:
     """Check that the body leaves the global random generators as they are."""
-    before = _state()
-    yield
-    expect(_state() == before, "the global random state must stay as it is, got another")
+    with watched() as found:
+        yield
+    expect(found.kept, "the global random state must stay as it is, got another")
 
 
 @contextmanager

@@ -44,6 +44,7 @@ def new_process(case: OptimiserCase) -> None:
     if ran.returncode == 3:
         raise SkippedError("the factory cannot be imported in another process")
     expect(not ran.returncode, f"it must work in a new process, got {ran.stderr.decode()[-300:]}")
+    expect(ran.stdout, "it must work in a new process, got one that ended in the middle")
     expect(
         same(case.trace(SPACE, sphere), pickle.loads(ran.stdout)),
         "one seed must give one trace in every process, got two",
@@ -78,16 +79,16 @@ def inputs(case: OptimiserCase) -> None:
 @checklist
 def deep_copy(case: OptimiserCase) -> None:
     """A deep copy goes on as the original does, each on its own."""
-    _continues(case, copy.deepcopy)
+    _continues(case, "a deep copy", copy.deepcopy)
 
 
 @checklist
 def pickled(case: OptimiserCase) -> None:
     """What comes out of a pickle goes on as the original does."""
-    _continues(case, lambda optimiser: pickle.loads(pickle.dumps(optimiser)))
+    _continues(case, "a pickle", lambda optimiser: pickle.loads(pickle.dumps(optimiser)))
 
 
-def _continues(case: OptimiserCase, copied: Any) -> None:
+def _continues(case: OptimiserCase, what: str, copied: Any) -> None:
     for told in (0, 2):
         optimiser = case.build(SPACE)
         for _ in case.steps(optimiser, SPACE, sphere, told):
@@ -95,9 +96,9 @@ def _continues(case: OptimiserCase, copied: Any) -> None:
         try:
             twin = copied(optimiser)
         except Exception as error:
-            raise BrokenError(f"it must be possible to copy it, got {type(error).__name__}: {error}") from None
+            raise BrokenError(f"{what} of it must be possible, got {type(error).__name__}: {error}") from None
         first = _rest(case, optimiser)
-        expect(same(first, _rest(case, twin)), f"a copy must go on as the original, got another trace after {told}")
+        expect(same(first, _rest(case, twin)), f"{what} must go on as the original, got another trace after {told}")
 
 
 def _rest(case: OptimiserCase, optimiser: Any) -> list[Array]:

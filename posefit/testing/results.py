@@ -1,13 +1,16 @@
 """What a kit of checks found: how many ran, which failed and why, which were skipped and why."""
 
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
-from posefit.fitting.guard import timed
+from posefit import limits
 
 SECONDS = 60.0  # how long a check may take before its plugin counts as one that never returns
+ALIKE = 2  # checks that fail for the same cause before the others count as not worth a try
 
 
 class BrokenError(AssertionError):
@@ -31,6 +34,7 @@ class Result:
     name: str
     outcome: Literal["passed", "failed", "skipped"]
     detail: str = ""
+    traceback: str = ""  # of what the plugin raised, from where its own code begins
 
 
 @dataclass(frozen=True)
@@ -44,16 +48,23 @@ class Check:
     def run(self) -> Result:
         """Return what became of the check; nothing that a plugin does escapes."""
         try:
-            with timed(SECONDS):
+            with limits.timed(SECONDS):
                 detail = self.body()
         except SkippedError as reason:
             return Result(self.name, "skipped", str(reason))
         except BrokenError as broken:
             return Result(self.name, "failed", str(broken))
-        except TimeoutError:
-            return Result(self.name, "failed", f"it must end within {SECONDS:g} s, and did not")
+        except TimeoutError as error:
+            return Result(
+                self.name, "failed", f"it must end within {SECONDS:g} s, and did not", _theirs(error.__cause__ or error)
+            )
+        except SystemExit as error:
+            return Result(
+                self.name, "failed", f"it must not end the program, got SystemExit: {error.code}", _theirs(error)
+            )
         except Exception as error:  # a plugin may raise anything
-            return Result(self.name, "failed", f"it must not fail, got {type(error).__name__}: {error}")
+            detail = f"it must not fail, got {type(error).__name__}: {error}"
+            return Result(self.name, "failed", detail, _theirs(error))
         return Result(self.name, "passed", detail or "")
 
     def __call__(self) -> None:
@@ -82,9 +93,13 @@ class Report:
         return not self.of("failed")
 
     def __str__(self) -> str:
-        lines = [f"{self.plugin}: {self.summary}"]
+        lines, told = [f"{self.plugin}: {self.summary}"], set[str]()
         width = max((len(result.name) for result in self.results), default=0)
-        lines += [f"  {one.outcome:8} {one.name:{width}}  {one.detail}".rstrip() for one in self.results]
+        for one in self.results:
+            lines.append(f"  {one.outcome:8} {one.name:{width}}  {one.detail}".rstrip())
+            if one.traceback and one.detail not in told:  # the same cause is told once
+                lines += [f"           {line}".rstrip() for line in one.traceback.splitlines()]
+            told.add(one.detail)
         return "\n".join(lines)
 
     @property
@@ -95,8 +110,47 @@ class Report:
 
 
 def run_checks(plugin: str, checks: Iterable[Check]) -> Report:
-    """Return the results of running all checks."""
-    return Report(plugin, tuple(check.run() for check in checks))
+    """Return the results of the checks; once some failed for one cause, the others are not run."""
+    results = Results()
+    for check in checks:
+        results.add(results.not_run(check.name) or check.run())
+    return Report(plugin, results.all)
+
+
+class Results:
+    """Collects results until one cause has made so many checks fail that it would make the others fail as well."""
+
+    def __init__(self) -> None:
+        self._all: list[Result] = []
+        self._cause: list[str] = []  # the checks that failed alike
+
+    @property
+    def all(self) -> tuple[Result, ...]:
+        """What was added, in its order."""
+        return tuple(self._all)
+
+    def add(self, result: Result) -> None:
+        """Take a result."""
+        self._all.append(result)
+        alike = [one.name for one in self._all if one.outcome == "failed" and one.detail == result.detail]
+        if not self._cause and len(alike) == ALIKE:
+            self._cause = alike
+
+    def not_run(self, name: str) -> Result | None:
+        """Return the result of a check that need not be run; None while each may say something new."""
+        return Result(name, "skipped", f"not run: {' and '.join(self._cause)} fail alike") if self._cause else None
+
+
+def _theirs(error: BaseException) -> str:
+    """Return an error's traceback without the frames of the kit that called the plugin."""
+    rest = error.__traceback__
+    while rest is not None and _ours(rest.tb_frame.f_code.co_filename):
+        rest = rest.tb_next
+    return "".join(traceback.format_exception(type(error), error, rest)).strip() if rest is not None else ""
+
+
+def _ours(file: str) -> bool:
+    return Path(file).parent == Path(__file__).parent or file == limits.__file__
 
 
 def parametrize(checks: Sequence[Check]) -> Any:

@@ -15,6 +15,7 @@ from posefit.testing.toy import Toy, sphere
 
 BUDGET = 800
 SEEDS = range(5)
+BEATS = 0.95  # a cost below so much of chance's beats it
 SLOW = 0.05  # seconds a proposal: twenty thousand times what a pose costs
 
 
@@ -76,10 +77,15 @@ def real_problem(case: OptimiserCase) -> str:
 def _beats_chance(case: OptimiserCase, space: Space, evaluate: Evaluate) -> str:
     if case.baseline:
         raise SkippedError("it is the baseline itself")
-    found = float(np.median([case.best(space, evaluate, seed, BUDGET) for seed in SEEDS]))
     chance = float(np.median([_by_chance(space, evaluate, seed) for seed in SEEDS]))
-    expect(found < 0.95 * chance, f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {found:.4g}")
-    return f"cost {found:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
+    found: list[float] = []
+    for seed in SEEDS:
+        found.append(case.best(space, evaluate, seed, BUDGET))
+        if sum(cost < BEATS * chance for cost in found) > len(SEEDS) // 2:
+            break  # whatever the others find, the median is below, too
+    best = float(np.median(found))
+    expect(best < BEATS * chance, f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {best:.4g}")
+    return f"cost {best:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
 
 
 def _by_chance(space: Space, evaluate: Evaluate, seed: int) -> float:

@@ -12,19 +12,6 @@ from posefit.footage.scene import Scene
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.tracking.measures import Measures, Spread
 
-_OF_THE_TRUTH = (
-    "error_degrees",
-    "geodesic_degrees",
-    "free_error_degrees",
-    "mpjpe_mm",
-    "pa_mpjpe_mm",
-    "swap_rate",
-    "lost_rate",
-    "skill",
-    "baselines_degrees",
-    "prior_floor_degrees",
-)
-
 
 def nearest(scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA) -> Array:
     """Return the pose (66,) of least cost in frame k of joint angles (n, 63), with the true root and translation."""
@@ -41,7 +28,8 @@ class Evaluation:
     """Collects a row a frame. Baselines have the true root and translation, which a tracker has not.
 
     They are `mean_pose`, the mean of the training poses; `persistence`, the true pose of the first frame, held;
-    `nearest`, the training pose of least cost in each frame; `prior_floor`, the truth's own projection into the prior.
+    `nearest`, the training pose of least cost in each frame. `prior_floor` is the truth's own projection into the
+    prior, which is no floor where a prior is not linear.
     """
 
     def __init__(self, scene: Scene, prior: Prior | None, training: Array, beta: float) -> None:
@@ -74,7 +62,7 @@ class Evaluation:
             "usable": np.array(self._usable, dtype=np.float64),
         }
         usable = np.array(self._usable) if any(self._usable) else np.ones(len(frames), dtype=bool)
-        errors: dict[str, Any] = dict.fromkeys(_OF_THE_TRUTH)
+        errors: dict[str, Any] = {}
         if self._scene.truth is not None:
             per_frame, errors = self._errors()
             columns |= per_frame

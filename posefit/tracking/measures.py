@@ -55,29 +55,34 @@ class Measures:
     """What one track is worth. Baselines and skill are by the names of `BASELINES`."""
 
     error_degrees: Spread | None = field(
+        default=None,
         metadata=_about(
             "error",
             "degrees",
             2,
             "absolute difference of the 66 angles from the true ones, the mean over angles: its mean over the frames, "
             "standard deviation and maximum. SAPSO (8)-(10)",
-        )
+        ),
     )
     geodesic_degrees: float | None = field(
+        default=None,
         metadata=_about(
             "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
-        )
+        ),
     )
     free_error_degrees: float | None = field(
+        default=None,
         metadata=_about(
             "error of free angles", "degrees", 2, "the error over those angles alone that the skeleton lets move"
-        )
+        ),
     )
     mpjpe_mm: float | None = field(
-        metadata=_about("MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point")
+        default=None,
+        metadata=_about("MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point"),
     )
     pa_mpjpe_mm: float | None = field(
-        metadata=_about("PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)")
+        default=None,
+        metadata=_about("PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)"),
     )
     iou: float = field(
         metadata=_about(
@@ -86,26 +91,36 @@ class Measures:
     )
     cost: float = field(metadata=_about("cost", "", 2, "silhouette mismatch of the poses found, 0 to 100. SAPSO (4)"))
     swap_rate: float | None = field(
-        metadata=_about("left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored", 100.0)
+        default=None,
+        metadata=_about("left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored", 100.0),
     )
     lost_rate: float | None = field(
-        metadata=_about("lost", "%", 0, "share of frames with an MPJPE above 150 mm", 100.0)
+        default=None, metadata=_about("lost", "%", 0, "share of frames with an MPJPE above 150 mm", 100.0)
     )
     held_frames: int = field(
         metadata=_about("held", "frames", 0, "frames that show too little: the pose is held, not searched")
     )
     skill: Mapping[str, float | None] | None = field(
-        metadata=_about("skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline")
+        default=None,
+        metadata=_about(
+            "skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline"
+        ),
     )
     baselines_degrees: Mapping[str, float] | None = field(
+        default=None,
         metadata=_about(
             "baselines", "degrees", 2, "errors of what anybody reaches, given the true root and translation"
-        )
+        ),
     )
     prior_floor_degrees: float | None = field(
+        default=None,
         metadata=_about(
-            "floor of the prior", "degrees", 2, "error of the truth's own projection into the prior and back"
-        )
+            "truth projected into the prior",
+            "degrees",
+            2,
+            "error of the true poses put into the prior and taken out again; no floor, as a prior that is "
+            "not linear may hold nearer ones",
+        ),
     )
     seconds_per_frame: float = field(metadata=_about("time", "ms a frame", 1, "wall time a frame", 1e3))
     evaluations: int = field(

@@ -1,7 +1,7 @@
 """A method, by names: an optimiser and a prior, or a tracker; with its settings checked and its plugins watched."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -11,12 +11,10 @@ import numpy as np
 from posefit import settings
 from posefit.arrays import Array
 from posefit.fitting.box import Space
-from posefit.fitting.guard import BrokenRuleError, Guarded
+from posefit.fitting.guard import Audit, BrokenRuleError, Guarded, GuardedTracker, blamed
 from posefit.fitting.optimiser import NextFrame, Optimiser, OptimiserFactory
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import (
-    Frame,
-    Observation,
     Prediction,
     SynthesisTracker,
     Task,
@@ -27,6 +25,7 @@ from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 
 ITERATIONS = 60  # C of the SAPSO paper, section 5.2
+SOME = 1000  # poses of which one at least has to be feasible in a prior
 
 Settings = Mapping[str, Any]
 
@@ -70,6 +69,7 @@ class Method:
     prior: Prior | None  # of a tracker of its own, None
     beta: float  # of the silhouette cost
     settings: dict[str, dict[str, Any]]
+    audit: Audit  # of what the trackers made of it say
     _make: Callable[[Task, float], Tracker] = field(repr=False)
 
     def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
@@ -94,10 +94,11 @@ def prepare(choice: Choice, task: Task) -> Method:
 
     def make(task: Task, patience: float) -> SynthesisTracker:
         limit = None if choice.ask_seconds is None else choice.ask_seconds + patience
-        return SynthesisTracker(task, learned, partial(_guarded, offer, mine, limit), offer.next_frame, prediction)
+        build = partial(_guarded, offer, mine, limit, task.evaluations)
+        return SynthesisTracker(task, learned, build, offer.next_frame, prediction)
 
     made_of = {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)}
-    return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, make)
+    return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, Audit(), make)
 
 
 def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: str | None) -> dict[str, dict[str, Any]]:
@@ -134,13 +135,21 @@ def _tracker(choice: Choice) -> Method:
     assert choice.tracker is not None
     offer, mine = _offered("tracker", choice.tracker), dict(choice.tracker_settings)
     settings.check(offer.name, offer.factory, mine)
+    audit, beta = Audit(), _beta(offer, mine)
 
     def make(task: Task, _patience: float) -> Tracker:
         with _rules(offer):
             tracker = offer.factory(task, **mine)
-        return _Watched(tracker, offer.label)
+        return GuardedTracker(tracker, task, offer.label, beta, audit)
 
-    return Method(offer.name, None, float(mine.get("beta", BETA)), {"tracker": mine}, make)
+    return Method(offer.name, None, beta, {"tracker": mine}, audit, make)
+
+
+def _beta(offer: Offer, given: Settings) -> float:
+    """Return the beta of the costs that a tracker gives: its setting of that name, if it has one."""
+    usual = {setting.name: setting.default for setting in offer.settings}.get("beta", BETA)
+    beta = given.get("beta", usual)
+    return float(beta) if isinstance(beta, float | int) else BETA
 
 
 def _prior(choice: Choice, task: Task) -> tuple[str, Prior]:
@@ -152,16 +161,22 @@ def _prior(choice: Choice, task: Task) -> tuple[str, Prior]:
     angles = task.angles
     with _rules(offer):
         prior: Prior = offer.factory(**choice.prior_settings).fit(angles, task.body.skeleton)
-        _check_prior(prior, angles[:3], offer)
+        _check_prior(prior, angles, offer)
     return offer.name, prior
 
 
-def _check_prior(prior: Prior, angles: Array, offer: Offer) -> None:
+def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
     low, high = np.asarray(prior.low), np.asarray(prior.high)
     if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low).all() and np.isfinite(high).all()):
         raise BrokenRuleError(
             f"{offer.label}: low and high must be finite and of shape (m,), got {low.shape}, {high.shape}"
         )
+    if (low > high).any():
+        k = int((low > high).argmax())
+        raise BrokenRuleError(
+            f"{offer.label}: low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}"
+        )
+    angles = training[:3]
     latents = np.asarray(prior.transform(angles))
     back, feasible = prior.inverse_transform(latents), prior.feasible(latents)
     for name, value, shape in (
@@ -173,47 +188,33 @@ def _check_prior(prior: Prior, angles: Array, offer: Offer) -> None:
             raise BrokenRuleError(f"{offer.label}: {name} must return shape {shape}, got {np.shape(value)}")
         if not np.isfinite(value).all():
             raise BrokenRuleError(f"{offer.label}: {name} must return finite numbers, got some that are not")
+    if not np.any(feasible):
+        _check_feasible(prior, training, offer)
 
 
-def _guarded(offer: Offer, mine: Settings, limit: float | None, space: Space, rng: np.random.Generator) -> Optimiser:
+def _check_feasible(prior: Prior, training: Array, offer: Offer) -> None:
+    """Look farther for something feasible, as a search would, which cannot say whose prior it is."""
+    some = training[np.unique(np.linspace(0, len(training) - 1, SOME).astype(np.int64))]
+    drawn = np.random.default_rng(0).uniform(prior.low, prior.high, (SOME, len(prior.low)))
+    for latents in (np.asarray(prior.transform(some)), drawn):
+        if np.any(prior.feasible(latents)):
+            return
+    raise BrokenRuleError(
+        f"{offer.label}: feasible must allow some poses, got none of {len(some)} training poses and {SOME} of the range"
+    )
+
+
+def _guarded(
+    offer: Offer, mine: Settings, limit: float | None, evaluations: int, space: Space, rng: np.random.Generator
+) -> Optimiser:
     with _rules(offer):
         optimiser = offer.factory(space, rng, **mine)
-    return Guarded(optimiser, space, offer.label, limit)
+    return Guarded(optimiser, space, offer.label, limit, evaluations)
 
 
-@contextmanager
-def _rules(offer: Offer) -> Iterator[None]:
+def _rules(offer: Offer) -> AbstractContextManager[None]:
     """Pass on what a user did wrong; whatever else a plugin raises is the plugin's fault, and the error says so."""
-    try:
-        yield
-    except (ValueError, ImportError):
-        raise
-    except Exception as error:
-        raise BrokenRuleError(f"{offer.label}: it must not fail, got {type(error).__name__}: {error}") from error
-
-
-class _Watched:
-    """A tracker whose every frame is checked."""
-
-    def __init__(self, tracker: Tracker, label: str) -> None:
-        self._tracker, self._label = tracker, label
-
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        try:
-            for frame in self._tracker.track(observations, rng):
-                if np.shape(frame.pose) != (66,) or not np.isfinite(frame.pose).all():
-                    raise BrokenRuleError(
-                        f"{self._label}: a pose must be 66 finite angles, got shape {np.shape(frame.pose)}"
-                    )
-                if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
-                    raise BrokenRuleError(
-                        f"{self._label}: a translation must be 3 finite metres, got {frame.translation}"
-                    )
-                yield frame
-        except (BrokenRuleError, ImportError, GeneratorExit):
-            raise
-        except Exception as error:
-            raise BrokenRuleError(f"{self._label}: it must not fail, got {type(error).__name__}: {error}") from error
+    return blamed(offer.label, "it", passed=(ValueError, ImportError))
 
 
 def _offered(kind: Kind, chosen: str | Callable[..., Any]) -> Offer:

@@ -1,9 +1,8 @@
 """How a sequence is begun whose first pose nobody knows: several starts, then the person's build."""
 
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -11,16 +10,17 @@ import numpy as np
 
 from posefit.fitting.shape import Shape, fit_shape
 from posefit.fitting.space import Translation
-from posefit.fitting.tracker import Frame, Observation, Task, Tracker
+from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.listening import Listener
 from posefit.motion.motion import Motion
+from posefit.settings import PARTICLES
 from posefit.tracking.method import Method
 
 RESTARTS = 8  # searches of the first frame
 BODY_FRAMES = 30  # from which a build is found
 COMPILING = 60.0  # seconds that a plugin's first calls may take longer than its limit
-PATIENCE = 1.5  # seconds of compiling before it is announced
+POPULATIONS = 8  # that are searched to compile what a search needs
 FRAMES = 10  # how many a start is judged by
 STRIDE = 3  # and how far apart they are, so that it shows which way somebody walks
 MOVED = 0.3  # metres; who goes so far in these frames goes where he faces
@@ -80,7 +80,7 @@ def opened(
     """Return a task with what was found out before the first frame, and the person's build where it was fitted."""
     began = time.perf_counter()
     with _announced(listener.say):
-        _warm_up(method.tracker(task, COMPILING), scene)
+        _warm_up(method, task, scene)
     listener.say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
 
     follow, blind = following(method), scene.truth is None
@@ -169,21 +169,30 @@ def built(
     )
 
 
-def _warm_up(tracker: Tracker, scene: Scene) -> None:
-    """Compile what is not compiled yet, on the first frame."""
+def _warm_up(method: Method, task: Task, scene: Scene) -> None:
+    """Compile what is not compiled yet: a few populations of the first frame, whatever comes of them."""
+    particles = method.settings.get("optimiser", {}).get("particles", PARTICLES)
+    few = replace(task, evaluations=min(task.evaluations, POPULATIONS * particles))
     first = next(iter(scene.observations))
-    next(tracker.track([first], np.random.default_rng(0)))
+    with suppress(ValueError):  # what does not work with so few evaluations is told where it does not with all
+        next(method.tracker(few, COMPILING).track([first], np.random.default_rng(0)))
 
 
 @contextmanager
 def _announced(say: Callable[[str], None]) -> Iterator[None]:
-    """Say that compiling takes its time, if it does."""
-    message = "compiling the kernels, once on this machine; this can take half a minute ..."
-    timer = threading.Timer(PATIENCE, say, (message,))
-    timer.daemon = True
-    timer.start()
-    try:
+    """Say that compiling takes its time, once something is compiled that was not found in numba's cache."""
+    from numba.core import event
+
+    class Once(event.Listener):  # type: ignore[misc]
+        said = False
+
+        def on_start(self, _event: event.Event) -> None:
+            if not self.said:
+                self.said = True
+                say("compiling the kernels, once on this machine; this can take half a minute ...")
+
+        def on_end(self, _event: event.Event) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Once()):
         yield
-    finally:
-        timer.cancel()
-        timer.join()  # it may be in the middle of saying it

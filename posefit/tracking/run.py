@@ -59,9 +59,12 @@ def follow(
         method = prepare(choice, task)
         task, shape = opened(scene, method, task, opening, seed, listener)
         scene = replace(scene, body=task.body)
+        method.audit.forget()  # what was tried before the first frame is in no row
         output = output or Nowhere()
         found = _found(scene, method, task, output, seed, listener)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
+        for warning in method.audit.warnings:
+            listener.say(f"warning: {warning}")
         for frame, observation in zip(found, scene.observations, strict=True):
             evaluation.add(frame, observation)
         rows, measures = evaluation.close()
@@ -91,7 +94,7 @@ def follow(
             "fps": scene.fps,
             "settings": method.settings,
             "body": None if shape is None else _described(shape),
-            "warnings": list(scene.warnings),
+            "warnings": [*scene.warnings, *method.audit.warnings],
         }
         output.finish(scene, estimate, found, rows, summary)
     return Track(estimate, scene.truth, measures, rows, summary, found)

@@ -7,6 +7,8 @@ from posefit.tracking.measures import BASELINES, MEASURES
 
 NOTABLE = 0.05  # a part of the build that is off the average by less is not worth a word
 
+WIDTH = 30  # of the names
+
 
 def table(summary: Mapping[str, Any]) -> str:
     """Return the lines that `posefit track` prints."""
@@ -16,14 +18,14 @@ def table(summary: Mapping[str, Any]) -> str:
     ]
     error = summary["error_degrees"]
     if error is not None:
-        lines.append(f"{'':24} {'error deg':>9} {'skill':>7}")
-        lines.append(f"{summary['method']:24} {error['mean']:9.2f}")
+        lines.append(f"{'':{WIDTH}} {'error deg':>9} {'skill':>7}")
+        lines.append(f"{summary['method']:{WIDTH}} {error['mean']:9.2f}")
         for name, baseline in summary["baselines_degrees"].items():
             skill = MEASURES["skill"].number(summary["skill"][name])  # a dash where the baseline has no error at all
-            lines.append(f"{BASELINES[name]:24} {baseline:9.2f} {skill:>7}")
+            lines.append(f"{BASELINES[name]:{WIDTH}} {baseline:9.2f} {skill:>7}")
         if summary["prior_floor_degrees"] is not None:  # a tracker of its own may have no prior
-            floor = MEASURES["prior_floor_degrees"]
-            lines.append(f"{floor.label:24} {floor.number(summary[floor.name]):>9}")
+            projected = MEASURES["prior_floor_degrees"]
+            lines.append(f"{projected.label:{WIDTH}} {projected.number(summary[projected.name]):>9}")
         told = (_shown(summary, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
         lines.append(f"{', '.join(told)} of frames")
     if summary["held_frames"]:

@@ -164,7 +164,7 @@ def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: p
 def test_one_frame_has_a_table_too() -> None:  # the pose held from the first frame has no error to compare with
     result = run("fit", "walk", "--frame", "3", *QUICK)
     assert result.exit_code == 0, result.output
-    assert "first true pose, held         0.00       -" in result.stdout
+    assert "first true pose, held               0.00       -" in result.stdout
 
 
 def test_an_amc_is_followed_with_the_asf_beside_it(clip: tuple[Path, Path]) -> None:
@@ -328,12 +328,18 @@ def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.Monkey
     assert "offers optimiser sapso, optimiser pso, optimiser random" in result.stdout
     from posefit import registry
 
-    broken = registry.Plugin("bad", "posefit-bad", "1.0", "broken", "ImportError: no module named 'lost'")
+    told = "Traceback ...\n  line 7, in bad"
+    broken = registry.Plugin(
+        "bad", "posefit-bad", "1.0", "broken", "ImportError: no module named 'lost'", traceback=told
+    )
     found = registry.Registry((*registry.registry().plugins, broken))
     monkeypatch.setattr(registry, "registry", lambda: found)
     result = run("plugins", "doctor")
     assert result.exit_code == 1
     assert "broken    bad (posefit-bad 1.0): ImportError: no module named 'lost'" in result.stdout
+    assert "line 7, in bad" not in result.stdout
+    verbose = run("plugins", "doctor", "-v").stdout
+    assert "no module named 'lost'\n          Traceback ...\n            line 7, in bad\n" in verbose
 
 
 def test_check_reports_every_rule_and_how_many_ran() -> None:
@@ -342,7 +348,8 @@ def test_check_reports_every_rule_and_how_many_ran() -> None:
     assert "29 checks ran, 0 failed, 5 skipped" in result.stdout
     assert "it is the baseline itself" in result.stdout
     report = json.loads(run("check", "prior", "pca", "--set", "components=4", "--json").stdout)
-    assert {"check": "ranges", "outcome": "passed", "detail": "4 latents"} in report["results"]
+    passed = {"check": "ranges", "outcome": "passed", "detail": "4 latents", "traceback": ""}
+    assert passed in report["results"]
     assert "optimiser must be one of" in fails("check", "optimiser", "nothing")
     assert "a setting of pca must be one of" in fails("check", "prior", "pca", "--set", "colour=red")
     assert "--set must be SETTING=VALUE" in fails("check", "prior", "pca", "--set", "colour")
@@ -415,6 +422,25 @@ def test_a_new_command_installs_offline_and_passes_its_own_test(tmp_path: Path) 
 def test_a_new_command_has_a_new_name(taken: str, tmp_path: Path) -> None:
     said = fails("plugins", "new", taken, "--kind", "command", "--out", tmp_path / "x")
     assert f"name must be a new one, got '{taken}', which posefit registers already" in said
+
+
+@pytest.mark.parametrize("name", ["swarm", "experiments", "envs"])
+def test_a_new_plugin_has_a_module_of_its_own(name: str, tmp_path: Path) -> None:
+    said = fails("plugins", "new", name, "--out", tmp_path / "x")
+    assert f"name must make a new module, got '{name}': its module posefit_{name} would hide the one" in said
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "class_name"), [("none", "NoneTracker"), ("true", "TrueTracker"), ("frame", "FrameTracker")]
+)
+def test_a_new_plugins_class_has_a_name_that_python_and_the_template_leave_free(
+    name: str, class_name: str, tmp_path: Path
+) -> None:
+    assert run("plugins", "new", name, "--kind", "tracker", "--out", tmp_path / "x").exit_code == 0
+    text = (tmp_path / "x" / f"posefit_{name}.py").read_text()
+    assert f"class {class_name}:" in text
+    compile(text, name, "exec")
 
 
 def test_a_new_plugin_replaces_nothing(tmp_path: Path) -> None:

@@ -1,5 +1,9 @@
 """Plugins come in by one door, and a broken one costs a warning."""
 
+import io
+import sys
+import threading
+import time
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -8,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit import hookimpl
+from posefit import entries, hookimpl
 from posefit.motion import library
 from posefit.registry import registry, registry_of
 from posefit_priors.pca import PCA
@@ -151,6 +155,56 @@ def test_a_registration_that_makes_no_sense_is_left_out(module: Any, cause: str)
         point = Point("bad", module)
     with pytest.warns(UserWarning, match=cause):
         assert not registry_of([point]).offers["optimiser"]  # type: ignore[list-item]
+
+
+def test_an_import_that_hangs_has_a_limit_that_names_the_distribution() -> None:
+    def hangs() -> Any:
+        while True:
+            try:
+                time.sleep(10.0)
+            except Exception:  # it swallows what would end it
+                continue
+
+    point = Point("slow", None)
+    point.load = hangs  # type: ignore[method-assign]
+    points: Any = [point, Point("good", offering("good"))]
+    with pytest.warns(
+        UserWarning, match="'slow' of posefit-slow 1.0 is left out: it must load within 0.05 s, and did not"
+    ):
+        found = registry_of(points, {"POSEFIT_LOAD_SECONDS": "0.05"})
+    assert list(found.offers["optimiser"]) == ["good"]
+    assert "in hangs" in found.plugins[1].traceback
+
+
+def test_a_load_that_nothing_can_end_is_told_of_by_name(monkeypatch: Any) -> None:
+    told, waiting = io.StringIO(), threading.Event()
+
+    def waits() -> Any:
+        waiting.wait(60.0)
+        return offering("late")
+
+    class Told(io.StringIO):
+        def write(self, text: str) -> int:
+            waiting.set()
+            return told.write(text)
+
+    point = Point("slow", None)
+    point.load = waits  # type: ignore[method-assign]
+    monkeypatch.setattr(entries, "GRACE", 0.0)
+    monkeypatch.setattr(sys, "stderr", Told())
+    found: list[Any] = []
+    load = threading.Thread(target=lambda: found.append(registry_of([point], {"POSEFIT_LOAD_SECONDS": "0.05"})))  # type: ignore[list-item]
+    load.start()
+    load.join()
+    assert "plugin 'slow' of posefit-slow 1.0 is still loading after 0.05 s" in told.getvalue()
+    assert list(found[0].offers["optimiser"]) == ["late"]
+
+
+@pytest.mark.parametrize("text", ["soon", "0", "-1", "nan"])
+def test_a_limit_that_makes_no_sense_is_named(text: str) -> None:
+    points: Any = [Point("good", offering("good"))]
+    with pytest.raises(ValueError, match=f"POSEFIT_LOAD_SECONDS must be a number of seconds above 0, got '{text}'"):
+        registry_of(points, {"POSEFIT_LOAD_SECONDS": text})
 
 
 def exits() -> Any:

@@ -1,8 +1,12 @@
 """Optimisers, priors and trackers that each break one rule on purpose. The kit has to find every one of them."""
 
+import ctypes
+import os
 import random
+import sys
 import threading
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -135,15 +139,87 @@ class Stubborn(Sound):
 class NeedsAsk(Sound):
     """Breaks where it is told something unasked."""
 
-    asked = 0
+    asked: Any = None
 
     def ask(self) -> Array:
-        self.asked += 1
+        self.asked = {0: 0}
         return super().ask()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        self.last = {}[0] if not self.asked else self.asked  # type: ignore[var-annotated]
+        self.asked = self.asked.get(0)
         super().tell(proposals, costs)
+
+
+class KnowsItsRows(Sound):
+    """Looks up what it is told among what it asked; it is right, as it gets exactly that population back."""
+
+    def ask(self) -> Array:
+        proposals = super().ask()
+        self.rows = {row.tobytes() for row in proposals}
+        return proposals
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        for row in proposals:
+            if row.tobytes() not in self.rows:
+                raise KeyError("a row that was never asked for")
+        super().tell(proposals, costs)
+
+
+class Talks(Sound):
+    """Prints whatever it does, by Python and past it; nothing else is wrong with it."""
+
+    def ask(self) -> Array:
+        print("asked", flush=True)
+        os.write(1, b"asked, too\n")
+        return super().ask()
+
+
+class WrongSignature(Sound):
+    def __init__(self, space: SearchSpace) -> None:
+        super().__init__(space, np.random.default_rng(0))
+
+
+class ExitsInTell(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        sys.exit(0)
+
+
+class EndsTheProcess(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        os._exit(0)
+
+
+class Crashes(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        ctypes.string_at(0)
+
+
+class NeverReturns(Sound):
+    """Swallows whatever would end it."""
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        while True:
+            try:
+                time.sleep(60.0)
+            except BaseException:
+                continue
+
+
+class FillsTheMemory(Sound):
+    def tell(self, proposals: Array, costs: Array) -> None:
+        self.hoard = np.ones((10**11,))
+
+
+class AsksNothing(Sound):
+    def ask(self) -> Array:
+        return super().ask()[:0]
+
+
+class AsksForTooMuch(Sound):
+    """Has more proposals than any budget."""
+
+    def ask(self) -> Array:
+        return np.tile(super().ask()[:1], (100_000, 1))
 
 
 class AskChanges(Sound):
@@ -284,6 +360,23 @@ class RefusesAll(PCA):
         return np.zeros(len(latents), dtype=bool)
 
 
+class Reversed(PCA):
+    def fit(self, angles: Array, skeleton: Any = None) -> Any:
+        super().fit(angles)
+        self.low, self.high = self.high, self.low
+        return self
+
+
+class Unhurried(PCA):
+    """Counts how often it learns, as that may take minutes; nothing is wrong with it."""
+
+    fits = 0
+
+    def fit(self, angles: Array, skeleton: Any = None) -> Any:
+        Unhurried.fits += 1
+        return super().fit(angles, skeleton)
+
+
 class ReturnsNone(PCA):
     def fit(self, angles: Array, skeleton: Any = None) -> Any:
         super().fit(angles)
@@ -306,7 +399,15 @@ class Holds:
 
         where = observation.translation
         counts = areas(self.task.body, self.task.cameras[0], observation.silhouettes[0], self.pose[None], where[None])
-        return Frame(self.pose, where, float(mismatch(counts)[0]), counts, 1, 0.0, np.zeros(1))
+        cost = float(mismatch(counts)[0])
+        return Frame(self.pose, where, cost, counts, 1, 0.0, np.array([cost]))
+
+    def draw(self, observation: Any, poses: int) -> None:
+        """Draw so many poses, for nothing."""
+        from posefit.silhouette.cost import areas
+
+        many, places = np.tile(self.pose, (poses, 1)), np.tile(observation.translation, (poses, 1))
+        areas(self.task.body, self.task.cameras[0], observation.silhouettes[0], many, places)
 
     def track(self, observations: Any, rng: Any) -> Any:
         for observation in observations:
@@ -333,6 +434,56 @@ class Spends(Holds):
     def frame(self, observation: Any) -> Frame:
         frame = super().frame(observation)
         return Frame(frame.pose, frame.translation, frame.cost, frame.areas, 10**6, 0.0, frame.history)
+
+
+class SpendsAndSaysSo(Holds):
+    """Spends 20,000 evaluations of any budget."""
+
+    def frame(self, observation: Any) -> Frame:
+        self.draw(observation, 20_000)
+        return replace(super().frame(observation), evaluations=20_000)
+
+
+class SpendsInSecret(Holds):
+    """Says 100 evaluations and spends 20,000."""
+
+    def frame(self, observation: Any) -> Frame:
+        self.draw(observation, 20_000)
+        return replace(super().frame(observation), evaluations=100)
+
+
+class SpendsInThreads(Holds):
+    """Says 100 evaluations and spends 20,000 in threads of its own."""
+
+    def frame(self, observation: Any) -> Frame:
+        threads = [threading.Thread(target=self.draw, args=(observation, 10_000)) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        return replace(super().frame(observation), evaluations=100)
+
+
+class CostsNothing(Holds):
+    def frame(self, observation: Any) -> Frame:
+        return replace(super().frame(observation), cost=0.0, history=np.zeros(1))
+
+
+class InventsAreas(Holds):
+    def frame(self, observation: Any) -> Frame:
+        return replace(super().frame(observation), areas=np.array([[0, 0, 100]]))
+
+
+class GivesFramesTwice(Holds):
+    def track(self, observations: Any, rng: Any) -> Any:
+        for frame in super().track(observations, rng):
+            yield frame
+            yield frame
+
+
+class ExitsInTrack(Holds):
+    def frame(self, observation: Any) -> Frame:
+        sys.exit(0)
 
 
 class Remembers(Holds):
@@ -376,13 +527,26 @@ OPTIMISERS: dict[type, tuple[str, ...]] = {
     IgnoresTheStart: ("start",),
     Slow: ("speed",),
     HangsOnNonsense: ("nonsense_settings",),
+    WrongSignature: ("construction", "shape"),
+    ExitsInTell: ("dtype", "box"),
+    AsksNothing: ("shape",),
+    AsksForTooMuch: ("budget",),
 }
+# what only a process of its own can find, and what is said of it
+APART: dict[type, tuple[str, str]] = {
+    EndsTheProcess: ("dtype", "it must not end the program, got exit status 0"),
+    Crashes: ("dtype", "it must not end the program, got SIGSEGV"),
+    NeverReturns: ("dtype", "it must end within 1 s, and did not"),
+    FillsTheMemory: ("dtype", "it must not fail, got MemoryError: Unable to allocate"),
+}
+RIGHT: tuple[type, ...] = (Sound, KnowsItsRows, Talks)
 PRIORS: dict[type, tuple[str, ...]] = {
     ShiftsWithTheCompany: ("same_bits",),
     NarrowRange: ("training_in_range",),
     RefusesAll: ("training_feasible",),
     ReturnsNone: ("fit",),
     TakesNan: ("bad_input",),
+    Reversed: ("ranges",),
 }
 TRACKERS: dict[type, tuple[str, ...]] = {
     ReadsAhead: ("as_they_come",),
@@ -390,4 +554,11 @@ TRACKERS: dict[type, tuple[str, ...]] = {
     Flatters: ("honest_cost",),
     Spends: ("budget",),
     Remembers: ("used_twice",),
+    SpendsAndSaysSo: ("budget",),
+    SpendsInSecret: ("honest_evaluations",),
+    SpendsInThreads: ("honest_evaluations",),
+    CostsNothing: ("honest_cost",),
+    InventsAreas: ("honest_cost",),
+    GivesFramesTwice: ("one_frame_each",),
+    ExitsInTrack: ("one_frame_each",),
 }

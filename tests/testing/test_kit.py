@@ -89,10 +89,41 @@ def test_chance_does_not_beat_chance_and_need_not_where_it_says_that_it_is_the_b
         assert outcomes(factory) == [("skipped", "it is the baseline itself")] * 2
 
 
-@pytest.mark.parametrize("name", ["Sound"])
-def test_it_passes_a_sound_plugin(name: str) -> None:
-    result = check_optimiser(getattr(planted, name))
+@pytest.mark.parametrize("right", planted.RIGHT)
+def test_it_passes_a_sound_plugin(right: Any) -> None:
+    result = check_optimiser(right)
     assert result, str(result)
+
+
+def test_one_cause_ends_the_checks() -> None:
+    result = check_optimiser(planted.WrongSignature)
+    construction, shape, dtype = result.of("failed")
+    assert (construction.name, shape.name, dtype.name) == ("construction", "shape", "dtype")
+    assert shape.detail == dtype.detail
+    assert {one.detail for one in result.of("skipped")} == {"not run: shape and dtype fail alike"}
+    assert len(result.results) == len(optimiser_checks(planted.WrongSignature))
+    assert str(result).count("takes 2 positional arguments but 3") == 2
+
+
+def test_a_traceback_begins_in_the_plugins_own_code() -> None:
+    check = next(one for one in optimiser_checks(planted.DividesByTheRange) if one.name == "equal_costs")
+    told = check.run().traceback
+    assert told.splitlines()[1].strip().startswith(f'File "{planted.__file__}"')
+    assert "rank = (costs - costs.min()) / (costs.max() - costs.min())" in told
+
+
+def test_a_traceback_is_told_once_a_cause() -> None:
+    both = [check for check in optimiser_checks(planted.ExitsInTell) if check.name in ("dtype", "box")]
+    report = run_checks("it", both)
+    assert len(report.of("failed")) == 2
+    assert str(report).count("sys.exit(0)") == 1
+
+
+def test_a_prior_that_takes_its_time_learns_twice_and_where_input_is_wrong() -> None:
+    planted.Unhurried.fits = 0
+    assert check_prior(planted.Unhurried)
+    # once for all rules, once more for `same_again`, three times for what `bad_input` has refused
+    assert planted.Unhurried.fits <= 5
 
 
 @pytest.mark.parametrize(("bug", "checks"), planted.OPTIMISERS.items(), ids=lambda one: getattr(one, "__name__", ""))

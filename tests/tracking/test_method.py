@@ -155,6 +155,11 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
         ),
         ({"feasible": lambda latents: True}, r"feasible must return shape \(3,\), got \(\)"),
         ({"transform": lambda angles: 1 / 0}, "it must not fail, got ZeroDivisionError"),
+        ({"low": np.full(6, 9.0)}, "low must not be above high, got 9 and [0-9.]+ of latent 0"),
+        (
+            {"feasible": lambda latents: np.zeros(len(latents), dtype=bool)},
+            "feasible must allow some poses, got none of [0-9]+ training poses and 1000 of the range",
+        ),
     ],
 )
 def test_a_broken_prior_is_named(change: dict[str, Any], rule: str, installed: Any) -> None:

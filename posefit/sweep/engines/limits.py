@@ -4,10 +4,11 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
+
+from posefit.limits import memory
 
 SECONDS, GIGABYTES = 3600.0, 4.0
 GRACE = 5.0  # seconds after which a process ends itself that nobody ended in time
@@ -38,7 +39,7 @@ def limited(run: Callable[[T], R], cell: T, limits: Limits, grace: float = GRACE
     Raises MemoryError where it wants more memory than it may have. A process that is still at it `grace` seconds after
     its time is ended by the operating system, whatever it does.
     """
-    with _one_at_a_time, _memory(limits.gigabytes):
+    with _one_at_a_time, memory(limits.gigabytes):
         timer = getattr(signal, "setitimer", None)
         if timer is not None:
             timer(signal.ITIMER_REAL, limits.seconds + grace)
@@ -77,21 +78,3 @@ def single_threaded() -> None:
     cv2.setNumThreads(1)
     numba.set_num_threads(1)
     threadpool_limits(1)
-
-
-@contextmanager
-def _memory(gigabytes: float) -> Iterator[None]:
-    try:
-        import resource
-    except ImportError:  # an operating system without such limits
-        yield
-        return
-    before = resource.getrlimit(resource.RLIMIT_DATA)
-    wanted = int(gigabytes * 1e9)
-    if before[1] != resource.RLIM_INFINITY:
-        wanted = min(wanted, before[1])
-    resource.setrlimit(resource.RLIMIT_DATA, (wanted, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_DATA, before)

@@ -1,0 +1,94 @@
+"""How long something that others wrote may take, how much memory it may have, and that it cannot end the program."""
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
+
+AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
+SOON = 1e-6  # seconds, for a timer that should have ended meanwhile; 0 would switch it off
+
+
+class _OvertimeError(BaseException):
+    """Ends what takes too long; no Exception, which it might swallow."""
+
+
+@contextmanager
+def timed(limit: float | None) -> Iterator[None]:
+    """Raise TimeoutError in the body once it has run for `limit` seconds.
+
+    That needs an operating system with timers, and a body that runs Python in the main thread: elsewhere, and inside a
+    call of compiled code that does not return, there is no limit. An earlier limit of a caller's holds as well, and
+    goes on afterwards.
+    """
+    if limit is None or not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    callers = signal.getitimer(signal.ITIMER_REAL)[0]
+    if callers and callers <= limit:
+        yield
+        return
+
+    def stop(_: int, __: FrameType | None) -> None:
+        raise _OvertimeError
+
+    began = time.monotonic()
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, limit, AGAIN)
+    try:
+        yield
+    except _OvertimeError as overtime:
+        raise TimeoutError from overtime  # whose traceback says where it was
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+        if callers:
+            signal.setitimer(signal.ITIMER_REAL, max(callers - (time.monotonic() - began), SOON))
+
+
+@contextmanager
+def memory(gigabytes: float) -> Iterator[None]:
+    """Let this process have so much memory in the body, on systems with limits: to want more is a MemoryError."""
+    try:
+        import resource
+    except ImportError:
+        yield
+        return
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    wanted = int(gigabytes * 1e9)
+    if before[1] != resource.RLIM_INFINITY:
+        wanted = min(wanted, before[1])
+    resource.setrlimit(resource.RLIMIT_DATA, (wanted, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+@contextmanager
+def exits_told(status: int) -> Iterator[None]:
+    """Have `os._exit` in the body say who called it, and end this process with `status` instead of its own.
+
+    It ends a process at once and past every `except`; a status of 0 would look like a result. Processes that are
+    forked in the body end as they like.
+    """
+    real, owner = os._exit, os.getpid()
+
+    def told(asked: int) -> NoReturn:
+        if os.getpid() != owner:
+            real(asked)
+        caller = sys._getframe(1)
+        where = f"{caller.f_code.co_filename}:{caller.f_lineno}"
+        os.write(2, f"posefit: nothing may end the program, got os._exit({asked}) in {where}\n".encode())
+        real(status)
+
+    os._exit = told  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        os._exit = real  # type: ignore[assignment]

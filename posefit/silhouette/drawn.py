@@ -1,0 +1,69 @@
+"""How many poses are drawn, and for whom: what somebody says of his evaluations can be held against it."""
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from copy import copy
+from weakref import WeakKeyDictionary
+
+from posefit.silhouette.mask import Silhouette
+
+
+class PoseCount:
+    """Counts the poses that are drawn within `counting`, and in any thread those compared with its `own` silhouettes.
+
+    Several count at once and each its own, in one thread or in many. A thread that others start is known by the
+    silhouettes alone; what calls the compiled loops itself, or draws in another process, is not counted.
+    """
+
+    def __init__(self) -> None:
+        self.poses = 0
+        self._lock = threading.Lock()
+
+    def add(self, poses: int) -> None:
+        """Count so many poses."""
+        with self._lock:
+            self.poses += poses
+
+    @contextmanager
+    def counting(self) -> Iterator[None]:
+        """Count what is drawn in the body; an outer count gets it as well."""
+        outer, before = _current.get(), self.poses
+        token = _current.set(self)
+        try:
+            yield
+        finally:
+            _current.reset(token)
+            if outer is not None:
+                outer.add(self.poses - before)
+
+    def own(self, silhouettes: Sequence[Silhouette]) -> list[Silhouette]:
+        """Return the same silhouettes, as objects that only this count knows."""
+        mine = [copy(one) for one in silhouettes]
+        for one in mine:
+            _owners[one] = self
+        return mine
+
+
+_current: ContextVar[PoseCount | None] = ContextVar("drawn", default=None)
+_owners: WeakKeyDictionary[Silhouette, PoseCount] = WeakKeyDictionary()
+
+
+@contextmanager
+def uncounted() -> Iterator[None]:
+    """Count nothing in the body, though it is called within `counting`."""
+    token = _current.set(None)
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
+def count_poses(poses: int, silhouette: Silhouette | None = None) -> None:
+    """Count poses that are drawn now, for whoever counts them."""
+    counted = _current.get()
+    if counted is None and _owners and silhouette is not None:
+        counted = _owners.get(silhouette)
+    if counted is not None:
+        counted.add(poses)

@@ -1,0 +1,75 @@
+"""Limits of time end what runs Python, nest, and let nothing swallow them."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from posefit.limits import memory, timed
+
+
+def test_what_takes_too_long_is_ended() -> None:
+    def works() -> None:
+        while True:
+            pass
+
+    with pytest.raises(TimeoutError), timed(0.05):
+        works()
+
+
+def test_what_swallows_exceptions_is_ended() -> None:
+    def swallows() -> None:
+        while True:
+            try:
+                time.sleep(10.0)
+            except Exception:
+                continue
+
+    with pytest.raises(TimeoutError), timed(0.05):
+        swallows()
+
+
+def test_a_limit_within_a_limit_leaves_the_outer_one_as_it_was() -> None:
+    def nested() -> None:
+        with timed(20.0):
+            pass
+        with pytest.raises(TimeoutError), timed(0.05):
+            time.sleep(10.0)
+        time.sleep(20.0)
+
+    with pytest.raises(TimeoutError), timed(0.3):
+        nested()
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_the_outer_limit_holds_where_the_inner_one_is_longer() -> None:
+    with pytest.raises(TimeoutError), timed(0.1), timed(20.0):
+        time.sleep(20.0)
+
+
+def test_more_memory_than_it_may_have_is_an_error() -> None:
+    import numpy as np
+
+    with pytest.raises(MemoryError), memory(4.0):
+        np.ones(10**10)
+
+
+def test_an_end_past_every_except_says_who_called_it() -> None:
+    script = "import os; from posefit.limits import exits_told\nwith exits_told(2):\n    os._exit(0)"
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert ran.returncode == 2
+    assert ran.stderr == "posefit: nothing may end the program, got os._exit(0) in <string>:3\n"
+
+
+def test_other_processes_end_as_they_like() -> None:
+    script = (
+        "import os; from posefit.limits import exits_told\n"
+        "with exits_told(2):\n"
+        "    child = os.fork()\n"
+        "    if not child: os._exit(5)\n"
+        "    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "5\n", "")

@@ -1,0 +1,116 @@
+"""`posefit check` runs in a process of its own: whatever an installed plugin does is a result and nothing else."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from posefit.testing import apart, results
+from posefit.testing.apart import check_apart
+from tests.testing import planted
+from tests.testing.sabotage import install, named
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have every planted plugin installed, for this process and those that it starts."""
+    monkeypatch.syspath_prepend(ROOT)
+    monkeypatch.syspath_prepend(install(tmp_path / "site"))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "site"), str(ROOT)]))
+
+
+def posefit(*words: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run([sys.executable, "-m", "posefit", *words], capture_output=True, text=True)
+
+
+@pytest.mark.parametrize(("bug", "found"), planted.APART.items(), ids=lambda one: getattr(one, "__name__", ""))
+@pytest.mark.usefixtures("installed")
+def test_what_ends_a_process_fails_the_check_that_ran(bug: Any, found: Any, monkeypatch: Any, capfd: Any) -> None:
+    if bug is planted.NeverReturns:
+        monkeypatch.setattr(results, "SECONDS", 1.0)
+        monkeypatch.setattr(apart, "GRACE", 1.0)
+    rule, said = found
+    report = check_apart("optimiser", named(bug), only=["construction", "shape", rule])
+    assert [one.name for one in report.of("passed")] == ["construction", "shape"]
+    (failed,) = report.of("failed")
+    assert failed.name == rule
+    assert failed.detail.startswith(said)
+    if bug in (planted.Crashes, planted.NeverReturns):  # where Python could not say it, the process does
+        assert f'File "{planted.__file__}"' in capfd.readouterr().err
+
+
+@pytest.mark.usefixtures("installed")
+def test_the_checks_go_on_after_one_that_ended_the_process_until_another_fails_alike() -> None:
+    report = check_apart("optimiser", "ends-the-process", only=["shape", "dtype", "one_dimension", "speed"])
+    assert [(one.name, one.outcome) for one in report.results] == [
+        ("shape", "passed"),
+        ("dtype", "failed"),
+        ("one_dimension", "failed"),
+        ("speed", "skipped"),
+    ]
+    assert report.results[-1].detail == "not run: dtype and one_dimension fail alike"
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_plugin_that_exits_fails_the_check_and_says_where() -> None:
+    ran = posefit("check", "optimiser", "exits-in-tell", "--only", "dtype", "--json")
+    assert ran.returncode == 1
+    (result,) = json.loads(ran.stdout)["results"]
+    assert result["detail"] == "it must not end the program, got SystemExit: 0"
+    assert result["traceback"].splitlines()[-2].strip() == "sys.exit(0)"
+
+
+@pytest.mark.usefixtures("installed")
+def test_what_a_plugin_prints_is_in_no_result() -> None:
+    ran = posefit("check", "optimiser", "talks", "--only", "shape", "--only", "new_process", "--json")
+    assert ran.returncode == 0
+    assert [one["outcome"] for one in json.loads(ran.stdout)["results"]] == ["passed", "passed"]
+    assert "asked\n" in ran.stderr
+    assert "asked, too\n" in ran.stderr
+
+
+@pytest.mark.usefixtures("installed")
+def test_what_a_plugin_prints_in_a_track_is_in_no_result() -> None:
+    ran = posefit("track", "walk", "--optimiser", "talks", "--frames", ":1", "--evaluations", "80", "--json")
+    assert ran.returncode == 0, ran.stderr
+    assert json.loads(ran.stdout)["method"] == "talks + pca"
+    assert "asked, too\n" in ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("--optimiser", "exits-in-tell"),
+            "optimiser 'exits-in-tell' of posefit-sabotage 1.0: tell must not end the program, got SystemExit: 0",
+        ),
+        (
+            ("--tracker", "exits-in-track"),
+            "tracker 'exits-in-track' of posefit-sabotage 1.0: it must not end the program, got SystemExit: 0",
+        ),
+        (("--optimiser", "ends-the-process"), f"nothing may end the program, got os._exit(0) in {planted.__file__}:"),
+    ],
+)
+@pytest.mark.usefixtures("installed")
+def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line(words: tuple[str, str], said: str) -> None:
+    ran = posefit("track", "walk", *words, "--frames", ":1", "--evaluations", "80")
+    assert ran.returncode == 2
+    assert ran.stdout == ""
+    (line,) = [line for line in ran.stderr.splitlines() if line.startswith("posefit: ")]
+    assert line.startswith(f"posefit: {said}")
+    assert "Traceback" not in ran.stderr
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_rule_is_checked_alone_and_one_that_is_not_there_is_named() -> None:
+    report = check_apart("optimiser", "sound", only=["speed"])
+    assert [one.name for one in report.results] == ["speed"]
+    assert report.plugin == "optimiser 'sound' of posefit-sabotage 1.0"
+    with pytest.raises(ValueError, match="--only must be one of construction, shape, .*, got 'sped'"):
+        check_apart("optimiser", "sound", only=["sped"])

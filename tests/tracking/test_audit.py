@@ -1,0 +1,172 @@
+"""The host counts what trackers draw, computes what their poses cost, and says where they say something else."""
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.fitting.guard import Audit, BrokenRuleError, GuardedTracker
+from posefit.silhouette.drawn import PoseCount
+from posefit.testing.tracker_rules import FRAMES, scene
+from tests.testing import planted
+
+QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 2440}
+
+
+def guarded(kind: Any, audit: Audit) -> GuardedTracker:
+    task = scene()[0]
+    return GuardedTracker(kind(task), task, "tracker 'bad' of posefit-bad 1.0", 0.5, audit)
+
+
+def found(kind: Any) -> tuple[list[Any], list[str]]:
+    audit = Audit()
+    frames = list(guarded(kind, audit).track(scene()[2], np.random.default_rng(0)))
+    return frames, audit.warnings
+
+
+def test_an_honest_tracker_is_left_as_it_is() -> None:
+    task, _, seen = scene()
+    plain = list(planted.Holds(task).track(seen, np.random.default_rng(0)))
+    frames, warnings = found(planted.Holds)
+    assert warnings == []
+    for one, other in zip(plain, frames, strict=True):
+        assert one.cost == other.cost
+        assert one.evaluations == other.evaluations == 1
+        np.testing.assert_array_equal(one.areas, other.areas)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (planted.SpendsAndSaysSo, "frame 0 must use at most 400 evaluations, got 20,000 (12 such frames)"),
+        (planted.SpendsInSecret, "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)"),
+        (planted.SpendsInThreads, "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)"),
+        (planted.CostsNothing, ", got 0 (12 such frames)"),
+        (planted.InventsAreas, ", got [[0, 0, 100]] (12 such frames)"),
+    ],
+)
+def test_what_a_tracker_says_is_held_against_what_the_host_finds(kind: Any, said: str) -> None:
+    frames, warnings = found(kind)
+    assert warnings[0].startswith("tracker 'bad' of posefit-bad 1.0: frame 0 must ")
+    assert warnings[0].endswith(said)
+    honest = found(planted.Holds)[0]
+    for one, other in zip(frames, honest, strict=True):
+        assert one.cost == other.cost
+        np.testing.assert_array_equal(one.areas, other.areas)
+        if kind in (planted.SpendsInSecret, planted.SpendsInThreads):
+            assert one.evaluations == 20_001
+
+
+def test_a_track_is_marked_by_a_warning_and_has_the_hosts_figures() -> None:
+    told: list[str] = []
+    result = posefit.track("walk", tracker=planted.SpendsInSecret, say=told.append, **QUICK)
+    said, spent = result.summary["warnings"]
+    assert "frame 0 must say how many poses it drew, 20,001, got 100 (3 such frames)" in said
+    assert "frame 0 must use at most 2,440 evaluations, got 20,001 (3 such frames)" in spent
+    assert result.summary["evaluations"] == 3 * 20_001
+    assert [line for line in told if line.startswith("warning")] == [f"warning: {said}", f"warning: {spent}"]
+    free = posefit.track("walk", tracker=planted.CostsNothing, **QUICK)
+    assert free.summary["cost"] == posefit.track("walk", tracker=planted.Holds, **QUICK).summary["cost"] > 0.0
+    assert len(free.summary["warnings"]) == 1
+
+
+@pytest.mark.parametrize("method", [{"optimiser": "sapso"}, {"tracker": "vsmm"}, {"tracker": "sapso+vsmm"}])
+def test_no_method_of_posefits_own_is_warned_of(method: dict[str, str]) -> None:
+    seen = posefit.track("walk", view_degrees=(45.0, 135.0), **method, **{**QUICK, "evaluations": 400}).summary
+    assert seen["warnings"] == []
+
+
+def test_trackers_in_several_threads_are_counted_each_for_itself() -> None:
+    together = threading.Barrier(4)
+
+    class Patient(planted.SpendsInThreads):
+        def frame(self, observation: Any) -> Any:
+            together.wait(60.0)
+            return super().frame(observation)
+
+    class Honest(Patient):
+        def draw(self, observation: Any, poses: int) -> None:
+            super().draw(observation, 49)
+
+    with ThreadPoolExecutor(4) as pool:
+        results = list(pool.map(found, [Patient, Honest, Patient, Honest]))
+    assert [bool(warnings) for _, warnings in results] == [True, False, True, False]
+    assert {frame.evaluations for frames, _ in results[::2] for frame in frames} == {20_001}
+
+
+def test_a_count_within_a_count_is_in_both() -> None:
+    task, _, seen = scene()
+    outer, inner = PoseCount(), PoseCount()
+    draw = planted.Holds(task).draw
+    with outer.counting():
+        draw(seen[0], 3)
+        with inner.counting():
+            draw(seen[0], 4)
+    draw(seen[0], 5)
+    assert (outer.poses, inner.poses) == (7, 4)
+
+
+class LooksAhead(planted.Holds):
+    """Takes the observation after next before it gives a frame, which the kit allows, and spends all it may."""
+
+    def track(self, observations: Any, rng: Any) -> Any:
+        latest = None
+        for observation in observations:
+            self.draw(observation, self.task.evaluations - 1)
+            if latest is not None:
+                yield latest
+            latest = replace(super().frame(observation), evaluations=self.task.evaluations)
+        yield latest
+
+
+def test_a_tracker_that_looks_ahead_is_honest() -> None:
+    assert found(LooksAhead)[1] == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (planted.GivesFramesTwice, "track must yield a frame for each observation, got 2 for 1"),
+        (planted.DropsFrames, "track must yield a frame for each observation, got 6 and then no more"),
+    ],
+)
+def test_too_many_frames_and_too_few_are_named(kind: Any, said: str) -> None:
+    with pytest.raises(BrokenRuleError, match=f"^tracker 'bad' of posefit-bad 1.0: {said}$"):
+        found(kind)
+
+
+def test_what_cannot_be_read_is_not_the_trackers_fault() -> None:
+    def broken() -> Any:
+        yield scene()[2][0]
+        raise ValueError("frame 1 of the video is damaged")
+
+    frames = guarded(planted.Holds, Audit()).track(broken(), np.random.default_rng(0))
+    next(frames)
+    with pytest.raises(ValueError, match="^frame 1 of the video is damaged$"):
+        next(frames)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"evaluations": 1.5}, "evaluations must be a whole number, 0 or more, got 1.5"),
+        ({"evaluations": -1}, "evaluations must be a whole number, 0 or more, got -1"),
+        ({"seconds": float("nan")}, "seconds must be a number, 0 or more, got nan"),
+        ({"seconds": None}, "seconds must be a number, 0 or more, got None"),
+    ],
+)
+def test_figures_that_are_none_are_named(change: dict[str, Any], said: str) -> None:
+    class Odd(planted.Holds):
+        def frame(self, observation: Any) -> Any:
+            return replace(super().frame(observation), **change)
+
+    with pytest.raises(BrokenRuleError, match=said):
+        found(Odd)
+
+
+def test_the_scene_is_as_long_as_the_counts_above() -> None:
+    assert FRAMES == 12
