@@ -27,21 +27,25 @@ class Tally:
     longest: float = 0.0  # seconds
     findings: list[str] = field(default_factory=list)
 
+    def find(self, how: str, finding: str) -> None:
+        """Take what should not have come, and say so at once."""
+        self.counts[how] += 1
+        self.findings.append(finding)
+        print(finding, file=sys.stderr, flush=True)
+
     def add(self, number: int, answer: list[object], seconds: float) -> None:
         """Take what a child says of an input."""
         how, reader, megabytes, what = str(answer[0]), str(answer[1]), int(str(answer[2])), answer[3]
-        self.counts[how] += 1
         if how in ("read", "refused"):
+            self.counts[how] += 1
             getattr(self, how)[reader] += 1
         else:
-            self.findings.append(f"{number} {how} {reader}: {what}")
+            self.find(how, f"{number} {how} {reader}: {what}")
         self.largest, self.longest = max(self.largest, megabytes), max(self.longest, seconds)
         if megabytes > MEGABYTES:
-            self.counts["large"] += 1
-            self.findings.append(f"{number} large {reader}: {megabytes} MB")
+            self.find("large", f"{number} large {reader}: {megabytes} MB")
         if seconds > SECONDS:
-            self.counts["hang"] += 1
-            self.findings.append(f"{number} hang {reader}: {seconds:.0f} s")
+            self.find("hang", f"{number} hang {reader}: {seconds:.0f} s")
 
 
 def fuzz(seed: int, numbers: range, tally: Tally) -> None:
@@ -57,8 +61,7 @@ def fuzz(seed: int, numbers: range, tally: Tally) -> None:
                 line = child.stdout.readline() if ready else None
                 if line is None:
                     child.kill()
-                    tally.counts["hang"] += 1
-                    tally.findings.append(f"{begun} hang: more than {SECONDS:g} s")
+                    tally.find("hang", f"{begun} hang: more than {SECONDS:g} s")
                     start = begun + 1
                     break
                 if not line:
@@ -67,8 +70,7 @@ def fuzz(seed: int, numbers: range, tally: Tally) -> None:
                         raise RuntimeError("a child could not read the valid files")
                     start = begun + 1 if status else numbers.stop
                     if status:
-                        tally.counts["abort"] += 1
-                        tally.findings.append(f"{begun} abort: exit status {status}")
+                        tally.find("abort", f"{begun} abort: exit status {status}")
                     break
                 number, _, rest = line.decode().partition(" ")
                 if rest.strip() == "begun":
@@ -92,8 +94,6 @@ def main() -> int:
     for reader in sorted(tally.read | tally.refused):
         print(f"  {reader:12} read {tally.read[reader]:>7,}  refused {tally.refused[reader]:>7,}")
     print(f"largest {tally.largest} MB, longest {tally.longest:.1f} s")
-    for finding in tally.findings[:100]:
-        print(finding)
     return int(bool(tally.findings))
 
 

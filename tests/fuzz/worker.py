@@ -21,6 +21,7 @@ from tests.fuzz.mutator import mutated
 
 NAME = "subject"  # what every input is called, so that a message can be seen to name it
 ADDRESSES = 6_000_000_000  # bytes of addresses that a child may have more than it has at first
+CELLS = 2_000  # of a plan here: a million are allowed, and reading takes as long as there are cells
 LONGEST = 2_000  # characters of a message
 
 
@@ -32,14 +33,15 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     from posefit.motion.amc import read_amc
     from posefit.motion.asf import read_asf
     from posefit.motion.bvh import read_bvh
+    from posefit.sweep import plan
     from posefit.sweep.ledger import Ledger
-    from posefit.sweep.plan import Plan
     from posefit_priors.full import Full
     from posefit_priors.loose import Loose
     from posefit_priors.pca import PCA
     from posefit_priors.union import Union
 
     skeleton = read_asf(folder / "a.asf")
+    plan.MOST = CELLS
 
     def masks(path: Path) -> object:
         views = Views([StackMasks.of(path, (None, None))])
@@ -76,7 +78,7 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         "masks": masks,
         "images": images,
         "calibration": calibration,
-        "plan": Plan.read,
+        "plan": plan.Plan.read,
         "ledger": ledger,
         **{kind.__name__: prior(kind) for kind in (PCA, Full, Loose, Union)},
     }
