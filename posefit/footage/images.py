@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.reading import check_size
+from posefit.reading import check_size, cut
 
 PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
 LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
@@ -31,7 +31,9 @@ def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
     if size is None:
         return None
     if size[0] * size[1] > PIXELS:
-        raise ValueError(f"{path}: expected at most {PIXELS // 10**6} million pixels, got {size[0]}x{size[1]}")
+        raise ValueError(
+            f"{path}: expected at most {PIXELS // 10**6} million pixels, got {cut(f'{size[0]}x{size[1]}')}"
+        )
     try:
         image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
     except cv2.error:
@@ -43,7 +45,7 @@ def size_of(content: bytes) -> tuple[int, int] | None:
     """Return the width and height that a picture states in its first bytes; None where it is no picture we read."""
     try:
         if content.startswith(b"\x89PNG\r\n\x1a\n") and content[12:16] == b"IHDR":
-            return struct.unpack(">II", content[16:24])
+            return struct.unpack(">II", content[16:24]) if _whole_chunks(content) else None
         if content.startswith(b"\xff\xd8"):
             return _jpeg(content)
         if content.startswith(b"BM"):
@@ -55,6 +57,19 @@ def size_of(content: bytes) -> tuple[int, int] | None:
     except (struct.error, IndexError, ValueError):
         pass
     return None
+
+
+def _whole_chunks(content: bytes) -> bool:
+    """Return whether a PNG file holds each chunk that it states: OpenCV makes room for as much as one says it has."""
+    place = 8
+    while place + 8 <= len(content):
+        length = int.from_bytes(content[place : place + 4], "big")
+        if place + 12 + length > len(content):
+            return False
+        if content[place + 4 : place + 8] == b"IEND":
+            return True
+        place += 12 + length
+    return False
 
 
 def _jpeg(content: bytes) -> tuple[int, int] | None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from numbers import Real
 from pathlib import Path
 from typing import Literal
 
@@ -53,8 +54,8 @@ class Viewing:
     def __post_init__(self) -> None:
         for degrees in self.view_degrees:
             finite("view_degrees", degrees)
-        if self.fps is not None and not finite("fps", self.fps) > 0.0:
-            raise ValueError(f"fps must be a positive number, got {self.fps}")
+        if self.fps is not None and not (isinstance(self.fps, Real) and 0.0 < self.fps < np.inf):
+            raise ValueError(f"fps must be a positive number, got {shown(self.fps)}")
         sides = pair("size", self.size, "(width, height)")
         if not all(isinstance(side, int | np.integer) and 1 <= side <= 16_384 for side in sides):
             raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {sides[0]}x{sides[1]}")

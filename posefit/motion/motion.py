@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from posefit.arrays import Array
 from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
+from posefit.reading import shown
 
 # Share of a frame within which two times count as the same one.
 SAME_TIME = 1e-6
@@ -85,8 +86,8 @@ class Motion:
 
 
 def _rate(fps: float) -> float:
-    if not (np.isfinite(fps) and fps > 0.0):
-        raise ValueError(f"fps must be a positive number, got {fps}")
+    if not 0.0 < fps < np.inf:
+        raise ValueError(f"fps must be a positive number, got {shown(fps)}")
     if not RATES[0] <= fps <= RATES[1]:
-        raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {fps:g}")
+        raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {shown(fps)}")
     return float(fps)

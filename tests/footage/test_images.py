@@ -38,6 +38,7 @@ def bomb(path: Path, side: int) -> None:
         b"\x89PNG\r\n\x1a\n"
         + struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
         + struct.pack(">I", len(content)) + data + struct.pack(">I", zlib.crc32(data))
+        + bytes(4) + b"IEND" + struct.pack(">I", zlib.crc32(b"IEND"))
     )  # fmt: skip
 
 
@@ -57,6 +58,22 @@ def test_a_picture_that_opencv_refuses_is_one_line(tmp_path: Path, monkeypatch: 
         ValueError, match=r"a.png: expected an image \(PNG, JPEG, BMP, TIFF or PGM\), got a file that is none"
     ):
         FolderMasks.of(tmp_path, (None, None)).silhouette(0)
+
+
+def test_a_chunk_that_says_it_has_more_than_the_file_is_not_made_room_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bomb(tmp_path / "a.png", 30)
+    content = (tmp_path / "a.png").read_bytes()
+    (tmp_path / "a.png").write_bytes(content[:33] + b"\x7f" + content[34:])  # OpenCV took 2 GB for it
+    monkeypatch.setattr(cv2, "imdecode", None)
+    assert read_image(tmp_path / "a.png", grey=True) is None
+
+
+def test_a_size_of_many_digits_is_cut_in_the_message(tmp_path: Path) -> None:
+    (tmp_path / "a.pgm").write_bytes(b"P5\n64 " + b"1" * 1000 + b"\n255\n")
+    with pytest.raises(ValueError, match=r"got 64x1{74}\.\.\.$"):
+        read_image(tmp_path / "a.pgm", grey=True)
 
 
 def test_masks_that_are_objects_are_one_line(tmp_path: Path) -> None:
