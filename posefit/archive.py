@@ -19,7 +19,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.reading import check_size, cut, shown
+from posefit.reading import check_size, cut, quoted
 
 MEMBERS = 1_000  # arrays of a file
 HEADER = 10_000  # characters before an array, as NumPy has it
@@ -96,7 +96,7 @@ class Stored:
 
 
 @contextmanager
-def opened(path: Path, names: Sequence[str], what: str, most: int, packed: int) -> Iterator[dict[str, Stored]]:
+def archived(path: Path, names: Sequence[str], what: str, most: int, packed: int) -> Iterator[dict[str, Stored]]:
     """Give those of `names` that an .npz file of at most `packed` bytes has; together they unpack to `most` at most.
 
     Raises ValueError, also while they are read, where the file is damaged or asks for more; `what` it says of the
@@ -117,8 +117,8 @@ def opened(path: Path, names: Sequence[str], what: str, most: int, packed: int) 
 
 
 def read_arrays(path: Path, names: Sequence[str], what: str, most: int) -> Mapping[str, NDArray[Any]]:
-    """Return those of `names` that an .npz file has, of `most` bytes together. Raises ValueError as `opened` does."""
-    with opened(path, names, what, most, most) as found:
+    """Return those of `names` that an .npz file has, of `most` bytes together. Raises ValueError as `archived` does."""
+    with archived(path, names, what, most, most) as found:
         return {name: one.read() for name, one in found.items()}
 
 
@@ -168,7 +168,7 @@ def _stored(path: Path, what: str, archive: zipfile.ZipFile, name: str) -> Store
     if dtype.kind not in KINDS or not dtype.itemsize:
         raise _RefusedError(f"{name} of {cut(str(dtype))}")
     if any(side < 0 for side in shape) or stored.size != info.file_size - start:
-        raise _RefusedError(f"{name} of {info.file_size - start} bytes for shape {shown(shape)}")
+        raise _RefusedError(f"{name} of {info.file_size - start} bytes for shape {quoted(shape)}")
     return stored
 
 

@@ -2,7 +2,7 @@
 
 - `read_text`: a file that may have so many bytes, in UTF-8.
 - `toml_of`, `json_of`: the values of a text. Whatever is wrong with it raises ValueError.
-- `shown`: a value as messages quote it.
+- `quoted`: a value as messages quote it.
 
 Archives of arrays have `posefit.archive`, pictures `posefit.footage.images`.
 """
@@ -21,7 +21,7 @@ NESTING = 10_000_000
 _DECIMAL = re.compile(r"(?<![\w.])[-+]?\d+\.\d+(?:[eE][-+]?\d+)?(?![\w.])")
 
 
-def shown(value: object, most: int = SHOWN) -> str:
+def quoted(value: object, most: int = SHOWN) -> str:
     """Return a value as a message quotes it, cut where it is long."""
     if isinstance(value, str | bytes | bytearray):
         value = value[: most + 1]  # the rest would not be shown, however long it is

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from posefit import archive
-from posefit.archive import opened, read_arrays
+from posefit.archive import archived, read_arrays
 
 REFUSED = r"a.npz: expected an .npz file with the key a, got "
 
@@ -30,7 +30,7 @@ def test_arrays_come_back_as_numpy_wrote_them(path, tmp_path):
     turned = np.asfortranarray(np.arange(12).reshape(3, 4))
     np.savez(tmp_path / "b.npz", a=turned)
     np.testing.assert_array_equal(read(tmp_path / "b.npz")["a"], turned)
-    with opened(tmp_path / "b.npz", ["a"], "a", 1000, 10_000) as stored:
+    with archived(tmp_path / "b.npz", ["a"], "a", 1000, 10_000) as stored:
         np.testing.assert_array_equal(np.stack(list(stored["a"].rows())), turned)
 
 
@@ -53,7 +53,7 @@ def test_what_would_unpack_to_more_is_refused_before_it_is(path, monkeypatch):
     monkeypatch.setattr(archive, "_exactly", None)  # nothing is unpacked
     with (
         pytest.raises(ValueError, match=REFUSED + "4.*e-05 GB when unpacked, where 3e-05 GB are the most"),
-        opened(path, ["a", "b"], "the key a", 30_000, 1_000_000),
+        archived(path, ["a", "b"], "the key a", 30_000, 1_000_000),
     ):
         pass
 

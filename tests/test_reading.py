@@ -2,14 +2,14 @@
 
 import pytest
 
-from posefit.reading import SHOWN, json_of, read_text, shown, toml_of
+from posefit.reading import SHOWN, json_of, quoted, read_text, toml_of
 
 
 def test_what_a_message_quotes_is_cut_at_80_characters():
-    assert shown("walk") == "'walk'"
-    assert len(shown("n" * 10_000)) == SHOWN == 80
-    assert shown("n" * 10_000).endswith("...")
-    assert shown(16**5000) == "one int that is too long to write"  # Python writes 4,300 digits at most
+    assert quoted("walk") == "'walk'"
+    assert len(quoted("n" * 10_000)) == SHOWN == 80
+    assert quoted("n" * 10_000).endswith("...")
+    assert quoted(16**5000) == "one int that is too long to write"  # Python writes 4,300 digits at most
 
 
 def test_a_byte_order_mark_is_no_part_of_a_text(tmp_path):

@@ -14,13 +14,13 @@ from gymnasium import error
 
 from posefit import Body, Camera, Motion, Observation, SearchSpace, Silhouette, Task
 from posefit.arrays import Array
-from posefit.fitting.check import finite
+from posefit.fitting.check import finite_number
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.footage.instance import motion_of_instance, variation
 from posefit.footage.source import motion_of
 from posefit.geometry.body import varied
-from posefit.reading import shown
+from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
@@ -118,23 +118,23 @@ def select(
     if unknown:
         raise TypeError(_unknown(next(iter(unknown))))
     if split not in RESERVED:
-        raise ArgumentError(f"split must be one of {', '.join(RESERVED)}, got {shown(split)}")
+        raise ArgumentError(f"split must be one of {', '.join(RESERVED)}, got {quoted(split)}")
     for name, value in (("motion", motion), ("prior", prior)):
         if not isinstance(value, str):
-            raise ArgumentError(f"{name} must be a name, got {shown(value)}")
+            raise ArgumentError(f"{name} must be a name, got {quoted(value)}")
     if instance is not None:
         instance = _number(instance)
     views = _views(view_degrees)
     if translation not in TRANSLATIONS:
-        raise ArgumentError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {shown(translation)}")
+        raise ArgumentError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {quoted(translation)}")
     sides = list(size) if isinstance(size, Sequence) and not isinstance(size, str) else []
     if len(sides) != 2 or not all(isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides):
-        raise ArgumentError(f"size must be (width, height) of 36 to 4096 pixels, got {shown(size)}")
+        raise ArgumentError(f"size must be (width, height) of 36 to 4096 pixels, got {quoted(size)}")
     strengths = _strengths(noise)
-    if not 0.0 <= checked(finite, "mismatch_percent", mismatch_percent) <= 50.0:
+    if not 0.0 <= checked(finite_number, "mismatch_percent", mismatch_percent) <= 50.0:
         raise ArgumentError(f"mismatch_percent must lie in 0 to 50, got {mismatch_percent}")
     if isinstance(train, str) or not all(isinstance(one, str) for one in train or ()):
-        raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {shown(train)}")
+        raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {quoted(train)}")
     made = World(
         motion,
         views,
@@ -156,7 +156,7 @@ def _unknown(name: str) -> str:
     known = tuple(Arguments.__annotations__)
     near = get_close_matches(name, known, 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"an argument must be one of {', '.join(known)}, got {shown(name)}{hint}"
+    return f"an argument must be one of {', '.join(known)}, got {quoted(name)}{hint}"
 
 
 def checked(check: Callable[..., Any], name: str, *given: Any) -> Any:
@@ -170,21 +170,21 @@ def checked(check: Callable[..., Any], name: str, *given: Any) -> Any:
 def _views(view_degrees: Any) -> tuple[float, ...]:
     several = isinstance(view_degrees, Sequence) and not isinstance(view_degrees, str)
     try:
-        views = tuple(finite("view_degrees", one) for one in (view_degrees if several else [view_degrees]))
+        views = tuple(finite_number("view_degrees", one) for one in (view_degrees if several else [view_degrees]))
     except ValueError:
         views = ()
     if not views:
-        raise ArgumentError(f"view_degrees must be a finite number or several, got {shown(view_degrees)}")
+        raise ArgumentError(f"view_degrees must be a finite number or several, got {quoted(view_degrees)}")
     return views
 
 
 def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
     if noise is not None and not isinstance(noise, Mapping):
-        raise ArgumentError(f"noise must be strengths such as {{'holes': 0.3}}, got {shown(noise)}")
+        raise ArgumentError(f"noise must be strengths such as {{'holes': 0.3}}, got {quoted(noise)}")
     for name, strength in (noise or {}).items():
         if name not in CORRUPTIONS:
-            raise ArgumentError(f"noise must be of {', '.join(CORRUPTIONS)}, got {shown(name)}")
-        if not 0.0 <= checked(finite, f"noise {name}", strength) <= 1.0:
+            raise ArgumentError(f"noise must be of {', '.join(CORRUPTIONS)}, got {quoted(name)}")
+        if not 0.0 <= checked(finite_number, f"noise {name}", strength) <= 1.0:
             raise ArgumentError(f"noise {name} must have a strength of 0 to 1, got {strength}")
     return tuple(sorted((noise or {}).items()))
 
@@ -193,9 +193,9 @@ def _number(number: Any) -> int:
     """Return the number of an instance. Raises ArgumentError where there is none of it."""
     last = RESERVED["test"][1] - 1
     if isinstance(number, bool) or not isinstance(number, int | np.integer):
-        raise ArgumentError(f"instance must be a whole number from 0 to {last}, got {shown(number)}")
+        raise ArgumentError(f"instance must be a whole number from 0 to {last}, got {quoted(number)}")
     if not 0 <= number <= last:
-        raise ArgumentError(f"instance must lie in 0 to {last}, got {shown(int(number))}")
+        raise ArgumentError(f"instance must lie in 0 to {last}, got {quoted(int(number))}")
     return int(number)
 
 

@@ -70,10 +70,10 @@ class FolderMasks:
         image = read_image(self.files[k], grey=True)
         if image is None:
             raise ValueError(f"{self.files[k]}: expected an image ({FORMATS}), got a file that is none")
-        return shown_person(drawn(image), None, self.label(k))
+        return shown_person(person_in(image), None, self.label(k))
 
 
-def drawn(mask: NDArray[Any]) -> Mask:
+def person_in(mask: NDArray[Any]) -> Mask:
     """Return where a person is: above 127 where values go beyond 1, else above 0."""
     return np.asarray(np.greater(mask, 127 if mask.max() > 1 else 0))
 

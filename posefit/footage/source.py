@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from posefit.fitting.check import finite, pair
+from posefit.fitting.check import finite_number, pair
 from posefit.footage.cameras import CameraView, calibrated, combined, masks_of, video_of
 from posefit.footage.masks import FPS, IMAGES, Range, existing
 from posefit.footage.scene import Scene, synthetic
@@ -20,8 +20,8 @@ from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
 from posefit.motion import library
-from posefit.motion.motion import Motion
-from posefit.reading import shown
+from posefit.motion.motion import RATES, Motion
+from posefit.reading import quoted
 
 MOTIONS = (".amc", ".bvh")
 NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".asf", ".json", ".csv", ".txt")
@@ -53,16 +53,18 @@ class Viewing:
 
     def __post_init__(self) -> None:
         for degrees in self.view_degrees:
-            finite("view_degrees", degrees)
+            finite_number("view_degrees", degrees)
         if self.fps is not None and not (isinstance(self.fps, Real) and 0.0 < self.fps < np.inf):
-            raise ValueError(f"fps must be a positive number, got {shown(self.fps)}")
+            raise ValueError(f"fps must be a positive number, got {quoted(self.fps)}")
+        if self.fps is not None and not RATES[0] <= self.fps <= RATES[1]:
+            raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(self.fps)}")
         sides = pair("size", self.size, "(width, height)")
         if not all(isinstance(side, int | np.integer) and 1 <= side <= 16_384 for side in sides):
             raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {sides[0]}x{sides[1]}")
         for end in pair("frames", self.frames, "(start, stop), either of which may be None"):
             if end is not None and (isinstance(end, bool) or not isinstance(end, int | np.integer)):
-                raise ValueError(f"frames must be two whole numbers or None, got {shown(self.frames)}")
-        if self.height is not None and not HEIGHTS[0] <= finite("height", self.height) <= HEIGHTS[1]:
+                raise ValueError(f"frames must be two whole numbers or None, got {quoted(self.frames)}")
+        if self.height is not None and not HEIGHTS[0] <= finite_number("height", self.height) <= HEIGHTS[1]:
             raise ValueError(f"height must lie in {HEIGHTS[0]} to {HEIGHTS[1]} metres, got {self.height}")
 
     def check_used(self, kind: Kind) -> None:
@@ -78,7 +80,7 @@ class Viewing:
             useless.append(("up", self.up, "calibrations"))
         for name, value, where in useless:
             if value is not None:
-                raise ValueError(f"{name} must be given for {where} only, got {shown(value)} for {_KINDS[kind]}")
+                raise ValueError(f"{name} must be given for {where} only, got {quoted(value)} for {_KINDS[kind]}")
 
 
 def scene_of(sources: Sequence[Source], viewing: Viewing, work: Path, listener: Listener = QUIET) -> Scene:

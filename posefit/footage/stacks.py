@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.archive import Stored, opened
-from posefit.footage.masks import Range, drawn, existing, shown_person, span
-from posefit.reading import shown
+from posefit.archive import Stored, archived
+from posefit.footage.masks import Range, existing, person_in, shown_person, span
+from posefit.reading import quoted
 from posefit.silhouette.mask import Silhouette
 
 PACKED = 2_000_000_000  # bytes of a file
@@ -37,7 +37,7 @@ class StackMasks:
     def of(cls, path: Path, frames: Range) -> "StackMasks":
         """Return the masks of an .npz file, cut to `frames`. Raises ValueError naming the file where it is none."""
         existing(path)
-        with opened(path, NAMES, "the key masks", UNPACKED, PACKED) as found:
+        with archived(path, NAMES, "the key masks", UNPACKED, PACKED) as found:
             if "masks" not in found:
                 raise ValueError(f"{path}: expected an .npz file with the key masks, got none")
             stack, known = found["masks"], found.get("valid")
@@ -83,7 +83,7 @@ def _check_shapes(path: Path, stack: Stored, known: Stored | None) -> None:
 
 
 def _shape(shape: Sequence[int]) -> str:
-    return shown(tuple(shape))
+    return quoted(tuple(shape))
 
 
 def _packed(path: Path, stored: Stored, start: int, stop: int, mask: bool) -> Planes:
@@ -94,7 +94,7 @@ def _packed(path: Path, stored: Stored, start: int, stop: int, mask: bool) -> Pl
         if frame.dtype.kind == "f" and not np.isfinite(frame).all():
             raise ValueError(f"{path}: masks must be finite, got nan or infinity in frame {k}")
         if start <= k < stop:
-            planes[k - start] = np.packbits(drawn(frame) if mask else frame != 0)
+            planes[k - start] = np.packbits(person_in(frame) if mask else frame != 0)
     return planes
 
 

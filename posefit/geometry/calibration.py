@@ -15,7 +15,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.camera import Camera
 from posefit.geometry.storage import Matrix, number_of, numbers_of, stored_values, xml_of
-from posefit.reading import cut, read_text, shown, toml_of
+from posefit.reading import cut, quoted, read_text, toml_of
 
 Up = Literal["x", "y", "z"]
 LARGEST_FILE = 1_000_000  # bytes
@@ -240,7 +240,7 @@ def _size(width: Any, height: Any) -> tuple[int, int]:
 def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
     numbers = np.asarray(values, dtype=np.float64)
     if numbers.shape != shape or not np.isfinite(numbers).all():
-        raise ValueError(f"{shown(numbers.tolist())} where finite numbers of shape {shape} should be")
+        raise ValueError(f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should be")
     return numbers
 
 
@@ -249,5 +249,5 @@ def _orthonormal(rotation: Array) -> Array:
     left, _, right = np.linalg.svd(rotation)
     nearest = left @ right
     if np.linalg.det(nearest) < 0.0 or np.abs(nearest - rotation).max() > 1e-2:
-        raise ValueError(f"a rotation that is none: {shown(rotation.tolist())}")
+        raise ValueError(f"a rotation that is none: {quoted(rotation.tolist())}")
     return np.asarray(nearest)

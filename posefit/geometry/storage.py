@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.reading import json_of, shown
+from posefit.reading import json_of, quoted
 
 LARGEST_YAML = 500_000  # characters: PyYAML reads some 100,000 a second
 NUMBERS = 100  # of a matrix; a calibration has 14 at most
@@ -34,7 +34,7 @@ class Matrix:
         shape = tuple(_count(side) for side in (self.sides if isinstance(self.sides, list) else [self.sides])[:4])
         found = _TYPE.fullmatch(str(self.type))
         if found is None:
-            raise ValueError(f"a matrix of the type {shown(self.type)}")
+            raise ValueError(f"a matrix of the type {quoted(self.type)}")
         channels = int(found[1] or 1)
         numbers = numbers_of(self.numbers)
         shape = shape if channels == 1 else (*shape, channels)
@@ -50,7 +50,7 @@ def stored_values(text: str) -> dict[str, Any]:
     start = text.lstrip()[:1]
     values = _xml(text) if start == "<" else json_of(text) if start == "{" else _yaml(text)
     if not isinstance(values, dict):
-        raise ValueError(f"a file without names, {shown(values)}")
+        raise ValueError(f"a file without names, {quoted(values)}")
     return {str(name): _value(value) for name, value in values.items()}
 
 
@@ -71,18 +71,18 @@ def numbers_of(value: Any) -> Array:
 def number_of(value: Any) -> float:
     """Return a number, which may be written as YAML writes it. Raises ValueError where it is none."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"{shown(value)} where a number should be")
+        raise ValueError(f"{quoted(value)} where a number should be")
     text = value.lower().replace(".inf", "inf").replace(".nan", "nan") if isinstance(value, str) else value
     try:
         return float(text)
     except (ValueError, OverflowError):
-        raise ValueError(f"{shown(value)} where a number should be") from None
+        raise ValueError(f"{quoted(value)} where a number should be") from None
 
 
 def _count(value: Any) -> int:
     number = number_of(value)
     if not 1.0 <= number <= NUMBERS or number != int(number):
-        raise ValueError(f"a matrix with {shown(value)} rows or columns")
+        raise ValueError(f"a matrix with {quoted(value)} rows or columns")
     return int(number)
 
 
@@ -113,7 +113,7 @@ def _yaml(text: str) -> Any:
 def _xml(text: str) -> dict[str, Any]:
     root = xml_of(text)
     if root.tag != "opencv_storage":
-        raise ValueError(f"XML of {shown(root.tag)}")
+        raise ValueError(f"XML of {quoted(root.tag)}")
     return {one.tag: _content(one) for one in root}
 
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from posefit.arrays import Array
 from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
-from posefit.reading import shown
+from posefit.reading import quoted
 
 # Share of a frame within which two times count as the same one.
 SAME_TIME = 1e-6
@@ -87,7 +87,7 @@ class Motion:
 
 def _rate(fps: float) -> float:
     if not 0.0 < fps < np.inf:
-        raise ValueError(f"fps must be a positive number, got {shown(fps)}")
+        raise ValueError(f"fps must be a positive number, got {quoted(fps)}")
     if not RATES[0] <= fps <= RATES[1]:
-        raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {shown(fps)}")
+        raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(fps)}")
     return float(fps)

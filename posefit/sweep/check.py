@@ -15,7 +15,7 @@ from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
 from posefit.motion import library
 from posefit.motion.motion import RATES
-from posefit.reading import SHOWN, cut, shown
+from posefit.reading import SHOWN, cut, quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.settings import planned
 from posefit.silhouette.corruption import CORRUPTIONS
@@ -36,7 +36,7 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
     """
     for name in spec:
         if name not in FIELDS:
-            raise ValueError(f"a cell must say {', '.join(FIELDS)}, got {shown(name)}{_nearest(name, FIELDS)}")
+            raise ValueError(f"a cell must say {', '.join(FIELDS)}, got {quoted(name)}{_nearest(name, FIELDS)}")
     for name in ("method", "motion"):
         if name not in spec:
             raise ValueError(f"a cell must say its {name}, got none")
@@ -74,12 +74,12 @@ def _offers(method: str) -> tuple[Offer, ...]:
         return tuple(registry().offer(kind, name) for kind, name in wanted)
     known = registry().offers
     if tracker not in known["tracker"] and tracker.partition(":")[0] in known["optimiser"]:
-        hint = f"; did you mean {shown(f'{tracker}@pca')}?"
-        raise ValueError(f"method must be a tracker or OPTIMISER@PRIOR, got {shown(tracker)}{hint}")
+        hint = f"; did you mean {quoted(f'{tracker}@pca')}?"
+        raise ValueError(f"method must be a tracker or OPTIMISER@PRIOR, got {quoted(tracker)}{hint}")
     if tracker.partition(":")[0] not in known["tracker"]:
         trackers = ", ".join(sorted(known["tracker"])) or "of which there are none"
         near = _nearest(tracker, [*known["tracker"], *(f"{name}@pca" for name in known["optimiser"])])
-        raise ValueError(f"method must be a tracker ({trackers}) or OPTIMISER@PRIOR, got {shown(tracker)}{near}")
+        raise ValueError(f"method must be a tracker ({trackers}) or OPTIMISER@PRIOR, got {quoted(tracker)}{near}")
     return (registry().offer("tracker", tracker),)
 
 
@@ -90,7 +90,7 @@ def _settings(method: str, texts: tuple[str, ...]) -> dict[str, Any]:
     for text in texts:
         if text.partition(".")[0] not in names_of(method):
             known = ", ".join(names_of(method))
-            raise ValueError(f"settings must be of {known}, which {cut(method)} uses, got {shown(text)}")
+            raise ValueError(f"settings must be of {known}, which {cut(method)} uses, got {quoted(text)}")
     parsed = parse_settings(texts, optimiser, prior, tracker)
     homes = {optimiser: "optimiser", prior: "prior", "tracker": "tracker"} if tracker is None else {tracker: "tracker"}
     typed: dict[str, Any] = {}
@@ -142,7 +142,7 @@ def _nearest(name: str, known: Sequence[str]) -> str:
 
 def _name(field: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
-        raise ValueError(f"{field} must be a name, got {shown(value)}")
+        raise ValueError(f"{field} must be a name, got {quoted(value)}")
     return value
 
 
@@ -151,14 +151,14 @@ def _motion(field: str, value: Any) -> str:
     if name not in library.names() and Path(name).suffix.lower() not in MOTIONS:
         raise ValueError(
             f"{field} must be an .amc file, a .bvh file or one of {', '.join(library.names())}, "
-            f"got {shown(name)}{_nearest(name, library.names())}"
+            f"got {quoted(name)}{_nearest(name, library.names())}"
         )
     return name
 
 
 def _motions(field: str, value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
-        raise ValueError(f"{field} must be a list of motions, got {shown(value)}")
+        raise ValueError(f"{field} must be a list of motions, got {quoted(value)}")
     return tuple(_motion(field, one) for one in value)
 
 
@@ -171,13 +171,13 @@ def _views(field: str, value: Any) -> tuple[float, ...]:
 
 def _number(field: str, value: Any, low: float = -np.inf, high: float = np.inf) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{field} must be a finite number, got {shown(value)}")
+        raise ValueError(f"{field} must be a finite number, got {quoted(value)}")
     try:
         number = float(value)
     except OverflowError:  # a whole number of any size
         number = np.inf
     if not np.isfinite(number):
-        raise ValueError(f"{field} must be a finite number, got {shown(value)}")
+        raise ValueError(f"{field} must be a finite number, got {quoted(value)}")
     if not low <= number <= high:
         raise ValueError(f"{field} must lie in {low:g} to {high:g}, got {value}")
     return number
@@ -192,7 +192,7 @@ def _rate(field: str, value: Any) -> float:
 def _whole(least: int) -> Callable[[str, Any], int]:
     def check(field: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > BITS:
-            raise ValueError(f"{field} must be a whole number of at least {least}, got {shown(value)}")
+            raise ValueError(f"{field} must be a whole number of at least {least}, got {quoted(value)}")
         return value
 
     return check
@@ -201,17 +201,17 @@ def _whole(least: int) -> Callable[[str, Any], int]:
 def _size(field: str, value: Any) -> tuple[int, int]:
     sides = list(value) if isinstance(value, list | tuple) else []
     if len(sides) != 2 or not all(type(side) is int and 1 <= side <= LARGEST for side in sides):
-        raise ValueError(f"{field} must be [width, height] in pixels, up to {LARGEST}, got {shown(value)}")
+        raise ValueError(f"{field} must be [width, height] in pixels, up to {LARGEST}, got {quoted(value)}")
     return sides[0], sides[1]
 
 
 def _corruption(field: str, value: Any) -> dict[str, float]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {shown(value)}")
+        raise ValueError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}")
     kinds = (*CORRUPTIONS, DROPPED)
     for kind in value:
         if kind not in kinds:
-            raise ValueError(f"{field} must be of {', '.join(kinds)}, got {shown(kind)}{_nearest(kind, kinds)}")
+            raise ValueError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{_nearest(kind, kinds)}")
     strengths = {kind: _number(f"{field} {kind}", value[kind], 0.0, 1.0) for kind in sorted(value)}
     return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
 
@@ -219,7 +219,7 @@ def _corruption(field: str, value: Any) -> dict[str, float]:
 def flattened(field: str, value: Any) -> dict[str, Any]:
     """Return settings whose names are NAME.SETTING, of a table that may hold a table for each NAME."""
     if not isinstance(value, Mapping):
-        raise ValueError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {shown(value)}")
+        raise ValueError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}")
     flat: dict[str, Any] = {}
     for name, inner in value.items():
         flat |= {f"{name}.{one}": what for one, what in inner.items()} if isinstance(inner, Mapping) else {name: inner}
@@ -229,7 +229,7 @@ def flattened(field: str, value: Any) -> dict[str, Any]:
 def _one_of(*choices: str) -> Callable[[str, Any], str]:
     def check(field: str, value: Any) -> str:
         if value not in choices:
-            raise ValueError(f"{field} must be one of {', '.join(choices)}, got {shown(value)}")
+            raise ValueError(f"{field} must be one of {', '.join(choices)}, got {quoted(value)}")
         return str(value)
 
     return check

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from posefit.files import appear
-from posefit.reading import cut, json_of, read_text, shown
+from posefit.reading import cut, json_of, quoted, read_text
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
 from posefit.sweep.table import dataframe
 from posefit.version import __version__
@@ -168,7 +168,7 @@ def _version(path: Path) -> str:
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {cut(str(error))}") from None
     if form != FORMAT or not isinstance(version, str):
-        raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {shown(form)}")
+        raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")
     return version
 
 

@@ -28,7 +28,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Self
 
-from posefit.reading import SHOWN, read_text, shown, toml_of
+from posefit.reading import SHOWN, quoted, read_text, toml_of
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import FIELDS, cell_of, flattened, names_of
 
@@ -90,14 +90,14 @@ class Plan:
         """
         for name in tables:
             if name not in TABLES:
-                raise ValueError(f"a plan must hold {', '.join(TABLES)}, got {shown(name)}")
+                raise ValueError(f"a plan must hold {', '.join(TABLES)}, got {quoted(name)}")
         defaults = _mapping("defaults", tables.get("defaults", {}))
         for name in defaults:
             if name not in FIELDS:
-                raise ValueError(f"defaults must be of {', '.join(FIELDS)}, got {shown(name)}")
+                raise ValueError(f"defaults must be of {', '.join(FIELDS)}, got {quoted(name)}")
         listed = tables.get("cells", [])
         if not isinstance(listed, list | tuple):
-            raise ValueError(f"cells must be a list of tables, got {shown(listed)}")
+            raise ValueError(f"cells must be a list of tables, got {quoted(listed)}")
         specs = [*_combined(tables.get("product")), *(_mapping("cells", one) for one in listed)]
         shared = _settings(defaults.get("settings", {}), specs, defaults)
         return cls(
@@ -118,7 +118,7 @@ def _combined(tables: Any) -> list[dict[str, Any]]:
     lists = _mapping("product", tables)
     for name in lists:
         if name not in LISTS:
-            raise ValueError(f"product must hold {', '.join(LISTS)}, got {shown(name)}")
+            raise ValueError(f"product must hold {', '.join(LISTS)}, got {quoted(name)}")
     entries = [_entries(name, values) for name, values in lists.items()]
     count = 1
     for one in entries:
@@ -144,7 +144,7 @@ def _entries(name: str, values: Any) -> list[dict[str, Any]]:
             raise ValueError(f"product.{name} must be at most {MOST:,}, got {_written(values)}")
         values = list(range(values))
     if not isinstance(values, list | tuple):
-        raise ValueError(f"product.{name} must be a list, got {shown(values)}")
+        raise ValueError(f"product.{name} must be a list, got {quoted(values)}")
     if not values:
         raise ValueError(f"product.{name} must hold at least one, got none: an empty product has no cells")
     whole = field == "corruption"  # whose value is itself a table
@@ -172,12 +172,12 @@ def _settings(shared: Any, specs: Sequence[Mapping[str, Any]], defaults: Mapping
 
 def _mapping(name: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a table, got {shown(value)}")
+        raise ValueError(f"{name} must be a table, got {quoted(value)}")
     return dict(value)
 
 
 def _written(number: int) -> str:
-    return f"{number:,}" if number < 10**SHOWN else shown(number)
+    return f"{number:,}" if number < 10**SHOWN else quoted(number)
 
 
 def _stdin() -> str:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.check import finite, whole
+from posefit.fitting.check import finite_number, whole
 from posefit.fitting.optimiser import OptimiserFactory
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import Translation
@@ -23,7 +23,7 @@ from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
 from posefit.motion import library
 from posefit.motion.motion import Motion
-from posefit.reading import shown
+from posefit.reading import quoted
 from posefit.tracking.identity import Told
 from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
@@ -112,7 +112,7 @@ def track(
         ask_seconds=ask_seconds,
     )
     if isinstance(train, str | Path | Motion):
-        raise ValueError(f"train must be a list of motions, got {shown(train)}")
+        raise ValueError(f"train must be a list of motions, got {quoted(train)}")
     viewing = Viewing(
         asf=asf,
         cameras=() if camera is None else (camera,) if isinstance(camera, Camera | str | Path) else tuple(camera),
@@ -191,22 +191,23 @@ def _check_numbers(seed: int, threads: int, ask_seconds: float | None, **counts:
     whole("seed", seed, 0)
     whole("threads", threads, 1)
     if ask_seconds is not None:
-        finite("ask_seconds", ask_seconds)
+        finite_number("ask_seconds", ask_seconds)
     for name, value in counts.items():
         if value is not None:
             whole(name, value, 0 if name in ("restarts", "body_frames") else 1)
 
 
 def _angles(degrees: float | Sequence[float] | None) -> Sequence[float]:
-    values = () if degrees is None else degrees
-    each = list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else [values]
-    return [finite("view_degrees", one) for one in each]
+    if degrees is None:
+        return ()
+    each = list(degrees) if isinstance(degrees, Sequence | np.ndarray) and not isinstance(degrees, str) else [degrees]
+    return [finite_number("view_degrees", one) for one in each]
 
 
 def _check_known(asf: str | Path | None, restarts: int | None, motions: Sequence[Source]) -> None:
     """Return nothing. Raises ValueError where something was given that a known motion has no use for."""
     if asf is not None and not any(str(one).lower().endswith(".amc") for one in motions if isinstance(one, str | Path)):
-        raise ValueError(f"asf must be given for .amc files and footage only, got {shown(str(asf))}")
+        raise ValueError(f"asf must be given for .amc files and footage only, got {quoted(str(asf))}")
     if restarts == 0:
         raise ValueError("restarts must be at least 1 for a motion, which is searched once where it is left out, got 0")
 
