@@ -22,7 +22,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
-from posefit.reading import cut, json_of, read_text
+from posefit.reading import cut, parsed_json, read_text
 
 MARK = "unfinished.json"  # in a folder that we work on
 LARGEST_MARK = 10_000_000  # bytes
@@ -131,7 +131,7 @@ class Unfinished:
                 continue
             with suppress(OSError, ValueError, KeyError, TypeError):
                 file = os.open(entry, os.O_RDWR | os.O_NOFOLLOW)
-                mark = json_of(read_text(entry, LARGEST_MARK)) if _locked(file) else None
+                mark = parsed_json(read_text(entry, LARGEST_MARK)) if _locked(file) else None
                 if mark is not None and mark["target"] == target.name and isinstance(mark["told"], dict):
                     found.append(cls(target, entry.parent, file, mark["told"]))
                 else:

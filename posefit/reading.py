@@ -1,7 +1,7 @@
 """What a stranger's file says, read so that it can neither fill the memory nor end in a traceback.
 
 - `read_text`: a file that may have so many bytes, in UTF-8.
-- `toml_of`, `json_of`: the values of a text. Whatever is wrong with it raises ValueError.
+- `parsed_toml`, `parsed_json`: the values of a text. Whatever is wrong with it raises ValueError.
 - `quoted`: a value as messages quote it.
 
 Archives of arrays have `posefit.archive`, pictures `posefit.footage.images`.
@@ -67,7 +67,7 @@ def read_text(path: str | Path, most: int, what: str = "text") -> str:
         raise ValueError(f"{path}: expected {what} in UTF-8, got byte 0x{content[error.start]:02x}") from None
 
 
-def toml_of(text: str) -> dict[str, Any]:
+def parsed_toml(text: str) -> dict[str, Any]:
     """Return the tables of a TOML text. Raises ValueError where it is none, or nested so deeply that it is hostile."""
     weight = 0
     for number, line in enumerate(text.splitlines(), 1):
@@ -81,7 +81,7 @@ def toml_of(text: str) -> dict[str, Any]:
         raise ValueError("expected values that are not nested so deeply, got too many brackets") from None
 
 
-def json_of(text: str) -> Any:
+def parsed_json(text: str) -> Any:
     """Return the value of a JSON text. Raises ValueError where it is none, or nested so deeply that it is hostile."""
     try:
         return json.loads(text)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from posefit.reading import SHOWN, json_of, quoted, read_text, toml_of
+from posefit.reading import SHOWN, parsed_json, parsed_toml, quoted, read_text
 
 
 def test_what_a_message_quotes_is_cut_at_80_characters():
@@ -32,15 +32,15 @@ def test_a_text_that_is_too_large_or_no_utf_8_is_named(tmp_path):
 def test_a_key_of_very_many_parts_is_refused_as_reading_it_takes_memory_as_their_square():
     # 100,000 parts, 200 kB, took more than 20 GB
     with pytest.raises(ValueError, match="keys that are not nested so deeply, got 99999 dots in line 1"):
-        toml_of(".".join("a" * 100_000) + " = 1")
+        parsed_toml(".".join("a" * 100_000) + " = 1")
     with pytest.raises(ValueError, match="keys that are not nested so deeply"):
-        toml_of("\n".join(f"k{k}." + ".".join("a" * 900) + " = 1" for k in range(1000)))
+        parsed_toml("\n".join(f"k{k}." + ".".join("a" * 900) + " = 1" for k in range(1000)))
     numbers = ", ".join(["0.5"] * 5_000)
-    assert len(toml_of(f"a = [{numbers}]")["a"]) == 5_000
+    assert len(parsed_toml(f"a = [{numbers}]")["a"]) == 5_000
 
 
 def test_brackets_without_end_are_refused():
     with pytest.raises(ValueError, match="not nested so deeply"):
-        toml_of("a = " + "[" * 100_000)
+        parsed_toml("a = " + "[" * 100_000)
     with pytest.raises(ValueError, match="not nested so deeply"):
-        json_of("[" * 1_000_000)
+        parsed_json("[" * 1_000_000)

@@ -11,7 +11,7 @@ from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import Episode
-from posefit_envs.instance import Arguments, checked, errors_in_degrees, select
+from posefit_envs.instance import Arguments, approved, errors_in_degrees, select
 from posefit_envs.search import Doorkeeper
 from posefit_swarm.flock import Flock, speed_limits
 
@@ -87,7 +87,7 @@ class ConfigureEnv(gym.Env[State, Any]):
     ) -> None:
         check_mode(render_mode)
         for name, value in (("particles", particles), ("iterations", iterations)):
-            checked(whole, name, value, 2)
+            approved(whole, name, value, 2)
         self.render_mode = render_mode
         self._selection = select(**arguments)
         self.world = self._selection.world

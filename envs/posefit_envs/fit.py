@@ -10,7 +10,7 @@ from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.check import finite_number, whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
-from posefit_envs.instance import Arguments, Instance, World, checked, errors_in_degrees, instance, select
+from posefit_envs.instance import Arguments, Instance, World, approved, errors_in_degrees, instance, select
 from posefit_envs.search import Doorkeeper, Evaluated, Image, look
 
 MAX_EVALUATIONS = 200
@@ -193,5 +193,5 @@ def spaces_of(setting: World) -> tuple[spaces.Box, spaces.Box]:
 
 def check_budget(target_cost: float, name: str, evaluations: int) -> None:
     """Return nothing. Raises ArgumentError where a number makes no sense."""
-    checked(finite_number, "target_cost", target_cost)
-    checked(whole, name, evaluations, 2)
+    approved(finite_number, "target_cost", target_cost)
+    approved(whole, name, evaluations, 2)

@@ -16,7 +16,7 @@ from posefit.fitting.check import whole
 from posefit_envs.batch import mask_of, seeds_of
 from posefit_envs.drawing import MODES, check_mode, portray
 from posefit_envs.fit import MAX_EVALUATIONS, TARGET_COST, Episode, action_shape, check_budget, spaces_of
-from posefit_envs.instance import Arguments, checked, errors_in_degrees, select
+from posefit_envs.instance import Arguments, approved, errors_in_degrees, select
 from posefit_envs.search import Doorkeeper, Evaluated, Image, distinct, look
 
 Infos = dict[str, Any]
@@ -46,7 +46,7 @@ class FitVectorEnv(VectorEnv[Image, Any, Array]):
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        checked(whole, "num_envs", num_envs, 1)
+        approved(whole, "num_envs", num_envs, 1)
         check_budget(target_cost, "max_evaluations", max_evaluations)
         check_mode(render_mode)
         if render_mode == "human":

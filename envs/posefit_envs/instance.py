@@ -131,7 +131,7 @@ def select(
     if len(sides) != 2 or not all(isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides):
         raise ArgumentError(f"size must be (width, height) of 36 to 4096 pixels, got {quoted(size)}")
     strengths = _strengths(noise)
-    if not 0.0 <= checked(finite_number, "mismatch_percent", mismatch_percent) <= 50.0:
+    if not 0.0 <= approved(finite_number, "mismatch_percent", mismatch_percent) <= 50.0:
         raise ArgumentError(f"mismatch_percent must lie in 0 to 50, got {mismatch_percent}")
     if isinstance(train, str) or not all(isinstance(one, str) for one in train or ()):
         raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {quoted(train)}")
@@ -159,7 +159,7 @@ def _unknown(name: str) -> str:
     return f"an argument must be one of {', '.join(known)}, got {quoted(name)}{hint}"
 
 
-def checked(check: Callable[..., Any], name: str, *given: Any) -> Any:
+def approved(check: Callable[..., Any], name: str, *given: Any) -> Any:
     """Return what a check of posefit returns; what it raises is an error of Gymnasium's too."""
     try:
         return check(name, *given)
@@ -184,7 +184,7 @@ def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
     for name, strength in (noise or {}).items():
         if name not in CORRUPTIONS:
             raise ArgumentError(f"noise must be of {', '.join(CORRUPTIONS)}, got {quoted(name)}")
-        if not 0.0 <= checked(finite_number, f"noise {name}", strength) <= 1.0:
+        if not 0.0 <= approved(finite_number, f"noise {name}", strength) <= 1.0:
             raise ArgumentError(f"noise {name} must have a strength of 0 to 1, got {strength}")
     return tuple(sorted((noise or {}).items()))
 

@@ -15,7 +15,7 @@ from posefit.fitting.check import whole
 from posefit_envs.batch import mask_of, seeds_of
 from posefit_envs.drawing import MODES, check_mode, portray
 from posefit_envs.fit import action_shape, check_budget, spaces_of
-from posefit_envs.instance import Arguments, checked, select
+from posefit_envs.instance import Arguments, approved, select
 from posefit_envs.search import Doorkeeper, Image, distinct, look_at
 from posefit_envs.track import EVALUATIONS, FRAMES, TrackEpisode
 
@@ -45,12 +45,12 @@ class TrackVectorEnv(VectorEnv[Image, Any, Array]):
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        checked(whole, "num_envs", num_envs, 1)
+        approved(whole, "num_envs", num_envs, 1)
         check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
         check_mode(render_mode)
         if render_mode == "human":
             raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
-        checked(whole, "frames", frames, 1)
+        approved(whole, "frames", frames, 1)
         self.num_envs, self.render_mode = num_envs, render_mode
         self._selection = select(**arguments)
         self.world = self._selection.world

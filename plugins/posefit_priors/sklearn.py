@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
-from posefit.reading import cut, json_of
+from posefit.reading import cut, parsed_json
 from posefit_priors.arrays import angles_of, load_arrays
 from posefit_priors.kernels import near, recover
 from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, clustered, reach_of
@@ -110,7 +110,7 @@ class Transformed:
         if ((letters < 0) | (letters > 255)).any():
             raise ValueError(f"{path}: words must be bytes, 0 to 255, got {letters.min():g} to {letters.max():g}")
         try:
-            settings = dict(zip(names, json_of(letters.astype(np.uint8).tobytes().decode()), strict=True))
+            settings = dict(zip(names, parsed_json(letters.astype(np.uint8).tobytes().decode()), strict=True))
             return cls(**settings).fit(arrays["angles"])
         except Exception as error:  # whatever the transformer trips over, the file is to blame
             came = cut(" ".join(str(error).split()))

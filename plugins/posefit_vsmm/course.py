@@ -80,6 +80,7 @@ class Course:
     def frame(self, observation: Observation) -> Frame:
         """Return what is found in the next frame."""
         began, models = time.perf_counter(), self._models
+        self._begun = time.process_time()
         blind = not observation.usable
         lines = [None if blind else lines_of(silhouette.mask) for silhouette in observation.silhouettes]
         blind = all(one is None for one in lines)
@@ -206,5 +207,8 @@ class Course:
         if not self._unseen:
             self._bad = self._bad + 1 if float(metrics.iou(heard).mean()) < LOST else 0
         seconds = time.perf_counter() - began
-        self._latest = Frame(pose, place, cost, counts, used, seconds, np.array([cost]), details=details)
+        spent = time.process_time() - self._begun
+        self._latest = Frame(
+            pose, place, cost, counts, used, seconds, np.array([cost]), details=details, cpu_seconds=spent
+        )
         return self._latest

@@ -1,7 +1,9 @@
 """`posefit sweep` and `posefit report`."""
 
 import json
+from collections.abc import Iterator
 from contextlib import nullcontext
+from itertools import islice
 from typing import Any
 
 import click
@@ -9,15 +11,27 @@ import click
 from posefit.cli.options import ENGINE, options
 from posefit.cli.output import results_alone, say
 
+LINES = 1000  # that are printed at a time
+
 
 @click.command()
 @click.argument("plan")
 @click.option("--out", metavar="DIR", help="The ledger: a new folder, or one that a sweep goes on in.")
 @options(ENGINE)
 @click.option("--dry-run", is_flag=True, help="Print the cells and about how long they take, and run none.")
+@click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 @click.pass_context
-def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, as_json: bool, **where: Any) -> None:
+def sweep(
+    context: click.Context,
+    /,
+    plan: str,
+    out: str | None,
+    dry_run: bool,
+    retry_quarantined: bool,
+    as_json: bool,
+    **places: Any,
+) -> None:
     """Run the cells of PLAN: methods, motions, views, corruptions and seeds.
 
     PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment, and any number of
@@ -27,22 +41,25 @@ def sweep(context: click.Context, /, plan: str, out: str | None, dry_run: bool, 
     from posefit.sweep import command
     from posefit.sweep.engines.limits import Limits
 
-    limits = Limits(where.pop("cell_seconds"), where.pop("cell_gigabytes"))
+    limits = Limits(places.pop("cell_seconds"), places.pop("cell_gigabytes"))
+    where = command.Where(**places, limits=limits)
     if dry_run:
-        with results_alone() if as_json else nullcontext():
-            found = command.preview(plan, out, limits=limits, **where)
-        if as_json:
-            click.echo(json.dumps(found))
-            return
-        for line in command.preview_lines(found):
-            click.echo(line)
+        lines = command.preview(plan, out, where=where, as_json=as_json)
+        while some := _next(lines, as_json):
+            click.echo(some)
         return
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
-        tally, status = command.run_plan(plan, out, limits=limits, say=say, **where)
+        tally, status = command.run_plan(plan, out, where=where, retry_quarantined=retry_quarantined, say=say)
     click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
     context.exit(status)
+
+
+def _next(lines: Iterator[str], as_json: bool) -> str:
+    """Return the next lines as one text, "" at their end; what a plugin prints meanwhile is none of them."""
+    with results_alone() if as_json else nullcontext():
+        return "\n".join(islice(lines, LINES))
 
 
 @click.command()

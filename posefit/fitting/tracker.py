@@ -49,6 +49,8 @@ class Frame:
     # (populations,) evaluations so far after each, where a tracker says
     spent: NDArray[np.int64] | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
+    # of all threads of the process, where a tracker says: unlike `seconds` it does not grow on a busy machine
+    cpu_seconds: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +199,7 @@ class SynthesisTracker:
         optimiser: Optimiser | None = None
         latest: Frame | None = task.before[-1] if task.before else None
         for observation in observations:
-            began = time.perf_counter()
+            began, begun = time.perf_counter(), time.process_time()
             space = follower.space(observation)
             if not observation.usable:
                 latest = self._held(latest, space, observation)
@@ -215,7 +217,7 @@ class SynthesisTracker:
             )
             best = minimise(problem.evaluate, optimiser, task.evaluations, told=True)
             follower.commit(best.proposal)
-            latest = _frame(problem, best, time.perf_counter() - began)
+            latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
             yield latest
 
     def _held(self, latest: Frame | None, space: SearchSpace, observation: Observation) -> Frame:
@@ -235,7 +237,9 @@ class SynthesisTracker:
         )
         counts = problem.areas(poses, places)
         areas = np.stack([one[0] for one in counts])
-        return Frame(poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0))
+        return Frame(
+            poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0), cpu_seconds=0.0
+        )
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
         """Return the optimiser of the next frame, as `next_frame` asks."""
@@ -245,10 +249,19 @@ class SynthesisTracker:
         return self.make(replace(space, start=None) if self.next_frame == "forget" else space, rng)
 
 
-def _frame(problem: PoseProblem, best: Minimum, seconds: float) -> Frame:
+def _frame(problem: PoseProblem, best: Minimum, seconds: float, cpu_seconds: float) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
     counts = np.stack([areas[0] for areas in problem.areas(poses, translations)])
     found = problem.space.coordinates(best.proposal)
     return Frame(
-        poses[0], translations[0], best.cost, counts, best.evaluations, seconds, best.history, found, best.spent
+        poses[0],
+        translations[0],
+        best.cost,
+        counts,
+        best.evaluations,
+        seconds,
+        best.history,
+        found,
+        best.spent,
+        cpu_seconds=cpu_seconds,
     )

@@ -15,7 +15,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.camera import Camera
 from posefit.geometry.storage import Matrix, number_of, numbers_of, stored_values, xml_of
-from posefit.reading import cut, quoted, read_text, toml_of
+from posefit.reading import cut, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
 LARGEST_FILE = 1_000_000  # bytes
@@ -127,7 +127,7 @@ def _own(path: Path, _: str) -> list[Calibration]:
 
 def _toml(_: Path, text: str) -> list[Calibration]:
     found: list[Calibration] = []
-    for name, camera in toml_of(text).items():
+    for name, camera in parsed_toml(text).items():
         if name == "metadata" or not isinstance(camera, dict):
             continue
         rotation = _turned(camera["rotation"]) if "rotation" in camera else None

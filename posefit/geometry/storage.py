@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.reading import json_of, quoted
+from posefit.reading import parsed_json, quoted
 
 LARGEST_YAML = 500_000  # characters: PyYAML reads some 100,000 a second
 NUMBERS = 100  # of a matrix; a calibration has 14 at most
@@ -48,7 +48,7 @@ class Matrix:
 def stored_values(text: str) -> dict[str, Any]:
     """Return the values of a file by name. Raises ValueError where it is none of the three formats."""
     start = text.lstrip()[:1]
-    values = _xml(text) if start == "<" else json_of(text) if start == "{" else _yaml(text)
+    values = _xml(text) if start == "<" else parsed_json(text) if start == "{" else _yaml(text)
     if not isinstance(values, dict):
         raise ValueError(f"a file without names, {quoted(values)}")
     return {str(name): _value(value) for name, value in values.items()}

@@ -74,7 +74,7 @@ def _baseline(name: str) -> Measure:
     return replace(MEASURES["baselines_degrees"], label=BASELINES[name])
 
 
-_TIME = MEASURES["seconds_per_frame"]
+_TIME, _CPU = MEASURES["seconds_per_frame"], MEASURES["cpu_seconds_per_frame"]
 _SPENT = replace(MEASURES["evaluations"], unit="a frame", meaning="poses whose cost was computed, the mean over frames")
 
 COLUMNS = {
@@ -89,6 +89,7 @@ COLUMNS = {
         Column("iou", MEASURES["iou"], ("iou",), rising=True),
         Column("cost", MEASURES["cost"], ("cost",), shown=False),
         Column("ms", replace(_TIME, factor=1.0), ("seconds_per_frame",), scale=_TIME.factor),
+        Column("cpu_ms", replace(_CPU, factor=1.0), ("cpu_seconds_per_frame",), scale=_CPU.factor),
         Column("evaluations", _SPENT, ("evaluations_used",), per_frame=True),
         *(Column(f"baseline_{name}", _baseline(name), ("baselines_degrees", name), shown=False) for name in BASELINES),
         Column("floor", MEASURES["prior_floor_degrees"], ("prior_floor_degrees",), shown=False),

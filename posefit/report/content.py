@@ -1,5 +1,6 @@
 """What `posefit report` says of a ledger, as data: what was run, who won, how sure that is, and every run."""
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -10,11 +11,22 @@ from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
 from posefit.report.colours import METHODS
 from posefit.report.columns import COLUMNS, SHOWN
-from posefit.report.contest import Contest, baseline_rows, claim, contest_of, leaderboard, paired_tests, resamples
+from posefit.report.contest import (
+    Contest,
+    baseline_rows,
+    claim,
+    contest_of,
+    dropped,
+    leaderboard,
+    paired_tests,
+    resamples,
+)
 from posefit.report.gallery import gallery
 from posefit.report.runs import Runs
 from posefit.sweep.ledger import Ledger
 from posefit.tracking.measures import BASELINES
+
+REASONS = 5  # of failures, the most frequent ones, that are named at the top
 
 
 def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str, Any]:
@@ -49,7 +61,10 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
         "versions": sorted({str(one["version"]) for one in runs.variants}),
         "done": len(runs),
         "failed": len(runs.failures),
+        "failed_by": Counter(one["method"] for one in runs.failures),
+        "reasons": Counter(reason for one in runs.failures for reason in one["reasons"]).most_common(REASONS),
         "unfinished": runs.unfinished,
+        "dropped": [] if contest is None else dropped(contest),
         "motions": all_of("motion"),
         "views": sorted({", ".join(f"{view:g}" for view in place["view_degrees"]) for place in runs.places}),
         "corruptions": sorted(

@@ -92,6 +92,21 @@ def _shared(runs: Runs, methods: Sequence[int]) -> Contest | None:
     return Contest(runs, tuple(int(block.methods[m]) for m in order), tuple(instances), np.array(table), left_out)
 
 
+def dropped(contest: Contest) -> list[dict[str, Any]]:
+    """Return the instances that are compared on no run, and the methods that have none there.
+
+    A method that takes part has runs of it, but one of the others has not, or none with the same seed.
+    """
+    runs = contest.runs
+    finished = np.isfinite(runs.figures["error"])
+    found = []
+    for instance in np.unique(runs.instance[finished & np.isin(runs.method, contest.methods)]).tolist():
+        if instance not in contest.instances:
+            there = set(runs.method[finished & (runs.instance == instance)].tolist())
+            found.append({"instance": instance, "missing": [m for m in contest.methods if m not in there]})
+    return found
+
+
 def resamples(numbers: int) -> int:
     """Return how many bootstrap resamples so many numbers may have."""
     return int(np.clip(WORK / max(numbers, 1), LEAST_RESAMPLES, RESAMPLES))

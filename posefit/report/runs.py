@@ -40,7 +40,7 @@ class Runs:
     figures: dict[str, Array] = field(repr=False)  # of each of FIGURES (n,), nan where a row has none
     joint_errors: Array = field(repr=False)  # (n, 27) mm
     traces: tuple[tuple[Array, Array], ...] = field(repr=False)  # evaluations and best costs (k,) of each row
-    failures: tuple[dict[str, Any], ...] = field(repr=False)  # cells in quarantine: name, reasons, command
+    failures: tuple[dict[str, Any], ...] = field(repr=False)  # cells in quarantine: name, method, reasons, command
     failed: tuple[int, ...] = field(repr=False)  # how many cells of each method are in quarantine
     unfinished: tuple[str, ...]  # methods of which every cell is in quarantine
 
@@ -51,14 +51,15 @@ class Runs:
 def runs_of(ledger: "Ledger") -> Runs:
     """Return the finished rows of a ledger, in an order that does not depend on who finished first.
 
-    Raises ValueError where there is none.
+    Where every cell failed there are no rows, but the reasons. Raises ValueError where there is neither.
     """
     found = _Table()
     for row in ledger.rows():
         found.add(row)
-    if not found.keys:
+    quarantined = ledger.quarantined()
+    if not found.keys and not quarantined:
         raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
-    return found.runs(ledger.version, ledger.quarantined())
+    return found.runs(ledger.version, quarantined)
 
 
 class _Table:
@@ -95,18 +96,21 @@ class _Table:
         self.traces.append((np.array(trace["evaluations"], np.float32), np.array(trace["cost"], np.float32)))
 
     def runs(self, version: str, quarantined: Sequence[Mapping[str, Any]]) -> Runs:
-        numbers, figures = np.array(self.numbers), np.array(self.figures)
+        # of no rows too, where every cell failed
+        numbers = np.array(self.numbers, dtype=int).reshape(-1, 3)
+        figures = np.array(self.figures, dtype=float).reshape(-1, len(FIGURES))
         variants, places = ([json.loads(text) for text in table] for table in (self.variants, self.places))
         error = np.nan_to_num(figures[:, FIGURES.index("error")], nan=np.inf)
         means = [float(np.mean(error[numbers[:, 0] == m])) for m in range(len(variants))]
         best = sorted(range(len(variants)), key=lambda m: (means[m], list(self.variants)[m]))
         texts = list(self.places)
         sorted_places = sorted(range(len(places)), key=lambda i: (_rank(places[i]), texts[i]))
-        numbers[:, 0], numbers[:, 1] = np.argsort(best)[numbers[:, 0]], np.argsort(sorted_places)[numbers[:, 1]]
+        for column, ranked in enumerate((best, sorted_places)):
+            numbers[:, column] = np.argsort(ranked).astype(int)[numbers[:, column]]
         heads = sorted(range(len(self.heads)), key=list(self.heads).__getitem__)
-        numbers[:, 2] = np.argsort(heads)[numbers[:, 2]]
+        numbers[:, 2] = np.argsort(heads).astype(int)[numbers[:, 2]]
         ranks = {seed: k for k, seed in enumerate(sorted(set(self.seeds)))}
-        seeds = np.array([ranks[seed] for seed in self.seeds])
+        seeds = np.array([ranks[seed] for seed in self.seeds], dtype=int)
         order = np.lexsort((seeds, numbers[:, 0], numbers[:, 1]))
         variants, places = [variants[m] for m in best], [places[i] for i in sorted_places]
         methods = _distinct([one["method"] for one in variants], [_variation(one) for one in variants])
@@ -126,7 +130,7 @@ class _Table:
             seeds=tuple(ranks),
             keys=tuple(self.keys[k] for k in order),
             figures=dict(zip(FIGURES, figures[order].T, strict=True)),
-            joint_errors=np.array(self.joints)[order],
+            joint_errors=np.asarray(np.reshape(self.joints, (-1, len(JOINTS)))[order]),
             traces=tuple(self.traces[k] for k in order),
             failures=tuple(_failure(one) for one in quarantined),
             failed=tuple(lost[text] for text in (list(self.variants)[m] for m in best)),
@@ -138,7 +142,12 @@ def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:
     spec = lost["spec"]
     name = f"{spec['method']} on {spec['motion']}, instance {spec['instance']}, seed {spec['seed']}"
     tail = "".join(f"{one} = {spec[one]}\n" for one in LAST)
-    return {"name": name, "reasons": list(dict.fromkeys(lost["reasons"])), "command": command_head(spec) + tail + "END"}
+    return {
+        "name": name,
+        "method": spec["method"],
+        "reasons": list(dict.fromkeys(lost["reasons"])),
+        "command": command_head(spec) + tail + "END",
+    }
 
 
 def _variant(spec: Mapping[str, Any]) -> str:

@@ -12,6 +12,8 @@ from posefit.report.page.webpage import MARK, document, plain
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 
+NAMED = 20  # instances that are named where they are not compared
+
 Say = Callable[[str], None]
 
 
@@ -53,11 +55,15 @@ def write_report(
 
         write_csv(map(flat, ledger.all_rows()), csv)
     said = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
-    return {"out": out, **dict(plain(said))}
+    gaps = [
+        {"instance": runs.instances[one["instance"]], "missing": [runs.methods[m] for m in one["missing"]]}
+        for one in data["header"]["dropped"]
+    ]
+    return {"out": out, **dict(plain(said)), "gaps": gaps}
 
 
 def leaderboard_lines(found: dict[str, Any]) -> list[str]:
-    """Return the lines that the command prints: the leaderboard and where the page is."""
+    """Return the lines that the command prints: what is not in it, the leaderboard, and where the page is."""
     lines = []
     for row in found["leaderboard"] or []:
         ends = "" if row["low"] is None else f"{row['low']:.2f} to {row['high']:.2f}"
@@ -65,7 +71,31 @@ def leaderboard_lines(found: dict[str, Any]) -> list[str]:
         error = "-" if row["error"] is None else f"{row['error']:.2f}"
         lines.append(f"{row['name'][:32]:32} {error:>9} {ends:>15} {skill:>7}")
     head = [f"{'':32} {'error deg':>9} {'95 % interval':>15} {'skill':>7}"] if lines else []
-    return [*head, *lines, f"written to {found['out']}: open it in any browser"]
+    return [*_gap_lines(found["header"], found["gaps"]), *head, *lines, _written(found["out"])]
+
+
+def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:
+    """Return the lines that say what failed, and which instances are therefore not compared."""
+    lines = []
+    if header["failed"]:
+        by = ", ".join(f"{method} {count}" for method, count in header["failed_by"].items())
+        lines.append(f"{_counted(header['failed'], 'cell')} failed, left out of all figures: {by}")
+        lines += [f"  {count} x {reason}" for reason, count in header["reasons"]]
+    if gaps:
+        lines.append(f"left out of the comparison, for every method: {_counted(len(gaps), 'instance')}")
+        for gap in gaps[:NAMED]:
+            why = f"no run of {', '.join(gap['missing'])}" if gap["missing"] else "no seed in common"
+            lines.append(f"  {gap['instance']}: {why}")
+        lines += [f"  and {len(gaps) - NAMED} more"] if len(gaps) > NAMED else []
+    return lines
+
+
+def _counted(count: int, word: str) -> str:
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"
+
+
+def _written(out: str) -> str:
+    return f"written to {out}: open it in any browser"
 
 
 def _check(ledger: Path, out: str, others: list[str | None]) -> None:

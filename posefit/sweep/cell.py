@@ -5,7 +5,7 @@ import io
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from posefit.tracking.opening import Opening
 
 POINTS = 64  # of an anytime trace at most
-TIMES = ("seconds", "seconds_per_frame")  # what two runs of a cell do not have in common
+TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # what two runs of a cell do not have in common
 DROPPED = "dropped"  # the corruption that takes whole frames away, a share of them
 UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
 
@@ -57,17 +57,20 @@ class Cell:
     @cached_property
     def spec(self) -> dict[str, Any]:
         """The cell as JSON holds it."""
-        spec: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        spec: dict[str, Any] = json.loads(json.dumps({name: getattr(self, name) for name in FIELDS}))
         return spec
 
     @cached_property
     def key(self) -> str:
         """The cell's name: the SHA-256 of its spec, version included, as 64 hexadecimal digits."""
-        canonical = json.dumps(self.spec, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return hashlib.sha256(canonical.encode()).hexdigest()
+        return hashlib.sha256(json_of({name: getattr(self, name) for name in NAMES}).encode()).hexdigest()
 
     def __str__(self) -> str:
         return f"{self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
+
+
+FIELDS = tuple(one.name for one in fields(Cell))
+NAMES = tuple(sorted(FIELDS))  # in which order a key is of them
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,11 @@ def cell_scene(cell: Cell) -> "Scene":
         return scene
     spoilt = Spoilt(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
     return replace(scene, observations=spoilt)
+
+
+def json_of(value: Any) -> str:
+    """Return the one JSON text of a value, as keys are made of it."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def digest_of(path: str | Path) -> str:

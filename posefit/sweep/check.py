@@ -40,7 +40,7 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
     for name in ("method", "motion"):
         if name not in spec:
             raise ValueError(f"a cell must say its {name}, got none")
-    values = {name: _CHECKS[name](name, value) for name, value in spec.items()}
+    values = checked(spec)
     offers = _offers(values["method"])
     texts = tuple(settings_text(values.get("settings", {})))
     settings = _settings(values["method"], texts)
@@ -56,6 +56,11 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
     if files.get(cell.motion) and cell.frames > (length := _length(cell.motion, cell.fps)):
         raise ValueError(f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}")
     return cell
+
+
+def checked(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return fields of a cell, each by itself checked. Raises ValueError where a value makes no sense."""
+    return {name: _CHECKS[name](name, value) for name, value in spec.items()}
 
 
 @lru_cache(maxsize=256)
@@ -115,6 +120,7 @@ def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
     return size if isinstance(size, int) else 1
 
 
+@lru_cache(maxsize=1024)
 def _other_styles(motion: str) -> tuple[str, ...]:
     return library.other_styles(motion if motion in library.names() else "walk")
 

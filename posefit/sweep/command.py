@@ -4,13 +4,13 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from posefit.sweep.cell import Cell, run_cell, settings_text
-from posefit.sweep.drive import Tally, drive_cells, progress_of
+from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of, progress_of
 from posefit.sweep.driver import Driver
 from posefit.sweep.engines.engine import Engine
 from posefit.sweep.engines.limits import Limits
@@ -22,75 +22,101 @@ DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 Say = Callable[[str], None]
 
 
-def run_plan(
-    plan: str,
-    out: str,
-    *,
-    workers: int | None,
-    scheduler: str | None,
-    dask_local: int | None,
-    limits: Limits,
-    say: Say,
-) -> tuple[Tally, int]:
+@dataclass(frozen=True)
+class Where:
+    """In which place cells run, and how much each may take: processes of this machine, or Dask workers."""
+
+    workers: int | None = None
+    scheduler: str | None = None
+    dask_local: int | None = None
+    dask_dashboard: bool = False
+    limits: Limits = field(default_factory=Limits)
+
+
+def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = False, say: Say) -> tuple[Tally, int]:
     """Return how the sweep of a plan to a folder ended, and the exit status that says so."""
-    cells = Plan.read(plan).cells
-    start = engine(workers, scheduler, dask_local, limits)
+    cells = Plan.read(plan)
+    start = engine(where)
     with closing(start()) as running:  # without an engine there is no folder either
-        tally = swept(cells, out, running, say)
+        tally = swept(cells, out, running, say, retry_quarantined)
     return tally, STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
 
 
-def swept(cells: Sequence[Cell], out: str | Path, running: Engine, say: Say) -> Tally:
+def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quarantined: bool = False) -> Tally:
     """Return how cells ended that an engine ran into the ledger in a folder, with a bar on stderr."""
+    from tqdm import tqdm
+
     with Driver(out, say) as driver:
-        already = sum(driver.state(cell.key) is not None for cell in cells)
-        if already:
-            say(f"{already} of {len(cells)} cells are done already")
-        if already < len(cells):
-            return _driven(cells, driver, running, already, say)
-        tally = Tally(len(cells))
-        tally.done = sum(cell.key in driver.ledger for cell in cells)
-        tally.quarantined = len(cells) - tally.done
-        return tally
+        if retry_quarantined:
+            lost = driver.ledger.sentenced()
+            again = sum(driver.pardon(key) for key in keys_of(cells) if key in lost)
+            say(f"{again} {'cell is' if again == 1 else 'cells are'} out of quarantine, to be tried again")
+        bar = tqdm(total=len(cells), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
+
+        def beside(message: str) -> None:
+            bar.clear()
+            say(message)
+
+        with bar:
+            return drive_cells(cells, driver, running, beside, progress_of(bar, say))
 
 
-def preview(
-    plan: str, out: str | None, *, workers: int | None, scheduler: str | None, dask_local: int | None, limits: Limits
-) -> dict[str, Any]:
-    """Return the cells of a plan, which of them are done already, and about how long the others take."""
-    from posefit.sweep.estimate import estimated_seconds
+def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Iterator[str]:
+    """Yield the lines that show the cells of a plan, which are done already, and about how long the others take.
 
-    cells = Plan.read(plan).cells
+    Or those of one JSON object that says the same. A million cells are never in memory together.
+    """
+    from posefit.sweep.estimate import SECONDS, Amounts, Estimate, estimated
+
+    cells = Plan.read(plan)
+    start = engine(replace(where, limits=replace(where.limits, seconds=min(where.limits.seconds, SECONDS))))
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
-    left = [cell for cell in cells if ledger is None or cell.key not in ledger]
-    if not left:
-        return {"cells": [_shown(cell, True) for cell in cells], "seconds": 0.0, "workers": 0}
-    with closing(engine(workers, scheduler, dask_local, limits)()) as running:
-        count = running.window()
-        taken = estimated_seconds(left, running, count)
-    waiting = {cell.key for cell in left}
-    return {"cells": [_shown(cell, cell.key not in waiting) for cell in cells], "seconds": taken, "workers": count}
+    left, count = Amounts(), 0
+    if as_json:
+        yield '{"cells": ['
+    for k, cell in enumerate(cells):
+        done = ledger is not None and cell.key in ledger
+        if not done:
+            left.add(cell)
+        if as_json:
+            shown = json.dumps({"key": cell.key, "done": done, **cell.spec})
+            yield shown if k == len(cells) - 1 else f"{shown},"
+        else:
+            yield preview_line(cell, done)
+    found = Estimate(0.0, {})
+    if len(left):
+        with closing(start()) as running:
+            count = running.window()
+            found = estimated(left, running, count)
+    if as_json:
+        yield f'], "seconds": {found.seconds!r}, "workers": {count}, "untried": {json.dumps(found.untried)}}}'
+        return
+    for cell_text, reason in found.untried.items():
+        yield f"warning: {cell_text}: {reason}; cells of its kind count for no time here, and would be quarantined"
+    takes = f": about {duration_text(found.seconds)} on {count} workers" if len(left) else ""
+    yield f"{len(cells)} cells, {len(left)} of them to run{takes}"
 
 
-def engine(workers: int | None, scheduler: str | None, dask_local: int | None, limits: Limits) -> Callable[[], Engine]:
+def engine(where: Where) -> Callable[[], Engine]:
     """Return what starts the engine that was asked for. Raises ValueError where more than one was."""
-    given = [
-        name for name, value in (("workers", workers), ("scheduler", scheduler), ("dask-local", dask_local)) if value
-    ]
+    places = (("workers", where.workers), ("scheduler", where.scheduler), ("dask-local", where.dask_local))
+    given = [name for name, value in places if value]
     if len(given) > 1:
         raise ValueError(f"--{given[0]} must not be given with --{given[1]}: cells run in one place")
-    for name, value in (("workers", workers), ("dask-local", dask_local)):
+    for name, value in (("workers", where.workers), ("dask-local", where.dask_local)):
         if value is not None and value < 1:
             raise ValueError(f"--{name} must be at least 1, got {value}")
+    if where.dask_dashboard and where.dask_local is None:
+        raise ValueError("--dask-dashboard must be given with --dask-local, whose workers it shows, got it without")
 
     def start() -> Engine:
-        if scheduler is not None or dask_local is not None:
+        if where.scheduler is not None or where.dask_local is not None:
             from posefit.sweep.engines.cluster import Cluster
 
-            return Cluster(scheduler, dask_local, limits, run_cell)
+            return Cluster(where.scheduler, where.dask_local, where.limits, run_cell, dashboard=where.dask_dashboard)
         from posefit.sweep.engines.processes import Processes
 
-        return Processes(workers or cores(), limits, run_cell)
+        return Processes(where.workers or cores(), where.limits, run_cell)
 
     return start
 
@@ -108,19 +134,14 @@ def tally_text(tally: Tally, out: str) -> str:
     return line
 
 
-def preview_lines(found: dict[str, Any]) -> list[str]:
-    """Return the lines that show a preview."""
-    lines = []
-    for cell in found["cells"]:
-        more = [*settings_text(cell["settings"]), *(f"{kind} {share:g}" for kind, share in cell["corruption"].items())]
-        views = ", ".join(f"{view:g}" for view in cell["view_degrees"])
-        lines.append(
-            f"{cell['key'][:8]}  {cell['method']} on {cell['motion']}, view {views}, instance {cell['instance']}, "
-            f"seed {cell['seed']}{''.join(f', {one}' for one in more)}{'  done' if cell['done'] else ''}"
-        )
-    left = sum(not cell["done"] for cell in found["cells"])
-    takes = f": about {duration_text(found['seconds'])} on {found['workers']} workers" if left else ""
-    return [*lines, f"{len(lines)} cells, {left} of them to run{takes}"]
+def preview_line(cell: Cell, done: bool) -> str:
+    """Return the line that shows a cell of a preview."""
+    more = [*settings_text(cell.settings), *(f"{kind} {share:g}" for kind, share in cell.corruption.items())]
+    views = ", ".join(f"{view:g}" for view in cell.view_degrees)
+    return (
+        f"{cell.key[:8]}  {cell.method} on {cell.motion}, view {views}, instance {cell.instance}, "
+        f"seed {cell.seed}{''.join(f', {one}' for one in more)}{'  done' if done else ''}"
+    )
 
 
 def duration_text(seconds: float) -> str:
@@ -129,23 +150,6 @@ def duration_text(seconds: float) -> str:
         if seconds >= 1.5 * size:
             return f"{seconds / size:.1f} {name}"
     return f"{seconds:.0f} seconds"
-
-
-def _driven(cells: Sequence[Cell], driver: Driver, running: Engine, already: int, say: Say) -> Tally:
-    from tqdm import tqdm
-
-    bar = tqdm(total=len(cells), initial=already, unit="cell", file=sys.stderr, dynamic_ncols=True)
-
-    def beside(message: str) -> None:
-        bar.clear()
-        say(message)
-
-    with bar:
-        return drive_cells(cells, driver, running, beside, progress_of(bar))
-
-
-def _shown(cell: Any, done: bool) -> dict[str, Any]:
-    return {"key": cell.key, "done": done, **json.loads(json.dumps(cell.spec))}
 
 
 def cores() -> int:

@@ -12,11 +12,13 @@ from typing import Any
 from posefit.sweep.cell import Cell
 from posefit.sweep.driver import Claim, Driver, State
 from posefit.sweep.engines.engine import Engine, Outcome
+from posefit.sweep.plan import Plan
 
 PATIENCE = 0.2  # seconds between two looks at whether somebody wants to stop
 ELSEWHERE = 0.5  # seconds between two looks at cells that other drivers run
 
 Say = Callable[[str], None]
+Cells = Plan | Sequence[Cell]
 
 
 @dataclass
@@ -59,7 +61,7 @@ class _Stop:
 
 
 def drive_cells(
-    cells: Sequence[Cell],
+    cells: Cells,
     driver: Driver,
     engine: Engine,
     say: Say,
@@ -92,7 +94,7 @@ class _Sweep:
 
     def __init__(
         self,
-        cells: Sequence[Cell],
+        cells: Cells,
         driver: Driver,
         engine: Engine,
         stop: _Stop,
@@ -101,12 +103,16 @@ class _Sweep:
     ) -> None:
         self._driver, self._engine, self._stop, self._say, self._watch = driver, engine, stop, say, watch
         self.tally = Tally(len(cells))
-        self._waiting: deque[Cell] = deque()
+        # of each cell whether it needs no work: a plan of a million cells is gone through, not held
+        settled, lost = bytearray(), driver.ledger.sentenced()
+        for key in keys_of(cells):
+            state = State.DONE if key in driver.ledger else State.QUARANTINED if key in lost else None
+            settled.append(self._count(state))
+        self._left = settled.count(False)  # cells that were not met yet
+        self._coming = (cell for cell, done in zip(cells, settled, strict=True) if not done)
+        self._again: deque[Cell] = deque()  # cells that failed, or that others ran
         self._elsewhere: list[Cell] = []
         self._running: dict[str, Claim] = {}
-        for cell in cells:
-            if not self._count(driver.state(cell.key)):
-                self._waiting.append(cell)
 
     @property
     def safe(self) -> str:
@@ -132,7 +138,7 @@ class _Sweep:
                 self._take(outcome)
             if self._elsewhere and time.monotonic() - looked > ELSEWHERE:
                 self._driver.ledger.refresh()
-                self._waiting.extend(self._elsewhere)
+                self._again.extend(self._elsewhere)
                 self._elsewhere.clear()
                 looked = time.monotonic()
         self.tally.stopped = bool(self._running or self._waiting or self._elsewhere)
@@ -145,13 +151,25 @@ class _Sweep:
             self._driver.release(claim)
         self._running.clear()
 
+    @property
+    def _waiting(self) -> int:
+        """How many cells nobody runs, as far as is known."""
+        return self._left + len(self._again)
+
+    def _next(self) -> Cell:
+        """Return a cell that waits: one that was not tried yet, while there is any."""
+        if not self._left:
+            return self._again.popleft()
+        self._left -= 1
+        return next(self._coming)
+
     def _pending(self) -> bool:
         return not self._stop.wishes and bool(self._waiting or self._elsewhere)
 
     def _fill(self) -> None:
         """Start as many cells as the engine takes."""
         while self._waiting and len(self._running) < self._engine.window():
-            cell = self._waiting.popleft()
+            cell = self._next()
             claim = self._driver.claim(cell)
             if isinstance(claim, Claim):
                 self._running[cell.key] = claim
@@ -172,9 +190,9 @@ class _Sweep:
             if outcome.reason is None:
                 self._driver.release(claim)
             else:
-                self._driver.fail(claim, outcome.reason)
+                self._driver.fail(claim, outcome.reason, outcome.own)
                 self.tally.failed += 1
-            self._waiting.append(outcome.cell)
+            self._again.append(outcome.cell)
         del self._running[outcome.cell.key]
         self._watch(self.tally)
 
@@ -185,12 +203,24 @@ class _Sweep:
         return state in (State.DONE, State.QUARANTINED)
 
 
-def progress_of(bar: Any) -> Callable[[Tally], None]:
-    """Return what tells a progress bar of tqdm how a sweep stands."""
+def keys_of(cells: Cells) -> Iterator[str]:
+    """Return the keys of cells; a plan gives them without making its cells."""
+    return cells.keys() if isinstance(cells, Plan) else (cell.key for cell in cells)
+
+
+def progress_of(bar: Any, say: Say) -> Callable[[Tally], None]:
+    """Return what tells a progress bar of tqdm how a sweep stands, and first what was done already."""
+    begun: list[bool] = []
 
     def watch(tally: Tally) -> None:
+        settled = tally.done + tally.quarantined
+        if not begun:
+            begun.append(True)
+            bar.n = bar.initial = settled
+            if settled:
+                say(f"{settled} of {tally.cells} cells are done already")
         if tally.failed or tally.quarantined:
             bar.set_postfix(failures=tally.failed, quarantined=tally.quarantined, refresh=False)
-        bar.update(tally.done + tally.quarantined - bar.n)
+        bar.update(settled - bar.n)
 
     return watch

@@ -3,26 +3,32 @@
 Nobody runs a cell without a claim on it, a file that only one driver can create. A driver's claims hold as long as it
 lives, which its locked log shows; what a dead one had claimed is tried again by others, as the next attempt. After
 creating a claim a driver looks whether the row has come meanwhile: it was written before the claim on it was given up.
+
+An attempt that failed says whether that was the cell's own fault. `ATTEMPTS` of these put it into quarantine. One that
+something outside ended, a driver that died among them, is no fault of the cell: it is tried again without limit as long
+as other cells get done. Only `LOSSES` of them, with no row between the first and the last, put it into quarantine.
 """
 
 import json
 import os
 import socket
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
+from itertools import count
 from pathlib import Path
 from typing import Any, Self
 
 from posefit.files import appear, replaced_file
 from posefit.sweep.cell import Cell, CellResult
+from posefit.sweep.fold import LEFT, fold
 from posefit.sweep.ledger import CLAIMS, QUARANTINE, ROWS, Ledger, create
-from posefit.sweep.log import Writer, alive
+from posefit.sweep.locks import is_locked, on_one_machine
+from posefit.sweep.log import SUFFIX, Writer
 
-ATTEMPTS = 3
-LEFT = 60.0  # seconds after which a file that never got its name was left behind
+ATTEMPTS = 3  # that fail by a cell's own fault
+LOSSES = 50  # attempts that end by no fault of the cell, while no other cell gets done
 SYNC = 1.0  # seconds between two times that rows are brought to the disk
 
 
@@ -62,10 +68,18 @@ class Driver:
                 f"{self.ledger.path}: expected a folder that can be written to, got {error.strerror}"
             ) from None
         self._tidy()
+        with suppress(OSError):  # there is no room for it: the sweep will say so, if it needs any
+            fold(self.ledger, self._log)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._log.close()
+        try:
+            self._log.close()
+        except OSError as error:  # only a disk that takes rows and then loses them
+            raise ValueError(
+                f"{self.ledger.path}: expected its latest rows to reach the disk, got {error.strerror}; the same "
+                "command runs again what is missing"
+            ) from None
 
     def state(self, key: str) -> State | None:
         """Return whether a cell is done or in quarantine; else None."""
@@ -75,26 +89,37 @@ class Driver:
 
     def claim(self, cell: Cell) -> Claim | State:
         """Return the right to run a cell, or why there is none."""
-        reasons = []
-        for attempt in range(1, ATTEMPTS + 1):
+        faults: list[str] = []
+        losses: list[str] = []
+        for attempt in count(1):
+            if len(faults) == ATTEMPTS or len(losses) == LOSSES:
+                break
             path = self._path(cell.key, attempt)
-            if not path.exists() and appear(path, self._me):
+            if not path.exists() and self._taken(path):
                 self.ledger.refresh()
                 if state := self.state(cell.key):
                     self._clear(cell.key, attempt)
                     return state
                 return Claim(cell, attempt)
-            try:
-                held = json.loads(path.read_text(encoding="utf-8"))
-            except FileNotFoundError:  # it was finished or released just now
+            held = _held(path)
+            if held is None:  # it was finished or released just now
                 self.ledger.refresh()
                 return self.state(cell.key) or State.ELSEWHERE
-            if "failed" not in held and self._lives(held["driver"]):
+            if "failed" not in held and self._lives(held):
                 return State.ELSEWHERE
-            reasons.append(held.get("failed") or f"its driver, process {held['process']} of {held['host']}, died")
+            if held.get("own"):
+                faults.append(held["failed"])
+            elif held.get("rows") == len(self.ledger):  # others have got nowhere since
+                losses.append(held.get("failed") or f"its driver, process {held['process']} of {held['host']}, died")
+        rows = len(self.ledger)
         self.ledger.refresh()
         if state := self.state(cell.key):
             return state
+        if len(self.ledger) != rows:  # others have got somewhere, after all
+            return self.claim(cell)
+        reasons = faults if len(faults) == ATTEMPTS else [
+            f"something outside ended it {LOSSES} times while no other cell got done", *losses[-ATTEMPTS:]
+        ]  # fmt: skip
         content = {"key": cell.key, "spec": cell.spec, "status": "quarantined", "reasons": reasons}
         if appear(self.ledger.path / QUARANTINE / f"{cell.key}.json", content):
             self._clear(cell.key)
@@ -102,19 +127,34 @@ class Driver:
 
     def finish(self, claim: Claim, result: CellResult) -> None:
         """Write the row of a claimed cell. Raises OSError where there is no room."""
-        self._log.append(claim.cell.key, result.row, result.joints)
-        self.ledger.refresh()
+        if not self._mine(claim):  # somebody has removed the claim, and another driver may have been quicker
+            self.ledger.refresh()
+        if claim.cell.key not in self.ledger:
+            self._log.append(claim.cell.key, result.row, result.joints)
+            self.ledger.refresh()
         self._clear(claim.cell.key)
 
-    def fail(self, claim: Claim, reason: str) -> None:
-        """Note why an attempt failed."""
-        mine = json.dumps(self._me).removesuffix("}").encode()  # how the claim begins, and goes on beginning
-        with replaced_file(self._path(claim.cell.key, claim.attempt), mine) as building:
-            building.write_text(json.dumps({**self._me, "failed": reason}), encoding="utf-8")
+    def fail(self, claim: Claim, reason: str, own: bool = True) -> None:
+        """Note why an attempt failed, and whether that was the cell's own fault."""
+        if not self._mine(claim):  # somebody has removed the claim: it is as if it had been released
+            return
+        path = self._path(claim.cell.key, claim.attempt)
+        with replaced_file(path, self._mark) as building:
+            told = {**self._me, "rows": len(self.ledger), "failed": reason, "own": own}
+            building.write_text(json.dumps(told), encoding="utf-8")
+
+    def pardon(self, key: str) -> bool:
+        """Let a cell out of quarantine, and return whether it was there."""
+        if not self.ledger.in_quarantine(key):
+            return False
+        self._clear(key)  # first, so that it does not come back at once
+        (self.ledger.path / QUARANTINE / f"{key}.json").unlink(missing_ok=True)
+        return True
 
     def release(self, claim: Claim) -> None:
         """Give a claim up as if it had never been."""
-        self._path(claim.cell.key, claim.attempt).unlink(missing_ok=True)
+        if self._mine(claim):
+            self._path(claim.cell.key, claim.attempt).unlink(missing_ok=True)
 
     def sync(self) -> None:
         """Bring rows to the disk, once a second."""
@@ -127,23 +167,66 @@ class Driver:
     def _path(self, key: str, attempt: int) -> Path:
         return self._claims / f"{key}.{attempt}"
 
+    @property
+    def _mark(self) -> bytes:
+        """How a claim of this driver begins, and goes on beginning."""
+        return json.dumps(self._me).removesuffix("}").encode()
+
+    def _taken(self, path: Path) -> bool:
+        try:
+            return appear(path, {**self._me, "rows": len(self.ledger)})
+        except FileNotFoundError:  # another driver, whose clock is ahead, took what was being written for left behind
+            return appear(path, {**self._me, "rows": len(self.ledger)})
+
+    def _mine(self, claim: Claim) -> bool:
+        try:
+            return self._path(claim.cell.key, claim.attempt).read_bytes().startswith(self._mark)
+        except FileNotFoundError:
+            return False
+
     def _clear(self, key: str, last: int = ATTEMPTS) -> None:
-        for attempt in range(1, last + 1):
-            self._path(key, attempt).unlink(missing_ok=True)
+        for attempt in count(1):
+            try:
+                self._path(key, attempt).unlink()
+            except FileNotFoundError:
+                if attempt >= last:
+                    return
 
     def _tidy(self) -> None:
         """Remove what drivers left behind that died between what they wrote and giving up their claim on it."""
         for entry in os.scandir(self._claims):
             if entry.name.startswith("."):
                 with suppress(FileNotFoundError):  # it got its name just now
-                    if time.time() - entry.stat().st_mtime > LEFT:
+                    if self._log.began - entry.stat().st_mtime > LEFT:
                         os.unlink(entry)
             elif self.state(entry.name.partition(".")[0]):
                 Path(entry).unlink(missing_ok=True)
 
-    def _lives(self, name: str) -> bool:
+    def _lives(self, held: dict[str, Any]) -> bool:
+        name = held["driver"]
         if name == self._log.name:
             return True
-        if name not in self._dead and not alive(self.ledger.path / ROWS, name):
+        if name in self._dead:
+            return False
+        if held["host"] != socket.gethostname() and (local := on_one_machine(self.ledger.path)):
+            raise ValueError(
+                f"{self.ledger.path}: expected a disk whose locks other machines see, got {local}, and {held['host']} "
+                "has begun cells: mount it with locks; or let one machine work on it, and remove from claims/ what "
+                "another one left there"
+            )
+        if not is_locked(self.ledger.path / ROWS / f"{name}{SUFFIX}"):
             self._dead.add(name)
         return name not in self._dead
+
+
+def _held(path: Path) -> dict[str, Any] | None:
+    """Return what a claim says; None where there is none. A damaged one holds nothing."""
+    try:
+        held: dict[str, Any] = json.loads(path.read_bytes())
+        if all(isinstance(held[name], str) for name in ("driver", "host")) and held["process"]:
+            return held
+    except FileNotFoundError:
+        return None
+    except (ValueError, KeyError, TypeError):
+        pass
+    return {"failed": "its claim was damaged"}

@@ -1,11 +1,11 @@
 """The ledger: a folder in which every finished cell has its row, whatever happens to those who write to it.
 
 ledger.json          the version of posefit whose results these are
-rows/NAME.jsonl      finished rows, one log a driver, never changed afterwards
+rows/NAME.jsonl      finished rows, one log a driver; those of drivers that ended are folded together
 rows/NAME.joints     the joints of the rows' frames
 claims/KEY.n         the nth attempt at a cell: who runs it, or why it failed
 quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
-aside/               damaged lines that were found; their cells are run again
+aside/               damaged lines and files that were found; their cells are run again
 """
 
 import io
@@ -13,12 +13,13 @@ import json
 import os
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from posefit.files import appear
-from posefit.reading import cut, json_of, quoted, read_text
-from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, lines
+from posefit.reading import cut, parsed_json, quoted, read_text
+from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, joints_at, lines
 from posefit.sweep.table import dataframe
 from posefit.version import __version__
 
@@ -43,17 +44,27 @@ class Ledger:
         self._ends: dict[str, int] = {}  # how far each log was read
         self._places: dict[str, tuple[str, int]] = {}  # of every finished row: its log, and where in it
         self.refresh()
+        self.refresh()  # a log may have been folded into another while the folder was listed
 
     def refresh(self) -> None:
         """Take note of what was written since."""
-        for name in self._logs():
+        logs = self._logs()
+        if any(logs.get(name, -1) < end for name, end in self._ends.items()):
+            # folded into another one, which was there before this one went, or cut off: everything is read again
+            self._ends.clear()
+            self._places.clear()
+            logs = self._logs()
+        for name in sorted(logs):
+            if logs[name] == self._ends.get(name, 0):
+                continue
             for offset, line in lines(self.path / ROWS / name, self._ends.get(name, 0)):
                 self._ends[name] = offset + len(line)
                 found = decoded(line)
                 if found is None:
-                    self._set_aside(Damage(self.path / ROWS / name, offset, line))
+                    self.set_aside(Damage(self.path / ROWS / name, offset, line))
                 else:
-                    # twice the same row can only come of a lock that a file system did not keep: the first one counts
+                    # a row may be there twice: of a log that is folded just now, or of a lock that a file system did
+                    # not keep. The first one counts
                     self._places[found[0]] = min((name, offset), self._places.get(found[0], (name, offset)))
 
     def __len__(self) -> int:
@@ -62,29 +73,49 @@ class Ledger:
     def __contains__(self, key: str) -> bool:
         return key in self._places
 
+    def place(self, key: str) -> tuple[str, int] | None:
+        """Return the log that a cell's row is in, and where; None where it has none."""
+        return self._places.get(key)
+
     def in_quarantine(self, key: str) -> bool:
         """Return whether a cell is in quarantine."""
         return (self.path / QUARANTINE / f"{key}.json").exists()
 
+    def sentenced(self) -> set[str]:
+        """Return the keys of all cells in quarantine that have no row."""
+        names = (entry.name.removesuffix(".json") for entry in os.scandir(self.path / QUARANTINE))
+        return {name for name in names if name not in self}
+
     def quarantined(self) -> list[dict[str, Any]]:
         """Return the cells in quarantine: key, spec, status, and the reason of each attempt."""
         paths = sorted((self.path / QUARANTINE).glob("*.json"))
-        return [json.loads(path.read_text(encoding="utf-8")) for path in paths if path.stem not in self]
+        found = [self._sentence(path) for path in paths if path.stem not in self]
+        return [one for one in found if one is not None]
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it."""
-        for name in self._logs():
-            for offset, line in lines(self.path / ROWS / name):
-                found = decoded(line)
-                if found is not None and self._places.get(found[0]) == (name, offset):
-                    yield json.loads(found[1])
+        given: set[str] = set()
+        while True:
+            for name in sorted(self._logs()):
+                for offset, line in lines(self.path / ROWS / name):
+                    found = decoded(line)
+                    if found is not None and self._places.get(found[0]) == (name, offset) and found[0] not in given:
+                        given.add(found[0])
+                        yield json.loads(found[1])
+            if self._ends.keys() <= self._logs().keys():
+                return
+            self.refresh()  # a log was folded into another one meanwhile
 
     def row(self, key: str) -> dict[str, Any]:
         """Return the row of a cell. Raises KeyError where there is none."""
         name, offset = self._places[key]
-        with (self.path / ROWS / name).open("rb") as file:
-            file.seek(offset)
-            found = decoded(file.readline())
+        try:
+            with (self.path / ROWS / name).open("rb") as file:
+                file.seek(offset)
+                found = decoded(file.readline())
+        except FileNotFoundError:  # folded into another one meanwhile
+            self.refresh()
+            return self.row(key)
         if found is None or found[0] != key:
             raise ValueError(f"{self.path / ROWS / name}: the row of cell {key[:8]} must be whole, got a damaged one")
         row: dict[str, Any] = json.loads(found[1])
@@ -101,9 +132,7 @@ class Ledger:
 
         start, length, checksum = self.row(key)["joints"]
         path = (self.path / ROWS / self._places[key][0]).with_suffix(JOINTS)
-        with path.open("rb") as file:
-            file.seek(start)
-            data = file.read(length)
+        data = joints_at(path, start, length)
         if zlib.crc32(data) != checksum:
             raise ValueError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
@@ -120,19 +149,45 @@ class Ledger:
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
         return dataframe(self.all_rows())
 
-    def _logs(self) -> list[str]:
-        return sorted(entry.name for entry in os.scandir(self.path / ROWS) if entry.name.endswith(SUFFIX))
-
-    def _set_aside(self, damage: Damage) -> None:
+    def set_aside(self, damage: Damage) -> bool:
+        """Keep a damaged line for whoever wants to look at it, and return whether it is kept."""
         aside = self.path / ASIDE / f"{damage.path.stem}-{damage.offset}.txt"
         if aside.exists():
-            return
+            return True
         try:
             aside.write_bytes(damage.text)
         except OSError as error:
             self._say(f"warning: {damage}, and cannot be put aside: {error.strerror}; it does not count")
+            return False
+        self._say(f"warning: {damage}; put aside as {aside}, to be run again")
+        return True
+
+    def _logs(self) -> dict[str, int]:
+        """Return the logs that there are, with their sizes."""
+        found = {}
+        for entry in os.scandir(self.path / ROWS):
+            with suppress(FileNotFoundError):  # an empty one that went away
+                if entry.name.endswith(SUFFIX):
+                    found[entry.name] = entry.stat().st_size
+        return found
+
+    def _sentence(self, path: Path) -> dict[str, Any] | None:
+        """Return what a file of the quarantine says. A damaged one is put aside, and its cell is tried again."""
+        try:
+            found: dict[str, Any] = json.loads(path.read_bytes())
+            if found["key"] == path.stem and isinstance(found["spec"], dict) and isinstance(found["reasons"], list):
+                return found
+        except (ValueError, KeyError, TypeError):
+            pass
+        except FileNotFoundError:  # it is tried again just now
+            return None
+        try:
+            path.rename(self.path / ASIDE / path.name)
+        except OSError as error:
+            self._say(f"warning: {path} is damaged, and cannot be put aside: {error.strerror}; it does not count")
         else:
-            self._say(f"warning: {damage}; put aside as {aside}, to be run again")
+            self._say(f"warning: {path} is damaged; put aside, its cell is to be run again")
+        return None
 
 
 def create(path: Path) -> None:
@@ -161,7 +216,7 @@ def create(path: Path) -> None:
 def _version(path: Path) -> str:
     """Return the version of posefit whose results a ledger holds."""
     try:
-        index = json_of(read_text(path / INDEX, LARGEST_INDEX))
+        index = parsed_json(read_text(path / INDEX, LARGEST_INDEX))
         form, version = index["format"], index["version"]
     except (FileNotFoundError, NotADirectoryError):
         raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None

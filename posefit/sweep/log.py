@@ -4,7 +4,7 @@ A line is a row with its key and a checksum; `.joints` beside it holds the rows'
 that was cut off when its driver died has no end, and counts for nothing.
 """
 
-import fcntl
+import errno
 import json
 import os
 import re
@@ -15,6 +15,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from posefit.sweep.locks import locked
 
 SUFFIX, JOINTS = ".jsonl", ".joints"
 _LINE = re.compile(rb'\{"key": "([0-9a-f]{64})", "crc": "([0-9a-f]{8})", "row": (\{.*\})\}\n', re.DOTALL)
@@ -56,15 +58,27 @@ class Writer:
         self._paths = folder / f"{self.name}{SUFFIX}", folder / f"{self.name}{JOINTS}"
         # opened for this process alone: no worker inherits the lock
         self._rows, self._joints = (os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644) for path in self._paths)
-        fcntl.flock(self._rows, fcntl.LOCK_EX)
-        self._ends = {self._rows: 0, self._joints: 0}
+        try:
+            locked(self._rows, self._paths[0])
+        except ValueError:
+            for path, file in zip(self._paths, (self._rows, self._joints), strict=True):
+                path.unlink()
+                os.close(file)
+            raise
         self._synced = time.monotonic()
 
-    def append(self, key: str, row: Mapping[str, Any], joints: bytes) -> None:
-        """Add a row with its arrays. Raises OSError where there is no room, and leaves the log as it was."""
-        place = [self._ends[self._joints], len(joints), zlib.crc32(joints)]
+    def append(self, key: str, row: Mapping[str, Any], joints: bytes, checksum: int | None = None) -> None:
+        """Add a row with its arrays, whose checksum is another one only where they are damaged already.
+
+        Raises OSError where there is no room, and leaves the log as it was.
+        """
+        place = [os.fstat(self._joints).st_size, len(joints), zlib.crc32(joints) if checksum is None else checksum]
         self._add(self._joints, joints)
-        self._add(self._rows, encoded(key, {**row, "joints": place}))
+        line = encoded(key, {**row, "joints": place})
+        end = os.fstat(self._rows).st_size
+        # where somebody has cut the log off, what is left of a line ends here and takes no other with it
+        cut = end and os.pread(self._rows, 1, end - 1) != b"\n"
+        self._add(self._rows, b"\n" + line if cut else line)
 
     def sync(self, seconds: float) -> None:
         """Bring everything to the disk, if it is so long ago that this was done."""
@@ -73,11 +87,16 @@ class Writer:
                 os.fsync(file)
             self._synced = time.monotonic()
 
+    @property
+    def began(self) -> float:
+        """When the log was made, by the clock of its disk, which need not be that of this machine."""
+        return os.fstat(self._rows).st_ctime
+
     def close(self) -> None:
         """End the log; one without rows goes away."""
         try:
             self.sync(0.0)
-            if not self._ends[self._rows]:
+            if not os.fstat(self._rows).st_size:
                 for path in self._paths:
                     path.unlink(missing_ok=True)
         finally:
@@ -85,15 +104,16 @@ class Writer:
                 os.close(file)
 
     def _add(self, file: int, data: bytes) -> None:
-        end = self._ends[file]
-        done = 0
+        found = os.fstat(file)
+        if not found.st_nlink:
+            raise FileNotFoundError(errno.ENOENT, "a log that somebody has removed")
+        end, done = found.st_size, 0
         try:
             while done < len(data):
                 done += os.pwrite(file, data[done:], end + done)
         except OSError:
             os.ftruncate(file, end)
             raise
-        self._ends[file] = end + len(data)
 
 
 def lines(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
@@ -113,16 +133,11 @@ def lines(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
             start += len(line)
 
 
-def alive(folder: Path, name: str) -> bool:
-    """Return whether the driver that writes a log lives."""
+def joints_at(path: Path, start: int, length: int) -> bytes:
+    """Return the arrays of a row: bytes of the file beside its log, fewer where that was cut off."""
     try:
-        file = os.open(folder / f"{name}{SUFFIX}", os.O_RDONLY)
+        with path.open("rb") as file:
+            file.seek(start)
+            return file.read(length)
     except FileNotFoundError:
-        return False
-    try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(file)
-    return False
+        return b""

@@ -22,15 +22,18 @@ An entry of a list of the product is the value of a cell's field, or a table of 
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.resources import files
-from itertools import product
+from itertools import chain
+from math import prod
 from pathlib import Path
 from typing import Any, Self
 
-from posefit.reading import SHOWN, quoted, read_text, toml_of
+import numpy as np
+
+from posefit.reading import SHOWN, parsed_toml, quoted, read_text
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import FIELDS, cell_of, flattened, names_of
+from posefit.sweep.product import Entries, Product
 
 LISTS = {
     "methods": "method",
@@ -45,22 +48,22 @@ DEFAULT = "default"  # the name of the plan that posefit brings along
 INPUT = "-"  # the name of a plan that is read from standard input
 MOST = 1_000_000  # cells
 LARGEST_FILE = 1_000_000  # bytes
+DIGEST = 32  # bytes of a key
 
 
-@dataclass(frozen=True)
 class Plan:
-    """The cells of a sweep; no two are alike."""
+    """The cells of a sweep, made as they are asked for; no two are alike."""
 
-    cells: tuple[Cell, ...]
-
-    def __post_init__(self) -> None:
-        if not self.cells:
+    def __init__(self, *parts: Product | Sequence[Cell]) -> None:
+        self._parts = parts
+        self._digests = bytearray()
+        for digest in chain.from_iterable(_digests(part) for part in parts):
+            self._digests += digest
+        if not self._digests:
             raise ValueError("a plan must hold at least one cell, got none")
-        seen: dict[str, Cell] = {}
-        for cell in self.cells:
-            if cell.key in seen:
-                raise ValueError(f"the cells of a plan must differ, got {cell} twice")
-            seen[cell.key] = cell
+        if twice := _repeated(bytes(self._digests)):
+            cell = next(cell for cell in self if cell.key == twice)
+            raise ValueError(f"the cells of a plan must differ, got {cell} twice")
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
@@ -77,7 +80,7 @@ class Plan:
         else:
             text = read_text(path, LARGEST_FILE, "a plan in TOML")
         try:
-            return cls.of(toml_of(text))
+            return cls.of(parsed_toml(text))
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
@@ -98,76 +101,102 @@ class Plan:
         listed = tables.get("cells", [])
         if not isinstance(listed, list | tuple):
             raise ValueError(f"cells must be a list of tables, got {quoted(listed)}")
-        specs = [*_combined(tables.get("product")), *(_mapping("cells", one) for one in listed)]
-        shared = _settings(defaults.get("settings", {}), specs, defaults)
-        return cls(
-            tuple(cell_of({**defaults, **spec, "settings": mine}) for spec, mine in zip(specs, shared, strict=True))
-        )
+        fitting = _Shared(defaults)
+
+        def make(spec: Mapping[str, Any]) -> Cell:
+            return cell_of({**defaults, **spec, "settings": fitting.settings(spec)})
+
+        lists = _lists(tables.get("product"))
+        cells = [make(_mapping("cells", one)) for one in listed]
+        plan = cls(cells) if lists is None else cls(Product(lists, make), cells)
+        fitting.check()
+        return plan
 
     def __len__(self) -> int:
-        return len(self.cells)
+        return len(self._digests) // DIGEST
 
     def __iter__(self) -> Iterator[Cell]:
-        return iter(self.cells)
+        return chain.from_iterable(self._parts)
+
+    def keys(self) -> Iterator[str]:
+        """Yield the key of each cell, without making it."""
+        return (self._digests[k : k + DIGEST].hex() for k in range(0, len(self._digests), DIGEST))
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """All cells, where there are few enough."""
+        return tuple(self)
 
 
-def _combined(tables: Any) -> list[dict[str, Any]]:
-    """Return the specs of a product."""
+class _Shared:
+    """The settings of the defaults, of which each cell has those that its method uses."""
+
+    def __init__(self, defaults: Mapping[str, Any]) -> None:
+        self._method = defaults.get("method")
+        self._flat = flattened("defaults.settings", defaults.get("settings", {}))
+        self._unused = dict(self._flat)
+
+    def settings(self, spec: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the settings of a cell: its own, and of the shared ones those of what its method uses."""
+        method = spec.get("method", self._method)
+        names = names_of(method) if isinstance(method, str) else ()
+        fitting = {name: value for name, value in self._flat.items() if name.partition(".")[0] in names}
+        for name in fitting:
+            self._unused.pop(name, None)
+        return fitting | flattened("settings", spec.get("settings", {}))
+
+    def check(self) -> None:
+        """Return nothing. Raises ValueError where no cell used one of them."""
+        if self._unused:
+            raise ValueError(
+                f"defaults.settings must be of the plan's methods, got {next(iter(self._unused))!r}, which none uses"
+            )
+
+
+def _lists(tables: Any) -> list[Entries] | None:
+    """Return the entries of each list of a product; None where there is no product."""
     if tables is None:
-        return []
-    lists = _mapping("product", tables)
-    for name in lists:
+        return None
+    named = _mapping("product", tables)
+    for name in named:
         if name not in LISTS:
             raise ValueError(f"product must hold {', '.join(LISTS)}, got {quoted(name)}")
-    entries = [_entries(name, values) for name, values in lists.items()]
-    count = 1
-    for one in entries:
-        count *= len(one)
-    if count > MOST:
+    entries = [_entries(name, values) for name, values in named.items()]
+    if (count := prod(len(one) for one in entries)) > MOST:
         raise ValueError(f"product must hold at most {MOST:,} cells, got {count:,}")
-    specs = []
-    for chosen in product(*entries):
-        spec: dict[str, Any] = {}
-        for fields in chosen:
-            if twice := sorted(spec.keys() & fields.keys()):
-                raise ValueError(f"product must say {twice[0]} in one list, got it in two")
-            spec |= fields
-        specs.append(spec)
-    return specs
+    return entries
 
 
-def _entries(name: str, values: Any) -> list[dict[str, Any]]:
+def _digests(part: Product | Sequence[Cell]) -> Iterator[bytes]:
+    return part.digests() if isinstance(part, Product) else (bytes.fromhex(cell.key) for cell in part)
+
+
+def _repeated(digests: bytes) -> str | None:
+    """Return a key that is there twice; None where all differ."""
+    starts = np.frombuffer(digests, dtype=np.uint64)[:: DIGEST // 8]  # alike where keys are; seldom where they are not
+    values, counts = np.unique(starts, return_counts=True)
+    seen: set[bytes] = set()
+    for k in np.flatnonzero(np.isin(starts, values[counts > 1])):
+        one = digests[DIGEST * k : DIGEST * (k + 1)]
+        if one in seen:
+            return one.hex()
+        seen.add(one)
+    return None
+
+
+def _entries(name: str, values: Any) -> Entries:
     """Return the fields that each entry of one list of a product stands for."""
     field = LISTS[name]
     if field in ("instance", "seed") and type(values) is int:
         if values > MOST:
             raise ValueError(f"product.{name} must be at most {MOST:,}, got {_written(values)}")
-        values = list(range(values))
-    if not isinstance(values, list | tuple):
+        values = range(values)
+    if not isinstance(values, list | tuple | range):
         raise ValueError(f"product.{name} must be a list, got {quoted(values)}")
     if not values:
         raise ValueError(f"product.{name} must hold at least one, got none: an empty product has no cells")
     whole = field == "corruption"  # whose value is itself a table
-    return [dict(one) if isinstance(one, Mapping) and not whole else {field: one} for one in values]
-
-
-def _settings(shared: Any, specs: Sequence[Mapping[str, Any]], defaults: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the settings of every cell: its own, and of the shared ones those of what its method uses."""
-    flat = flattened("defaults.settings", shared)
-    unused = dict(flat)
-    mine = []
-    for spec in specs:
-        method = spec.get("method", defaults.get("method"))
-        names = names_of(method) if isinstance(method, str) else ()
-        fitting = {name: value for name, value in flat.items() if name.partition(".")[0] in names}
-        for name in fitting:
-            unused.pop(name, None)
-        mine.append(fitting | flattened("settings", spec.get("settings", {})))
-    if specs and unused:
-        raise ValueError(
-            f"defaults.settings must be of the plan's methods, got {next(iter(unused))!r}, which none uses"
-        )
-    return mine
+    return Entries(field, values, whole)
 
 
 def _mapping(name: str, value: Any) -> dict[str, Any]:

@@ -3,8 +3,8 @@
 Columns are `key`, `version`, `status` ("done" or "quarantined"), `reason`; the cell's spec, with `settings`,
 `corruption`, `train`, `view_degrees` and `size` as text, so that rows can be grouped by them; every figure, those of a
 kind as `error_degrees.mean`, `skill.nearest`, `baselines_degrees.mean_pose`; `joint_errors_mm.NAME` of the 27 joints;
-and `seconds` and `seconds_per_frame`, the only ones that differ when a cell is run again. Rows are sorted by what the
-spec says, not by when they were finished.
+and `seconds`, `seconds_per_frame` and `cpu_seconds_per_frame`, the only ones that differ when a cell is run again. Rows
+are sorted by what the spec says, not by when they were finished.
 """
 
 import importlib

@@ -67,12 +67,14 @@ class Evaluation:
             per_frame, errors = self._errors()
             columns |= per_frame
         used, seconds = sum(frame.evaluations for frame in frames), sum(frame.seconds for frame in frames)
+        spent = [frame.cpu_seconds for frame in frames if frame.cpu_seconds is not None]
         measures = Measures(
             **errors,
             iou=float(columns["iou"][usable].mean()),
             cost=float(columns["cost"][usable].mean()),
             held_frames=int(np.count_nonzero(~np.array(self._usable))),
             seconds_per_frame=seconds / len(frames),
+            cpu_seconds_per_frame=sum(spent) / len(spent) if spent else None,
             evaluations=used,
             evaluations_per_second=used / max(seconds, 1e-9),  # a tracker of somebody else may say 0
         )

@@ -123,6 +123,16 @@ class Measures:
         ),
     )
     seconds_per_frame: float = field(metadata=_about("time", "ms a frame", 1, "wall time a frame", 1e3))
+    cpu_seconds_per_frame: float | None = field(
+        metadata=_about(
+            "CPU time",
+            "ms a frame",
+            1,
+            "processor time a frame, of all threads of the process together, where a tracker says; a busy machine "
+            "does not add to it",
+            1e3,
+        )
+    )
     evaluations: int = field(
         metadata=_about("evaluations", "", 0, "poses whose cost was computed, in all frames together")
     )

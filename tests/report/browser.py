@@ -78,6 +78,7 @@ def row_of(cell: Cell, error: float, **more: Any) -> dict[str, Any]:
         "baselines_degrees": dict.fromkeys(skill, 4.0),
         "prior_floor_degrees": 0.5,
         "seconds_per_frame": 0.01,
+        "cpu_seconds_per_frame": 0.008,
         "seconds": 0.01 * cell.frames,
         "evaluations_used": cell.evaluations * cell.frames,
         "joint_errors_mm": [error * joint for joint in range(27)],

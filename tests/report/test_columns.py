@@ -23,6 +23,7 @@ def test_every_figure_has_its_place_in_a_row(row):
         assert math.isfinite(column.value(row)), column.name
     assert COLUMNS["error"].value(row) == row["error_degrees"]["mean"]
     assert COLUMNS["ms"].value(row) == 1e3 * row["seconds_per_frame"]
+    assert COLUMNS["cpu_ms"].value(row) == 1e3 * row["cpu_seconds_per_frame"]
     assert COLUMNS["evaluations"].value(row) == row["evaluations_used"] / 3
     for name in BASELINES:
         assert COLUMNS[f"skill_{name}"].value(row) == row["skill"][name]
@@ -56,7 +57,7 @@ def test_a_page_is_given_a_digit_more_than_it_shows():
     kept = {name: COLUMNS[name].kept for name in SHOWN}
     assert kept == {
         "error": 3, "skill_mean_pose": 3, "skill_persistence": 3, "skill_nearest": 3, "lost": 4, "swapped": 4,
-        "mpjpe": 1, "iou": 4, "ms": 2, "evaluations": 1,
+        "mpjpe": 1, "iou": 4, "ms": 2, "cpu_ms": 2, "evaluations": 1,
     }  # fmt: skip
     assert set(SHOWN) < set(FIGURES)
 

@@ -220,3 +220,14 @@ def test_on_paper_there_are_no_controls(chromium: Any, swept: Path) -> None:
         assert seen.page.locator("#leaders table").is_visible()
         assert seen.page.locator("nav").is_hidden()
         assert seen.page.locator("#rows").is_hidden()
+
+
+def test_a_page_of_failures_alone_loads_and_shows_them(chromium: Any, tmp_path: Path) -> None:
+    lost = replace(cells(1)[0], seed=7)
+    made = ledger(tmp_path / "results", [], [(lost, ["its process died of SIGSEGV"])])
+    assert run("report", made, "--out", tmp_path / "report.html").exit_code == 0
+    with opened(chromium, tmp_path / "report.html") as watched:
+        assert "its process died of SIGSEGV" in watched.page.inner_text("#notes")
+        assert "random@pca on walk" in watched.page.inner_text("#failures")
+        assert watched.page.locator("#leaderboard").count() == 0
+        assert watched.complaints == []

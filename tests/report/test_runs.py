@@ -94,7 +94,7 @@ def test_seeds_of_any_size_keep_every_digit(tmp_path: Path) -> None:
 
 
 def test_a_ledger_without_rows_is_refused(tmp_path: Path) -> None:
-    empty = ledger(tmp_path / "results", [], [(FIRST, ["why"])])
+    empty = ledger(tmp_path / "results", [])
     with pytest.raises(ValueError, match="results: expected a ledger with finished rows, got one with none"):
         runs_of(Ledger(empty))
 

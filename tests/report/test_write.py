@@ -61,7 +61,8 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     done = run("report", results, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert done.stdout.splitlines()[-1] == f"written to {out}: open it in any browser"
-    assert [line.split()[:2] for line in done.stdout.splitlines()[1:-1]] == [
+    assert done.stdout.startswith("1 cell failed, left out of all figures: random@pca 1\n")
+    assert [line.split()[:2] for line in done.stdout.splitlines()[3:-1]] == [
         ["sapso@pca", "1.06"],
         ["random@pca", "2.06"],
     ]
@@ -82,6 +83,44 @@ def test_the_same_ledger_gives_the_same_bytes_and_replaces_an_earlier_report(res
     out.write_text(MARK + "of another day")
     assert run("report", results, "--out", out).exit_code == 0
     assert out.read_bytes() == first
+
+
+def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_above_the_leaderboard(
+    tmp_path: Path,
+) -> None:
+    found = [
+        result(replace(FIRST, method=m, instance=i, seed=s), 1.0 + i)
+        for m in ("random@pca", "sapso@pca")
+        for i in range(3)
+        for s in range(2)
+        if (m, i) != ("sapso@pca", 1)
+    ]
+    lost = [(replace(FIRST, method="sapso@pca", instance=1, seed=s), ["its process died of SIGSEGV"]) for s in range(2)]
+    done = run("report", ledger(tmp_path / "results", found, lost), "--out", tmp_path / "report.html")
+    assert done.stdout.splitlines()[:5] == [
+        "2 cells failed, left out of all figures: sapso@pca 2",
+        "  2 x its process died of SIGSEGV",
+        "left out of the comparison, for every method: 1 instance",
+        "  walk, view 45, instance 1: no run of sapso@pca",
+        f"{'':32} error deg   95 % interval   skill",
+    ]
+    header = Page(tmp_path / "report.html").data["header"]
+    assert header["failed_by"] == {"sapso@pca": 2}
+    assert [(one["instance"], len(one["missing"])) for one in header["dropped"]] == [(1, 1)]
+
+
+def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: Path) -> None:
+    made = ledger(tmp_path / "results", [], [(LOST, ["ValueError: it had to", "its process died of SIGSEGV"])])
+    done = run("report", made, "--out", tmp_path / "report.html")
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.splitlines()[:3] == [
+        "1 cell failed, left out of all figures: random@pca 1",
+        "  1 x ValueError: it had to",
+        "  1 x its process died of SIGSEGV",
+    ]
+    page = Page(tmp_path / "report.html")
+    assert page.data["failures"][0]["reasons"] == ["ValueError: it had to", "its process died of SIGSEGV"]
+    assert page.data["header"]["unfinished"] == ["random@pca"]
 
 
 def test_json_is_the_leaderboard(results: Path, tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from posefit.sweep.ledger import Ledger
+from tests.sweep.chaos import Chaos
 from tests.sweep.fake import LIMITS, STARTS, cells, starts
 
 ROOT = Path(__file__).parents[2]
@@ -92,6 +93,20 @@ def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: s
     runs = Counter(key for key, _ in starts(noted))
     assert {key for key, count in runs.items() if count > 1} <= killed
     wait_for(lambda: not any(living(worker) for worker in {worker for _, worker in starts(noted)}))
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds a driver's processes in /proc")
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_sabotaged_sweep_loses_and_doubles_no_row_and_quarantines_no_healthy_cell(
+    engine: str, tmp_path: Path
+) -> None:
+    # `python -m tests.sweep.chaos` is the long version
+    if engine == "dask":
+        pytest.importorskip("distributed")
+    told = Chaos(tmp_path, engine, 24, 8, 1).run()
+    assert {name: told[name] for name in ("lost", "doubled", "quarantined")} == {
+        "lost": 0, "doubled": 0, "quarantined": 0,
+    }  # fmt: skip
 
 
 def test_two_drivers_at_once_run_no_cell_twice(tmp_path: Path) -> None:

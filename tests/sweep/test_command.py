@@ -8,7 +8,9 @@ from click.testing import CliRunner
 
 from posefit.cli import main
 from posefit.sweep.command import duration_text
+from posefit.sweep.driver import Claim, Driver, State
 from posefit.sweep.ledger import Ledger
+from posefit.sweep.plan import Plan
 from tests.cli.test_command_line import fails, run
 
 PLAN = """
@@ -94,6 +96,32 @@ def test_a_cell_that_fails_is_quarantined_and_the_exit_status_says_so(plan: Path
     assert "ValueError: " in lost["reasons"][0]
 
 
+def test_a_preview_names_the_kind_of_cell_that_fails_and_estimates_the_others(plan: Path) -> None:
+    # the prior refuses its setting when it is fitted: the sweep would isolate it, and so does its preview
+    plan.write_text(PLAN + '\n[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nsettings.pca.components = -1\n')
+    result = run("sweep", plan, "--dry-run", "--workers", 1)
+    assert result.exit_code == 0, result.stderr
+    *_, warning, last = result.stdout.splitlines()
+    assert warning.startswith("warning: random@pca on walk, instance 0, seed 0: ValueError: ")
+    assert last.startswith("9 cells, 9 of them to run: about ")
+
+
+def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path, tmp_path: Path) -> None:
+    plan.write_text('[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nframes = 1\nevaluations = 80\n')
+    (cell,) = Plan.read(plan)
+    with Driver(tmp_path / "out") as driver:
+        for _ in range(3):
+            claim = driver.claim(cell)
+            assert isinstance(claim, Claim)
+            driver.fail(claim, "the disk of its files was away")
+        assert driver.claim(cell) is State.QUARANTINED
+    assert run("sweep", plan, "--out", tmp_path / "out", "--workers", 1).exit_code == 1
+    again = run("sweep", plan, "--out", tmp_path / "out", "--workers", 1, "--retry-quarantined")
+    assert again.exit_code == 0, again.stderr
+    assert "1 of 1 cells done, 1 of them now" in again.stdout
+    assert "1 cell is out of quarantine, to be tried again" in again.stderr
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -102,6 +130,7 @@ def test_a_cell_that_fails_is_quarantined_and_the_exit_status_says_so(plan: Path
         (["PLAN", "--out", "OUT", "--workers", "0"], "--workers must be at least 1, got 0"),
         (["PLAN", "--out", "OUT", "--dask-local", "-1"], "--dask-local must be at least 1, got -1"),
         (["PLAN", "--out", "OUT", "--workers", "1", "--dask-local", "1"], "--workers must not be given with --dask-local"),
+        (["PLAN", "--out", "OUT", "--dask-dashboard"], "--dask-dashboard must be given with --dask-local"),
         (["PLAN", "--out", "OUT", "--cell-seconds", "0"], "the limit of seconds must be above 0, got 0.0"),
         (["PLAN", "--out", "OUT", "--scheduler", "nonsense"], "scheduler must be one that answers, got nonsense"),
         (["BAD", "--out", "OUT"], "bad.toml: defaults must be of"),

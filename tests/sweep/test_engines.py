@@ -1,13 +1,17 @@
 """What a cell can do wrong ends with that cell; what runs it makes no difference."""
 
+import os
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
 from dataclasses import replace
+from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -24,6 +28,7 @@ from tests.sweep.fake import behave, cells, swept
 
 LIMITS = Limits(seconds=300.0, gigabytes=0.6)  # a slow machine takes seconds to start a worker
 PATIENCE = 300.0  # seconds for workers to come; these tests mean something else
+ROOT = Path(__file__).parents[2]
 Make = Callable[..., Engine]
 
 
@@ -111,6 +116,144 @@ def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(t
     first = next(iter(found[0][0].values()))
     assert first["trace"]["evaluations"][-1] <= 200
     assert first["trace"]["cost"] == sorted(first["trace"]["cost"], reverse=True)
+
+
+@pytest.mark.parametrize("engine", ["pebble", pytest.param("dask", marks=pytest.mark.slow)])
+def test_a_cell_that_ends_its_process_with_status_0_is_noticed_at_once(engine: str, tmp_path: Path) -> None:
+    # the limit is an hour: a sweep that waits for it takes three, and no test here does
+    bad = [replace(cells(1)[0], frames=n) for n in (fake.LEAVE, fake.EXIT)]
+    tally = swept(tmp_path / "ledger", [*bad, *cells(3)], made(engine, Limits(3600.0, 0.6)))
+    assert (tally.done, tally.quarantined, tally.failed) == (3, 2, 2 * ATTEMPTS)
+    reasons = {row["spec"]["frames"]: row["reasons"] for row in Ledger(tmp_path / "ledger").quarantined()}
+    assert reasons[fake.LEAVE] == ["its process ended itself with status 0"] * 3
+    assert reasons[fake.EXIT] == ["SystemExit: 0"] * 3
+
+
+@pytest.mark.parametrize("engine", ["pebble", pytest.param("dask", marks=pytest.mark.slow)])
+def test_a_process_that_something_outside_kills_costs_its_cell_no_attempt(engine: str, tmp_path: Path) -> None:
+    pair = [replace(cell, frames=fake.KILLED) for cell in cells(2)]
+    running = made(engine, LIMITS)
+    ended: list[Any] = []
+    with closing(running):
+        running.window()
+        for cell in pair:
+            running.submit(cell)
+            while not (found := running.wait(1.0)):
+                pass
+            ended += found
+    assert [(one.reason, one.own) for one in ended] == [
+        ("its process died of SIGKILL", False),
+        ("its process died of SIGTERM", False),
+    ]
+
+
+@pytest.mark.parametrize("engine", ["pebble", pytest.param("dask", marks=pytest.mark.slow)])
+def test_limits_of_memory_and_time_segfaults_and_exceptions_are_the_cells_own_faults(engine: str) -> None:
+    bad = [replace(cells(1)[0], frames=n) for n in (fake.SEGFAULT, fake.HOG, fake.RAISE, fake.ENDLESS)]
+    running = made(engine, Limits(5.0, 0.6))
+    with closing(running):
+        running.window()
+        for cell in bad:
+            running.submit(cell)
+            while not (found := running.wait(1.0)):
+                pass
+            assert found[0].own
+            assert found[0].reason in (
+                "its process died of SIGSEGV",
+                "it wanted more memory than its limit of 0.6 GB",
+                "ZeroDivisionError: one by none",
+                "it ran past its limit of 5 s",
+            )
+
+
+def test_where_numba_is_loaded_already_a_worker_leaves_its_number_of_threads_alone() -> None:
+    # as in a worker that `--preload numba` started, or where a script's top imports it before the pool's initialiser
+    code = """
+import os
+os.environ["NUMBA_NUM_THREADS"] = "2"
+import numba
+from tests.sweep.fake import compiled
+compiled()
+from posefit.sweep.engines.limits import alone
+alone()
+assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
+assert compiled() == 1
+"""
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+@pytest.mark.slow
+def test_a_cell_changes_nothing_for_other_peoples_tasks_on_a_shared_worker(served: "Served", tmp_path: Path) -> None:
+    from posefit.sweep.engines.cluster import Cluster
+
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(served.address) as client:
+        client.wait_for_workers(1, timeout=PATIENCE)
+        before = client.submit(surroundings, pure=False).result()
+        bad = [replace(cells(1)[0], frames=n) for n in (fake.SEGFAULT, fake.LEAVE, fake.HOG, fake.COMPILE)]
+        engine = Cluster(served.address, limits=LIMITS, run=behave, patience=PATIENCE)
+        assert swept(tmp_path / "ledger", [*bad, *cells(2)], engine).quarantined == 3
+        assert client.submit(surroundings, pure=False).result() == before
+
+
+def surroundings() -> list[Any]:
+    """Return what of a process a cell might have changed, and the process itself."""
+    import os
+    import resource
+    import signal
+
+    threads = {name: value for name, value in os.environ.items() if name.endswith("_THREADS")}
+    handlers = [signal.getsignal(number) is signal.SIG_IGN for number in (signal.SIGINT, signal.SIGTERM)]
+    return [os.getpid(), threads, handlers, resource.getrlimit(resource.RLIMIT_DATA), "numba" in sys.modules]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="reads which ports are open from /proc")
+def test_workers_of_this_machine_listen_on_the_loopback_alone_and_show_no_page_unless_asked() -> None:
+    pytest.importorskip("distributed")
+    from posefit.sweep.engines.cluster import Cluster
+
+    for asked, status in ((False, 404), (True, 200)):
+        with closing(Cluster(workers=1, run=behave, patience=PATIENCE, dashboard=asked)) as engine:
+            engine.window()
+            found = set(listening())
+            assert found
+            assert found <= {"0100007F"}  # 127.0.0.1, as the kernel writes it
+            address = urlsplit(engine._local.dashboard_link)
+            connection = HTTPConnection(str(address.hostname), address.port)
+            connection.request("GET", "/status")
+            assert connection.getresponse().status == status
+            connection.close()
+
+
+def listening() -> Iterator[str]:
+    """Yield the addresses that this process and its descendants listen on."""
+    parents = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            parents[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
+    mine = {os.getpid()}
+    while more := {process for process, parent in parents.items() if parent in mine} - mine:
+        mine |= more
+    sockets = set()
+    for process in mine:
+        with suppress(OSError):
+            sockets |= {os.readlink(path) for path in Path(f"/proc/{process}/fd").iterdir()}
+    for name in ("tcp", "tcp6"):
+        for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]:
+            words = line.split()
+            if words[3] == "0A" and f"socket:[{words[9]}]" in sockets:
+                yield words[1].partition(":")[0]
+
+
+def made(engine: str, limits: Limits) -> Engine:
+    """Return an engine of one worker."""
+    if engine == "pebble":
+        return Processes(1, limits, behave)
+    pytest.importorskip("distributed")
+    from posefit.sweep.engines.cluster import Cluster
+
+    return Cluster(workers=1, limits=limits, run=behave, patience=PATIENCE)
 
 
 def test_two_workers_run_two_cells_at_once(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ import posefit
 from posefit.sweep import log
 from posefit.sweep.cell import Cell
 from posefit.sweep.drive import drive_cells
-from posefit.sweep.driver import Claim, Driver, State
+from posefit.sweep.driver import ATTEMPTS, LOSSES, Claim, Driver, State
 from posefit.sweep.engines.engine import Outcome
 from posefit.sweep.ledger import Ledger
 from tests.sweep.fake import cells, result
@@ -287,13 +287,63 @@ def test_nobody_runs_what_a_living_driver_has_claimed_and_a_dead_ones_cells_are_
         assert other.claim(cell) == Claim(cell, 1)
         other.finish(Claim(cell, 1), result(cell))
         assert one.claim(cell) is State.DONE
-    for attempt in (1, 2, 3):
-        with Driver(tmp_path / "ledger") as dead:
-            assert dead.claim(cells(2)[1]) == Claim(cells(2)[1], attempt)
+    with Driver(tmp_path / "ledger") as dead:
+        assert dead.claim(cells(2)[1]) == Claim(cells(2)[1], 1)
     with Driver(tmp_path / "ledger") as last:
-        assert last.claim(cells(2)[1]) is State.QUARANTINED
-    (lost,) = Ledger(tmp_path / "ledger").quarantined()
-    assert all("its driver, process" in reason and reason.endswith("died") for reason in lost["reasons"])
+        assert last.claim(cells(2)[1]) == Claim(cells(2)[1], 2)
+
+
+def test_the_death_of_drivers_is_no_fault_of_a_cell_until_fifty_of_them_got_nothing_else_done(tmp_path: Path) -> None:
+    folder, (cell, other) = tmp_path / "ledger", cells(2)
+
+    def die() -> int:
+        with Driver(folder) as dead:
+            claim = dead.claim(cell)
+            assert isinstance(claim, Claim)
+        return claim.attempt
+
+    assert [die() for _ in range(LOSSES - 1)] == list(range(1, LOSSES))
+    filled(folder, 1, start=1)  # another cell gets done, and all that was before counts no more
+    assert [die() for _ in range(LOSSES)][-1] == 2 * LOSSES - 1
+    with Driver(folder) as last:
+        assert last.claim(cell) is State.QUARANTINED
+    (lost,) = Ledger(folder).quarantined()
+    assert lost["reasons"][0] == "something outside ended it 50 times while no other cell got done"
+    assert all("its driver, process" in reason and reason.endswith("died") for reason in lost["reasons"][1:])
+    assert not list((folder / "claims").iterdir())
+    assert other.key in Ledger(folder)
+
+
+def test_only_a_cells_own_faults_count_towards_its_three_attempts(tmp_path: Path) -> None:
+    folder, (cell,) = tmp_path / "ledger", cells(1)
+    with Driver(folder) as driver:
+        for own in (False, True, False, False, True, False, True):
+            claim = driver.claim(cell)
+            assert isinstance(claim, Claim)
+            driver.fail(claim, "its own" if own else "from outside", own)
+        assert driver.claim(cell) is State.QUARANTINED
+    assert Ledger(folder).quarantined()[0]["reasons"] == ["its own"] * ATTEMPTS
+
+
+def test_a_claim_that_is_damaged_or_removed_costs_no_row_and_stops_nobody(tmp_path: Path) -> None:
+    folder, (cell, other) = tmp_path / "ledger", cells(2)
+    with Driver(folder) as one, Driver(folder) as two:
+        first = one.claim(cell)
+        assert isinstance(first, Claim)
+        (folder / "claims" / f"{cell.key}.1").unlink()
+        second = two.claim(cell)
+        assert isinstance(second, Claim)
+        one.fail(first, "too late")  # the claim is another one's by now
+        one.release(first)
+        assert two.claim(cell) is State.ELSEWHERE
+        two.finish(second, result(cell))
+        one.finish(first, result(cell))
+        (folder / "claims" / f"{other.key}.1").write_bytes(b"\xff{")
+        assert one.claim(other) == Claim(other, 2)
+        one.finish(Claim(other, 2), result(other))
+    lines = [line for path in (folder / "rows").glob("*.jsonl") for line in path.read_bytes().splitlines()]
+    assert len(lines) == 2
+    assert not list((folder / "claims").iterdir())
 
 
 def test_of_many_drivers_that_claim_the_same_cells_one_gets_each(tmp_path: Path) -> None:

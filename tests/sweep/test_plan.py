@@ -1,6 +1,9 @@
 """A plan is checked as a whole, before anything runs; a mistake in it is one line."""
 
 import json
+import tracemalloc
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +17,10 @@ from posefit.motion.asf import write_asf
 from posefit.registry import Offer, Registry
 from posefit.sweep import check
 from posefit.sweep.cell import Cell, anytime_trace, cell_scene, digest_of, run_cell
+from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit.tracking import method
+from tests.effort import effort
 from tests.testing.planted import Holds
 
 PRODUCT: dict[str, Any] = {"methods": ["sapso@pca"], "motions": ["walk"]}
@@ -256,3 +261,47 @@ def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(t
             Plan.read(path)
     path.write_text(cells + "view_degrees = 999999999999999999999")  # was a traceback; it is an angle like others
     assert Plan.read(path).cells[0].view_degrees == (1e21,)
+
+
+def test_a_product_gives_the_cells_and_keys_that_its_specs_give_one_by_one() -> None:
+    lists = {
+        "seeds": [3, 1],
+        "methods": [
+            "sapso@pca",
+            {"method": "random@full", "evaluations": 300, "settings": {"full.limits": "training"}},
+        ],
+        "corruptions": [{}, {"dropped": 0.5, "holes": 0.25}],
+        "motions": ["walk", {"motion": "run", "train": ["walk-a"], "size": [80, 60]}],
+        "views": [45, [0, 90.5]],
+        "instances": 2,
+    }
+    defaults = {"frames": 5, "translation": "searched", "settings": {"sapso.cooling": 0.9}}
+    plan = Plan.of({"defaults": defaults, "product": lists})
+    expected = []
+    for seed, chosen, damage, motion, view, instance in product(
+        lists["seeds"], lists["methods"], lists["corruptions"], lists["motions"], lists["views"], range(2)
+    ):
+        spec: dict[str, Any] = {"frames": 5, "translation": "searched", "seed": seed, "instance": instance}
+        spec |= {"corruption": damage, "view_degrees": view}
+        spec |= chosen if isinstance(chosen, dict) else {"method": chosen, "settings": {"sapso.cooling": 0.9}}
+        spec |= motion if isinstance(motion, dict) else {"motion": motion}
+        expected.append(cell_of(spec))
+    assert list(plan) == expected
+    assert [replace(cell).key for cell in plan] == list(plan.keys()) == [cell.key for cell in expected]
+
+
+def test_a_large_plan_is_held_in_a_few_bytes_a_cell_and_each_one_is_checked_once() -> None:
+    def tables(seeds: int) -> dict[str, Any]:
+        return {"product": {"methods": ["random@pca"], "motions": ["walk"], "seeds": seeds}}
+
+    Plan.of(tables(10))
+    calls = [effort(lambda seeds=seeds: Plan.of(tables(seeds))).calls for seeds in (1000, 2000)]  # type: ignore[misc]
+    assert (calls[1] - calls[0]) / 1000 < 60  # of Python and of C, a cell: checking each took 900
+    tracemalloc.start()
+    try:
+        plan = Plan.of(tables(50_000))
+        held = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert len(plan) == 50_000
+    assert held / len(plan) < 80  # 32 of them are the key

@@ -1,4 +1,6 @@
 // Puts the page together.
+const NAMED = 20; // instances that a note names
+
 function header() {
   const H = D.header;
   const words = (list) => list.join("; ");
@@ -46,15 +48,28 @@ function header() {
   if (H.versions.length > 1) notes.push("Commands run rows again where the same versions are installed.");
   $("notes").append(...notes.map((text) => make("p", { class: "note" }, text)));
   if (H.failed) {
-    const sorts = new Map();
-    D.failures.forEach((one) => one.reasons.forEach((reason) => sorts.set(reason, (sorts.get(reason) || 0) + 1)));
-    const most = [...sorts].sort((a, b) => b[1] - a[1]).slice(0, 5);
+    const by = Object.entries(H.failed_by).map(([method, count]) => `${method} ${whole(count)}`);
     $("notes").append(
       make(
         "div",
         { class: "note warn" },
-        `${whole(H.failed)} cells failed, each in every attempt:`,
-        make("ul", {}, ...most.map(([reason, count]) => make("li", {}, `${count} × ${reason}`))),
+        `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join(", ")}.`,
+        make("ul", {}, ...H.reasons.map(([reason, count]) => make("li", {}, `${count} × ${reason}`))),
+      ),
+    );
+  }
+  if (H.dropped.length) {
+    const named = H.dropped.slice(0, NAMED).map(({ instance, missing }) => {
+      const why = missing.length ? `no run of ${words(missing.map((m) => METHODS[m]))}` : "no seed in common";
+      return make("li", {}, `${INSTANCES[instance]}: ${why}`);
+    });
+    if (H.dropped.length > NAMED) named.push(make("li", {}, `and ${whole(H.dropped.length - NAMED)} more`));
+    $("notes").append(
+      make(
+        "div",
+        { class: "note warn" },
+        `${counted(H.dropped.length, "instance")} left out of the comparison, for every method:`,
+        make("ul", {}, ...named),
       ),
     );
   }
@@ -74,21 +89,26 @@ if (D.leaderboard) {
   curves();
   jointErrors();
 } else ["leaderboard", "comparison", "curves", "joints"].forEach((id) => $(id).remove());
-gallery();
-viewer();
-const first = D.leaderboard ? D.leaderboard[0].method : 0;
-choose(
-  $("mine"),
-  METHODS.map((name, m) => [String(m), name]),
-  String(first),
-  () => author(+$("mine").value),
-);
-author(first);
-choose($("of-method"), [["", "all"], ...METHODS.map((name, m) => [String(m), name])], "", allRows);
-choose($("of-instance"), [["", "all"], ...INSTANCES.map((name, i) => [String(i), name])], "", allRows);
-allRows();
+if (METHODS.length) runs();
+else ["gallery", "author", "rows"].forEach((id) => $(id).remove());
 failures();
 $("copy").onclick = copy;
 document.querySelectorAll("dialog .close").forEach((button) => {
   button.onclick = () => button.closest("dialog").close();
 });
+
+function runs() {
+  gallery();
+  viewer();
+  const first = D.leaderboard ? D.leaderboard[0].method : 0;
+  choose(
+    $("mine"),
+    METHODS.map((name, m) => [String(m), name]),
+    String(first),
+    () => author(+$("mine").value),
+  );
+  author(first);
+  choose($("of-method"), [["", "all"], ...METHODS.map((name, m) => [String(m), name])], "", allRows);
+  choose($("of-instance"), [["", "all"], ...INSTANCES.map((name, i) => [String(i), name])], "", allRows);
+  allRows();
+}

@@ -14,5 +14,6 @@
 | what an engine is, and what becomes of a cell | engine.py |
 | processes of this machine, one pool a worker | processes.py |
 | a Dask cluster, here or elsewhere | cluster.py |
+| a process of its own for a cell on a Dask worker | child.py |
 | how long and how much memory a cell may have; one thread of everything | limits.py |
 """

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from posefit.sweep.cell import Cell, run_cell
-from posefit.sweep.engines.engine import EngineError, Outcome, Run, reason_of
-from posefit.sweep.engines.limits import THREADS, Limits, limited, single_threaded
+from posefit.sweep.engines.child import called
+from posefit.sweep.engines.engine import EngineError, Outcome, Run
+from posefit.sweep.engines.limits import Limits, text_of
 
 PATIENCE = 30.0  # seconds to wait for a scheduler, or for workers, that are not there
 CONNECTING = 5.0  # seconds for one try
 ARRIVING = 10.0  # seconds for a result that is ready to come over
+LOOPBACK = "127.0.0.1"
 LOOK = 1.0  # seconds between two looks at which workers there are
 
 
@@ -24,7 +26,6 @@ class _Sent:
 
     cell: Cell
     worker: str  # the address that it was sent to
-    began: float
     missed: int = 0  # how often this worker was looked for in vain
 
 
@@ -32,7 +33,9 @@ class Cluster:
     """An engine of Dask workers: of a scheduler at an address, or, with `workers` instead, so many on this machine.
 
     Each cell is sent to one worker that has no other. So it starts at once, no other cell dies with it, and Dask does
-    not run it again by itself. A scheduler that is not there, or has no workers, is waited for `patience` seconds;
+    not run it again by itself. The worker runs it in a process of its own, see `posefit.sweep.engines.child`: limits,
+    threads and a cell's end touch nothing else on it. With `dashboard` the workers of this machine have Dask's page,
+    on the loopback. A scheduler that is not there, or has no workers, is waited for `patience` seconds;
     after that EngineError is raised.
     """
 
@@ -43,10 +46,11 @@ class Cluster:
         limits: Limits | None = None,
         run: Run = run_cell,
         patience: float = PATIENCE,
+        dashboard: bool = False,
     ) -> None:
         self._limits, self._run, self._patience = limits or Limits(), run, patience
         self._distributed = _library()
-        self._local = None if workers is None else _local(self._distributed, workers)
+        self._local = None if workers is None else _local(self._distributed, workers, dashboard)
         self._address = scheduler if self._local is None else self._local.scheduler_address
         self._running: dict[Any, _Sent] = {}
         self._idle: list[str] = []
@@ -73,10 +77,10 @@ class Cluster:
     def submit(self, cell: Cell) -> None:
         """Send a cell to an idle worker."""
         worker = self._idle.pop()
-        arguments = self._run, cell, self._limits, 0.0
+        arguments = self._run, cell, self._limits
         name = f"{cell.key}-{secrets.token_hex(4)}"
-        future = self._client.submit(limited, *arguments, key=name, workers=[worker], pure=False, retries=0)
-        self._running[future] = _Sent(cell, worker, time.monotonic())
+        future = self._client.submit(called, *arguments, key=name, workers=[worker], pure=False, retries=0)
+        self._running[future] = _Sent(cell, worker)
         future.add_done_callback(self._wake)
 
     def wait(self, seconds: float) -> list[Outcome]:
@@ -101,33 +105,33 @@ class Cluster:
     def _outcome(self, future: Any) -> Outcome | None:
         """Return what became of a cell, if anything has."""
         sent = self._running[future]
-        result, reason = None, None
         try:
             if future.status == "finished":
-                result = future.result(timeout=ARRIVING)
+                ended = Outcome(sent.cell, *future.result(timeout=ARRIVING))
             elif future.status == "error":
-                reason = self._reason(future.exception(timeout=ARRIVING), sent)
+                ended = self._unrun(sent, future.exception(timeout=ARRIVING))
             elif sent.missed > 1:
-                reason = self._reason(None, sent)
-            elif future.status != "cancelled":
+                ended = self._unrun(sent, None)
+            else:
                 return None
         except (TimeoutError, OSError, self._distributed.CancelledError):
             return None  # its worker died with the result
         except Exception as error:  # a result that cannot be read
-            reason = reason_of(error, self._limits)
+            ended = Outcome(sent.cell, None, text_of(error))
+        finished = future.status == "finished"
         del self._running[future]
         future.cancel()
-        if result is not None:
+        if finished:
             self._idle.append(sent.worker)
         else:
             self._looked = 0.0  # the worker may be gone
-        return Outcome(sent.cell, result, reason)
+        return ended
 
-    def _reason(self, error: BaseException | None, sent: _Sent) -> str:
-        if error is not None and type(error).__name__ != "KilledWorker":
-            return reason_of(error, self._limits)
-        past = time.monotonic() - sent.began >= self._limits.seconds
-        return reason_of(TimeoutError(), self._limits) if past else "its worker died"
+    def _unrun(self, sent: _Sent, error: BaseException | None) -> Outcome:
+        """Return that a worker did not run a cell: nothing that a cell does ends a worker, or raises in it."""
+        if error is None or type(error).__name__ == "KilledWorker":
+            return Outcome(sent.cell, None, "its worker was lost", own=False)
+        return Outcome(sent.cell, None, f"its worker could not run it: {text_of(error)}", own=False)
 
     def _lost(self) -> list[Outcome]:
         """Return all cells as lost with the scheduler, once there is one again."""
@@ -157,7 +161,6 @@ class Cluster:
             try:
                 limit = min(CONNECTING, self._patience)
                 self._client = self._distributed.Client(self._address, timeout=limit, set_as_default=False)
-                self._client.register_plugin(_plugin(self._distributed))
                 return
             except (OSError, ValueError, TimeoutError) as error:
                 if isinstance(error, ValueError) or time.monotonic() > until:
@@ -169,37 +172,26 @@ class Cluster:
         self._woken.set()
 
 
-def _local(distributed: Any, workers: int) -> Any:
-    """Return a cluster of worker processes on this machine, one thread each."""
+def _local(distributed: Any, workers: int, dashboard: bool) -> Any:
+    """Return a cluster of worker processes on this machine, one thread each, which nobody reaches from elsewhere."""
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     import dask
 
-    told = {
-        "distributed.scheduler.allowed-failures": 0,  # attempts are counted by the ledger
-        "distributed.nanny.pre-spawn-environ": dict.fromkeys(THREADS, 1),
-    }
+    told: dict[str, Any] = {"distributed.scheduler.allowed-failures": 0}  # attempts are counted by the ledger
+    if not dashboard:
+        told |= {f"distributed.{one}.http.routes": [] for one in ("scheduler", "worker")}
     with dask.config.set(told):
         return distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
             memory_limit=0,  # each cell has a limit of its own
-            dashboard_address=":0",
+            host=LOOPBACK,
+            dashboard_address=f"{LOOPBACK}:0",  # None would take a port that others may have
+            scheduler_kwargs={"dashboard": dashboard},
             silence_logs=logging.CRITICAL,
         )
-
-
-def _plugin(distributed: Any) -> Any:
-    """Return what makes each worker of a cluster, also one that comes later, run on one thread."""
-
-    class Alone(distributed.WorkerPlugin):  # type: ignore[misc]
-        name = "posefit"
-
-        def setup(self, **_: Any) -> None:
-            single_threaded()
-
-    return Alone()
 
 
 def _library() -> Any:

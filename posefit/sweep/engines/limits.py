@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from posefit.limits import memory
 SECONDS, GIGABYTES = 3600.0, 4.0
 GRACE = 5.0  # seconds after which a process ends itself that nobody ended in time
 WATCH = 0.5  # seconds between two looks whether the driver lives
-THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -33,11 +34,20 @@ class Limits:
                 raise ValueError(f"the limit of {name} must be above 0, got {getattr(self, name)}")
 
 
+class FailedError(Exception):
+    """A cell raised something, told in one line: what a plugin raises need not survive the way to another process."""
+
+
+def text_of(error: BaseException) -> str:
+    """Return an exception in one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
+
+
 def limited(run: Callable[[T], R], cell: T, limits: Limits, grace: float = GRACE) -> R:
     """Return what `run` makes of a cell.
 
-    Raises MemoryError where it wants more memory than it may have. A process that is still at it `grace` seconds after
-    its time is ended by the operating system, whatever it does.
+    Raises MemoryError where it wants more memory than it may have, FailedError where it raises anything else. A process
+    that is still at it `grace` seconds after its time is ended by the operating system, whatever it does.
     """
     with _one_at_a_time, memory(limits.gigabytes):
         timer = getattr(signal, "setitimer", None)
@@ -46,16 +56,23 @@ def limited(run: Callable[[T], R], cell: T, limits: Limits, grace: float = GRACE
         try:
             return run(cell)
         except MemoryError:
-            pass  # a new one is raised below: this one holds on to everything that filled the memory
+            failed: Exception = MemoryError()  # a new one: that one holds on to everything that filled the memory
+        except BaseException as error:  # an exit and an interrupt too: they are the cell's, and end nothing else
+            failed = FailedError(text_of(error))
         finally:
             if timer is not None:
                 timer(signal.ITIMER_REAL, 0.0)
-    raise MemoryError
+    raise failed
 
 
 def alone() -> None:
-    """Make this process a worker: one thread of everything, no interest in Ctrl-C, and no life without its driver."""
-    single_threaded()
+    """Make this process a worker: one thread of everything, no interest in Ctrl-C, and no life without its driver.
+
+    It is for a process that runs cells and nothing else: what it changes holds for everything in the process.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is the driver's
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # so that a kill from outside looks like one
+    _single_threaded()
     driver = os.getppid()
 
     def watch() -> None:
@@ -66,11 +83,11 @@ def alone() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def single_threaded() -> None:
-    """Give numba, BLAS and OpenCV one thread each in this process, and leave Ctrl-C to the driver."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _single_threaded() -> None:
+    """Give numba, BLAS and OpenCV one thread each in this process."""
     os.environ.update(dict.fromkeys(THREADS, "1"))  # before they are loaded
+    if "numba" not in sys.modules:  # one that is loaded takes another number for an error, at its next compilation
+        os.environ["NUMBA_NUM_THREADS"] = "1"
     import cv2
     import numba
     from threadpoolctl import threadpool_limits

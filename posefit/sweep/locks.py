@@ -1,0 +1,72 @@
+"""Proof of life: a driver holds a lock (`flock`) on its log, which the operating system drops when it ends in any way.
+
+On a disk that machines share such a lock is worth something only where every machine sees it. Linux passes locks on NFS
+to the server, unless the disk is mounted with `nolock` or `local_lock`; then they hold on one machine alone, and the
+claims of another one say nothing.
+"""
+
+import fcntl
+import os
+import re
+from pathlib import Path
+
+MOUNTS = Path("/proc/self/mountinfo")
+# of kinds of file systems, the options with which their locks stay on one machine; "" for always
+LOCAL = {
+    "nfs": ("nolock", "local_lock=flock", "local_lock=all"),
+    "nfs4": ("nolock", "local_lock=flock", "local_lock=all"),
+    "lustre": ("localflock",),
+    "cifs": ("nobrl",),
+    "smb3": ("nobrl",),
+    "fuse.sshfs": ("",),
+}
+
+
+def locked(file: int, path: Path) -> None:
+    """Lock an open file for as long as it is open. Raises ValueError where its disk keeps no locks."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise _useless(path, error.strerror or str(error)) from None
+    if not is_locked(path):
+        raise _useless(path, "one that forgets them")
+
+
+def is_locked(path: Path) -> bool:
+    """Return whether anybody holds a lock on a file: whether the driver that writes a log lives."""
+    try:
+        file = os.open(path, os.O_RDONLY)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False
+
+
+def on_one_machine(path: Path, mounts: Path = MOUNTS) -> str | None:
+    """Return why locks in a folder hold on this machine alone; None where others see them, or nobody can say."""
+    try:
+        lines = mounts.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:  # an operating system that does not say
+        return None
+    found, longest = None, -1
+    for line in lines:
+        before, _, after = line.partition(" - ")
+        words, (kind, _, options) = before.split(), [*after.split(), "", "", ""][:3]
+        place = Path(re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), words[4]))
+        if path.resolve().is_relative_to(place) and len(place.parts) >= longest:  # a later mount covers an earlier one
+            told = {"", *words[5].split(","), *options.split(",")}
+            found = next((f"{kind} {option}".strip() for option in LOCAL.get(kind, ()) if option in told), None)
+            longest = len(place.parts)
+    return found
+
+
+def _useless(path: Path, what: str) -> ValueError:
+    return ValueError(
+        f"{path.parent.parent}: expected a disk that keeps locks (flock), got {what}; without them nobody can see "
+        "which sweep lives"
+    )

@@ -1,0 +1,269 @@
+"""What disks, clocks and kills can do to a ledger, one after the other: no row is lost, and none is made up."""
+
+import errno
+import fcntl
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from posefit.sweep import fold, locks
+from posefit.sweep.drive import drive_cells
+from posefit.sweep.driver import Claim, Driver
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.locks import on_one_machine
+from tests.sweep.fake import cells, result
+from tests.sweep.test_ledger import Here, filled
+
+ROOT = Path(__file__).parents[2]
+KILLS = 24
+# A driver that is gone right before its nth call that changes a disk, half of the bytes of a write being there.
+KILLED = """
+import os, sys
+from pathlib import Path
+from tests.sweep.fake import cells
+from tests.sweep.test_ledger import Here
+from posefit.sweep.drive import drive_cells
+from posefit.sweep.driver import Driver
+
+folder, count, last = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+real = {name: getattr(os, name) for name in ("pwrite", "link", "replace", "rename", "unlink", "fsync", "mkdir")}
+met = 0
+
+def faulty(name):
+    def call(*words, **named):
+        global met
+        met += 1
+        if met == last:
+            if name == "pwrite":
+                real[name](words[0], words[1][: len(words[1]) // 2], words[2])
+            os.kill(os.getpid(), 9)
+        return real[name](*words, **named)
+    return call
+
+for name in real:
+    setattr(os, name, faulty(name))
+with Driver(folder) as driver:
+    drive_cells(cells(count), driver, Here(), print, lambda _: None)
+"""
+
+
+def test_a_driver_may_be_killed_before_any_call_that_changes_the_disk(tmp_path: Path) -> None:
+    # one ledger goes through all of it: every driver folds the logs of those that were killed before it
+    folder, ended = tmp_path / "ledger", 0
+    for last in range(1, KILLS + 1):
+        words = [sys.executable, "-c", KILLED, str(folder), str(1 + last // 4), str(last)]
+        done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+        assert done.returncode in (0, -9), done.stderr
+        ended += done.returncode == 0
+    wanted = {cell.key for cell in cells(1 + KILLS // 4)}
+    filled(folder, len(wanted))
+    ledger = Ledger(folder, pytest.fail)  # nothing is damaged but what has no end
+    keys = [row["key"] for row in ledger.rows()]
+    assert len(keys) == len(set(keys)) == len(wanted)
+    for key in keys:
+        assert ledger.joints(key)["truth"].shape == (1, 27, 3)
+    assert not ledger.quarantined()
+    assert ended < KILLS
+
+
+def test_logs_of_drivers_that_ended_are_folded_into_one(tmp_path: Path) -> None:
+    folder = tmp_path / "ledger"
+    for count in range(1, 6):
+        filled(folder, count)
+    rows = {row["key"]: {**row, "joints": None} for row in Ledger(folder).rows()}
+    reader = Ledger(folder)
+    filled(folder, 6)
+    assert len(list((folder / "rows").iterdir())) <= 4
+    filled(folder, 7)
+    ledger = Ledger(folder)
+    for key, row in rows.items():
+        assert {**ledger.row(key), "joints": None} == row
+        assert reader.joints(key)["truth"].tobytes() == ledger.joints(key)["truth"].tobytes()
+    assert len(list(reader.rows())) == 7  # a reader from before the folding sees what everybody sees
+
+
+def test_a_log_that_is_folded_while_somebody_reads_gives_every_row_once(tmp_path: Path) -> None:
+    folder = tmp_path / "ledger"
+    with Driver(folder) as one, Driver(folder) as other:  # so many logs that nobody could fold before
+        for driver, cell in zip((one, other, one, other), cells(4), strict=True):
+            claim = driver.claim(cell)
+            assert isinstance(claim, Claim)
+            driver.finish(claim, result(cell))
+    reading = Ledger(folder).rows()
+    keys = [next(reading)["key"]]
+    filled(folder, 5)
+    keys += [row["key"] for row in reading]
+    assert len(keys) == len(set(keys)) >= 4
+
+
+def test_a_log_that_lives_and_one_that_is_large_are_not_folded(tmp_path: Path, monkeypatch: Any) -> None:
+    folder = tmp_path / "ledger"
+    with Driver(folder) as living:
+        claim = living.claim(cells(1)[0])
+        assert isinstance(claim, Claim)
+        living.finish(claim, result(cells(1)[0]))
+        filled(folder, 3)
+        assert len(list((folder / "rows").glob("*.jsonl"))) == 2
+    monkeypatch.setattr(fold, "LARGE", 1)
+    filled(folder, 4)
+    assert len(list((folder / "rows").glob("*.jsonl"))) == 3
+
+
+def test_a_log_that_is_cut_off_behind_its_driver_takes_no_later_row_with_it(tmp_path: Path) -> None:
+    folder, chosen = tmp_path / "ledger", cells(3)
+    said: list[str] = []
+    with Driver(folder, said.append) as driver:
+        for k, cell in enumerate(chosen):
+            claim = driver.claim(cell)
+            assert isinstance(claim, Claim)
+            driver.finish(claim, result(cell))
+            if k == 1:
+                (log,) = (folder / "rows").glob("*.jsonl")
+                os.truncate(log, log.stat().st_size - 40)
+    assert {row["key"] for row in Ledger(folder).rows()} == {chosen[0].key, chosen[2].key}
+    assert len(said) == 1
+    filled(folder, 3)
+
+
+def test_a_log_that_somebody_removes_ends_the_sweep_in_one_line(tmp_path: Path) -> None:
+    expected = "got a log that somebody has removed; 0 of 2 cells are done and safe"
+    with Driver(tmp_path / "ledger") as driver:
+        for path in (tmp_path / "ledger" / "rows").iterdir():
+            path.unlink()
+        with pytest.raises(ValueError, match=expected):
+            drive_cells(cells(2), driver, Here(), print, lambda _: None)
+
+
+def test_a_damaged_file_of_the_quarantine_is_put_aside_and_its_cell_is_tried_again(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger", 1)
+    bad = folder / "quarantine" / f"{cells(2)[1].key}.json"
+    bad.write_bytes(b'{"key"')
+    said: list[str] = []
+    assert Ledger(folder, said.append).quarantined() == []
+    assert len(said) == 1
+    assert (folder / "aside" / bad.name).read_bytes() == b'{"key"'
+    filled(folder, 2)
+
+
+@pytest.mark.parametrize("step", [-86_400.0, 86_400.0])
+def test_a_clock_that_is_set_back_or_ahead_changes_nothing(step: float, tmp_path: Path, monkeypatch: Any) -> None:
+    folder, clock = tmp_path / "ledger", time.time
+    with Driver(folder) as one:
+        claim = one.claim(cells(1)[0])
+        assert isinstance(claim, Claim)
+        (folder / "claims" / ".half").write_text("")  # what another one is writing just now
+        monkeypatch.setattr(time, "time", lambda: clock() + step)
+        monkeypatch.setattr(time, "gmtime", lambda: time.localtime(clock() + step))
+        filled(folder, 3, start=1)
+        assert (folder / "claims" / ".half").exists()
+        one.finish(claim, result(cells(1)[0]))
+    filled(folder, 4)
+    assert len(list(Ledger(folder).rows())) == 4
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_a_disk_without_locks_is_refused_and_nothing_is_left(number: int, tmp_path: Path, monkeypatch: Any) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with pytest.raises(ValueError, match=r"ledger: expected a disk that keeps locks \(flock\), got "):
+        Driver(tmp_path / "ledger").__enter__()
+    assert not list((tmp_path / "ledger" / "rows").iterdir())
+
+
+def test_a_disk_that_forgets_locks_is_refused(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr(fcntl, "flock", lambda *_: None)
+    with pytest.raises(ValueError, match=r"expected a disk that keeps locks \(flock\), got one that forgets them"):
+        Driver(tmp_path / "ledger").__enter__()
+
+
+@pytest.mark.parametrize(
+    ("mount", "found"),
+    [
+        ("nfs rw - nfs host:/x rw,vers=3,local_lock=none", None),
+        ("nfs rw - nfs host:/x rw,vers=3,local_lock=all", "nfs local_lock=all"),
+        ("nfs rw - nfs host:/x rw,vers=3,nolock,local_lock=flock", "nfs nolock"),
+        ("nfs rw - nfs4 host:/x rw,vers=4.2,local_lock=none", None),
+        ("nfs rw - fuse.sshfs host:/x rw", "fuse.sshfs"),
+        ("nfs rw - lustre host:/x rw,localflock", "lustre localflock"),
+        ("nfs rw - ext4 /dev/sda1 rw", None),
+    ],
+)
+def test_a_mount_whose_locks_stay_on_one_machine_is_known(mount: str, found: str | None, tmp_path: Path) -> None:
+    place, _, rest = mount.partition(" ")
+    (tmp_path / "a b" / place / "ledger").mkdir(parents=True)
+    escaped = str(tmp_path / "a b" / place).replace(" ", "\\040")  # proc(5)
+    mounts = tmp_path / "mountinfo"
+    mounts.write_text(f"1 0 8:1 / / rw - ext4 /dev/sda2 rw\n36 35 98:0 / {escaped} {rest}\n")
+    assert on_one_machine(tmp_path / "a b" / place / "ledger", mounts) == found
+    assert on_one_machine(tmp_path, mounts) is None
+    assert on_one_machine(tmp_path, tmp_path / "nothing") is None
+
+
+def test_where_locks_stay_on_one_machine_another_ones_cells_are_not_judged(tmp_path: Path, monkeypatch: Any) -> None:
+    folder = tmp_path / "ledger"
+    with Driver(folder) as there:
+        monkeypatch.setattr("socket.gethostname", lambda: "there")
+        assert isinstance(there.claim(cells(1)[0]), Claim)
+        monkeypatch.setattr("socket.gethostname", lambda: "here")
+        monkeypatch.setattr("posefit.sweep.driver.on_one_machine", lambda _: "nfs nolock")
+        with (
+            Driver(folder) as here,
+            pytest.raises(
+                ValueError, match="expected a disk whose locks other machines see, got nfs nolock, and there"
+            ),
+        ):
+            here.claim(cells(1)[0])
+    monkeypatch.setattr("posefit.sweep.driver.on_one_machine", lambda _: None)
+    assert locks.MOUNTS.name == "mountinfo"
+    filled(folder, 1)
+
+
+SMALL = """
+set -e
+mount -t tmpfs -o size=48k none {folder}
+cd {root}
+{python} - <<'END'
+from pathlib import Path
+from tests.sweep.fake import cells
+from tests.sweep.test_ledger import Here
+from posefit.sweep.drive import drive_cells
+from posefit.sweep.driver import Driver
+from posefit.sweep.ledger import Ledger
+import json
+folder = Path({folder!r}) / "ledger"
+said = ""
+try:
+    with Driver(folder) as driver:
+        drive_cells(cells(200), driver, Here(), print, lambda _: None)
+except ValueError as error:
+    said = str(error)
+damaged = []
+print(json.dumps([said, len(Ledger(folder, damaged.append)), damaged, len(list((folder / "claims").iterdir()))]))
+END
+"""
+
+
+def test_a_disk_that_is_really_full_ends_the_sweep_in_one_line_and_keeps_what_was_done(tmp_path: Path) -> None:
+    try:
+        able = subprocess.run(["unshare", "-rm", "mount", "-t", "tmpfs", "none", str(tmp_path)], capture_output=True)
+    except FileNotFoundError:
+        pytest.skip("there is no unshare here, with which a small disk is made")
+    if able.returncode:
+        pytest.skip("nobody may mount a small disk here")
+    script = SMALL.format(folder=str(tmp_path), root=ROOT, python=sys.executable)
+    done = subprocess.run(["unshare", "-rm", "bash", "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    said, rows, damaged, claims = json.loads(done.stdout)
+    assert "expected room to write to, got No space left on device" in said
+    assert f"; {rows} of 200 cells are done and safe" in said
+    assert 0 < rows < 200
+    assert not damaged
+    assert claims == 0
