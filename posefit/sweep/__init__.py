@@ -21,7 +21,7 @@
 | how long a plan will take | estimate.py |
 | where cells run: processes, a Dask cluster, their limits | engines/ |
 
-A row is written whole, with a checksum, and its content never changes. What is seen in a cell follows from its motion and
-instance (`posefit.footage.instance`), so that methods are paired: all see the same. `posefit.report` says what was
+A row is written whole, with a checksum, and its content never changes. What is seen in a cell follows from its motion
+and instance (`posefit.footage.instance`), so that methods are paired: all see the same. `posefit.report` says what was
 found.
 """

@@ -20,7 +20,7 @@ Entry = Mapping[str, Any]
 
 
 class Entries(Sequence[Entry]):
-    """The fields that each value of a list stands for: those of a table, or `field`; a `whole` one is itself a table."""
+    """The fields each value of a list stands for: those of a table, or `field`; a `whole` one is a table itself."""
 
     def __init__(self, field: str, values: Sequence[Any], whole: bool = False) -> None:
         self._field, self._values, self._whole = field, values, whole
