@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from posefit.sweep.ledger import ROWS, Ledger
-from posefit.sweep.log import JOINTS, SUFFIX, Damage, Writer, decoded, joints_at, lines
+from posefit.sweep.log import JOINTS, SUFFIX, UNNAMED, Damage, Writer, decoded, joints_at, lines
 
 LARGE = 2**24  # bytes: a log of so many rows stays as it is, so that no row is copied over and over
 LEFT = 60.0  # seconds after which a file that nothing points to was left behind
@@ -21,7 +21,7 @@ LEFT = 60.0  # seconds after which a file that nothing points to was left behind
 def fold_logs(ledger: Ledger, log: Writer) -> None:
     """Bring the rows of all logs that nobody writes to any more into one that is open, unless there is but one."""
     folder = ledger.path / ROWS
-    for path in folder.glob(f"*{JOINTS}"):
+    for path in [*folder.glob(f"*{JOINTS}"), *folder.glob(f"*{UNNAMED}")]:
         with suppress(FileNotFoundError):
             if not path.with_suffix(SUFFIX).exists() and log.began - path.stat().st_mtime > LEFT:
                 path.unlink()

@@ -23,9 +23,12 @@ LOCAL = {
 
 
 def locked(file: int, path: Path) -> None:
-    """Lock an open file for as long as it is open. Raises ValueError where its disk keeps no locks."""
+    """Lock an open file of one's own for as long as it is open. Raises ValueError where its disk keeps no locks.
+
+    Others only ever look whether it is locked, which takes a lock for a moment: that moment is waited for.
+    """
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(file, fcntl.LOCK_EX)
     except OSError as error:
         raise _useless(path, error.strerror or str(error)) from None
     if not is_locked(path):

@@ -18,7 +18,7 @@ from typing import Any
 
 from posefit.sweep.locks import locked
 
-SUFFIX, JOINTS = ".jsonl", ".joints"
+SUFFIX, JOINTS, UNNAMED = ".jsonl", ".joints", ".new"
 _LINE = re.compile(rb'\{"key": "([0-9a-f]{64})", "crc": "([0-9a-f]{8})", "row": (\{.*\})\}\n', re.DOTALL)
 
 
@@ -56,13 +56,18 @@ class Writer:
     def __init__(self, folder: Path) -> None:
         self.name = f"{time.strftime('%Y%m%dT%H%M%S', time.gmtime())}-{secrets.token_hex(4)}"
         self._paths = folder / f"{self.name}{SUFFIX}", folder / f"{self.name}{JOINTS}"
+        # a log gets its name when it is locked: without, another driver would take it for that of a dead one
+        unnamed = folder / f"{self.name}{UNNAMED}"
         # opened for this process alone: no worker inherits the lock
-        self._rows, self._joints = (os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644) for path in self._paths)
+        self._rows, self._joints = (
+            os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644) for path in (unnamed, self._paths[1])
+        )
         try:
-            locked(self._rows, self._paths[0])
-        except ValueError:
-            for path, file in zip(self._paths, (self._rows, self._joints), strict=True):
-                path.unlink()
+            locked(self._rows, unnamed)
+            unnamed.rename(self._paths[0])
+        except (OSError, ValueError):
+            for path, file in zip((unnamed, self._paths[1]), (self._rows, self._joints), strict=True):
+                path.unlink(missing_ok=True)
                 os.close(file)
             raise
         self._synced = time.monotonic()

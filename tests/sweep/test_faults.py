@@ -267,3 +267,24 @@ def test_a_disk_that_is_really_full_ends_the_sweep_in_one_line_and_keeps_what_wa
     assert 0 < rows < 200
     assert not damaged
     assert claims == 0
+
+
+def test_a_log_has_its_name_only_when_it_is_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = filled(tmp_path / "ledger", 2)
+    lock, met = fcntl.flock, []
+
+    def late(file: int, how: int) -> None:
+        if how == fcntl.LOCK_EX and not met:  # another driver comes between the making of a log and its lock
+            met.append(file)
+            with Driver(folder) as other:
+                fold.fold_logs(other.ledger, other._log)
+        lock(file, how)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with Driver(folder) as driver:
+        claim = driver.claim(cells(3)[2])
+        assert isinstance(claim, Claim)
+        driver.finish(claim, result(claim.cell))
+    assert met
+    assert len(list(Ledger(folder).rows())) == 3
+    assert not list((folder / "rows").glob("*.new"))
