@@ -22,7 +22,7 @@ from typing import Any, Self
 
 from posefit.files import appear, replaced_file
 from posefit.sweep.cell import Cell, CellResult
-from posefit.sweep.fold import LEFT, fold
+from posefit.sweep.fold import LEFT, fold_logs
 from posefit.sweep.ledger import CLAIMS, QUARANTINE, ROWS, Ledger, create
 from posefit.sweep.locks import is_locked, on_one_machine
 from posefit.sweep.log import SUFFIX, Writer
@@ -69,7 +69,7 @@ class Driver:
             ) from None
         self._tidy()
         with suppress(OSError):  # there is no room for it: the sweep will say so, if it needs any
-            fold(self.ledger, self._log)
+            fold_logs(self.ledger, self._log)
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -18,7 +18,7 @@ LARGE = 2**24  # bytes: a log of so many rows stays as it is, so that no row is 
 LEFT = 60.0  # seconds after which a file that nothing points to was left behind
 
 
-def fold(ledger: Ledger, log: Writer) -> None:
+def fold_logs(ledger: Ledger, log: Writer) -> None:
     """Bring the rows of all logs that nobody writes to any more into one that is open, unless there is but one."""
     folder = ledger.path / ROWS
     for path in folder.glob(f"*{JOINTS}"):
