@@ -2,21 +2,30 @@
 
 - `new_folder`, `new_file`: what must not be there yet.
 - `replaced_file`: what may replace an earlier file of its kind, which its first bytes tell.
+- `Unfinished`: a folder that is worked on for so long that it may have to be gone on with later.
 - `appear`: a small file that many may want to be the first to make, such as a claim.
 
 What is being written stands beside its place, under a random name that begins with a dot. It is created exclusively, so
-that nobody's file or link is written through; and nothing is ever removed but what the call itself has made.
+that nobody's file or link is written through; and nothing is ever removed but what the call itself has made, or what
+carries the mark of an earlier one that has ended.
 """
 
 import errno
+import fcntl
+import glob
 import json
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any, Self
 
+from posefit.reading import cut, parsed_json, read_text
+
+MARK = "unfinished.json"  # in a folder that we work on
+LARGEST_MARK = 10_000_000  # bytes
 # what a file system says that has no hard links
 _NO_LINKS = (errno.EPERM, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EMLINK)
 _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # what it says where a folder's new name is no longer free
@@ -87,6 +96,119 @@ def replaceable(path: str | Path, mark: bytes) -> bool:
         return False
     with target.open("rb") as file:
         return file.read(len(mark)) == mark
+
+
+class Unfinished:
+    """A hidden folder beside its target, which carries our mark while it is worked on and where that ended too early.
+
+    The mark is a file that its worker holds a lock on, so that everybody sees whether somebody is at work. Where a file
+    system has no locks, nobody seems to be.
+    """
+
+    def __init__(self, target: Path, path: Path, file: int, told: Mapping[str, Any]) -> None:
+        self.path, self.told = path, told
+        self._target, self._file = target, file
+
+    @classmethod
+    def begun(cls, target: Path, told: Mapping[str, Any]) -> Self:
+        """Return a new folder, whose mark says what is `told`. Raises OSError where there is no room."""
+        target.parent.mkdir(parents=True, exist_ok=True)
+        path = _beside(target)
+        path.mkdir()
+        with _undone(lambda: shutil.rmtree(path)):
+            file = os.open(path / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+            with _undone(lambda: os.close(file)):
+                _locked(file)
+                (path / MARK).write_text(json.dumps({"target": target.name, "told": told}), encoding="utf-8")
+        return cls(target, path, file, told)
+
+    @classmethod
+    def left(cls, target: Path) -> list[Self]:
+        """Return those of a target that carry our mark and nobody works on, the latest first."""
+        found = []
+        for entry in sorted(target.parent.glob(f".{glob.escape(target.name)}.*/{MARK}"), key=_age):
+            if entry.is_symlink() or entry.parent.is_symlink():
+                continue
+            with suppress(OSError, ValueError, KeyError, TypeError):
+                file = os.open(entry, os.O_RDWR | os.O_NOFOLLOW)
+                mark = parsed_json(read_text(entry, LARGEST_MARK)) if _locked(file) else None
+                if mark is not None and mark["target"] == target.name and isinstance(mark["told"], dict):
+                    found.append(cls(target, entry.parent, file, mark["told"]))
+                else:
+                    os.close(file)
+        return found[::-1]
+
+    def close(self) -> None:
+        """Leave the folder to whoever goes on with it; again does nothing."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove the folder with what of it has these names; where there is more, all that stays."""
+        emptied(self.path, [*names, MARK])
+        self.close()
+
+    def finish(self, names: Iterable[str]) -> None:
+        """Give the folder its target's name. Of an earlier folder of that name, what has these names is removed.
+
+        Raises OSError where that one holds anything else, or has come meanwhile.
+        """
+        names = [*names, MARK]
+        aside = None
+        if os.path.lexists(self._target):
+            if strange := strangers(self._target, names):
+                raise OSError(errno.ENOTEMPTY, f"a folder with {cut(strange[0])}")
+            aside = _beside(self._target)
+            self._target.rename(aside)
+        try:
+            self.path.rename(self._target)
+        except OSError:
+            if aside is not None:
+                aside.rename(self._target)
+            raise
+        (self._target / MARK).unlink(missing_ok=True)
+        if aside is not None:
+            emptied(aside, names)
+        self.close()
+
+
+def strangers(folder: Path, names: Iterable[str]) -> list[str]:
+    """Return what a folder holds that has none of these names, sorted."""
+    known = {*names, MARK}
+    return sorted(entry.name for entry in folder.iterdir() if entry.name not in known)
+
+
+def emptied(folder: Path, names: Iterable[str]) -> None:
+    """Remove what has these names from a folder, and the folder where nothing is left; a link is only unlinked."""
+    with suppress(OSError):
+        if folder.is_symlink():
+            folder.unlink()
+            return
+        for path in (folder / name for name in names):
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+        folder.rmdir()
+
+
+def _locked(file: int) -> bool:
+    """Lock a file; return whether nobody else has."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
+
+
+def _age(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def appear(path: Path, content: object) -> bool:

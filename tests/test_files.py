@@ -7,7 +7,8 @@ from threading import Barrier, Thread
 
 import pytest
 
-from posefit.files import appear, new_file, new_folder, replaceable, replaced_file
+from posefit.files import MARK as UNFINISHED
+from posefit.files import Unfinished, appear, new_file, new_folder, replaceable, replaced_file
 
 MARK = b"<!-- ours -->"
 
@@ -210,3 +211,54 @@ def test_bytes_appear_as_they_are(tmp_path):
     assert appear(tmp_path / "a", b"\x00\x01")
     assert not appear(tmp_path / "a", b"other")
     assert (tmp_path / "a").read_bytes() == b"\x00\x01"
+
+
+def test_only_what_carries_our_mark_for_this_target_and_nobody_works_on_is_left_of_an_earlier_run(tmp_path):
+    target = tmp_path / "out"
+    at_work = Unfinished.begun(target, {"seed": 0})
+    ended = Unfinished.begun(target, {"seed": 1})
+    ended.close()
+    for name, mark in (
+        (".out.partial", None),
+        (".out.1", "no JSON"),
+        (".out.2", '{"target": "other", "told": {}}'),
+        (".out.3", "[]"),
+    ):
+        (tmp_path / name).mkdir()
+        if mark is not None:
+            (tmp_path / name / UNFINISHED).write_text(mark)
+    (tmp_path / ".out.4").symlink_to(ended.path)
+    found = Unfinished.left(target)
+    assert [one.path for one in found] == [ended.path]
+    assert found[0].told == {"seed": 1}
+    assert Unfinished.left(target) == []  # somebody works on it now
+    at_work.close()
+    assert [one.path for one in Unfinished.left(target)] == [at_work.path]
+
+
+def test_of_an_unfinished_folder_only_named_files_are_removed(tmp_path):
+    one = Unfinished.begun(tmp_path / "out", {})
+    (one.path / "ours").write_text("")
+    (one.path / "theirs").write_text("theirs")
+    one.remove(["ours"])
+    assert [path.name for path in one.path.iterdir()] == ["theirs"]
+    other = Unfinished.begun(tmp_path / "out", {})
+    (other.path / "ours").write_text("")
+    other.remove(["ours"])
+    assert not other.path.exists()
+
+
+def test_a_finished_folder_replaces_an_earlier_one_but_nothing_that_came_meanwhile(tmp_path):
+    target = tmp_path / "out"
+    for text in ("one", "two"):
+        place = Unfinished.begun(target, {})
+        (place.path / "ours").write_text(text)
+        place.finish(["ours"])
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert [(path.name, path.read_text()) for path in target.iterdir()] == [("ours", "two")]
+    place = Unfinished.begun(target, {})
+    (target / "theirs").write_text("theirs")
+    with pytest.raises(OSError, match="theirs"):
+        place.finish(["ours"])
+    assert sorted(path.name for path in target.iterdir()) == ["ours", "theirs"]
+    assert place.path.is_dir()

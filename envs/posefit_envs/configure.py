@@ -8,9 +8,10 @@ from gymnasium import error, spaces
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.check import whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import Episode
-from posefit_envs.instance import Arguments, errors_in_degrees, select
+from posefit_envs.instance import Arguments, approved, errors_in_degrees, select
 from posefit_envs.search import Doorkeeper
 from posefit_swarm.flock import Flock, speed_limits
 
@@ -86,8 +87,7 @@ class ConfigureEnv(gym.Env[State, Any]):
     ) -> None:
         check_mode(render_mode)
         for name, value in (("particles", particles), ("iterations", iterations)):
-            if value < 2:
-                raise error.Error(f"{name} must be at least 2, got {value}")
+            approved(whole, name, value, 2)
         self.render_mode = render_mode
         self._selection = select(**arguments)
         self.world = self._selection.world

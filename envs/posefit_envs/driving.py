@@ -34,7 +34,7 @@ def drive(
     env.reset(seed=seed, **options)
     searching = _built(env, optimiser, seed, evaluations, settings) if isinstance(optimiser, str) else optimiser
     try:
-        return minimise(lambda proposals: _costs(env, proposals.astype(dtype)), searching, evaluations)
+        return minimise(lambda proposals: _costs(env, proposals.astype(dtype)), searching, evaluations, told=True)
     except BudgetError as mistake:
         raise error.Error(str(mistake)) from None
 

@@ -8,8 +8,9 @@ from gymnasium import error, spaces
 
 from posefit import SearchSpace
 from posefit.arrays import Array
+from posefit.fitting.check import finite_number, whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
-from posefit_envs.instance import Arguments, Instance, World, errors_in_degrees, instance, select
+from posefit_envs.instance import Arguments, Instance, World, approved, errors_in_degrees, instance, select
 from posefit_envs.search import Doorkeeper, Evaluated, Image, look
 
 MAX_EVALUATIONS = 200
@@ -191,8 +192,6 @@ def spaces_of(setting: World) -> tuple[spaces.Box, spaces.Box]:
 
 
 def check_budget(target_cost: float, name: str, evaluations: int) -> None:
-    """Return nothing. Raises gymnasium.error.Error where a number makes no sense."""
-    if not np.isfinite(target_cost):
-        raise error.Error(f"target_cost must be finite, got {target_cost}")
-    if evaluations < 2:
-        raise error.Error(f"{name} must be at least 2, got {evaluations}")
+    """Return nothing. Raises ArgumentError where a number makes no sense."""
+    approved(finite_number, "target_cost", target_cost)
+    approved(whole, name, evaluations, 2)

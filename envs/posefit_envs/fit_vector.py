@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from posefit import PoseProblem, SearchSpace
 from posefit.arrays import Array
+from posefit.fitting.check import whole
 from posefit_envs.batch import mask_of, seeds_of
 from posefit_envs.drawing import MODES, check_mode, portray
 from posefit_envs.fit import MAX_EVALUATIONS, TARGET_COST, Episode, action_shape, check_budget, spaces_of
-from posefit_envs.instance import Arguments, errors_in_degrees, select
+from posefit_envs.instance import Arguments, approved, errors_in_degrees, select
 from posefit_envs.search import Doorkeeper, Evaluated, Image, distinct, look
 
 Infos = dict[str, Any]
@@ -45,8 +46,7 @@ class FitVectorEnv(VectorEnv[Image, Any, Array]):
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        if num_envs < 1:
-            raise error.Error(f"num_envs must be at least 1, got {num_envs}")
+        approved(whole, "num_envs", num_envs, 1)
         check_budget(target_cost, "max_evaluations", max_evaluations)
         check_mode(render_mode)
         if render_mode == "human":

@@ -5,6 +5,7 @@ The motion, its speed and phase, and from where it is seen, are those of a sweep
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, TypedDict
 
@@ -13,11 +14,13 @@ from gymnasium import error
 
 from posefit import Body, Camera, Motion, Observation, SearchSpace, Silhouette, Task
 from posefit.arrays import Array
+from posefit.fitting.check import finite_number
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.footage.instance import motion_of_instance, variation
 from posefit.footage.source import motion_of
 from posefit.geometry.body import varied
+from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
@@ -31,6 +34,10 @@ YAW_DEGREES = 20.0  # how far the middle of the searched yaw is from the truth a
 DISTANCE, HEIGHT = 3.5, 0.9  # metres from camera to person; of the camera above the ground
 
 Views = float | Sequence[float]
+
+
+class ArgumentError(error.Error, ValueError):
+    """An argument of an environment makes no sense."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +90,10 @@ class Selection:
     def number(self, options: Mapping[str, Any] | None, generator: Callable[[], np.random.Generator]) -> int:
         """Return the number of the next instance: of a reset's options, the one that is fixed, or one drawn.
 
-        Raises gymnasium.error.Error where the options name one that there is not.
+        Raises ArgumentError where the options name one that there is not.
         """
         if options and options.get("instance") is not None:
-            number = int(options["instance"])
-            _check_number(number)
-            return number
+            return _number(options["instance"])
         return self.instance if self.instance is not None else int(generator().integers(*RESERVED[self.split]))
 
 
@@ -104,47 +109,94 @@ def select(
     size: Sequence[int] = SIZE,
     noise: Mapping[str, float] | None = None,
     mismatch_percent: float = 0.0,
+    **unknown: Any,
 ) -> Selection:
-    """Return what the arguments describe. Raises gymnasium.error.Error where one of them makes no sense."""
+    """Return what the arguments describe.
+
+    Raises ArgumentError where one of them makes no sense, and TypeError where there is none of that name.
+    """
+    if unknown:
+        raise TypeError(_unknown(next(iter(unknown))))
     if split not in RESERVED:
-        raise error.Error(f"split must be one of {', '.join(RESERVED)}, got {split!r}")
+        raise ArgumentError(f"split must be one of {', '.join(RESERVED)}, got {quoted(split)}")
+    for name, value in (("motion", motion), ("prior", prior)):
+        if not isinstance(value, str):
+            raise ArgumentError(f"{name} must be a name, got {quoted(value)}")
     if instance is not None:
-        _check_number(instance)
-    views = tuple(map(float, view_degrees)) if isinstance(view_degrees, Sequence) else (float(view_degrees),)
-    if not views or not np.isfinite(views).all():
-        raise error.Error(f"view_degrees must be a finite number or several, got {view_degrees!r}")
+        instance = _number(instance)
+    views = _views(view_degrees)
     if translation not in TRANSLATIONS:
-        raise error.Error(f"translation must be one of {', '.join(TRANSLATIONS)}, got {translation!r}")
-    if len(size) != 2 or not all(36 <= side <= 4096 for side in size):
-        raise error.Error(f"size must be (width, height) of 36 to 4096 pixels, got {tuple(size)}")
-    for name, strength in (noise or {}).items():
-        if name not in CORRUPTIONS:
-            raise error.Error(f"noise must be of {', '.join(CORRUPTIONS)}, got {name!r}")
-        if not 0.0 <= strength <= 1.0:
-            raise error.Error(f"noise {name} must have a strength of 0 to 1, got {strength}")
-    if not 0.0 <= mismatch_percent <= 50.0:
-        raise error.Error(f"mismatch_percent must lie in 0 to 50, got {mismatch_percent}")
+        raise ArgumentError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {quoted(translation)}")
+    sides = list(size) if isinstance(size, Sequence) and not isinstance(size, str) else []
+    if len(sides) != 2 or not all(isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides):
+        raise ArgumentError(f"size must be (width, height) of 36 to 4096 pixels, got {quoted(size)}")
+    strengths = _strengths(noise)
+    if not 0.0 <= approved(finite_number, "mismatch_percent", mismatch_percent) <= 50.0:
+        raise ArgumentError(f"mismatch_percent must lie in 0 to 50, got {mismatch_percent}")
+    if isinstance(train, str) or not all(isinstance(one, str) for one in train or ()):
+        raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {quoted(train)}")
     made = World(
         motion,
         views,
         prior,
         tuple(train or ()),
         translation,  # type: ignore[arg-type]
-        (int(size[0]), int(size[1])),
-        tuple(sorted((noise or {}).items())),
+        (int(sides[0]), int(sides[1])),
+        strengths,
         float(mismatch_percent),
     )
     try:
         assert made.learned is not None
     except (ValueError, ImportError) as mistake:  # unknown motions and priors are named there
-        raise error.Error(str(mistake)) from None
+        raise ArgumentError(str(mistake)) from None
     return Selection(made, instance, split)
 
 
-def _check_number(number: int) -> None:
+def _unknown(name: str) -> str:
+    known = tuple(Arguments.__annotations__)
+    near = get_close_matches(name, known, 1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"an argument must be one of {', '.join(known)}, got {quoted(name)}{hint}"
+
+
+def approved(check: Callable[..., Any], name: str, *given: Any) -> Any:
+    """Return what a check of posefit returns; what it raises is an error of Gymnasium's too."""
+    try:
+        return check(name, *given)
+    except ValueError as mistake:
+        raise ArgumentError(str(mistake)) from None
+
+
+def _views(view_degrees: Any) -> tuple[float, ...]:
+    several = isinstance(view_degrees, Sequence) and not isinstance(view_degrees, str)
+    try:
+        views = tuple(finite_number("view_degrees", one) for one in (view_degrees if several else [view_degrees]))
+    except ValueError:
+        views = ()
+    if not views:
+        raise ArgumentError(f"view_degrees must be a finite number or several, got {quoted(view_degrees)}")
+    return views
+
+
+def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
+    if noise is not None and not isinstance(noise, Mapping):
+        raise ArgumentError(f"noise must be strengths such as {{'holes': 0.3}}, got {quoted(noise)}")
+    for name, strength in (noise or {}).items():
+        if name not in CORRUPTIONS:
+            raise ArgumentError(f"noise must be of {', '.join(CORRUPTIONS)}, got {quoted(name)}")
+        if not 0.0 <= approved(finite_number, f"noise {name}", strength) <= 1.0:
+            raise ArgumentError(f"noise {name} must have a strength of 0 to 1, got {strength}")
+    return tuple(sorted((noise or {}).items()))
+
+
+def _number(number: Any) -> int:
+    """Return the number of an instance. Raises ArgumentError where there is none of it."""
     last = RESERVED["test"][1] - 1
+    if isinstance(number, bool) or not isinstance(number, int | np.integer):
+        raise ArgumentError(f"instance must be a whole number from 0 to {last}, got {quoted(number)}")
     if not 0 <= number <= last:
-        raise error.Error(f"instance must lie in 0 to {last}, got {number}")
+        raise ArgumentError(f"instance must lie in 0 to {last}, got {quoted(int(number))}")
+    return int(number)
 
 
 @lru_cache(maxsize=32)

@@ -37,7 +37,7 @@ class Scenery:
 
     def problem(self, space: SearchSpace) -> PoseProblem:
         """Return the problem of finding the pose in a space."""
-        return PoseProblem(self.task.body, self.task.cameras, self.observation.silhouettes, space)
+        return PoseProblem(self.task.body, self.task.cameras, self.observation.silhouettes, space, blank=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,11 @@ from gymnasium import error
 from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting import metrics
+from posefit.fitting.check import whole
 from posefit.fitting.tracker import Follower, Prediction
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import action_shape, check_budget, spaces_of
-from posefit_envs.instance import Arguments, Instance, World, errors_in_degrees, instance, select
+from posefit_envs.instance import Arguments, Instance, World, approved, errors_in_degrees, instance, select
 from posefit_envs.search import Doorkeeper, Evaluated, Image, Scenery, look, look_at
 
 FRAMES = 20
@@ -69,8 +70,7 @@ class TrackEnv(gym.Env[Image, Any]):
     ) -> None:
         check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
         check_mode(render_mode)
-        if frames < 1:
-            raise error.Error(f"frames must be at least 1, got {frames}")
+        approved(whole, "frames", frames, 1)
         self.render_mode = render_mode
         self._selection = select(**arguments)
         self.world = self._selection.world

@@ -11,10 +11,11 @@ from gymnasium.vector.utils import batch_space
 
 from posefit import SearchSpace
 from posefit.arrays import Array
+from posefit.fitting.check import whole
 from posefit_envs.batch import mask_of, seeds_of
 from posefit_envs.drawing import MODES, check_mode, portray
 from posefit_envs.fit import action_shape, check_budget, spaces_of
-from posefit_envs.instance import Arguments, select
+from posefit_envs.instance import Arguments, approved, select
 from posefit_envs.search import Doorkeeper, Image, distinct, look_at
 from posefit_envs.track import EVALUATIONS, FRAMES, TrackEpisode
 
@@ -44,14 +45,12 @@ class TrackVectorEnv(VectorEnv[Image, Any, Array]):
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        if num_envs < 1:
-            raise error.Error(f"num_envs must be at least 1, got {num_envs}")
+        approved(whole, "num_envs", num_envs, 1)
         check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
         check_mode(render_mode)
         if render_mode == "human":
             raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
-        if frames < 1:
-            raise error.Error(f"frames must be at least 1, got {frames}")
+        approved(whole, "frames", frames, 1)
         self.num_envs, self.render_mode = num_envs, render_mode
         self._selection = select(**arguments)
         self.world = self._selection.world

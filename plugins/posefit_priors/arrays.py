@@ -4,9 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from posefit.archive import read_arrays
 from posefit.arrays import Array
 
+LARGEST = 500_000_000  # bytes of a file, packed and unpacked; a space learned from 200,000 poses has 100 MB
 Shape = tuple[str | int, ...]
 
 
@@ -27,13 +30,13 @@ def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Arra
 
     Raises ValueError where an array is missing, has another shape or is not finite.
     """
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: np.array(stored[name], dtype=np.float64) for name in shapes}
-    except FileNotFoundError:
-        raise
-    except (KeyError, ValueError, OSError) as error:
-        raise ValueError(f"{path}: expected an .npz file with {', '.join(shapes)}, got {error}") from None
+    stored = read_arrays(Path(path), tuple(shapes), ", ".join(shapes), LARGEST)
+    arrays: dict[str, Array] = {}
+    for name in shapes:
+        if name not in stored or stored[name].dtype.kind not in "biuf":
+            kind = "none" if name not in stored else f"one of {stored[name].dtype}"
+            raise ValueError(f"{path}: expected an .npz file with {', '.join(shapes)}, got {kind} for {name}")
+        arrays[name] = np.array(stored[name], dtype=np.float64)
     sizes: dict[str, int] = {}
     for name, shape in shapes.items():
         came = arrays[name].shape
@@ -43,4 +46,14 @@ def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Arra
         wanted = tuple(sizes.get(one, 0) if isinstance(one, str) else one for one in shape)
         if came != wanted or not np.isfinite(arrays[name]).all():
             raise ValueError(f"{path}: {name} must be finite and of shape {wanted}, got {came}")
+    if "low" in arrays and not (arrays["low"] <= arrays["high"]).all():
+        raise ValueError(f"{path}: low must be at most high, got some above it")
     return arrays
+
+
+def indices_of(path: str | Path, name: str, values: Array, count: int) -> NDArray[np.intp]:
+    """Return numbers of a file as indices into so many. Raises ValueError where one is none, or is there twice."""
+    whole = (values == np.round(values)) & (values >= 0.0) & (values < count)
+    if not whole.all() or len(np.unique(values)) != len(values):
+        raise ValueError(f"{path}: {name} must be different whole numbers from 0 to {count - 1}, got others")
+    return values.astype(np.intp)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.check import at_least, one_of
 from posefit.geometry.skeleton import Skeleton
-from posefit_priors.arrays import Shape, angles_of, load_arrays
+from posefit_priors.arrays import Shape, angles_of, indices_of, load_arrays
 
 _SHAPES: dict[str, Shape] = {"low": ("m",), "high": ("m",), "angles": ("m",), "rest": (63,)}
 
@@ -80,5 +80,5 @@ class Full:
         arrays = load_arrays(path, _SHAPES)
         prior = cls()
         prior.low, prior.high, prior.rest = arrays["low"], arrays["high"], arrays["rest"]
-        prior.angles = arrays["angles"].astype(np.int64)
+        prior.angles = indices_of(path, "angles", arrays["angles"], len(prior.rest)).astype(np.int64)
         return prior

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least, positive
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index, both
-from posefit_priors.arrays import load_arrays
+from posefit_priors.arrays import indices_of, load_arrays
 from posefit_priors.kernels import near_and_bearable, recover_loose
 from posefit_priors.pca import CLUSTERS, PCA, QUANTILE
 
@@ -125,7 +125,9 @@ class Loose:
         arrays = load_arrays(path, _SHAPES)
         prior = cls()
         prior._pca = PCA.load(path, "pca_")
-        prior.loose = arrays["loose"].astype(np.intp)
+        prior.loose = indices_of(path, "loose", arrays["loose"], len(prior._pca.mean))
+        if (wanted := len(prior._pca.low) + len(prior.loose)) != len(arrays["low"]):
+            raise ValueError(f"{path}: low must be of shape ({wanted},), got {arrays['low'].shape}")
         for name in ("angles_low", "angles_high", "low", "high"):
             setattr(prior, name, arrays[name])
         return prior

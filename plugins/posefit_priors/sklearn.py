@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
+from posefit.reading import cut, parsed_json
 from posefit_priors.arrays import angles_of, load_arrays
 from posefit_priors.kernels import near, recover
 from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, clustered, reach_of
@@ -105,12 +106,15 @@ class Transformed:
         """Return the space that `save` wrote. Raises ValueError where the file is not one."""
         arrays = load_arrays(path, {"angles": ("n", 63), "words": ("k",)})
         names = ("variant", "components", "options", "clusters", "quantile", "seed")
+        letters = arrays["words"]
+        if ((letters < 0) | (letters > 255)).any():
+            raise ValueError(f"{path}: words must be bytes, 0 to 255, got {letters.min():g} to {letters.max():g}")
         try:
-            words = json.loads(arrays["words"].astype(np.uint8).tobytes())
-            settings = dict(zip(names, words, strict=True))
-        except (ValueError, TypeError) as error:
-            raise ValueError(f"{path}: expected the settings of a prior, got {error}") from None
-        return cls(**settings).fit(arrays["angles"])
+            settings = dict(zip(names, parsed_json(letters.astype(np.uint8).tobytes().decode()), strict=True))
+            return cls(**settings).fit(arrays["angles"])
+        except Exception as error:  # whatever the transformer trips over, the file is to blame
+            came = cut(" ".join(str(error).split()))
+            raise ValueError(f"{path}: expected the settings of a prior, got {came}") from None
 
 
 def _built(variant: str, components: int, options: str, seed: int) -> Any:

@@ -70,7 +70,8 @@ def extract(video: str, out: str, as_json: bool, frames: Any, **options: Any) ->
     from posefit.footage.extract import extract as run
     from posefit.footage.segmentation import Extraction
 
-    result = run(video, out, Extraction(**options), frames=frames, progress=progress)
+    given = {name: value for name, value in options.items() if value is not None}
+    result = run(video, out, Extraction(**given), frames=frames, progress=progress)
     for warning in result["warnings"]:
         say(f"warning: {warning}")
     if as_json:
@@ -97,7 +98,8 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
         if options["tracker"] and context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
             raise ValueError(f"{name} must not be given beside a tracker, got {options[name]} and {options['tracker']}")
     how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
-    options["extraction"] = Extraction(method=options["extraction"], **how)
+    given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
+    options["extraction"] = Extraction(**given) if given else None
     options["source"] = options["source"] or ("walk",)
     options["view_degrees"] = options["view_degrees"] or None
     prior = options["prior"] or prior_of(options["source"][0])

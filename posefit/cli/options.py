@@ -40,7 +40,7 @@ EXTRACTION = (
     click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
     click.option("--roi", callback=box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
     click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
-    click.option("--width", type=int, default=640, show_default=True, help="Larger videos are scaled down to this."),
+    click.option("--width", type=int, help="Larger videos are scaled down to this; by default 640."),
 )
 TRACK = (
     click.argument("source", nargs=-1),
@@ -71,9 +71,7 @@ TRACK = (
     click.option("--height", type=float, metavar="METRES", help="How tall the person in the footage stands."),
     click.option("--restarts", type=int, help="Searches of a first pose nobody knows; by default 8."),
     click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
-    click.option(
-        "--extraction", default="mixture", show_default=True, help="Of video: mixture, median, mean, or masks."
-    ),
+    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks."),
     *EXTRACTION,
     click.option("--seed", type=int, default=0, show_default=True),
     click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),

@@ -2,6 +2,12 @@
 
 import math
 from collections.abc import Iterable
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from posefit.reading import quoted
 
 
 def at_least(name: str, value: float, least: float) -> None:
@@ -22,6 +28,33 @@ def positive(name: str, value: float) -> None:
     """Return nothing. Raises ValueError where a number is not finite and above 0."""
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"{name} must be above 0, got {value}")
+
+
+def whole(name: str, value: object, least: int) -> int:
+    """Return a whole number as an int. Raises ValueError where it is none, or below the least it may be."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise ValueError(f"{name} must be a whole number of at least {least}, got {quoted(value)}")
+    if value < least:
+        raise ValueError(f"{name} must be {f'at least {least}' if least else '0 or more'}, got {quoted(int(value))}")
+    return int(value)
+
+
+def finite_number(name: str, value: object) -> float:
+    """Return a finite number as a float. Raises ValueError where it is none."""
+    try:
+        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:  # a whole number of any size
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be a finite number, got {quoted(value)}")
+    return number
+
+
+def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
+    """Return two values. Raises ValueError where it is anything else; `what` says what was expected."""
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        raise ValueError(f"{name} must be {what}, got {quoted(value)}")
+    return value[0], value[1]
 
 
 def one_of(name: str, value: object, known: Iterable[object]) -> None:

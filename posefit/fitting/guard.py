@@ -1,4 +1,4 @@
-"""Watches over optimisers and trackers that somebody else wrote.
+"""Watches over optimisers, priors and trackers that somebody else wrote.
 
 Whatever they do wrong ends the search with one line; and what a tracker says of its frames is held against what the
 host counts and computes itself.
@@ -9,14 +9,19 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import BudgetError, Optimiser
+from posefit.fitting.prior import Prior
 from posefit.fitting.problem import over_views
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
+from posefit.geometry.skeleton import Skeleton
 from posefit.limits import timed
 from posefit.silhouette.cost import areas
 from posefit.silhouette.drawn import PoseCount, uncounted
@@ -100,17 +105,62 @@ def blamed(
 
     It may try to end the program, too.
     """
+    passed = (BrokenRuleError, *passed)  # another plugin's fault, perhaps, which this one met
     try:
         with timed(limit):
             yield
     except passed:
         raise
-    except SystemExit as error:
-        raise BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         if limit is not None and isinstance(error, TimeoutError):
             raise BrokenRuleError(f"{name}: {what} must return within {limit:g} s, and did not") from None
-        raise BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}") from error
+        raise _fault(name, what, error) from error
+
+
+def _fault(name: str, what: str, error: BaseException) -> BrokenRuleError:
+    """Return what is said of something that a plugin raised."""
+    if isinstance(error, SystemExit):
+        return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
+    return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}")
+
+
+class GuardedPrior:
+    """A prior that has learned; whatever it raises is its own fault, whoever calls it."""
+
+    def __init__(self, prior: Prior, name: str) -> None:
+        self._prior, self._name = prior, name
+        self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
+
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
+        """Learn anew, and return itself."""
+        self._prior = self._asked("fit", angles, skeleton)
+        self.low, self.high = np.asarray(self._prior.low), np.asarray(self._prior.high)
+        return self
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63)."""
+        latents: Array = self._asked("transform", angles)
+        return latents
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        angles: Array = self._asked("inverse_transform", latents)
+        return angles
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return which latents (n, m) are poses at all (n,)."""
+        allowed: NDArray[np.bool_] = self._asked("feasible", latents)
+        return allowed
+
+    def save(self, path: str | Path) -> None:
+        """Write what it learned to an .npz file."""
+        self._asked("save", path)
+
+    def _asked(self, method: str, *arguments: Any) -> Any:
+        try:
+            return getattr(self._prior, method)(*arguments)
+        except (Exception, SystemExit) as error:
+            raise _fault(self._name, method, error) from error
 
 
 @dataclass(eq=False)
@@ -148,7 +198,7 @@ class GuardedTracker:
         """Yield the tracker's frame for each observation. Raises BrokenRuleError where it is none, or misses."""
         drawn = PoseCount()
         stream = _Stream(observations, drawn)
-        passed = (BrokenRuleError, ImportError, GeneratorExit)
+        passed = (ImportError, GeneratorExit)
         said = given = 0
         with blamed(self._name, "it", passed=passed):
             frames = iter(self._tracker.track(stream, rng))

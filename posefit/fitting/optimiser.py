@@ -1,6 +1,7 @@
 """What an optimiser is, and the loop that drives one."""
 
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -65,23 +66,31 @@ def populations(
     """Yield each population (n, d) that an optimiser proposes, with its costs (n,): the loop that every search is.
 
     The optimiser is told the costs when the next population is asked for. The search ends when it proposes none, or
-    one that would go over the budget, which is not evaluated. Raises BudgetError where the first one does.
+    one that would go over the budget, which is not evaluated. Raises BudgetError where the first one does, and
+    TypeError where `evaluate` returns anything else than an array of costs (n,).
     """
     used = 0
     while len(proposals := optimiser.ask()) and used + len(proposals) <= evaluations:
         used += len(proposals)
         costs = evaluate(proposals)
+        if not isinstance(costs, np.ndarray) or costs.shape != (len(proposals),):
+            came = f"shape {costs.shape}" if isinstance(costs, np.ndarray) else type(costs).__name__
+            raise TypeError(f"evaluate must return an array of costs of shape ({len(proposals)},), got {came}")
         yield proposals, costs
         optimiser.tell(proposals, costs)
     if not used:
         raise BudgetError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
 
 
-def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluations: int) -> Minimum:
+def minimise(
+    evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluations: int, *, told: bool = False
+) -> Minimum:
     """Return the best proposal an optimiser finds within a budget of whole populations.
 
     `evaluate` gives the costs (n,) of proposals (n, d). A population that would go over `evaluations` is not
-    evaluated. A cost that is nan never counts as best. Raises BudgetError where the budget does not hold one
+    evaluated. A cost that is nan never counts as best. Where an optimiser ends its search before half of the budget is
+    spent, a warning says so, unless it was `told` the budget when it was built: the schedules of some follow it.
+    Raises BudgetError where the budget does not hold one
     population, and ValueError where every cost is nan.
     """
     best, cost, used, history, spent = None, np.inf, 0, [], []
@@ -96,4 +105,10 @@ def minimise(evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluatio
         spent.append(used)
     if best is None or math.isnan(cost):
         raise ValueError(f"costs must be numbers, got nan for all {used} proposals")
+    if not told and 2 * used < evaluations:
+        warnings.warn(
+            f"the optimiser ended its search after {used} of {evaluations} evaluations: if its schedule follows the "
+            "budget, build it with it, as factory(space, rng, evaluations=...) or iterations=...",
+            stacklevel=2,
+        )
     return Minimum(best, cost, used, np.array(history), np.array(spent))

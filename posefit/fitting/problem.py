@@ -25,6 +25,7 @@ class PoseProblem:
     space: SearchSpace
     beta: float = BETA
     threads: int = 1
+    blank: bool = False  # whether nobody may be seen at all, as it happens in the middle of a track
 
     def __post_init__(self) -> None:
         if len(self.cameras) != len(self.silhouettes) or not self.cameras:
@@ -33,6 +34,8 @@ class PoseProblem:
             if silhouette.size != (camera.width, camera.height):
                 size = (camera.height, camera.width)
                 raise ValueError(f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}")
+        if not self.blank and not any(silhouette.mask.any() for silhouette in self.silhouettes):
+            raise ValueError("silhouettes must show a person, got an empty mask")
         if not 0.0 <= self.beta <= 1.0:
             raise ValueError(f"beta must lie in 0 to 1, got {self.beta}")
         if self.threads < 1:

@@ -13,6 +13,7 @@ from posefit.fitting.kernels import unpack_proposals, within
 from posefit.fitting.prior import Prior
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
+from posefit.reading import quoted
 
 Translation = Literal["known", "searched", "aligned"]  # Reading S4
 TRANSLATIONS: tuple[Translation, ...] = ("known", "searched", "aligned")
@@ -43,6 +44,10 @@ class SearchSpace:
     def __post_init__(self) -> None:
         if self.translation not in TRANSLATIONS:
             raise ValueError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {self.translation!r}")
+        for name in ("root_range", "translation_range"):
+            reach = np.asarray(getattr(self, name))
+            if reach.shape != (3,) or not (np.isfinite(reach).all() and (reach >= 0.0).all()):
+                raise ValueError(f"{name} must be 3 numbers of 0 or more, got {quoted(reach.tolist())}")
         low, high = np.asarray(self.prior.low), np.asarray(self.prior.high)
         middle, half = [self.root_centre, 0.5 * (low + high)], [self.root_range, 0.5 * (high - low)]
         if self.translation == "searched":

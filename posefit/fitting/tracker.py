@@ -113,6 +113,9 @@ class Prediction:
             raise ValueError(f"floor must be above 0, got {self.floor}")
         if not self.spread >= 0.0:
             raise ValueError(f"spread must be 0 or more, got {self.spread}")
+        for name in ("root_range_degrees", "translation_range"):
+            if not (np.isfinite(getattr(self, name)).all() and np.min(getattr(self, name)) >= 0.0):
+                raise ValueError(f"{name} must be 0 or more to either side, got {getattr(self, name)}")
         if self.prediction not in ("latest", "literal"):
             raise ValueError(f"prediction must be one of latest, literal, got {self.prediction!r}")
         if not 0.0 <= self.beta <= 1.0:
@@ -204,9 +207,15 @@ class SynthesisTracker:
                 continue
             optimiser = self._ready(optimiser, space, rng)
             problem = PoseProblem(
-                task.body, task.cameras, observation.silhouettes, space, beta=self.prediction.beta, threads=task.threads
+                task.body,
+                task.cameras,
+                observation.silhouettes,
+                space,
+                beta=self.prediction.beta,
+                threads=task.threads,
+                blank=True,
             )
-            best = minimise(problem.evaluate, optimiser, task.evaluations)
+            best = minimise(problem.evaluate, optimiser, task.evaluations, told=True)
             follower.commit(best.proposal)
             latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
             yield latest
@@ -219,7 +228,12 @@ class SynthesisTracker:
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
         problem = PoseProblem(
-            self.task.body, self.task.cameras, observation.silhouettes, space, beta=self.prediction.beta
+            self.task.body,
+            self.task.cameras,
+            observation.silhouettes,
+            space,
+            beta=self.prediction.beta,
+            blank=True,
         )
         counts = problem.areas(poses, places)
         areas = np.stack([one[0] for one in counts])

@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 
 from posefit.footage.extract import store
-from posefit.footage.masks import FPS, LazyMasks, Masks, Range, Straight, Views
+from posefit.footage.masks import FPS, FolderMasks, Masks, Range, Straight, Views
 from posefit.footage.scene import Placing, Scene, observed
 from posefit.footage.segmentation import Segmentation
+from posefit.footage.stacks import StackMasks
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
@@ -37,7 +38,7 @@ class CameraView:
 
 def masks_of(path: Path, fps: float | None, frames: Range) -> CameraView:
     """Return what a folder or an .npz of masks shows, at `fps`, or else at the rate that the file states, or 30."""
-    masks = LazyMasks.of(path, frames)
+    masks = FolderMasks.of(path, frames) if path.is_dir() else StackMasks.of(path, frames)
     return CameraView(masks, Views([masks]).sizes[0], None, fps or masks.fps or FPS)
 
 

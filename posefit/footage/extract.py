@@ -1,15 +1,16 @@
 """Masks from a video of one person before a still background: `posefit extract`."""
 
 import csv
-import shutil
-import tempfile
+import os
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from posefit.files import new_folder
 from posefit.footage.masks import KINDS, PackedMasks, Range, packed
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video, VideoWriter
@@ -33,13 +34,13 @@ def extract(
     all. Raises ValueError for every mistake in the arguments or files, where nobody is seen, and on a full disk.
     """
     target = Path(out)
-    if target.exists():
+    if os.path.lexists(target):
         raise ValueError(f"{target}: expected a new folder, got one that exists")
     video = Video.of(source)
     found = Segmentation(video, how, frames)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    building = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
+    with suppress(OSError):  # told where the folder is made
+        target.parent.mkdir(parents=True, exist_ok=True)
+    with new_folder(target) as building:
         with VideoWriter(building / "preview.mp4", video.fps, found.size) as preview:
             masks = store(building, found, progress, lambda *seen: preview.write(_painted(*seen)))
         _write_npz(building, masks, video.fps, found.size)
@@ -47,12 +48,6 @@ def extract(
             writer = csv.DictWriter(file, list(found.rows[0]))
             writer.writeheader()
             writer.writerows(found.rows)
-        building.chmod(0o755)
-        building.rename(target)
-    except OSError as error:
-        raise ValueError(f"{target}: expected a place to write to, got {error.strerror or error}") from None
-    finally:
-        shutil.rmtree(building, ignore_errors=True)
     return {"video": str(source), "method": how.method, **found.summary}
 
 

@@ -14,7 +14,6 @@ from posefit.silhouette.mask import Mask, Silhouette
 
 FPS = 30.0  # of motions and masks, where nobody says
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
-BITE = 2_000_000_000  # bytes; the largest .npz of masks that is read
 Range = tuple[int | None, int | None]
 
 
@@ -39,77 +38,52 @@ class Masks(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class LazyMasks:
-    """The masks of a folder of images, or of an .npz file."""
+class FolderMasks:
+    """The masks of a folder of images, each read when its turn comes."""
 
     files: Sequence[Path]
-    stack: NDArray[Any] | None = field(default=None, repr=False)
-    known: NDArray[Any] | None = field(default=None, repr=False)  # of the same shape; 0 where nothing is known
-    usable: NDArray[np.bool_] | None = field(default=None, repr=False)  # (T,)
-    fps: float | None = None  # where the file says it
+    fps: float | None = None  # a folder does not say it
 
     @classmethod
-    def of(cls, path: Path, frames: Range) -> "LazyMasks":
-        """Return the masks of a folder or an .npz file, cut to `frames`."""
-        if path.is_dir():
-            files = sorted(file for file in path.iterdir() if file.suffix.lower() in IMAGES)
-            if not files:
-                raise ValueError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
-            return cls(files[slice(*span(frames, len(files)))])
-        existing(path)
-        if path.stat().st_size > BITE:
-            raise ValueError(f"{path}: expected at most {BITE // 10**9} GB, got {path.stat().st_size / 1e9:.1f} GB")
-        try:
-            with np.load(path, allow_pickle=False) as stored:
-                stack = stored["masks"]
-                known, usable, fps = stored.get("valid"), stored.get("usable"), stored.get("fps")
-        except (KeyError, ValueError, OSError, EOFError) as error:
-            raise ValueError(f"{path}: expected an .npz file with the key masks, got {error}") from None
-        if stack.ndim != 3 or not len(stack) or stack.dtype.kind not in "buif":
-            raise ValueError(f"{path}: masks must have shape (frames, height, width), got {stack.shape} {stack.dtype}")
-        if stack.dtype.kind == "f" and not np.isfinite(stack).all():
-            raise ValueError(f"{path}: masks must be finite, got nan or infinity")
-        if known is not None and (known.shape != stack.shape or known.dtype.kind not in "bui"):
-            raise ValueError(f"{path}: valid must have the masks' shape {stack.shape}, got {known.shape} {known.dtype}")
-        start, stop = span(frames, len(stack))
-        if usable is not None and (usable.shape != stack.shape[:1] or usable.dtype != np.bool_):
-            raise ValueError(f"{path}: usable must be {len(stack)} booleans, got {usable.shape} {usable.dtype}")
-        names, part = [Path(f"{path}[{k}]") for k in range(start, stop)], slice(start, stop)
-        known, usable = (None if value is None else value[part] for value in (known, usable))
-        if usable is not None and not usable.any():
-            raise ValueError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
-        if fps is not None and not (fps.shape == () and fps.dtype.kind in "iuf" and 0.0 < fps <= 1000.0):
-            raise ValueError(f"{path}: fps must be a number up to 1000, got {fps.tolist()}")
-        return cls(names, stack[part], known, usable, None if fps is None else float(fps))
+    def of(cls, path: Path, frames: Range) -> "FolderMasks":
+        """Return the masks of a folder, in the order of their names, cut to `frames`."""
+        files = sorted(file for file in path.iterdir() if file.suffix.lower() in IMAGES)
+        if not files:
+            raise ValueError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
+        return cls(files[slice(*span(frames, len(files)))])
 
     def __len__(self) -> int:
         return len(self.files)
 
     def is_usable(self, k: int) -> bool:
-        """Return whether mask k shows enough of the person to be searched; masks that do not say so do."""
-        return self.usable is None or bool(self.usable[k])
+        """Return that there is a mask k: that too little of the person is seen, a folder cannot say."""
+        return k < len(self)
 
     def label(self, k: int) -> str:
-        """Return the file of mask k, or its place in the .npz file."""
+        """Return the file of mask k."""
         return str(self.files[k])
 
     def silhouette(self, k: int) -> Silhouette:
         """Return mask k. Raises ValueError naming the file where it is no mask, or empty, or full."""
-        mask = self.stack[k] if self.stack is not None else self._image(self.files[k])
-        person = np.greater(mask, 127 if mask.max() > 1 else 0)
-        if self.is_usable(k) and (not person.any() or person.all()):
-            came = "an empty one" if not person.any() else "one without background"
-            raise ValueError(f"{self.files[k]}: expected a mask with a person before a background, got {came}")
-        return Silhouette.of(person, None if self.known is None else self.known[k])
+        from posefit.footage.images import FORMATS, read_image
 
-    @staticmethod
-    def _image(path: Path) -> NDArray[Any]:
-        import cv2
-
-        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        image = read_image(self.files[k], grey=True)
         if image is None:
-            raise ValueError(f"{path}: expected an image, got a file that is none")
-        return image
+            raise ValueError(f"{self.files[k]}: expected an image ({FORMATS}), got a file that is none")
+        return shown_person(person_in(image), None, self.label(k))
+
+
+def person_in(mask: NDArray[Any]) -> Mask:
+    """Return where a person is: above 127 where values go beyond 1, else above 0."""
+    return np.asarray(np.greater(mask, 127 if mask.max() > 1 else 0))
+
+
+def shown_person(person: Mask, known: NDArray[Any] | None, label: str) -> Silhouette:
+    """Return the silhouette of a person's mask. Raises ValueError where nobody is there, or nothing else."""
+    if not person.any() or person.all():
+        came = "an empty one" if not person.any() else "one without background"
+        raise ValueError(f"{label}: expected a mask with a person before a background, got {came}")
+    return Silhouette.of(person, known)
 
 
 class PackedMasks:

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import cv2
 import numpy as np
 
+from posefit.footage.images import read_image
 from posefit.footage.masks import Range, span
 from posefit.footage.video import Video
 from posefit.silhouette.foreground import (
@@ -189,7 +190,7 @@ def _given_background(video: Video, given: str, size: tuple[int, int]) -> Iterat
         first, last = span((int(start or 0), int(stop)), video.count())
         yield from video.frames(first, last, size)
         return
-    image = cv2.imread(given)
+    image = read_image(given, grey=False)
     if image is None:
         raise ValueError(f"background must be frames A:B or an image, got {given!r}")
     if (image.shape[1], image.shape[0]) != video.size:
@@ -211,7 +212,7 @@ def _scaled_roi(roi: Box | None, video: Video, scale: float) -> Box | None:
 def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
     if path is None:
         return None
-    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    image = read_image(path, grey=True)
     if image is None:
         raise ValueError(f"{path}: expected an image of what to ignore, got a file that is none")
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > 127)

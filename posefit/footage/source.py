@@ -1,13 +1,15 @@
 """What a user names, a motion or what one camera or several saw, becomes a scene, once."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
+from numbers import Real
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from posefit.fitting.check import finite_number, pair
 from posefit.footage.cameras import CameraView, calibrated, combined, masks_of, video_of
 from posefit.footage.masks import FPS, IMAGES, Range, existing
 from posefit.footage.scene import Scene, synthetic
@@ -18,12 +20,14 @@ from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
 from posefit.motion import library
-from posefit.motion.motion import Motion
+from posefit.motion.motion import RATES, Motion
+from posefit.reading import quoted
 
 MOTIONS = (".amc", ".bvh")
 NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".asf", ".json", ".csv", ".txt")
 HEIGHTS = (0.3, 2.8)  # metres that a person may stand
 Kind = Literal["motion", "masks", "video"]
+_KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video"}
 Source = str | Path | Motion
 
 
@@ -43,20 +47,40 @@ class Viewing:
     size: tuple[int, int] = (320, 240)
     fps: float | None = None
     frames: Range = (None, None)
-    extraction: Extraction = field(default_factory=Extraction)
+    extraction: Extraction | None = None
     height: float | None = None
     up: Up | None = None
 
     def __post_init__(self) -> None:
         for degrees in self.view_degrees:
-            if not np.isfinite(degrees):
-                raise ValueError(f"view_degrees must be a finite number, got {degrees}")
-        if self.fps is not None and not (np.isfinite(self.fps) and self.fps > 0.0):
-            raise ValueError(f"fps must be a positive number, got {self.fps}")
-        if min(self.size) < 1 or max(self.size) > 16_384:
-            raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {self.size[0]}x{self.size[1]}")
-        if self.height is not None and not HEIGHTS[0] <= self.height <= HEIGHTS[1]:
+            finite_number("view_degrees", degrees)
+        if self.fps is not None and not (isinstance(self.fps, Real) and 0.0 < self.fps < np.inf):
+            raise ValueError(f"fps must be a positive number, got {quoted(self.fps)}")
+        if self.fps is not None and not RATES[0] <= self.fps <= RATES[1]:
+            raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(self.fps)}")
+        sides = pair("size", self.size, "(width, height)")
+        if not all(isinstance(side, int | np.integer) and 1 <= side <= 16_384 for side in sides):
+            raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {sides[0]}x{sides[1]}")
+        for end in pair("frames", self.frames, "(start, stop), either of which may be None"):
+            if end is not None and (isinstance(end, bool) or not isinstance(end, int | np.integer)):
+                raise ValueError(f"frames must be two whole numbers or None, got {quoted(self.frames)}")
+        if self.height is not None and not HEIGHTS[0] <= finite_number("height", self.height) <= HEIGHTS[1]:
             raise ValueError(f"height must lie in {HEIGHTS[0]} to {HEIGHTS[1]} metres, got {self.height}")
+
+    def check_used(self, kind: Kind) -> None:
+        """Return nothing. Raises ValueError where something was given that sources of this kind have no use for."""
+        useless: list[tuple[str, object, str]] = []
+        if kind != "video":
+            useless.append(("extraction", self.extraction, "video"))
+        if kind == "video":
+            useless.append(("fps", self.fps, "motions and masks"))
+        if kind == "motion":
+            useless.append(("height", self.height, "footage"))
+        if not self.cameras:
+            useless.append(("up", self.up, "calibrations"))
+        for name, value, where in useless:
+            if value is not None:
+                raise ValueError(f"{name} must be given for {where} only, got {quoted(value)} for {_KINDS[kind]}")
 
 
 def scene_of(sources: Sequence[Source], viewing: Viewing, work: Path, listener: Listener = QUIET) -> Scene:
@@ -67,6 +91,7 @@ def scene_of(sources: Sequence[Source], viewing: Viewing, work: Path, listener: 
     kinds = {kind_of(source) for source in sources}
     if len(kinds) > 1:
         raise ValueError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
+    viewing.check_used(next(iter(kinds)))
     if kinds == {"motion"}:
         return _known(sources, viewing)
     if len(viewing.view_degrees) > 1:
@@ -85,8 +110,6 @@ def _known(sources: Sequence[Source], viewing: Viewing) -> Scene:
     """Return the scene of a motion, which cameras see that stand where they are told."""
     if len(sources) > 1:
         raise ValueError(f"source must be one motion, or views of one person, got {len(sources)} motions")
-    if viewing.height is not None:
-        raise ValueError(f"height must be given for footage only, a motion knows its own, got {viewing.height}")
     cameras = [camera for one in viewing.cameras for camera in _cameras(one, viewing)]
     motion = motion_of(sources[0], viewing.asf, viewing.fps or FPS)
     return synthetic(motion, viewing.view_degrees, viewing.size, cameras, viewing.frames)
@@ -147,7 +170,7 @@ def _filmed(
     if len(rates) > 1:
         raise ValueError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
     calibrated(viewing.cameras, [video.size for video in videos])
-    found = [Segmentation(video, viewing.extraction, viewing.frames) for video in videos]
+    found = [Segmentation(video, viewing.extraction or Extraction(), viewing.frames) for video in videos]
     seen = []
     for k, (video, one) in enumerate(zip(videos, found, strict=True)):
         listener.say(f"taking the person out of {video.path}")

@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from posefit.footage.images import PIXELS
 from posefit.silhouette.foreground import Image
 
 CODE = "mp4v"
@@ -34,6 +35,10 @@ class Video:
             raise ValueError(f"{path}: expected a video file, got {came}")
         capture = cv2.VideoCapture(str(path))
         try:
+            wide, tall = (capture.get(one) for one in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+            if wide * tall > PIXELS:
+                most = f"{PIXELS // 10**6} million pixels"
+                raise ValueError(f"{path}: expected frames of at most {most}, got {wide:.0f}x{tall:.0f}")
             read, image = capture.read()
             if not read:
                 raise ValueError(f"{path}: expected a video that OpenCV can read, got none or one without frames")

@@ -4,10 +4,7 @@ A file holds one camera or several. All give camera_from_world in OpenCV's frame
 differs, and is turned to +y here: the axis that the images of all cameras see pointing up, unless `up` names one.
 """
 
-import json
-import tomllib
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -17,9 +14,13 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.camera import Camera
+from posefit.geometry.storage import Matrix, number_of, numbers_of, stored_values, xml_of
+from posefit.reading import cut, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
-LARGEST_FILE = 4_000_000  # bytes
+LARGEST_FILE = 1_000_000  # bytes
+MESSAGE = 300  # characters of what is wrong
+DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV describes a lens by
 SUBPIXELS = 64.0  # Qualisys counts lengths on the sensor in 64ths of a pixel
 HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
 # The rotation of the world that turns an axis to +y.
@@ -89,15 +90,14 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     path = Path(path)
     if not path.is_file():
         raise ValueError(f"{path}: expected a calibration file, got nothing of that name")
-    if path.stat().st_size > LARGEST_FILE:
-        raise ValueError(f"{path}: expected a calibration of at most 4 MB, got {path.stat().st_size} bytes")
+    text = read_text(path, LARGEST_FILE)
     try:
-        text = path.read_bytes().decode("utf-8", errors="replace")
         found = _reader(path, text)(path, text)
         for one in found:
             one.camera(one.size, np.eye(3))
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, cv2.error) as error:
-        said = f"no {error}" if isinstance(error, KeyError) else str(error).strip() or type(error).__name__
+    except (ValueError, TypeError, KeyError, OverflowError, AttributeError, RecursionError, cv2.error) as error:
+        told = " ".join(str(error).split()) or type(error).__name__
+        said = cut(f"no {told}" if isinstance(error, KeyError) else told, MESSAGE)
         raise ValueError(f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {said}") from None
     if not found:
         raise ValueError(f"{path}: expected a calibration with a camera, got none")
@@ -127,18 +127,18 @@ def _own(path: Path, _: str) -> list[Calibration]:
 
 def _toml(_: Path, text: str) -> list[Calibration]:
     found: list[Calibration] = []
-    for name, camera in tomllib.loads(text).items():
+    for name, camera in parsed_toml(text).items():
         if name == "metadata" or not isinstance(camera, dict):
             continue
-        rotation = cv2.Rodrigues(_numbers(camera["rotation"], (3,)))[0] if "rotation" in camera else None
+        rotation = _turned(camera["rotation"]) if "rotation" in camera else None
         translation = _numbers(camera["translation"], (3,)) if "translation" in camera else None
         found.append(
             Calibration(
                 str(camera.get("name", name)),
                 _size(*camera["size"]),
                 _numbers(camera["matrix"], (3, 3)),
-                np.asarray(camera.get("distortions", np.zeros(4)), dtype=np.float64).reshape(-1),
-                None if rotation is None else np.asarray(rotation, dtype=np.float64),
+                _distortion(camera.get("distortions", [])),
+                rotation,
                 translation,
                 bool(camera.get("fisheye", False)),
             )
@@ -147,12 +147,7 @@ def _toml(_: Path, text: str) -> list[Calibration]:
 
 
 def _qualisys(_: Path, text: str) -> list[Calibration]:
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ValueError("an XML file with a document type, which is not read")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise ValueError(f"XML that is broken: {error}") from None
+    root = xml_of(text)
     found: list[Calibration] = []
     for camera in root.iter("camera"):
         view, lens, place = (_tag(camera, name) for name in ("fov_video", "intrinsic", "transform"))
@@ -173,7 +168,7 @@ def _qualisys(_: Path, text: str) -> list[Calibration]:
     return found
 
 
-def _tag(camera: ElementTree.Element, name: str) -> ElementTree.Element:
+def _tag(camera: Any, name: str) -> Any:
     tag = camera.find(name)
     if tag is None:
         raise ValueError(f"a camera without {name}")
@@ -181,50 +176,55 @@ def _tag(camera: ElementTree.Element, name: str) -> ElementTree.Element:
 
 
 def _opencv(path: Path, text: str) -> list[Calibration]:
-    storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-    try:
-        if not storage.isOpened():
-            raise ValueError("a file that OpenCV cannot read")
-        matrix = _matrix(storage, "camera_matrix", "cameraMatrix", "K", "M")
-        width, height = (_number(storage, f"image_{name.lower()}", f"image{name}") for name in ("Width", "Height"))
-        if matrix is None or width is None or height is None:
-            raise ValueError("one without camera_matrix, image_width and image_height")
-        distortion = _matrix(storage, "distortion_coefficients", "dist_coeffs", "distCoeffs", "distortion", "D")
-        rotation = _matrix(storage, "R", "rotation", "rvec")
-        translation = _matrix(storage, "T", "translation", "tvec")
-        if rotation is not None and rotation.size == 3:
-            rotation = np.asarray(cv2.Rodrigues(rotation.reshape(3))[0], dtype=np.float64)
-        if (rotation is None) != (translation is None):
-            raise ValueError("one with a rotation or a translation, but not both")
-        return [
-            Calibration(
-                path.stem,
-                _size(width, height),
-                _numbers(matrix, (3, 3)),
-                np.zeros(4) if distortion is None else distortion.reshape(-1),
-                None if rotation is None else _numbers(rotation, (3, 3)),
-                None if translation is None else _numbers(translation.reshape(-1), (3,)),
-            )
-        ]
-    finally:
-        storage.release()
+    values = stored_values(text)
+    matrix = _matrix(values, "camera_matrix", "cameraMatrix", "K", "M")
+    width, height = (_named(values, f"image_{name.lower()}", f"image{name}") for name in ("Width", "Height"))
+    if matrix is None or width is None or height is None:
+        raise ValueError("one without camera_matrix, image_width and image_height")
+    distortion = _matrix(values, "distortion_coefficients", "dist_coeffs", "distCoeffs", "distortion", "D")
+    rotation = _matrix(values, "R", "rotation", "rvec")
+    translation = _matrix(values, "T", "translation", "tvec")
+    if rotation is not None and rotation.size == 3:
+        rotation = _turned(rotation.reshape(3))
+    if (rotation is None) != (translation is None):
+        raise ValueError("one with a rotation or a translation, but not both")
+    return [
+        Calibration(
+            path.stem,
+            _size(number_of(width), number_of(height)),
+            _numbers(matrix, (3, 3)),
+            _distortion([] if distortion is None else distortion),
+            None if rotation is None else _numbers(rotation, (3, 3)),
+            None if translation is None else _numbers(translation.reshape(-1), (3,)),
+        )
+    ]
 
 
-def _matrix(storage: cv2.FileStorage, *names: str) -> Array | None:
-    for name in names:
-        node = storage.getNode(name)
-        if not node.empty():
-            value = node.mat() if node.isMap() else [node.at(k).real() for k in range(node.size())]
-            return np.asarray(value, dtype=np.float64)
-    return None
+def _named(values: Mapping[str, Any], *names: str) -> Any:
+    """Return the first value that has one of these names, or None."""
+    return next((values[name] for name in names if name in values), None)
 
 
-def _number(storage: cv2.FileStorage, *names: str) -> float | None:
-    for name in names:
-        node = storage.getNode(name)
-        if not node.empty():
-            return float(node.real())
-    return None
+def _matrix(values: Mapping[str, Any], *names: str) -> Array | None:
+    value = _named(values, *names)
+    return None if value is None else value.array() if isinstance(value, Matrix) else numbers_of(value)
+
+
+def _turned(vector: Any) -> Array:
+    """Return the rotation (3, 3) that a vector (3,) stands for: its axis, and as long as its angle."""
+    return np.asarray(cv2.Rodrigues(_numbers(vector, (3,)))[0], dtype=np.float64)
+
+
+def _distortion(values: Any) -> Array:
+    """Return OpenCV's numbers of a lens; none, or any number of zeros, is no distortion."""
+    numbers = np.array(values, dtype=np.float64).reshape(-1)
+    if not np.isfinite(numbers).all():
+        raise ValueError("a distortion that is not finite")
+    if not numbers.any():
+        return np.zeros(4)
+    if numbers.size not in DISTORTIONS:
+        raise ValueError(f"a distortion of {numbers.size} numbers")
+    return numbers
 
 
 def _pinhole(focal: Array, centre: Array) -> Array:
@@ -240,7 +240,7 @@ def _size(width: Any, height: Any) -> tuple[int, int]:
 def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
     numbers = np.asarray(values, dtype=np.float64)
     if numbers.shape != shape or not np.isfinite(numbers).all():
-        raise ValueError(f"{json.dumps(numbers.tolist())} where finite numbers of shape {shape} should be")
+        raise ValueError(f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should be")
     return numbers
 
 
@@ -249,5 +249,5 @@ def _orthonormal(rotation: Array) -> Array:
     left, _, right = np.linalg.svd(rotation)
     nearest = left @ right
     if np.linalg.det(nearest) < 0.0 or np.abs(nearest - rotation).max() > 1e-2:
-        raise ValueError(f"a rotation that is none: {rotation.tolist()}")
+        raise ValueError(f"a rotation that is none: {quoted(rotation.tolist())}")
     return np.asarray(nearest)

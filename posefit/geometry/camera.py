@@ -65,6 +65,10 @@ class Camera:
         It stands `distance` metres away in the direction `azimuth` radians about the vertical: 0 is world +z, and
         pi/2 is world +x. `field_of_view` is the angle across the image's larger side.
         """
+        if not (math.isfinite(distance) and distance >= 0.0):
+            raise ValueError(f"distance must be 0 or more metres, got {distance}")
+        if not 0.0 < field_of_view < math.pi:
+            raise ValueError(f"field_of_view must lie between 0 and pi radians, got {field_of_view}")
         sine, cosine = math.sin(azimuth), math.cos(azimuth)
         rotation = np.array([[cosine, 0.0, -sine], [0.0, -1.0, 0.0], [-sine, 0.0, -cosine]])
         focal = 0.5 * max(size) / math.tan(0.5 * field_of_view)

@@ -1,6 +1,7 @@
 """Acclaim motions (.amc): read into a `Motion`, and written from one."""
 
 from array import array
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,14 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
 )
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton, angle_index
-from posefit.motion.asf import LARGEST, METRES_PER_UNIT, check_size, mistake, parse_asf, unit_length
-from posefit.motion.motion import Motion
+from posefit.motion.asf import LARGEST, METRES_PER_UNIT, mistake, parse_asf, unit_length
+from posefit.motion.motion import LONGEST, Motion
+from posefit.reading import SHOWN, check_size, cut
 
 FPS = 120.0  # CMU's rate; the files do not state it
 SIZE_LIMIT = 500_000_000  # bytes
 LONGEST_LINE = 10_000  # bytes; a root line has about 60
+VALUES = 20_000_000  # numbers of a file: 200,000 frames of 100 channels
 
 Spans = dict[bytes, tuple[int, int]]  # bone: where its values start and stop in a frame
 
@@ -76,9 +79,9 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
     seen: set[bytes] = set()
     frame, radians, number = -1, None, 0
     with path.open("rb") as file:
-        for number, raw in enumerate(file, 1):
+        for number, raw in enumerate(iter(partial(file.readline, LONGEST_LINE + 1), b""), 1):
             if len(raw) > LONGEST_LINE:
-                raise mistake(path, number, f"a line of at most {LONGEST_LINE} bytes", f"{len(raw)}")
+                raise mistake(path, number, f"a line of at most {LONGEST_LINE} bytes", "a longer one")
             words = raw.split()
             if not words or words[0].startswith(b"#"):
                 continue
@@ -95,6 +98,9 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
                 if frame >= 0:
                     _check_whole(path, number, spans, seen, frame, f"frame {int(word)}")
                     data.extend(row)
+                    if len(data) >= min(LONGEST * width, VALUES):
+                        most = min(LONGEST, VALUES // width)
+                        raise mistake(path, number, f"at most {most} frames of {width} numbers", "more")
                     if int(word) != frame + 1:
                         raise mistake(path, number, f"frame {frame + 1}", f"frame {int(word)}")
                 frame = int(word)
@@ -136,7 +142,7 @@ def _check_whole(path: Path, number: int, spans: Spans, seen: set[bytes], frame:
 
 
 def _quoted(raw: bytes) -> str:
-    return repr(raw.strip().decode("utf-8", errors="replace"))
+    return repr(cut(raw.strip()[: 4 * SHOWN].decode("utf-8", errors="replace")))
 
 
 def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METRES_PER_UNIT) -> None:

@@ -9,11 +9,12 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Channels, Skeleton, angle_index
+from posefit.reading import SHOWN, check_size, cut
 
 INCH = 0.0254  # metres
 METRES_PER_UNIT = INCH / 0.45  # CMU's files say `length 0.45`: a unit is 1 / 0.45 inch
 LARGEST = 1e6  # no angle or length of a person comes near; beyond it arithmetic would overflow
-SIZE_LIMIT = 10_000_000  # bytes; CMU's files have 7,000
+SIZE_LIMIT = 1_000_000  # bytes; CMU's files have 7,000
 ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
 # Where to hang the bones that a Skeleton knows by their channels alone.
 _FINGERS = {"lfingers": "lhand", "lthumb": "lwrist", "rfingers": "rhand", "rthumb": "rwrist"}
@@ -21,14 +22,7 @@ _FINGERS = {"lfingers": "lhand", "lthumb": "lwrist", "rfingers": "rhand", "rthum
 
 def mistake(path: Path, line: int, expected: str, got: str) -> ValueError:
     """Return the error of a file's line; what came is quoted, and cut where it is long."""
-    return ValueError(f"{path}:{line}: expected {expected}, got {got if len(got) <= 60 else got[:57] + '...'}")
-
-
-def check_size(path: Path, limit: int) -> None:
-    """Return nothing. Raises ValueError where a file is too large to be read."""
-    size = path.stat().st_size
-    if size > limit:
-        raise ValueError(f"{path}: expected at most {limit // 1_000_000} MB, got {size / 1e6:.1f} MB")
+    return ValueError(f"{path}:{line}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
 
 
 def unit_length(name: str, value: float) -> float:

@@ -8,6 +8,7 @@ vector. Where bones fork, as the thorax does into neck and shoulders, all BVH ch
 
 import importlib
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,10 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
 )
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Channels, Skeleton, angle_index
-from posefit.motion.amc import SIZE_LIMIT
-from posefit.motion.asf import LARGEST, check_size, unit_length
-from posefit.motion.motion import Motion
+from posefit.motion.amc import SIZE_LIMIT, VALUES
+from posefit.motion.asf import LARGEST, mistake, unit_length
+from posefit.motion.motion import LONGEST, Motion
+from posefit.reading import check_size, cut
 
 _LIMBS = {  # names in the CMU conversions by cgspeed, without their side
     "hipjoint": "HipJoint",
@@ -52,6 +54,9 @@ NAMES = {
 }
 CHANNELS: Channels = tuple((BONES[j - 1], ("rx", "ry", "rz")) for j in range(1, len(JOINTS)) if j not in ENDS)
 ROTATIONS = "Zrotation Xrotation Yrotation"
+LONGEST_LINE = 100_000  # bytes; a frame of CMU's files has about 1,000
+NODES = 1_000  # joints and ends of a file
+FRAME_TIMES = (1e-4, 10.0)  # seconds
 SAME_PLACE = 1e-4  # share of the longest bone within which two joints are at one point
 
 
@@ -94,6 +99,7 @@ def _parsed(path: Path) -> Any:
     except ImportError as error:
         raise ImportError("reading .bvh files needs the library pybvh: pip install posefit[bvh]") from error
     check_size(path, SIZE_LIMIT)
+    _check_lengths(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -101,13 +107,38 @@ def _parsed(path: Path) -> Any:
     except (OSError, MemoryError):
         raise
     except Exception as error:  # whatever the library trips over, the file is to blame
-        raise ValueError(f"{path}: expected a BVH file, got one that pybvh cannot read: {error}") from error
+        raise ValueError(
+            f"{path}: expected a BVH file, got one that pybvh cannot read: {cut(str(error), 200)}"
+        ) from error
     for values in (bvh.root_pos, bvh.joint_angles, np.array([node.offset for node in bvh.nodes])):
         if not (np.abs(values) < LARGEST).all():
             raise ValueError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
-    if not (np.isfinite(bvh.fps) and bvh.fps > 0.0):
-        raise ValueError(f"{path}: expected a positive frame time, got {bvh.frame_time}")
+    if not FRAME_TIMES[0] <= bvh.frame_time <= FRAME_TIMES[1]:
+        low, high = FRAME_TIMES
+        raise ValueError(f"{path}: expected a positive frame time, {low:g} to {high:g} s, got {bvh.frame_time:g}")
     return bvh
+
+
+def _check_lengths(path: Path) -> None:
+    """Return nothing. Raises ValueError where a file has more lines, joints or frames than are read.
+
+    Everything else that may be wrong is left to the library, which makes arrays as large as a file asks for.
+    """
+    nodes, rows, width, moving = 0, 0, 0, False
+    with path.open("rb") as file:
+        for number, line in enumerate(iter(partial(file.readline, LONGEST_LINE + 1), b""), 1):
+            if len(line) > LONGEST_LINE:
+                raise mistake(path, number, f"a line of at most {LONGEST_LINE} bytes", "a longer one")
+            words = line.split()
+            if moving and words:
+                rows, width = rows + 1, max(width, len(words))
+                if rows > LONGEST or rows * width > VALUES:
+                    raise mistake(path, number, f"at most {LONGEST} frames and {VALUES} numbers", "more")
+            elif words:
+                nodes += words[0] in (b"ROOT", b"JOINT", b"End")
+                if nodes > NODES:
+                    raise mistake(path, number, f"at most {NODES} joints and ends", "more")
+                moving = words[:2] == [b"Frame", b"Time:"]
 
 
 def _offsets(path: Path, nodes: list[Any]) -> Array:

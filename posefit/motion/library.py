@@ -21,7 +21,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
-from posefit.motion.motion import Motion
+from posefit.motion.motion import LONGEST, Motion
+from posefit.reading import SHOWN, quoted
 
 
 @lru_cache(maxsize=1)
@@ -69,7 +70,9 @@ def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1
     """
     angles, series, period, pace = _model(name)
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 1:
-        raise ValueError(f"frames must be a whole number of at least 1, got {frames!r}")
+        raise ValueError(f"frames must be a whole number of at least 1, got {quoted(frames)}")
+    if frames > LONGEST:
+        raise ValueError(f"frames must be at most {LONGEST}, got {quoted(frames)}")
     if not (np.isfinite(fps) and fps > 0.0 and np.isfinite(speed) and speed > 0.0):
         raise ValueError(f"fps and speed must be positive, got {fps} and {speed}")
     if not np.isfinite(phase):
@@ -96,6 +99,6 @@ def _model(name: str) -> tuple[list[int], Array, float, float]:
 
 def _check(name: str) -> None:
     if name not in names():
-        near = get_close_matches(name, names(), 1)
+        near = get_close_matches(name[:SHOWN], names(), 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"motion must be a file, a folder or one of {', '.join(names())}, got {name!r}{hint}")
+        raise ValueError(f"motion must be a file, a folder or one of {', '.join(names())}, got {quoted(name)}{hint}")

@@ -8,9 +8,12 @@ from scipy.spatial.transform import Rotation, Slerp
 from posefit.arrays import Array
 from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
+from posefit.reading import quoted
 
 # Share of a frame within which two times count as the same one.
 SAME_TIME = 1e-6
+LONGEST = 200_000  # frames of a file, or of a motion that is made or resampled: 28 minutes at 120 a second
+RATES = (1e-3, 1e6)  # frames a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +62,9 @@ class Motion:
         if step >= 1 and abs(ratio - step) < 1e-9 * step:
             return Motion(self.name, self.skeleton, self.poses[::step], self.translations[::step], fps)
         last = len(self) - 1
+        if last / ratio >= LONGEST:
+            came = f"{last / ratio:.3g} frames at {fps:g} fps"
+            raise ValueError(f"{self.name} must have at most {LONGEST} frames when it is resampled, got {came}")
         # in frames of this motion; the last time may be off by rounding
         times = np.minimum(np.arange(int(last / ratio + SAME_TIME) + 1) * ratio, last)
         if last == 0:
@@ -80,6 +86,8 @@ class Motion:
 
 
 def _rate(fps: float) -> float:
-    if not (np.isfinite(fps) and fps > 0.0):
-        raise ValueError(f"fps must be a positive number, got {fps}")
+    if not 0.0 < fps < np.inf:
+        raise ValueError(f"fps must be a positive number, got {quoted(fps)}")
+    if not RATES[0] <= fps <= RATES[1]:
+        raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(fps)}")
     return float(fps)

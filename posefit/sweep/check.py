@@ -14,6 +14,8 @@ from posefit.fitting.space import TRANSLATIONS
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
 from posefit.motion import library
+from posefit.motion.motion import RATES
+from posefit.reading import SHOWN, cut, quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.settings import planned
 from posefit.silhouette.corruption import CORRUPTIONS
@@ -23,6 +25,7 @@ from posefit.version import __version__
 
 FIELDS = tuple(one.name for one in fields(Cell) if one.name not in ("files", "version"))
 LARGEST = 16_384  # pixels
+BITS = 1_024  # of a whole number: more than anything is counted in, and few enough to be written down
 
 
 def cell_of(spec: Mapping[str, Any]) -> Cell:
@@ -33,7 +36,7 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
     """
     for name in spec:
         if name not in FIELDS:
-            raise ValueError(f"a cell must say {', '.join(FIELDS)}, got {name!r}{_nearest(name, FIELDS)}")
+            raise ValueError(f"a cell must say {', '.join(FIELDS)}, got {quoted(name)}{_nearest(name, FIELDS)}")
     for name in ("method", "motion"):
         if name not in spec:
             raise ValueError(f"a cell must say its {name}, got none")
@@ -76,11 +79,12 @@ def _offers(method: str) -> tuple[Offer, ...]:
         return tuple(registry().offer(kind, name) for kind, name in wanted)
     known = registry().offers
     if tracker not in known["tracker"] and tracker.partition(":")[0] in known["optimiser"]:
-        raise ValueError(f"method must be a tracker or OPTIMISER@PRIOR, got {tracker!r}; did you mean '{tracker}@pca'?")
+        hint = f"; did you mean {quoted(f'{tracker}@pca')}?"
+        raise ValueError(f"method must be a tracker or OPTIMISER@PRIOR, got {quoted(tracker)}{hint}")
     if tracker.partition(":")[0] not in known["tracker"]:
         trackers = ", ".join(sorted(known["tracker"])) or "of which there are none"
         near = _nearest(tracker, [*known["tracker"], *(f"{name}@pca" for name in known["optimiser"])])
-        raise ValueError(f"method must be a tracker ({trackers}) or OPTIMISER@PRIOR, got {tracker!r}{near}")
+        raise ValueError(f"method must be a tracker ({trackers}) or OPTIMISER@PRIOR, got {quoted(tracker)}{near}")
     return (registry().offer("tracker", tracker),)
 
 
@@ -90,7 +94,8 @@ def _settings(method: str, texts: tuple[str, ...]) -> dict[str, Any]:
     optimiser, prior, tracker = parts(method)
     for text in texts:
         if text.partition(".")[0] not in names_of(method):
-            raise ValueError(f"settings must be of {', '.join(names_of(method))}, which {method} uses, got {text!r}")
+            known = ", ".join(names_of(method))
+            raise ValueError(f"settings must be of {known}, which {cut(method)} uses, got {quoted(text)}")
     parsed = parse_settings(texts, optimiser, prior, tracker)
     homes = {optimiser: "optimiser", prior: "prior", "tracker": "tracker"} if tracker is None else {tracker: "tracker"}
     typed: dict[str, Any] = {}
@@ -137,13 +142,13 @@ def _length(motion: str, fps: float) -> int:
 
 
 def _nearest(name: str, known: Sequence[str]) -> str:
-    near = get_close_matches(name, known, 1)
+    near = get_close_matches(name[:SHOWN], known, 1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def _name(field: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
-        raise ValueError(f"{field} must be a name, got {value!r}")
+        raise ValueError(f"{field} must be a name, got {quoted(value)}")
     return value
 
 
@@ -152,14 +157,14 @@ def _motion(field: str, value: Any) -> str:
     if name not in library.names() and Path(name).suffix.lower() not in MOTIONS:
         raise ValueError(
             f"{field} must be an .amc file, a .bvh file or one of {', '.join(library.names())}, "
-            f"got {name!r}{_nearest(name, library.names())}"
+            f"got {quoted(name)}{_nearest(name, library.names())}"
         )
     return name
 
 
 def _motions(field: str, value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
-        raise ValueError(f"{field} must be a list of motions, got {value!r}")
+        raise ValueError(f"{field} must be a list of motions, got {quoted(value)}")
     return tuple(_motion(field, one) for one in value)
 
 
@@ -171,23 +176,29 @@ def _views(field: str, value: Any) -> tuple[float, ...]:
 
 
 def _number(field: str, value: Any, low: float = -np.inf, high: float = np.inf) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise ValueError(f"{field} must be a finite number, got {value!r}")
-    if not low <= value <= high:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{field} must be a finite number, got {quoted(value)}")
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number of any size
+        number = np.inf
+    if not np.isfinite(number):
+        raise ValueError(f"{field} must be a finite number, got {quoted(value)}")
+    if not low <= number <= high:
         raise ValueError(f"{field} must lie in {low:g} to {high:g}, got {value}")
-    return float(value)
+    return number
 
 
 def _rate(field: str, value: Any) -> float:
     if (rate := _number(field, value)) <= 0.0:
         raise ValueError(f"{field} must be a positive number, got {value}")
-    return rate
+    return _number(field, rate, *RATES)
 
 
 def _whole(least: int) -> Callable[[str, Any], int]:
     def check(field: str, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise ValueError(f"{field} must be a whole number of at least {least}, got {value!r}")
+        if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > BITS:
+            raise ValueError(f"{field} must be a whole number of at least {least}, got {quoted(value)}")
         return value
 
     return check
@@ -196,17 +207,17 @@ def _whole(least: int) -> Callable[[str, Any], int]:
 def _size(field: str, value: Any) -> tuple[int, int]:
     sides = list(value) if isinstance(value, list | tuple) else []
     if len(sides) != 2 or not all(type(side) is int and 1 <= side <= LARGEST for side in sides):
-        raise ValueError(f"{field} must be [width, height] in pixels, up to {LARGEST}, got {value!r}")
+        raise ValueError(f"{field} must be [width, height] in pixels, up to {LARGEST}, got {quoted(value)}")
     return sides[0], sides[1]
 
 
 def _corruption(field: str, value: Any) -> dict[str, float]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {value!r}")
+        raise ValueError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}")
     kinds = (*CORRUPTIONS, DROPPED)
     for kind in value:
         if kind not in kinds:
-            raise ValueError(f"{field} must be of {', '.join(kinds)}, got {kind!r}{_nearest(kind, kinds)}")
+            raise ValueError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{_nearest(kind, kinds)}")
     strengths = {kind: _number(f"{field} {kind}", value[kind], 0.0, 1.0) for kind in sorted(value)}
     return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
 
@@ -214,7 +225,7 @@ def _corruption(field: str, value: Any) -> dict[str, float]:
 def flattened(field: str, value: Any) -> dict[str, Any]:
     """Return settings whose names are NAME.SETTING, of a table that may hold a table for each NAME."""
     if not isinstance(value, Mapping):
-        raise ValueError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {value!r}")
+        raise ValueError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}")
     flat: dict[str, Any] = {}
     for name, inner in value.items():
         flat |= {f"{name}.{one}": what for one, what in inner.items()} if isinstance(inner, Mapping) else {name: inner}
@@ -224,7 +235,7 @@ def flattened(field: str, value: Any) -> dict[str, Any]:
 def _one_of(*choices: str) -> Callable[[str, Any], str]:
     def check(field: str, value: Any) -> str:
         if value not in choices:
-            raise ValueError(f"{field} must be one of {', '.join(choices)}, got {value!r}")
+            raise ValueError(f"{field} must be one of {', '.join(choices)}, got {quoted(value)}")
         return str(value)
 
     return check

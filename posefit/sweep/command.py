@@ -66,7 +66,7 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
 
     Or those of one JSON object that says the same. A million cells are never in memory together.
     """
-    from posefit.sweep.estimate import SECONDS, Amounts, Estimate, time_taken
+    from posefit.sweep.estimate import SECONDS, Amounts, Estimate, estimate_of
 
     cells = Plan.read(plan)
     start = engine(replace(where, limits=replace(where.limits, seconds=min(where.limits.seconds, SECONDS))))
@@ -87,7 +87,7 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
     if len(left):
         with closing(start()) as running:
             count = running.window()
-            found = time_taken(left, running, count)
+            found = estimate_of(left, running, count)
     if as_json:
         yield f'], "seconds": {found.seconds!r}, "workers": {count}, "untried": {json.dumps(found.untried)}}}'
         return

@@ -47,7 +47,7 @@ class Estimate:
     untried: Mapping[str, str]
 
 
-def time_taken(amounts: Amounts, engine: Engine, workers: int) -> Estimate:
+def estimate_of(amounts: Amounts, engine: Engine, workers: int) -> Estimate:
     """Return about how long cells take on so many workers.
 
     For each kind of cell a short and a shorter one are run, each after one that compiles what is not compiled yet: they

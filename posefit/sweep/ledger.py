@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from posefit.files import appear
+from posefit.reading import cut, parsed_json, quoted, read_text
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, joints_at, lines
 from posefit.sweep.table import dataframe
 from posefit.version import __version__
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 INDEX = "ledger.json"
 ROWS, CLAIMS, QUARANTINE, ASIDE = FOLDERS = ("rows", "claims", "quarantine", "aside")
 FORMAT = 1
+LARGEST_INDEX = 10_000  # bytes
 
 
 class Ledger:
@@ -214,14 +216,15 @@ def create(path: Path) -> None:
 def _version(path: Path) -> str:
     """Return the version of posefit whose results a ledger holds."""
     try:
-        index = json.loads((path / INDEX).read_text(encoding="utf-8"))
-        if index["format"] != FORMAT:
-            raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {index['format']}")
-        return str(index["version"])
-    except FileNotFoundError:
+        index = parsed_json(read_text(path / INDEX, LARGEST_INDEX))
+        form, version = index["format"], index["version"]
+    except (FileNotFoundError, NotADirectoryError):
         raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None
-    except (json.JSONDecodeError, KeyError, TypeError, OSError) as error:
-        raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {error}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {cut(str(error))}") from None
+    if form != FORMAT or not isinstance(version, str):
+        raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")
+    return version
 
 
 def _nothing(_: str) -> None:

@@ -21,7 +21,6 @@ An entry of a list of the product is the value of a cell's field, or a table of 
 """
 
 import sys
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from itertools import chain
@@ -31,6 +30,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from posefit.reading import SHOWN, parsed_toml, quoted, read_text
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import FIELDS, cell_of, flattened, names_of
 from posefit.sweep.product import Entries, Product
@@ -47,6 +47,7 @@ TABLES = ("defaults", "product", "cells")
 DEFAULT = "default"  # the name of the plan that posefit brings along
 INPUT = "-"  # the name of a plan that is read from standard input
 MOST = 1_000_000  # cells
+LARGEST_FILE = 1_000_000  # bytes
 DIGEST = 32  # bytes of a key
 
 
@@ -73,16 +74,13 @@ class Plan:
         if str(path) == DEFAULT:
             text = (files("posefit.sweep") / "default.toml").read_text(encoding="utf-8")
         elif str(path) == INPUT:
-            text = sys.stdin.read()
+            text = _stdin()
         elif not Path(path).is_file():
             raise ValueError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {_what(Path(path))}")
         else:
-            try:
-                text = Path(path).read_text(encoding="utf-8")
-            except (OSError, UnicodeDecodeError) as error:
-                raise ValueError(f"{path}: expected a plan in TOML, got {error}") from None
+            text = read_text(path, LARGEST_FILE, "a plan in TOML")
         try:
-            return cls.of(tomllib.loads(text))
+            return cls.of(parsed_toml(text))
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
@@ -95,14 +93,14 @@ class Plan:
         """
         for name in tables:
             if name not in TABLES:
-                raise ValueError(f"a plan must hold {', '.join(TABLES)}, got {name!r}")
+                raise ValueError(f"a plan must hold {', '.join(TABLES)}, got {quoted(name)}")
         defaults = _mapping("defaults", tables.get("defaults", {}))
         for name in defaults:
             if name not in FIELDS:
-                raise ValueError(f"defaults must be of {', '.join(FIELDS)}, got {name!r}")
+                raise ValueError(f"defaults must be of {', '.join(FIELDS)}, got {quoted(name)}")
         listed = tables.get("cells", [])
         if not isinstance(listed, list | tuple):
-            raise ValueError(f"cells must be a list of tables, got {listed!r}")
+            raise ValueError(f"cells must be a list of tables, got {quoted(listed)}")
         fitting = _Shared(defaults)
 
         def make(spec: Mapping[str, Any]) -> Cell:
@@ -162,7 +160,7 @@ def _lists(tables: Any) -> list[Entries] | None:
     named = _mapping("product", tables)
     for name in named:
         if name not in LISTS:
-            raise ValueError(f"product must hold {', '.join(LISTS)}, got {name!r}")
+            raise ValueError(f"product must hold {', '.join(LISTS)}, got {quoted(name)}")
     entries = [_entries(name, values) for name, values in named.items()]
     if (count := prod(len(one) for one in entries)) > MOST:
         raise ValueError(f"product must hold at most {MOST:,} cells, got {count:,}")
@@ -191,10 +189,10 @@ def _entries(name: str, values: Any) -> Entries:
     field = LISTS[name]
     if field in ("instance", "seed") and type(values) is int:
         if values > MOST:
-            raise ValueError(f"product.{name} must be at most {MOST:,}, got {values:,}")
+            raise ValueError(f"product.{name} must be at most {MOST:,}, got {_written(values)}")
         values = range(values)
     if not isinstance(values, list | tuple | range):
-        raise ValueError(f"product.{name} must be a list, got {values!r}")
+        raise ValueError(f"product.{name} must be a list, got {quoted(values)}")
     if not values:
         raise ValueError(f"product.{name} must hold at least one, got none: an empty product has no cells")
     whole = field == "corruption"  # whose value is itself a table
@@ -203,8 +201,19 @@ def _entries(name: str, values: Any) -> Entries:
 
 def _mapping(name: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a table, got {value!r}")
+        raise ValueError(f"{name} must be a table, got {quoted(value)}")
     return dict(value)
+
+
+def _written(number: int) -> str:
+    return f"{number:,}" if number < 10**SHOWN else quoted(number)
+
+
+def _stdin() -> str:
+    try:
+        return sys.stdin.read(LARGEST_FILE).removeprefix("\ufeff")
+    except UnicodeDecodeError:
+        raise ValueError(f"{INPUT}: expected a plan in UTF-8, got other bytes") from None
 
 
 def _what(path: Path) -> str:

@@ -11,8 +11,9 @@ or one test a rule:
     def test_kit(check):
         check()
 
-The same checks run for an installed plugin as `posefit check optimiser NAME`. A factory with the attribute
-`baseline = True` is chance itself, and is not asked to beat it.
+The same checks run for an installed plugin as `posefit check optimiser NAME`, in a process of its own: there a plugin
+that ends or hangs its process has failed a check, where here it ends or hangs the caller's. A factory with the
+attribute `baseline = True` is chance itself, and is not asked to beat it.
 """
 
 from collections.abc import Callable

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.check import finite_number, whole
 from posefit.fitting.optimiser import OptimiserFactory
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import Translation
@@ -22,6 +23,7 @@ from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
 from posefit.motion import library
 from posefit.motion.motion import Motion
+from posefit.reading import quoted
 from posefit.tracking.identity import Told
 from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
@@ -99,14 +101,26 @@ def track(
     recording for the Rerun viewer goes. Raises ValueError for every mistake in the arguments or files.
     """
     sources = _sources(source)
+    _check_numbers(
+        particles=particles,
+        iterations=iterations,
+        evaluations=evaluations,
+        restarts=restarts,
+        body_frames=body_frames,
+        seed=seed,
+        threads=threads,
+        ask_seconds=ask_seconds,
+    )
+    if isinstance(train, str | Path | Motion):
+        raise ValueError(f"train must be a list of motions, got {quoted(train)}")
     viewing = Viewing(
         asf=asf,
         cameras=() if camera is None else (camera,) if isinstance(camera, Camera | str | Path) else tuple(camera),
-        view_degrees=() if view_degrees is None else np.atleast_1d(view_degrees).astype(float).tolist(),
+        view_degrees=_angles(view_degrees),
         size=size,
         fps=fps,
         frames=frames,
-        extraction=extraction or Extraction(),
+        extraction=extraction,
         height=height,
         up=up,
     )
@@ -132,10 +146,12 @@ def track(
         body_frames=0 if body_frames is None and asf is not None else body_frames,
         height=height,
     )
-    opening.check(kind_of(sources[0]) == "motion")
+    kind = kind_of(sources[0])
+    viewing.check_used(kind)
+    if kind == "motion":
+        _check_known(asf, restarts, [*sources, *train])
+    opening.check(kind == "motion")
     clips = [clip_of(one, asf) for one in _training(sources, train)]  # before the work, as a name may be wrong
-    if seed < 0:
-        raise ValueError(f"seed must be 0 or more, got {seed}")
     if resume and out is None:
         raise ValueError("resume must be given with out, the folder of the track that goes on, got none")
     if rerun is not None:
@@ -170,10 +186,35 @@ def track(
     return result
 
 
+def _check_numbers(seed: int, threads: int, ask_seconds: float | None, **counts: int | None) -> None:
+    """Return nothing. Raises ValueError where one of them is not the number that it has to be."""
+    whole("seed", seed, 0)
+    whole("threads", threads, 1)
+    if ask_seconds is not None:
+        finite_number("ask_seconds", ask_seconds)
+    for name, value in counts.items():
+        if value is not None:
+            whole(name, value, 0 if name in ("restarts", "body_frames") else 1)
+
+
+def _angles(degrees: float | Sequence[float] | None) -> Sequence[float]:
+    if degrees is None:
+        return ()
+    each = list(degrees) if isinstance(degrees, Sequence | np.ndarray) and not isinstance(degrees, str) else [degrees]
+    return [finite_number("view_degrees", one) for one in each]
+
+
+def _check_known(asf: str | Path | None, restarts: int | None, motions: Sequence[Source]) -> None:
+    """Return nothing. Raises ValueError where something was given that a known motion has no use for."""
+    if asf is not None and not any(str(one).lower().endswith(".amc") for one in motions if isinstance(one, str | Path)):
+        raise ValueError(f"asf must be given for .amc files and footage only, got {quoted(str(asf))}")
+    if restarts == 0:
+        raise ValueError("restarts must be at least 1 for a motion, which is searched once where it is left out, got 0")
+
+
 def fit(source: Source | Sequence[Source] = "walk", *, frame: int = 0, **settings: Any) -> Fit:
     """Return the pose found in one frame of a source; settings as for `track`, but for `frames`."""
-    if frame < 0:
-        raise ValueError(f"frame must be 0 or more, got {frame}")
+    frame = whole("frame", frame, 0)
     result = track(source, frames=(frame, frame + 1), **settings)
     history = np.array(result.summary.pop("history"))
     return Fit(result.motion.poses[0], result.motion.translations[0], result.measures.cost, history, result.summary)

@@ -11,7 +11,7 @@ import numpy as np
 from posefit import settings
 from posefit.arrays import Array
 from posefit.fitting.box import Space
-from posefit.fitting.guard import Audit, BrokenRuleError, Guarded, GuardedTracker, blamed
+from posefit.fitting.guard import Audit, BrokenRuleError, Guarded, GuardedPrior, GuardedTracker, blamed
 from posefit.fitting.optimiser import NextFrame, Optimiser, OptimiserFactory
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import (
@@ -162,7 +162,7 @@ def _prior(choice: Choice, task: Task) -> tuple[str, Prior]:
     with _rules(offer):
         prior: Prior = offer.factory(**choice.prior_settings).fit(angles, task.body.skeleton)
         _check_prior(prior, angles, offer)
-    return offer.name, prior
+    return offer.name, GuardedPrior(prior, offer.label)
 
 
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:

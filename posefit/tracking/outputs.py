@@ -14,15 +14,18 @@ from typing import Protocol, Self
 
 import numpy as np
 
+from posefit.files import Unfinished, strangers
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
 from posefit.motion.motion import Motion
+from posefit.reading import cut
 from posefit.tracking.formats import FILES, Rows, State, write_formats
 from posefit.tracking.identity import Told, difference
 from posefit.tracking.picture import Painter
 
-_FOUND, _SPEC = "found.jsonl", "spec.json"
+_FOUND, _WORK = "found.jsonl", "work"
+_MINE = (*FILES, _FOUND, _WORK)  # what a track writes to its folder
 _ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
 _NUMBERS = ("cost", "evaluations", "seconds")
 
@@ -81,58 +84,61 @@ class OutputFolder:
             raise ValueError(f"{self.path}: expected a folder to write to, got a file")
         if self.path.exists() and not force:
             raise ValueError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
-        if self.path.exists():
-            strange = sorted(entry.name for entry in self.path.iterdir() if entry.name not in FILES)
-            if strange:
-                raise ValueError(
-                    f"{self.path}: expected a folder of earlier results to replace, got one with {strange[0]}"
-                )
-        self._building = self.path.parent / f".{self.path.name}.partial"
-        self.work = self._building / "work"
+        if self.path.exists() and (strange := strangers(self.path, _MINE)):
+            came = f"one with {cut(strange[0])}"
+            raise ValueError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
         self._recorded = 0
-        if resume:
-            self._check_same()
+        self._place = self._same() if resume else None
 
-    def _check_same(self) -> None:
-        try:
-            before = json.loads((self._building / _SPEC).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            raise ValueError(f"{self.path}: expected a track that was interrupted to resume, got none") from None
-        if (other := difference(before, self._spec)) is not None:
-            raise ValueError(f"{self.path}: {other}")
+    def _same(self) -> Unfinished:
+        """Return the folder of the track that goes on: the latest that was told the same."""
+        left = Unfinished.left(self.path)
+        if not left:
+            raise ValueError(f"{self.path}: expected a track that was interrupted to resume, got none")
+        others = [difference(one.told, self._spec) for one in left]
+        place = left[others.index(None)] if None in others else None
+        for one in left:
+            if one is not place:
+                one.close()
+        if place is None:
+            raise ValueError(f"{self.path}: {others[0]}")
+        return place
 
     def __enter__(self) -> Self:
+        told = {name: one.as_json() for name, one in self._spec.items()}
         try:
-            if self._building.exists() and not self._resume:
-                shutil.rmtree(self._building)
+            if self._place is None:
+                for earlier in Unfinished.left(self.path):
+                    earlier.remove(_MINE)
+                self._place = Unfinished.begun(self.path, told)
+            self._building = self._place.path
+            self.work = self._building / _WORK
             shutil.rmtree(self.work, ignore_errors=True)
-            self.work.mkdir(parents=True)
-            told = {name: one.as_json() for name, one in self._spec.items()}
-            (self._building / _SPEC).write_text(json.dumps(told), encoding="utf-8")
+            self.work.mkdir()
         except OSError as error:
             raise ValueError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        assert self._place is not None
         shutil.rmtree(self.work, ignore_errors=True)
         if kind is None:
-            for name in (_FOUND, _SPEC):
-                (self._building / name).unlink(missing_ok=True)
-            if self.path.exists():
-                old = Path(tempfile.mkdtemp(prefix=f".{self.path.name}-", dir=self.path.parent))
-                self.path.rename(old / "old")
-                self._building.rename(self.path)
-                shutil.rmtree(old)
-            else:
-                self._building.rename(self.path)
+            try:
+                self._place.finish(_MINE)
+            except OSError as taken:
+                self._place.close()
+                where = f"{taken.strerror}; the results are in {self._building}"
+                raise ValueError(f"{self.path}: expected its name to be free, got {where}") from None
+            (self.path / _FOUND).unlink(missing_ok=True)
             return
         kept = ""
         if self._recorded:
             for name in FILES:
                 (self._building / name).unlink(missing_ok=True)
             kept = f"; {self._recorded} finished frames are kept: the same command with --resume goes on from there"
+            self._place.close()
         else:
-            shutil.rmtree(self._building, ignore_errors=True)
+            self._place.remove(_MINE)
         if isinstance(error, OSError):
             raise ValueError(f"{self.path}: expected room to write to, got {error.strerror or error}{kept}") from error
         if kept and isinstance(error, ValueError):

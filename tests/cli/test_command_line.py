@@ -197,11 +197,11 @@ def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> 
 
 
 def test_memory_of_masks_in_a_folder_is_that_of_one(tmp_path: Path) -> None:
-    from posefit.footage.masks import LazyMasks
+    from posefit.footage.masks import FolderMasks
 
-    source = LazyMasks.of(masks(tmp_path / "masks"), (None, None))
-    assert source.stack is None
+    source = FolderMasks.of(masks(tmp_path / "masks"), (None, None))
     assert len(source) == 3
+    assert all(isinstance(file, Path) for file in source.files)  # what it holds are names
 
 
 def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:

@@ -375,6 +375,13 @@ def test_the_third_number_of_configure_kicks_every_particle_by_its_deviation() -
         ({"translation": "free"}, "translation must be one of known, searched, aligned"),
         ({"view_degrees": float("nan")}, "view_degrees must be a finite number or several"),
         ({"mismatch_percent": 80.0}, "mismatch_percent must lie in 0 to 50"),
+        ({"noise": 0.5}, r"noise must be strengths such as \{'holes': 0.3\}, got 0.5"),
+        ({"size": 64}, r"size must be \(width, height\) of 36 to 4096 pixels, got 64"),
+        ({"instance": 1.5}, "instance must be a whole number from 0 to 19999, got 1.5"),
+        ({"train": "walk"}, r"train must be a list of motions such as \['walk-a'\], got 'walk'"),
+        ({"motion": 5}, "motion must be a name, got 5"),
+        ({"view_degrees": "front"}, "view_degrees must be a finite number or several, got 'front'"),
+        ({"mismatch_percent": "much"}, "mismatch_percent must be a finite number, got 'much'"),
         ({"render_mode": "ansi"}, "render_mode must be one of rgb_array, human, got 'ansi'"),
     ],
 )
@@ -382,11 +389,18 @@ def test_the_third_number_of_configure_kicks_every_particle_by_its_deviation() -
     "ignore:.*render_mode:UserWarning", "ignore:.*The environment is being initialised with render_mode.*"
 )
 def test_arguments_that_make_no_sense_are_named(name: str, arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(error.Error, match=message):
+    with pytest.raises(error.Error, match=message) as caught:
         gym.make(name, **arguments)
+    assert isinstance(caught.value, ValueError) or "render_mode" in arguments
     if name != "posefit/Configure-v0" and "render_mode" not in arguments:
         with pytest.raises(error.Error, match=message):
             gym.make_vec(name, num_envs=2, **arguments)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_an_argument_that_there_is_not_is_named(name: str) -> None:
+    with pytest.raises(TypeError, match="an argument must be one of motion, .*, got 'nois'; did you mean 'noise'"):
+        gym.make(name, nois={"holes": 0.3})
 
 
 @pytest.mark.parametrize("name", IDS)

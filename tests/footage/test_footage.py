@@ -19,8 +19,9 @@ from posefit.fitting import metrics
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.footage.extract import extract
-from posefit.footage.masks import LazyMasks, Straight, Views
+from posefit.footage.masks import Straight, Views
 from posefit.footage.segmentation import Extraction
+from posefit.footage.stacks import StackMasks
 from posefit.geometry.rotation import wrapped
 from posefit.motion import library
 from posefit.motion.amc import read_clip
@@ -126,7 +127,7 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path
     usable = np.array([True, True, False, True, True, True])
     np.savez(tmp_path / "a.npz", masks=side, usable=usable)
     np.savez(tmp_path / "b.npz", masks=front)
-    views = Views([LazyMasks.of(tmp_path / name, (None, None)) for name in ("a.npz", "b.npz")])
+    views = Views([StackMasks.of(tmp_path / name, (None, None)) for name in ("a.npz", "b.npz")])
     assert [views[k].usable for k in range(6)] == [True] * 6
     assert not views[2].silhouettes[0].valid.any()
     assert views[2].silhouettes[1].valid.all()
@@ -154,7 +155,7 @@ def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path:
     undone = cv2.undistortPoints(bent, one.matrix, one.distortion, P=one.matrix).reshape(SIZE[1], SIZE[0], 2)
     seen = cv2.remap(straight.astype(np.uint8), undone.astype(np.float32), None, cv2.INTER_NEAREST)
     np.savez(tmp_path / "a.npz", masks=seen[None])
-    masks = Straight(LazyMasks.of(tmp_path / "a.npz", (None, None)), one.maps(SIZE))
+    masks = Straight(StackMasks.of(tmp_path / "a.npz", (None, None)), one.maps(SIZE))
     found = masks.silhouette(0)
     both = (found.mask & straight).sum() / (found.mask | straight).sum()
     without = ((seen > 0) & straight).sum() / ((seen > 0) | straight).sum()
@@ -200,7 +201,7 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path, optimiser: str) -> None:
     again = posefit.track(path, out=tmp_path / "out", resume=True, say=said.append, **settings)
     assert "going on from frame 11 of 20" in said
     assert {one.name for one in (tmp_path / "out").iterdir()} == {one.name for one in (tmp_path / "whole").iterdir()}
-    assert not (tmp_path / ".out.partial").exists()
+    assert not list(tmp_path.glob(".out.*"))
     np.testing.assert_array_equal(again.motion.poses[:12], whole.motion.poses[:12])  # frame 11 is held
     if optimiser == "sapso":  # a filter's particles are not kept: it goes on around the last pose
         np.testing.assert_array_equal(again.motion.poses, whole.motion.poses)
@@ -220,11 +221,20 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="seed must be 0, as before, to resume, got 1"):
         posefit.track(path, resume=True, seed=1, **settings)
     # a line that was half written does not count
-    found = tmp_path / ".out.partial" / "found.jsonl"
+    (found,) = tmp_path.glob(".out.*/found.jsonl")
     found.write_text(found.read_text()[:-40])
     said: list[str] = []
     posefit.track(path, resume=True, say=said.append, **settings)
     assert "going on from frame 4 of 20" in said
+
+
+def test_a_track_removes_nobody_elses_hidden_folder(tmp_path: Path) -> None:
+    theirs = tmp_path / ".out.partial"
+    theirs.mkdir()
+    (theirs / "found.jsonl").write_text("theirs")
+    posefit.track("walk", frames=(0, 2), evaluations=80, out=tmp_path / "out")
+    assert (theirs / "found.jsonl").read_text() == "theirs"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".out.partial", "out"]
 
 
 @pytest.mark.slow

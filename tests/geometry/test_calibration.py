@@ -177,3 +177,65 @@ def test_the_real_calibration_places_its_camera_ten_metres_off() -> None:
     camera = one.camera(one.size, upright([one]))
     assert np.abs(camera.position).max() == pytest.approx(10.0, abs=0.1)
     assert camera.rotation[1] @ [0.0, 1.0, 0.0] == pytest.approx(-1.0, abs=1e-3)  # level and upright
+
+
+OPENCV = """%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 500., 0., 319.5, 0., 510., 239.5, 0., 0., 1. ]
+"""
+HIDDEN = "".join(f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in range(1, 60))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("   cols: 3", "   cols: 3x", "'3x' where a number should be"),  # OpenCV's own reader corrupted memory
+        ("   cols: 3", "   cols: -3", "a matrix with '-3' rows or columns"),
+        ("   rows: 3", "   rows: 2147483647", "a matrix with '2147483647' rows or columns"),
+        ("   rows: 3", "   rows: 4", "a matrix of 4 x 3 with 9 numbers"),
+        ("   dt: d", "   dt: 99d", "a matrix of the type '99d'"),
+        ("data: [", "data: [ [[[1]]],", "where a number should be"),
+        ("640", "nan", "an image size of nan x 480.0"),
+        ("---", "--- !!python/object/apply:os.system ['true']", "YAML that is broken"),
+        ("image_width", "a0: &a0 {b: 1}\n" + HIDDEN + "image_width", None),  # merges are not expanded
+        ("image_width", "a: " + "[" * 9000 + "\nimage_width", "YAML that is broken"),
+        ("image_width", "# " + "a" * 500_000 + "\nimage_width", "YAML of 500"),
+    ],
+)
+def test_a_hostile_yaml_is_read_as_far_as_it_goes_or_refused(
+    tmp_path: Path, before: str, after: str, message: str | None
+) -> None:
+    assert before in OPENCV
+    (tmp_path / "a.yml").write_text(OPENCV.replace(before, after, 1))
+    if message is None:
+        assert read_calibrations(tmp_path / "a.yml")[0].size == (640, 480)
+        return
+    with pytest.raises(ValueError, match=message) as caught:
+        read_calibrations(tmp_path / "a.yml")
+    assert "\n" not in str(caught.value)
+
+
+def test_numbers_are_those_that_opencv_reads(tmp_path: Path) -> None:
+    matrix = np.array([[501.123456789012345, 0, 319.1], [0, 510.7, 239.3], [0, 0, 1]])
+    for name in ("a.yml", "a.json", "a.xml"):
+        storage = cv2.FileStorage(str(tmp_path / name), cv2.FILE_STORAGE_WRITE)
+        storage.write("image_width", 640)
+        storage.write("image_height", 480)
+        storage.write("camera_matrix", matrix)
+        storage.write("distortion_coefficients", np.array([[0.1, 0.2, 0.3, 0.4]], dtype=np.float32))
+        storage.release()
+        (one,) = read_calibrations(tmp_path / name)
+        np.testing.assert_array_equal(one.matrix, matrix)
+        np.testing.assert_array_equal(one.distortion, np.array([0.1, 0.2, 0.3, 0.4], dtype=np.float32))
+
+
+def test_a_lens_has_as_many_numbers_as_opencv_knows(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"))
+    with pytest.raises(ValueError, match="a distortion of 3 numbers"):
+        read_calibrations(tmp_path / "a.toml")

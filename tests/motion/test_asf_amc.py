@@ -324,7 +324,7 @@ def test_a_clip_is_scaled_by_its_own_skeleton(tmp_path: Path) -> None:
         (":DEGREES\n", "", ":3: expected :DEGREES or :RADIANS before the first frame, got frame 1"),
         (":DEGREES", ":GRADS", ":3: expected :FULLY-SPECIFIED, :DEGREES or :RADIANS, got ':GRADS'"),
         ("\n1\n", "\n", ":4: expected a header such as :DEGREES or the number of a frame, got 'root 1 2 3"),
-        ("\n1\n", "\n" + "1" * 10_001 + "\n", ":4: expected a line of at most 10000 bytes, got 10002"),
+        ("\n1\n", "\n" + "1" * 10_001 + "\n", ":4: expected a line of at most 10000 bytes, got a longer one"),
     ],
 )
 def test_mistakes_in_a_motion_are_named(
@@ -363,7 +363,7 @@ def test_huge_files_are_refused_unread(skeleton: Skeleton, tmp_path: Path, monke
         read_amc(tmp_path / "huge.amc", skeleton)
     with (tmp_path / "huge.asf").open("wb") as file:
         file.truncate(20_000_000)
-    with pytest.raises(ValueError, match=r"huge\.asf: expected at most 10 MB, got 20\.0 MB"):
+    with pytest.raises(ValueError, match=r"huge\.asf: expected at most 1 MB, got 20\.0 MB"):
         read_asf(tmp_path / "huge.asf")
 
 
@@ -458,4 +458,4 @@ def test_a_damaged_skeleton_is_read_or_refused(workshop: Path, cuts: list[tuple[
 
 
 def test_limits_are_those_that_the_manual_names() -> None:
-    assert (amc.SIZE_LIMIT, asf.SIZE_LIMIT, amc.FPS) == (500_000_000, 10_000_000, 120.0)
+    assert (amc.SIZE_LIMIT, asf.SIZE_LIMIT, amc.FPS) == (500_000_000, 1_000_000, 120.0)

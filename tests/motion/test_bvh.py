@@ -1,5 +1,6 @@
 """BVH files against forward kinematics done slowly from the file's own definition."""
 
+import re
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.motion.bvh import read_bvh
+from posefit.motion import bvh, library
+from posefit.motion.bvh import read_bvh, write_bvh
 
 pytest.importorskip("pybvh")
 
@@ -242,3 +244,20 @@ def test_without_the_library_the_way_out_is_named(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setitem(sys.modules, "pybvh", None)
     with pytest.raises(ImportError, match=r"pip install posefit\[bvh\]"):
         read_bvh(tmp_path / "x.bvh")
+
+
+def test_what_comes_out_of_a_file_has_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.bvh"
+    write_bvh(path, library.built_in("walk", frames=6))
+    text = path.read_text()
+    # 30 frames of 70,000,000 s were 2.1e9 at 30 a second
+    path.write_text(re.sub("Frame Time: .*", "Frame Time: 70000000", text))
+    with pytest.raises(ValueError, match=r"a.bvh: expected a positive frame time, 0.0001 to 10 s, got 7e\+07"):
+        read_bvh(path)
+    path.write_text(text)
+    monkeypatch.setattr(bvh, "LONGEST", 5)
+    with pytest.raises(ValueError, match="a.bvh:.*: expected at most 5 frames and 20000000 numbers, got more"):
+        read_bvh(path)
+    monkeypatch.setattr(bvh, "NODES", 20)
+    with pytest.raises(ValueError, match="a.bvh:.*: expected at most 20 joints and ends, got more"):
+        read_bvh(path)

@@ -113,3 +113,13 @@ def test_a_root_that_turns_on_and_on_keeps_its_turns() -> None:
 def test_a_new_rate_must_be_positive() -> None:
     with pytest.raises(ValueError, match=r"fps must be a positive number, got -30"):
         clip(3).resampled(-30.0)
+
+
+def test_a_motion_is_not_resampled_to_more_frames_than_fit_into_memory() -> None:
+    motion = clip(100, fps=0.1)
+    with pytest.raises(
+        ValueError, match="must have at most 200000 frames when it is resampled, got .* frames at 1000 fps"
+    ):
+        motion.resampled(1000.0)
+    with pytest.raises(ValueError, match=r"fps must lie in 0.001 to 1e\+06, got 1e-300"):
+        motion.resampled(1e-300)

@@ -223,3 +223,26 @@ def test_a_setting_that_makes_no_sense_is_one_line_of_check_and_not_one_a_rule()
     result = CliRunner().invoke(main, ["check", "prior", "loose", "--set", "slack=-1"])
     assert result.exit_code == 2
     assert result.stderr.splitlines() == ["posefit: slack must be above 0, got -1"]
+
+
+@pytest.mark.parametrize(("kind", "name"), [(Loose, "loose"), (Full, "angles")])
+def test_places_in_a_file_are_those_of_joint_angles(kind: Any, name: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    kind().fit(angles("walk-a"), library.average_skeleton()).save(path)
+    stored = arrays(path)
+    for wrong in (63, -1, 10**9):  # a compiled loop would have written there
+        stored[name] = np.array([wrong, *stored[name][1:]])
+        np.savez(path, **stored)
+        with pytest.raises(ValueError, match=f"a.npz: {name} must be different whole numbers from 0 to 62, got others"):
+            kind.load(path)
+
+
+@pytest.mark.parametrize("kind", [PCA, Full, Loose, Union])
+def test_a_damaged_prior_is_one_line(kind: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    kind().fit(angles("walk-a", "walk-b"), library.average_skeleton()).save(path)
+    content = path.read_bytes()
+    for damaged in (content[: len(content) // 2], content.replace(b"NUMPY", b"NUMPI"), content[:-3]):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="a.npz: expected an .npz file with"):
+            kind.load(path)

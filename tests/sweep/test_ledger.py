@@ -399,3 +399,14 @@ def test_many_drivers_may_make_the_same_ledger_at_once(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert not failed
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b'{"format": 1, "version": "\xff"}', b"[]", b"{}", b"[" * 9000, b'{"format": 1, "version": 3}', b" " * 20_000],
+)
+def test_an_index_that_is_damaged_is_one_line(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "ledger.json").write_bytes(content)
+    with pytest.raises(ValueError, match="expected (the index of a ledger|a ledger of format 1), got") as caught:
+        Ledger(tmp_path)
+    assert str(tmp_path) in str(caught.value)

@@ -245,6 +245,24 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
     assert row["trace"]["evaluations"][-1] <= 2440
 
 
+def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(tmp_path: Path) -> None:
+    path, cells = tmp_path / "plan.toml", '[[cells]]\nmethod = "random@pca"\nmotion = "walk"\n'
+    path.write_bytes(b"\xef\xbb\xbf" + cells.encode())
+    assert len(Plan.read(path)) == 1
+    for line, message in (
+        (f"view_degrees = {10**400}", "view_degrees must be a finite number, got 1000"),
+        (f"seed = 0x{'f' * 9000}", "seed must be a whole number of at least 0, got one int that is too long"),
+        ("fps = 1e-320", "fps must lie in 0.001 to 1e[+]06, got 1e-320"),
+        (f'"{"n" * 300}" = 1', "got 'n{76}[.]{3}$"),
+        ("train = " + "[" * 9000, "not nested so deeply"),
+    ):
+        path.write_text(cells + line)
+        with pytest.raises(ValueError, match=message):
+            Plan.read(path)
+    path.write_text(cells + "view_degrees = 999999999999999999999")  # was a traceback; it is an angle like others
+    assert Plan.read(path).cells[0].view_degrees == (1e21,)
+
+
 def test_a_product_gives_the_cells_and_keys_that_its_specs_give_one_by_one() -> None:
     lists = {
         "seeds": [3, 1],

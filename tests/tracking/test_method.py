@@ -174,6 +174,29 @@ def test_a_broken_prior_is_named(change: dict[str, Any], rule: str, installed: A
         posefit.track("walk", prior="bad", **QUICK)
 
 
+@pytest.mark.parametrize("method", ["inverse_transform", "feasible"])
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [(SystemExit(0), "end the program, got SystemExit: 0"), (KeyError("lost"), "fail, got KeyError: 'lost'")],
+)
+def test_a_prior_that_fails_in_a_search_is_named_and_not_the_optimiser_that_meets_it(
+    method: str, error: BaseException, said: str, installed: Any
+) -> None:
+    class Tires(planted.PCA):
+        left = 5
+
+    def tires(self: Any, latents: Any) -> Any:
+        self.left -= 1
+        if self.left < 0:
+            raise error
+        return getattr(super(Tires, self), method)(latents)
+
+    setattr(Tires, method, tires)
+    installed("prior", Tires)
+    with pytest.raises(BrokenRuleError, match=f"^prior 'bad' of posefit-bad 1.0: {method} must not {said}$"):
+        posefit.track("walk", prior="bad", **QUICK)
+
+
 def test_a_tracker_is_reached_by_name(installed: Any) -> None:
     installed("tracker", planted.Holds)
     summary = posefit.track("walk", tracker="bad", **QUICK).summary

@@ -34,7 +34,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
 
     def frame(seed: int) -> None:
         optimiser = SAPSO(alone.space, np.random.default_rng(seed), particles=PARTICLES, iterations=ITERATIONS)
-        minimise(alone.evaluate, optimiser, PARTICLES * (ITERATIONS + 1))
+        minimise(alone.evaluate, optimiser, PARTICLES * (ITERATIONS + 1), told=True)
 
     jobs: dict[str, Callable[[], object]] = {
         "one": lambda: alone.evaluate(proposals),

@@ -70,14 +70,14 @@ class Search:
             space = space.around(space.centre, space.start, observation.translation)
         doubt = 0.5 * REACH**2 / self.weight  # of a proposal at the box's border
         problem = PoseProblem(
-            self.task.body, self.task.cameras, observation.silhouettes, space, threads=self.task.threads
+            self.task.body, self.task.cameras, observation.silhouettes, space, threads=self.task.threads, blank=True
         )
         optimiser = self.factory(space, rng, **of_plugins.planned(self.factory, {}, budget))
 
         def posterior(proposals: Array) -> Array:  # in units of cost, less a constant
             return np.asarray(problem.evaluate(proposals) + doubt * (proposals**2).sum(axis=1))
 
-        best = minimise(posterior, optimiser, budget)
+        best = minimise(posterior, optimiser, budget, told=True)
         pose, place = problem.decode(best.proposal[None])
         found = encode(pose, place)[0]
 

@@ -1,0 +1,180 @@
+"""Arrays out of an .npz file of a stranger: how large each of them is, is known before it is unpacked.
+
+`numpy.load` unpacks whatever a file asks for. Here the archive's directory and the header of each array are read first:
+nothing is unpacked that has another size than they say, or more bytes than the caller allows.
+"""
+
+import math
+import struct
+import tokenize
+import warnings
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.reading import check_size, cut, quoted
+
+MEMBERS = 1_000  # arrays of a file
+HEADER = 10_000  # characters before an array, as NumPy has it
+TURNED = 500_000_000  # bytes of an array that is stored column by column, which has to be unpacked whole
+KINDS = "biufUS"  # booleans, numbers and text: nothing that has to be unpickled
+_END, _END64 = b"PK\x05\x06", b"PK\x06\x07"  # of an archive's directory
+_PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # as NumPy writes; others unpack a thousand times slower
+# what zipfile, zlib and NumPy raise where bits were flipped or bytes are missing
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    tokenize.TokenError,
+    OSError,
+    ValueError,
+    TypeError,
+    RuntimeError,
+    LookupError,
+    OverflowError,
+    MemoryError,
+    EOFError,
+    SyntaxError,
+)
+
+
+class _RefusedError(ValueError):
+    """Says what came that is not read."""
+
+
+@dataclass(frozen=True)
+class Stored:
+    """One array of an archive, which is not unpacked yet."""
+
+    name: str
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    fortran: bool
+    _path: Path = field(repr=False)
+    _what: str = field(repr=False)
+    _archive: zipfile.ZipFile = field(repr=False)
+    _start: int = field(repr=False)  # bytes before the array
+
+    @property
+    def size(self) -> int:
+        """How many bytes it unpacks to."""
+        return math.prod(self.shape) * self.dtype.itemsize
+
+    def read(self) -> NDArray[Any]:
+        """Return the array."""
+        with self._opened() as member:
+            content = _exactly(member, self.size)
+            _exactly(member, 0)
+        array = np.frombuffer(content, self.dtype)
+        return array.reshape(self.shape, order="F" if self.fortran else "C")
+
+    def rows(self) -> Iterator[NDArray[Any]]:
+        """Yield one row after the other, so that only one of them is in memory."""
+        if self.fortran:
+            if self.size > TURNED:
+                raise ValueError(f"{self._path}: expected {self.name} row by row, got it column by column")
+            yield from self.read()
+            return
+        size = math.prod(self.shape[1:]) * self.dtype.itemsize
+        with self._opened() as member:
+            for _ in range(self.shape[0]):
+                yield np.frombuffer(_exactly(member, size), self.dtype).reshape(self.shape[1:])
+            _exactly(member, 0)
+
+    @contextmanager
+    def _opened(self) -> Iterator[IO[bytes]]:
+        with _told(self._path, self._what), self._archive.open(f"{self.name}.npy") as member:
+            _exactly(member, self._start)
+            yield member
+
+
+@contextmanager
+def archived(path: Path, names: Sequence[str], what: str, most: int, packed: int) -> Iterator[dict[str, Stored]]:
+    """Give those of `names` that an .npz file of at most `packed` bytes has; together they unpack to `most` at most.
+
+    Raises ValueError, also while they are read, where the file is damaged or asks for more; `what` it says of the
+    arrays that were expected.
+    """
+    check_size(path, packed)
+    with ExitStack() as stack:
+        with _told(path, what):
+            file = stack.enter_context(path.open("rb"))
+            _check_directory(file)
+            archive = stack.enter_context(zipfile.ZipFile(file))
+            there = set(archive.namelist())
+            found = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in there}
+            asked = sum(one.size for one in found.values())
+            if asked > most:
+                raise _RefusedError(f"{asked / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most")
+        yield found
+
+
+def read_arrays(path: Path, names: Sequence[str], what: str, most: int) -> Mapping[str, NDArray[Any]]:
+    """Return those of `names` that an .npz file has, of `most` bytes together. Raises ValueError as `archived` does."""
+    with archived(path, names, what, most, most) as found:
+        return {name: one.read() for name, one in found.items()}
+
+
+def _check_directory(file: IO[bytes]) -> None:
+    """Return nothing. Raises ValueError where an archive's directory, which is read whole, has too many entries.
+
+    The record that says so is looked for as zipfile does it.
+    """
+    size = file.seek(0, 2)
+    tail = min(size, 22 + (1 << 16))
+    file.seek(size - tail)
+    end = file.read(tail)
+    start = len(end) - 22 if end[-22:-18] == _END and end.endswith(b"\0\0") else end.rfind(_END)
+    record = end[start : start + 22] if start >= 0 else b""
+    if len(record) < 22:
+        raise _RefusedError("a file that is none")
+    count, length = struct.unpack("<10xHL6x", record)
+    if max(count, length // 46) > MEMBERS or (start >= 20 and end[start - 20 : start - 16] == _END64):
+        raise _RefusedError(f"one of more than {MEMBERS} arrays")
+
+
+@contextmanager
+def _told(path: Path, what: str) -> Iterator[None]:
+    """Tell whatever an archive or an array is damaged by as a mistake in the file."""
+    try:
+        yield
+    except _DAMAGE as error:
+        text = " ".join(str(error).split()) or type(error).__name__
+        came = text if isinstance(error, _RefusedError) else f"a damaged one: {cut(text)}"
+        raise ValueError(f"{path}: expected an .npz file with {what}, got {came}") from None
+
+
+def _stored(path: Path, what: str, archive: zipfile.ZipFile, name: str) -> Stored:
+    info = archive.getinfo(f"{name}.npy")
+    if info.compress_type not in _PACKED:
+        raise _RefusedError(f"{name} packed in a way that NumPy does not write")
+    with archive.open(info) as member:
+        version = np.lib.format.read_magic(member)
+        if version not in ((1, 0), (2, 0)):
+            raise _RefusedError(f"{name} in NumPy's format {version}")
+        header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about headers as Python 2 wrote them
+            shape, fortran, dtype = header(member, HEADER)
+        start = member.tell()
+    stored = Stored(name, shape, dtype, fortran, path, what, archive, start)
+    if dtype.kind not in KINDS or not dtype.itemsize:
+        raise _RefusedError(f"{name} of {cut(str(dtype))}")
+    if any(side < 0 for side in shape) or stored.size != info.file_size - start:
+        raise _RefusedError(f"{name} of {info.file_size - start} bytes for shape {quoted(shape)}")
+    return stored
+
+
+def _exactly(member: IO[bytes], count: int) -> bytes:
+    """Return the next bytes; for none, see that it is the end, where the checksum is compared."""
+    content = member.read(count or 1)
+    if len(content) != count:
+        raise EOFError("an array that ends too early" if count else "an array that is longer than it says")
+    return content

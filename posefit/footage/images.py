@@ -1,0 +1,121 @@
+"""Pictures of strangers: how many pixels one has, is read from its first bytes before OpenCV makes an array of it."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.reading import check_size, cut
+
+PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
+LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
+FORMATS = "PNG, JPEG, BMP, TIFF or PGM"
+_FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # of JPEG: markers before a frame's height and width
+_WIDTH, _HEIGHT, _SAMPLES = 256, 257, 277  # tags of TIFF
+
+
+def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
+    """Return a picture (height, width) in grey, or (height, width, 3) in colours; None where the file is no picture.
+
+    Raises ValueError where it has more than `PIXELS` or `LARGEST_FILE`.
+    """
+    import cv2
+
+    path = Path(path)
+    if not path.is_file():
+        return None
+    check_size(path, LARGEST_FILE)
+    content = path.read_bytes()
+    size = size_of(content)
+    if size is None:
+        return None
+    if size[0] * size[1] > PIXELS:
+        raise ValueError(
+            f"{path}: expected at most {PIXELS // 10**6} million pixels, got {cut(f'{size[0]}x{size[1]}')}"
+        )
+    try:
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+    except cv2.error:
+        return None
+    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+def size_of(content: bytes) -> tuple[int, int] | None:
+    """Return the width and height that a picture states in its first bytes; None where it is no picture we read."""
+    try:
+        if content.startswith(b"\x89PNG\r\n\x1a\n") and content[12:16] == b"IHDR":
+            return struct.unpack(">II", content[16:24]) if _whole_chunks(content) else None
+        if content.startswith(b"\xff\xd8"):
+            return _jpeg(content)
+        if content.startswith(b"BM"):
+            return _bmp(content)
+        if content[:4] in (b"II*\0", b"MM\0*"):
+            return _tiff(content)
+        if content[:1] == b"P" and content[1:2] in b"123456":
+            return _pnm(content)
+    except (struct.error, IndexError, ValueError):
+        pass
+    return None
+
+
+def _whole_chunks(content: bytes) -> bool:
+    """Return whether a PNG file holds each chunk that it states: OpenCV makes room for as much as one says it has."""
+    place = 8
+    while place + 8 <= len(content):
+        length = int.from_bytes(content[place : place + 4], "big")
+        if place + 12 + length > len(content):
+            return False
+        if content[place + 4 : place + 8] == b"IEND":
+            return True
+        place += 12 + length
+    return False
+
+
+def _jpeg(content: bytes) -> tuple[int, int] | None:
+    """Return the largest size of the frames that a JPEG file states."""
+    place, found = 2, None
+    while place + 4 <= len(content):
+        if content[place] != 0xFF:
+            place += 1  # OpenCV looks for the next marker, too
+            continue
+        marker = content[place + 1]
+        if marker in (0x00, 0x01, 0xFF) or 0xD0 <= marker <= 0xD8:
+            place += 1 if marker == 0xFF else 2
+            continue
+        if marker in _FRAMES:
+            tall, wide = struct.unpack(">HH", content[place + 5 : place + 9])
+            if found is None or wide * tall > found[0] * found[1]:
+                found = wide, tall
+        if marker == 0xDA:  # what follows are pixels
+            return found
+        place += 2 + int.from_bytes(content[place + 2 : place + 4], "big")
+    return found
+
+
+def _bmp(content: bytes) -> tuple[int, int]:
+    (header,) = struct.unpack("<I", content[14:18])
+    wide, tall = struct.unpack("<HH" if header == 12 else "<ii", content[18 : 22 if header == 12 else 26])
+    return abs(wide), abs(tall)
+
+
+def _tiff(content: bytes) -> tuple[int, int] | None:
+    """Return the size of the first picture of a TIFF file, as wide as its samples are many."""
+    order = "<" if content[:2] == b"II" else ">"
+    (place,) = struct.unpack(f"{order}I", content[4:8])
+    (count,) = struct.unpack(f"{order}H", content[place : place + 2])
+    found: dict[int, int] = {}
+    for k in range(count):
+        entry = content[place + 2 + 12 * k : place + 14 + 12 * k]
+        tag, kind = struct.unpack(f"{order}HH", entry[:4])
+        if tag in (_WIDTH, _HEIGHT, _SAMPLES):
+            found[tag] = struct.unpack(f"{order}H" if kind == 3 else f"{order}I", entry[8 : 10 if kind == 3 else 12])[0]
+    if not {_WIDTH, _HEIGHT} <= found.keys():
+        return None
+    return found[_WIDTH] * max(1, -(-found.get(_SAMPLES, 1) // 4)), found[_HEIGHT]
+
+
+def _pnm(content: bytes) -> tuple[int, int]:
+    lines = (line.partition(b"#")[0] for line in content[2:4096].split(b"\n"))
+    words = b" ".join(lines).split()
+    return int(words[0]), int(words[1])

@@ -1,0 +1,139 @@
+"""What OpenCV's FileStorage writes, as YAML, JSON or XML, read without OpenCV: its reader trusts what a file says.
+
+A file's values become numbers, texts, lists and `Matrix`, whatever the format. Nothing is expanded, no tag makes an
+object, and a matrix is as large as the numbers that are there.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.reading import parsed_json, quoted
+
+LARGEST_YAML = 500_000  # characters: PyYAML reads some 100,000 a second
+NUMBERS = 100  # of a matrix; a calibration has 14 at most
+# the letters of OpenCV's element types whose numbers are rounded when they are read
+_ROUNDED = {"f": np.float32, "h": np.float16}
+_TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """A matrix as a file states it; nothing of it is checked yet."""
+
+    sides: Any
+    type: Any
+    numbers: Any
+
+    def array(self) -> Array:
+        """Return the array, its channels last where it has several. Raises ValueError where sizes contradict."""
+        shape = tuple(_count(side) for side in (self.sides if isinstance(self.sides, list) else [self.sides])[:4])
+        found = _TYPE.fullmatch(str(self.type))
+        if found is None:
+            raise ValueError(f"a matrix of the type {quoted(self.type)}")
+        channels = int(found[1] or 1)
+        numbers = numbers_of(self.numbers)
+        shape = shape if channels == 1 else (*shape, channels)
+        if numbers.size != math.prod(shape):
+            raise ValueError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
+        if found[2] in _ROUNDED:
+            numbers = numbers.astype(_ROUNDED[found[2]]).astype(np.float64)
+        return numbers.reshape(shape)
+
+
+def stored_values(text: str) -> dict[str, Any]:
+    """Return the values of a file by name. Raises ValueError where it is none of the three formats."""
+    start = text.lstrip()[:1]
+    values = _xml(text) if start == "<" else parsed_json(text) if start == "{" else _yaml(text)
+    if not isinstance(values, dict):
+        raise ValueError(f"a file without names, {quoted(values)}")
+    return {str(name): _value(value) for name, value in values.items()}
+
+
+def numbers_of(value: Any) -> Array:
+    """Return numbers, or lists of lists of them, as an array. Raises ValueError where they are none, or too many."""
+    if isinstance(value, str):
+        value = value[: 40 * NUMBERS].split()
+    rows = value if isinstance(value, list) else [value]
+    flat = [one for row in rows[: NUMBERS + 1] for one in (row[: NUMBERS + 1] if isinstance(row, list) else [row])]
+    if len(flat) > NUMBERS:
+        raise ValueError(f"a matrix of more than {NUMBERS} numbers")
+    numbers = np.array([number_of(one) for one in flat], dtype=np.float64)
+    if rows and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows):
+        return numbers.reshape(len(rows), -1)
+    return numbers
+
+
+def number_of(value: Any) -> float:
+    """Return a number, which may be written as YAML writes it. Raises ValueError where it is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"{quoted(value)} where a number should be")
+    text = value.lower().replace(".inf", "inf").replace(".nan", "nan") if isinstance(value, str) else value
+    try:
+        return float(text)
+    except (ValueError, OverflowError):
+        raise ValueError(f"{quoted(value)} where a number should be") from None
+
+
+def _count(value: Any) -> int:
+    number = number_of(value)
+    if not 1.0 <= number <= NUMBERS or number != int(number):
+        raise ValueError(f"a matrix with {quoted(value)} rows or columns")
+    return int(number)
+
+
+def _value(value: Any) -> Any:
+    if isinstance(value, dict) and "data" in value:
+        if {"rows", "cols"} <= value.keys():
+            return Matrix([value["rows"], value["cols"]], value.get("dt", "d"), value["data"])
+        if "sizes" in value:
+            return Matrix(value["sizes"], value.get("dt", "d"), value["data"])
+    return value
+
+
+def _yaml(text: str) -> Any:
+    """Return what a YAML text holds: texts, lists and dictionaries alone, whatever tags it has."""
+    import yaml
+
+    if len(text) > LARGEST_YAML:
+        raise ValueError(f"YAML of {len(text)} characters, more than {LARGEST_YAML}")
+    # OpenCV writes %YAML:1.0 where the directive is %YAML 1.0
+    text = re.sub(r"\A\s*%YAML[^\n]*\n", "", text)
+    try:
+        return yaml.load(text, Loader=yaml.BaseLoader)
+    except (yaml.YAMLError, RecursionError) as error:
+        said = " ".join(str(error).split()) or "brackets that are nested too deeply"
+        raise ValueError(f"YAML that is broken: {said}") from None
+
+
+def _xml(text: str) -> dict[str, Any]:
+    root = xml_of(text)
+    if root.tag != "opencv_storage":
+        raise ValueError(f"XML of {quoted(root.tag)}")
+    return {one.tag: _content(one) for one in root}
+
+
+def _content(element: Any) -> Any:
+    if len(element) == 0:
+        words = (element.text or "").split()
+        return words[0] if len(words) == 1 else words
+    return {one.tag: (one.text or "").strip() for one in element}
+
+
+def xml_of(text: str) -> Any:
+    """Return the root of an XML text. Raises ValueError where it is broken or has a document type, which may expand."""
+    from xml.etree.ElementTree import ParseError
+
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    try:
+        return fromstring(text, forbid_dtd=True)
+    except DefusedXmlException:
+        raise ValueError("an XML file with a document type, which is not read") from None
+    except (ParseError, ValueError, RecursionError) as error:  # ValueError: an encoding that contradicts the text's
+        raise ValueError(f"XML that is broken: {error}") from None

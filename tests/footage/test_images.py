@@ -1,0 +1,94 @@
+"""Pictures of strangers: their size is known before they are unpacked."""
+
+import struct
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from posefit.footage import images
+from posefit.footage.images import read_image, size_of
+from posefit.footage.masks import FolderMasks
+from posefit.footage.stacks import StackMasks
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".bmp", ".tif", ".pgm", ".ppm"])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_the_size_that_is_stated_is_the_size_that_comes(tmp_path: Path, suffix: str, channels: int) -> None:
+    if (suffix, channels) in ((".pgm", 3), (".ppm", 1)):
+        pytest.skip("one is grey, the other is not")
+    drawn = np.random.default_rng(0).integers(0, 255, (37, 53, channels), dtype=np.uint8)
+    path = tmp_path / f"a{suffix}"
+    assert cv2.imwrite(str(path), drawn if channels == 3 else drawn[..., 0])
+    assert size_of(path.read_bytes()) == (53, 37)
+    for grey in (True, False):
+        found = read_image(path, grey=grey)
+        wanted = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+        np.testing.assert_array_equal(found, wanted)
+
+
+def bomb(path: Path, side: int) -> None:
+    """Write a PNG file whose header states a size and whose pixels are not there."""
+    chunk = b"IHDR" + struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
+    content = zlib.compress(bytes(100))
+    data = b"IDAT" + content
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
+        + struct.pack(">I", len(content)) + data + struct.pack(">I", zlib.crc32(data))
+        + bytes(4) + b"IEND" + struct.pack(">I", zlib.crc32(b"IEND"))
+    )  # fmt: skip
+
+
+def test_a_picture_of_too_many_pixels_is_refused_before_it_is_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bomb(tmp_path / "a.png", 30_000)
+    monkeypatch.setattr(cv2, "imdecode", None)
+    with pytest.raises(ValueError, match="a.png: expected at most 50 million pixels, got 30000x30000"):
+        FolderMasks.of(tmp_path, (None, None)).silhouette(0)
+
+
+def test_a_picture_that_opencv_refuses_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bomb(tmp_path / "a.png", 2**20 + 1)  # wider than OpenCV reads, where it raises
+    monkeypatch.setattr(images, "PIXELS", 2**60)
+    with pytest.raises(
+        ValueError, match=r"a.png: expected an image \(PNG, JPEG, BMP, TIFF or PGM\), got a file that is none"
+    ):
+        FolderMasks.of(tmp_path, (None, None)).silhouette(0)
+
+
+def test_a_chunk_that_says_it_has_more_than_the_file_is_not_made_room_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bomb(tmp_path / "a.png", 30)
+    content = (tmp_path / "a.png").read_bytes()
+    (tmp_path / "a.png").write_bytes(content[:33] + b"\x7f" + content[34:])  # OpenCV took 2 GB for it
+    monkeypatch.setattr(cv2, "imdecode", None)
+    assert read_image(tmp_path / "a.png", grey=True) is None
+
+
+def test_a_size_of_many_digits_is_cut_in_the_message(tmp_path: Path) -> None:
+    (tmp_path / "a.pgm").write_bytes(b"P5\n64 " + b"1" * 1000 + b"\n255\n")
+    with pytest.raises(ValueError, match=r"got 64x1{74}\.\.\.$"):
+        read_image(tmp_path / "a.pgm", grey=True)
+
+
+def test_masks_that_are_objects_are_one_line(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", masks=np.array([[[{}]]], dtype=object))
+    with pytest.raises(ValueError, match="a.npz: expected an .npz file with the key masks, got masks of object"):
+        StackMasks.of(tmp_path / "a.npz", (None, None))
+
+
+def test_masks_are_kept_as_bits_and_chosen_frames_alone(tmp_path: Path) -> None:
+    drawn = np.random.default_rng(0).random((9, 31, 45)) < 0.5
+    for stack in (drawn, drawn * 255.0, np.asfortranarray(drawn.astype(np.uint8))):
+        np.savez_compressed(tmp_path / "a.npz", masks=stack, valid=drawn)
+        found = StackMasks.of(tmp_path / "a.npz", (2, 7))
+        assert found.masks.nbytes == 5 * -(-31 * 45 // 8)
+        for k in range(5):
+            np.testing.assert_array_equal(found.silhouette(k).mask, drawn[2 + k])
+            np.testing.assert_array_equal(found.silhouette(k).valid, drawn[2 + k])
+        assert found.label(0).endswith("a.npz[2]")

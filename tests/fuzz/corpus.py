@@ -1,0 +1,114 @@
+"""Valid files of every kind that is read, small ones, made by the project's own writers where it has them."""
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from posefit import Camera
+from posefit.geometry.body import Body
+from posefit.motion import library
+from posefit.motion.amc import write_amc
+from posefit.motion.asf import write_asf
+from posefit.motion.bvh import write_bvh
+from posefit.silhouette.cost import project
+from posefit_priors.full import Full
+from posefit_priors.loose import Loose
+from posefit_priors.pca import PCA
+from posefit_priors.union import Union
+
+TOML = """
+[left]
+name = "left"
+size = [ 640, 480]
+matrix = [ [ 500.0, 0.0, 319.5], [ 0.0, 510.0, 239.5], [ 0.0, 0.0, 1.0]]
+distortions = [ 0.1, 0.0, 0.0, 0.0]
+rotation = [ 1.5707963267948966, 0.0, 0.0]
+translation = [ 0.0, 1.0, 4.0]
+fisheye = false
+
+[metadata]
+adjusted = false
+"""
+QUALISYS = """<?xml version='1.0'?><calibration><cameras><camera serial="7">
+<fov_video left="10" top="20" right="649" bottom="499"/>
+<transform x="0" y="-4000" z="1000" r11="1" r12="0" r13="0" r21="0" r22="0" r23="1" r31="0" r32="-1" r33="0"/>
+<intrinsic focalLengthU="32000" focalLengthV="32640" centerPointU="21088" centerPointV="16608"
+ radialDistortion1="-0.05" radialDistortion2="0.1" tangentalDistortion1="0.001" tangentalDistortion2="0.002"/>
+</camera></cameras></calibration>"""
+PLAN = """[defaults]
+frames = 3
+settings = { sapso.cooling = 0.9 }
+[product]
+methods = ["sapso@pca", { method = "random@full", settings = { random.particles = 20 } }]
+motions = ["walk", { motion = "walk-a", train = ["walk-b"] }]
+views = [45, [0, 90]]
+corruptions = [{}, { holes = 0.3, dropped = 0.1 }]
+instances = 2
+seeds = [0, 1]
+[[cells]]
+method = "random@pca"
+motion = "run"
+"""
+LEDGER = '{"format": 1, "version": "0.1.0"}'
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A valid file: which reader it is for, its suffix, and what it holds."""
+
+    reader: str
+    suffix: str
+    content: bytes
+
+
+def corpus(folder: Path) -> list[Seed]:
+    """Return valid files of every kind; `folder` is for what is written meanwhile."""
+    motion = library.built_in("walk", frames=3)
+    write_asf(folder / "a.asf", motion.skeleton)
+    write_amc(folder / "a.amc", motion)
+    write_bvh(folder / "a.bvh", motion)
+    seeds = [Seed(kind, f".{kind}", (folder / f"a.{kind}").read_bytes()) for kind in ("asf", "amc", "bvh")]
+    body, camera = Body.of(motion.skeleton), Camera.around(motion.translations[0], 0.8, 3.5, (64, 48))
+    masks = np.stack([project(body, camera, *where) for where in zip(motion.poses, motion.translations, strict=True)])
+    usable = np.array([True, False, True])
+    for save in (np.savez, np.savez_compressed):
+        for stack in (masks, masks.astype(np.uint8) * 255, np.asfortranarray(masks.astype(np.float32))):
+            seeds.append(_npz("masks", save, masks=stack, valid=~masks, usable=usable, fps=np.array(30.0)))
+    seeds += [Seed("images", suffix, _image(masks[0], suffix)) for suffix in (".png", ".jpg", ".bmp", ".tif", ".pgm")]
+    angles = np.concatenate([library.built_in(name).poses[:, 3:] for name in library.other_styles("walk")])
+    for prior in (PCA, Full, Loose, Union):
+        path = folder / "prior.npz"
+        prior().fit(angles, motion.skeleton).save(path)
+        seeds.append(Seed(prior.__name__, ".npz", path.read_bytes()))
+    texts = [(".json", camera.to_json()), (".toml", TOML), (".xml", QUALISYS)]
+    texts += [(suffix, _opencv(folder / f"calibration{suffix}")) for suffix in (".yml", ".json", ".xml")]
+    seeds += [Seed("calibration", suffix, text.encode()) for suffix, text in texts]
+    return [*seeds, Seed("plan", ".toml", PLAN.encode()), Seed("ledger", ".json", LEDGER.encode())]
+
+
+def _npz(reader: str, save: Any, **arrays: Any) -> Seed:
+    buffer = io.BytesIO()
+    save(buffer, **arrays)
+    return Seed(reader, ".npz", buffer.getvalue())
+
+
+def _image(mask: Any, suffix: str) -> bytes:
+    written, content = cv2.imencode(suffix, np.where(mask, 255, 0).astype(np.uint8))
+    assert written
+    return content.tobytes()
+
+
+def _opencv(path: Path) -> str:
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("image_width", 640)
+    storage.write("image_height", 480)
+    storage.write("camera_matrix", np.array([[500.0, 0, 319.5], [0, 510.0, 239.5], [0, 0, 1]]))
+    storage.write("distortion_coefficients", np.array([[0.1, 0.0, 0.0, 0.0, 0.0]]))
+    storage.write("rvec", np.array([np.pi / 2, 0.0, 0.0]))
+    storage.write("tvec", np.array([[0.0], [1.0], [4.0]]))
+    storage.release()
+    return path.read_text()

@@ -1,0 +1,47 @@
+"""The readers of strangers' files hold against 5,000 damaged ones, and the harness notices what does not hold."""
+
+import random
+
+import pytest
+
+from tests.fuzz.__main__ import MEGABYTES, SECONDS, Tally, run
+from tests.fuzz.corpus import Seed
+from tests.fuzz.mutator import mutated
+from tests.fuzz.worker import input_of, outcome
+
+
+@pytest.mark.slow
+def test_five_thousand_damaged_files_are_read_or_refused_with_one_line():
+    tally = run(2, range(5_000), 1)
+    assert tally.findings == []
+    assert tally.counts["read"] + tally.counts["refused"] == 5_000
+    assert all(tally.read[reader] for reader in tally.refused)  # some of every kind were still whole enough
+
+
+def test_an_input_is_the_same_for_the_same_seed_and_number():
+    seeds = [Seed("plan", ".toml", b"seeds = [0, 1, 2]\n" * 9), Seed("ledger", ".json", b'{"format": 1}')]
+    assert input_of(seeds, 1, 7) == input_of(seeds, 1, 7)
+    assert len({mutated(random.Random(k), seeds[0].content, ".toml", b"x")[:60] for k in range(50)}) > 10
+
+
+def test_the_harness_tells_what_is_neither_read_nor_refused(tmp_path):
+    path = tmp_path / "subject.toml"
+
+    def refuse(_):
+        raise ValueError(f"{path}: expected a plan, got none")
+
+    def mumble(_):
+        raise ValueError("no")
+
+    def fail(_):
+        raise KeyError("rows")
+
+    assert outcome(lambda _: None, path)[0] == "read"
+    assert outcome(refuse, path)[0] == "refused"
+    assert outcome(mumble, path)[0] == "unclean"
+    assert outcome(fail, path)[0] == "unclean"
+    tally = Tally()
+    tally.add(0, ["read", "plan", MEGABYTES + 1, ""], 0.0)
+    tally.add(1, ["refused", "plan", 1, ""], SECONDS + 1.0)
+    tally.add(2, ["unclean", "plan", 1, "KeyError: 'rows'"], 0.0)
+    assert [finding.split()[1] for finding in tally.findings] == ["large", "hang", "unclean"]

@@ -1,0 +1,89 @@
+"""Arrays of strangers: damaged ones are one line, and none is larger than was said before it was unpacked."""
+
+import io
+import zipfile
+
+import numpy as np
+import pytest
+
+from posefit import archive
+from posefit.archive import archived, read_arrays
+
+REFUSED = r"a.npz: expected an .npz file with the key a, got "
+
+
+def read(path, most=1_000_000):
+    return read_arrays(path, ["a", "b"], "the key a", most)
+
+
+@pytest.fixture
+def path(tmp_path):
+    np.savez_compressed(tmp_path / "a.npz", a=np.arange(5000.0), b=np.array(["x", "y"]), c=np.zeros(3))
+    return tmp_path / "a.npz"
+
+
+def test_arrays_come_back_as_numpy_wrote_them(path, tmp_path):
+    found = read(path)
+    assert set(found) == {"a", "b"}
+    np.testing.assert_array_equal(found["a"], np.arange(5000.0))
+    assert found["b"].tolist() == ["x", "y"]
+    turned = np.asfortranarray(np.arange(12).reshape(3, 4))
+    np.savez(tmp_path / "b.npz", a=turned)
+    np.testing.assert_array_equal(read(tmp_path / "b.npz")["a"], turned)
+    with archived(tmp_path / "b.npz", ["a"], "a", 1000, 10_000) as stored:
+        np.testing.assert_array_equal(np.stack(list(stored["a"].rows())), turned)
+
+
+def test_any_cut_and_any_flipped_bit_is_read_or_refused_with_one_line(path):
+    content, rng = path.read_bytes(), np.random.default_rng(0)
+    for _ in range(300):
+        damaged = bytearray(content)
+        if rng.random() < 0.3:
+            damaged = damaged[: rng.integers(len(content))]
+        else:
+            damaged[rng.integers(len(content))] ^= 1 << rng.integers(8)
+        path.write_bytes(damaged)
+        try:
+            read(path)
+        except ValueError as error:
+            assert str(error).startswith(f"{path}: expected an .npz file with the key a, got ")
+
+
+def test_what_would_unpack_to_more_is_refused_before_it_is(path, monkeypatch):
+    monkeypatch.setattr(archive, "_exactly", None)  # nothing is unpacked
+    with (
+        pytest.raises(ValueError, match=REFUSED + "4.*e-05 GB when unpacked, where 3e-05 GB are the most"),
+        archived(path, ["a", "b"], "the key a", 30_000, 1_000_000),
+    ):
+        pass
+
+
+def test_objects_and_foreign_packing_and_other_sizes_are_refused(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, a=np.array([{}], dtype=object))
+    with pytest.raises(ValueError, match=REFUSED + "a of object"):
+        read(path)
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.arange(9.0))
+    for packing, content, message in (
+        (zipfile.ZIP_BZIP2, buffer.getvalue(), "a packed in a way that NumPy does not write"),
+        (zipfile.ZIP_STORED, buffer.getvalue()[:-8], r"a of 64 bytes for shape \(9,\)"),
+        (zipfile.ZIP_STORED, buffer.getvalue() + b"x", r"a of 73 bytes for shape \(9,\)"),
+        (zipfile.ZIP_STORED, b"", "a damaged one"),
+    ):
+        with zipfile.ZipFile(path, "w", packing) as made:
+            made.writestr("a.npy", content)
+        with pytest.raises(ValueError, match=REFUSED + message):
+            read(path)
+
+
+def test_a_directory_of_very_many_entries_is_not_read(tmp_path):
+    path = tmp_path / "a.npz"
+    with zipfile.ZipFile(path, "w") as made:
+        for k in range(archive.MEMBERS + 1):
+            made.writestr(str(k), b"")
+    with pytest.raises(ValueError, match=REFUSED + "one of more than 1000 arrays"):
+        read(path)
+    path.write_bytes(b"no archive")
+    with pytest.raises(ValueError, match=REFUSED + "a file that is none"):
+        read(path)

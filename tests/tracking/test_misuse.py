@@ -1,0 +1,104 @@
+"""What a caller from Python or at the command line gets wrong is one clear line, and no option is ignored."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit import Camera, PoseProblem, SearchSpace, Silhouette, minimise
+from posefit.fitting.tracker import Prediction
+from posefit.footage.segmentation import Extraction
+from posefit.geometry.body import Body
+from posefit.motion import library
+from posefit.registry import registry
+
+MISUSES: list[tuple[dict[str, Any], str]] = [
+    ({"evaluations": 1e3}, "evaluations must be a whole number of at least 1, got 1000.0"),
+    ({"particles": 2.5}, "particles must be a whole number of at least 1, got 2.5"),
+    ({"restarts": 1.5}, "restarts must be a whole number of at least 0, got 1.5"),
+    ({"frames": 5}, r"frames must be \(start, stop\), either of which may be None, got 5"),
+    ({"frames": (1.5, None)}, r"frames must be two whole numbers or None, got \(1.5, None\)"),
+    ({"frames": (5, 2)}, "frames must choose some of the 60 frames, got 5:2"),
+    ({"size": 320}, r"size must be \(width, height\), got 320"),
+    ({"size": (320.5, 240)}, "size must be from 1x1 to 16384x16384 pixels, got 320.5x240"),
+    ({"seed": None}, "seed must be a whole number of at least 0, got None"),
+    ({"seed": -1}, "seed must be 0 or more, got -1"),
+    ({"threads": True}, "threads must be a whole number of at least 1, got True"),
+    ({"fps": "fast"}, "fps must be a positive number, got 'fast'"),
+    ({"fps": 10**400}, "fps must lie in 0.001 to 1e[+]06, got 1000"),
+    ({"view_degrees": "front"}, "view_degrees must be a finite number, got 'front'"),
+    ({"train": "walk-a"}, "train must be a list of motions, got 'walk-a'"),
+    ({"ask_seconds": "long"}, "ask_seconds must be a finite number, got 'long'"),
+    ({"asf": "a.asf"}, "asf must be given for .amc files and footage only, got 'a.asf'"),
+    ({"extraction": Extraction()}, "extraction must be given for video only, got Extraction.* for a motion"),
+    ({"up": "y"}, "up must be given for calibrations only, got 'y' for a motion"),
+    ({"restarts": 0}, "restarts must be at least 1 for a motion, which is searched once where it is left out, got 0"),
+]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"), MISUSES, ids=[f"{next(iter(given))}-{k}" for k, (given, _) in enumerate(MISUSES)]
+)
+def test_a_misuse_of_track_is_one_clear_error(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        posefit.track("walk", **{"evaluations": 80, "frames": (0, 2), **given})
+
+
+def test_what_masks_have_no_use_for_is_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", masks=np.zeros((2, 40, 40), dtype=bool))
+    with pytest.raises(ValueError, match="extraction must be given for video only, got Extraction.* for masks"):
+        posefit.track(tmp_path / "a.npz", extraction=Extraction())
+
+
+def test_a_camera_stands_at_a_distance_that_is_not_negative() -> None:
+    with pytest.raises(ValueError, match="distance must be 0 or more metres, got -1.0"):
+        Camera.around(np.zeros(3), 0.0, -1.0, (64, 48))
+    with pytest.raises(ValueError, match="field_of_view must lie between 0 and pi radians, got 4.0"):
+        Camera.around(np.zeros(3), 0.0, 3.0, (64, 48), 4.0)
+
+
+@pytest.fixture(scope="module")
+def problem() -> PoseProblem:
+    motion = library.built_in("walk", frames=1)
+    body = Body.of(motion.skeleton)
+    angles = np.concatenate([library.built_in(name).poses[:, 3:] for name in library.other_styles("walk")])
+    prior = registry().prior("pca")().fit(angles, motion.skeleton)
+    camera = Camera.around(motion.translations[0], 0.8, 3.5, (64, 48))
+    mask = posefit.silhouette.cost.project(body, camera, motion.poses[0], motion.translations[0])
+    space = SearchSpace(prior, np.zeros(3), np.radians([45.0, 15.0, 15.0]), motion.translations[0])
+    return PoseProblem(body, [camera], [Silhouette.of(mask)], space)
+
+
+def test_a_range_is_not_negative(problem: PoseProblem) -> None:
+    space = problem.space
+    with pytest.raises(ValueError, match=r"root_range must be 3 numbers of 0 or more, got \[-1.0, -1.0, -1.0\]"):
+        SearchSpace(space.prior, np.zeros(3), -np.ones(3), space.anchor)
+    with pytest.raises(ValueError, match="translation_range must be 3 numbers of 0 or more"):
+        SearchSpace(space.prior, np.zeros(3), np.ones(3), space.anchor, translation_range=np.full(3, -0.5))
+    with pytest.raises(ValueError, match="root_range_degrees must be 0 or more to either side"):
+        Prediction(root_range_degrees=(45.0, -15.0, 15.0))
+
+
+def test_a_pose_is_not_sought_in_an_empty_mask(problem: PoseProblem) -> None:
+    empty = Silhouette.of(np.zeros((48, 64), dtype=bool))
+    with pytest.raises(ValueError, match="silhouettes must show a person, got an empty mask"):
+        PoseProblem(problem.body, problem.cameras, [empty], problem.space)
+
+
+def test_costs_are_an_array_with_one_for_each_proposal(problem: PoseProblem) -> None:
+    factory = registry().optimiser("random")
+    for costs, came in (
+        (lambda proposals: problem.evaluate(proposals)[:-1], r"shape \(39,\)"),
+        (lambda proposals: problem.evaluate(proposals).tolist(), "list"),
+    ):
+        with pytest.raises(TypeError, match=rf"evaluate must return an array of costs of shape \(40,\), got {came}"):
+            minimise(costs, factory(problem.space, np.random.default_rng(0), particles=40), 400)
+
+
+@pytest.mark.parametrize("name", ["sapso", "annealed", "particle"])
+def test_a_search_that_ends_long_before_its_budget_says_so(problem: PoseProblem, name: str) -> None:
+    factory = registry().optimiser(name)
+    with pytest.warns(UserWarning, match="ended its search after 24.. of 100000 evaluations: .* build it with it"):
+        minimise(problem.evaluate, factory(problem.space, np.random.default_rng(0)), 100_000)
