@@ -3,6 +3,7 @@
 import importlib
 import logging
 import secrets
+import signal
 import threading
 import time
 from dataclasses import dataclass
@@ -161,6 +162,8 @@ class Cluster:
             try:
                 limit = min(CONNECTING, self._patience)
                 self._client = self._distributed.Client(self._address, timeout=limit, set_as_default=False)
+                if self._local is not None:
+                    self._client.register_plugin(_plugin(self._distributed))
                 return
             except (OSError, ValueError, TimeoutError) as error:
                 if isinstance(error, ValueError) or time.monotonic() > until:
@@ -192,6 +195,19 @@ def _local(distributed: Any, workers: int, dashboard: bool) -> Any:
             scheduler_kwargs={"dashboard": dashboard},
             silence_logs=logging.CRITICAL,
         )
+
+
+def _plugin(distributed: Any) -> Any:
+    """Return what makes each worker of this machine, also one that comes later, leave Ctrl-C to the driver."""
+
+    class Ours(distributed.WorkerPlugin):  # type: ignore[misc]
+        name = "posefit"
+
+        def setup(self, **_: Any) -> None:
+            if threading.current_thread() is threading.main_thread():
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    return Ours()
 
 
 def _library() -> Any:
