@@ -120,7 +120,7 @@ MUTANTS = (
     ),
     Mutant(
         "the kernel's radii ignore fy",
-        "posefit/silhouette/kernels.py",
+        "posefit/silhouette/rasteriser.py",
         (("math.sqrt(view.focal[0] * view.focal[1])", "view.focal[0]"),),
         "tests/silhouette/test_kernels.py::test_radii_are_seen_at_the_mean_of_two_focal_lengths",
     ),

@@ -15,6 +15,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette import drawn, kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
+from posefit.silhouette.rasteriser import View
 
 SCALE = 100.0  # S
 BETA = 0.5  # beta
@@ -23,9 +24,9 @@ LEAST_SHARE = 16  # poses; a smaller share of work is not worth handing to anoth
 Areas = NDArray[np.int64]  # (n, 3): R, B, Y
 
 
-def view_of(camera: Camera) -> kernels.View:
+def view_of(camera: Camera) -> View:
     """Return a camera as the kernel wants it."""
-    return kernels.View(camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height)
+    return View(camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height)
 
 
 def areas(

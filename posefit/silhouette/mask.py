@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Bits
-from posefit.silhouette.kernels import PAD
+from posefit.silhouette.rasteriser import PAD
 
 Mask = NDArray[np.bool_]  # (height, width)
 

@@ -15,8 +15,8 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import PARENTS, SIDES
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
-from posefit.silhouette.kernels import NEAR
 from posefit.silhouette.mask import Mask
+from posefit.silhouette.rasteriser import NEAR
 
 BACKGROUND = (28, 24, 22)
 BOTH, MISSED, SPILLED = (186, 214, 168), (90, 90, 235), (235, 160, 70)  # Y, R, B

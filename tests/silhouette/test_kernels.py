@@ -15,8 +15,8 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, Skeleton
 from posefit.silhouette.cost import areas, project
-from posefit.silhouette.kernels import FAR, NEAR
 from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.rasteriser import FAR, NEAR
 from tests.silhouette.twin import body_distance, hull_distance
 
 TIE = 1e-3  # pixels; the kernel's rows are float32

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posefit.silhouette.kernels import PAD
 from posefit.silhouette.mask import Silhouette, pack, unpack
+from posefit.silhouette.rasteriser import PAD
 
 
 @given(st.integers(1, 200), st.integers(1, 20), st.integers(0, 2**32 - 1))

@@ -6,7 +6,7 @@ from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import PARENTS
-from posefit.silhouette.kernels import FAR, NEAR
+from posefit.silhouette.rasteriser import FAR, NEAR
 
 
 def hull_distance(x: Array, y: Array, first: Array, second: Array, r0: float, r1: float) -> Array:
