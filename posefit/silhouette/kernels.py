@@ -7,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import jit
 from posefit.silhouette.popcount import popcount
-from posefit.silhouette.rasteriser import BLOCK, NONE, below, draw_body, scratch
+from posefit.silhouette.rasteriser import BLOCK, NONE, below, draw_pose, scratch
 
 
 @jit
@@ -55,7 +55,7 @@ def count_areas(chain, radii, view, observed, valid, poses, translations, areas,
         for y in range(view.height):
             silhouette += np.uint64(popcount(observed[w, y]))
     for i in range(poses.shape[0]):
-        image, box = draw_body(chain, radii, view, poses[i], translations[i], work)
+        image, box = draw_pose(chain, radii, view, poses[i], translations[i], work)
         if pixels is not None:
             paint_bits(image, box, value, pixels[i])
         body, overlap = count(image, observed, valid, box)
@@ -79,6 +79,6 @@ def add_mismatch(areas, scale, beta, costs):
 def draw_bits(chain, radii, view, pose, translation):
     """Return the bit image of one body."""
     work = scratch(view, chain.parents.size, pose.size)
-    image, _ = draw_body(chain, radii, view, pose, translation, work)
+    image, _ = draw_pose(chain, radii, view, pose, translation, work)
     image[:, view.height :] = NONE
     return image

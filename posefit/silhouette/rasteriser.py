@@ -218,7 +218,7 @@ def scratch(view, bones, angles):
 
 
 @jit
-def draw_body(chain, radii, view, pose, translation, work):
+def draw_pose(chain, radii, view, pose, translation, work):
     """Set the pixels of one body in the clear bit image of `work`, which `scratch` makes; return it and its box."""
     (sines, cosines, frames, joints), (seen, ends, lines, bounds, items, box), image = work
     place_joints(chain, pose, translation, sines, cosines, frames, joints)
