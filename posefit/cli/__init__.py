@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from posefit.cli import following, plugins, sweeping
+from posefit.cli.motions import motions
 from posefit.limits import exits_told
 from posefit.version import __version__
 
@@ -22,6 +23,7 @@ BUILT_IN = (
     following.extract,
     sweeping.sweep,
     sweeping.report,
+    motions,
     plugins.plugins,
     plugins.check,
 )

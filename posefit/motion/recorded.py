@@ -7,7 +7,7 @@ from NSF EIA-0196217.
 
     from posefit.motion import recorded
 
-    others = recorded.clips(without=("16",))     # of everybody but the person 16
+    others = recorded.clips(without=("16",))     # of everybody but the person 16; also recorded.named("library:-16")
     print(others[0].name, others[0].poses.shape, others[0].times[:4])
     walk = recorded.clip("16_15").motion()       # as a motion of 30 frames a second
 """
@@ -29,6 +29,7 @@ from posefit.motion.motion import Motion
 from posefit.reading import quoted
 
 FPS = 30.0  # frames a second that the times of clips count
+LIBRARY = "library"  # the name of all clips where motions are named
 STEP = 0.001  # radians and metres: what a stored number is a whole multiple of
 _NAME = re.compile(r"\d+_\d+")
 
@@ -123,3 +124,26 @@ def clips(only: Iterable[str] = (), without: Iterable[str] = ()) -> Sequence[Rec
     if not chosen:
         raise ValueError("the library must hold somebody else, got everybody left out")
     return chosen
+
+
+def is_library(name: object) -> bool:
+    """Return whether a name is the library's, or that of some people of it."""
+    return isinstance(name, str) and name.partition(":")[0] == LIBRARY
+
+
+def named(name: str) -> Sequence[RecordedClip]:
+    """Return the clips of `library`, of some people as in `library:02,16`, or of all but some as in `library:-16`.
+
+    Raises ValueError where one of them is not in the library, or where nobody is left.
+    """
+    if not is_library(name):
+        raise ValueError(f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}")
+    people = [one.strip() for one in name.partition(":")[2].split(",") if one.strip()]
+    return clips([one for one in people if one[0] != "-"], [one[1:] for one in people if one[0] == "-"])
+
+
+def leaving_out(name: str, subjects: Iterable[str]) -> str:
+    """Return the name of the same library without some people."""
+    named(name)  # raises where it is none
+    people = [one for one in [name.partition(":")[2], *(f"-{subject}" for subject in subjects)] if one]
+    return f"{LIBRARY}:{','.join(people)}"
