@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from posefit.arrays import Array
+import numpy as np
+
+from posefit.arrays import Array, writeable
 from posefit.fitting.alignment import align
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.silhouette.cost import BETA, Areas, areas, mismatch
 from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.sharing import parts_of, work_through
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +46,23 @@ class PoseProblem:
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4)."""
-        return self.cost(*self.decode(proposals))  # SAPSO (5)
+        if np.shape(proposals)[1:] != (self.space.dimensions,):
+            self.space.decode(proposals)  # says what is wrong
+        parts = parts_of(len(proposals), self.threads)
+        if len(parts) == 1:
+            return self.cost(*self.decode(proposals))  # SAPSO (5)
+        proposals, costs = writeable(proposals), np.empty(len(proposals))
+
+        def count(part: slice, poses: Array, translations: Array) -> None:
+            costs[part] = self.combined(self._areas(poses, self._aligned(poses, translations), threads=1))
+
+        work_through(parts, self.threads, lambda part: self.space.decode(proposals[part]), count)
+        return costs
 
     def decode(self, proposals: Array) -> tuple[Array, Array]:
         """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space asks it."""
         poses, translations = self.space.decode(proposals)
-        if self.space.translation == "aligned":
-            translations = align(self.body, self.cameras, self.silhouettes, poses, translations)
-        return poses, translations
+        return poses, self._aligned(poses, translations)
 
     def cost(self, poses: Array, translations: Array) -> Array:
         """Return the cost (n,) of poses (n, 66) with their root at translations (n, 3)."""
@@ -62,10 +74,19 @@ class PoseProblem:
 
     def areas(self, poses: Array, translations: Array) -> list[Areas]:
         """Return R, B, Y (n, 3) of each view."""
+        return self._areas(poses, translations, self.threads)
+
+    def _areas(self, poses: Array, translations: Array, threads: int) -> list[Areas]:
         return [
-            areas(self.body, camera, silhouette, poses, translations, self.threads)
+            areas(self.body, camera, silhouette, poses, translations, threads)
             for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
         ]
+
+    def _aligned(self, poses: Array, translations: Array) -> Array:
+        """Return the translations (n, 3) of decoded poses (n, 66): other ones where the space has them aligned."""
+        if self.space.translation != "aligned":
+            return translations
+        return align(self.body, self.cameras, self.silhouettes, poses, translations)
 
 
 def over_views(counts: Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:
