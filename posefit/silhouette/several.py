@@ -66,82 +66,71 @@ def draw_bones(chain, radii, view, poses, translations, images, boxes):
 
 
 @jit
-def put(limb, box, observed, valid, image, added):
-    """OR a limb's bit image into an image; return how many pixels are new, of those known and of those observed.
+def put(limb, image, added, observed, valid):
+    """OR a limb's words into an image; return how many pixels are new, of those known and of those observed.
 
-    The new pixels are written to `added`, within the limb's box.
+    The new pixels are written to `added`.
     """
     body, overlap = NONE, NONE
-    for w in range(box[2], box[3] + 1):
-        bits = limb[w][box[0] : box[1]]
-        there = image[w][box[0] : box[1]]
-        new = added[w][box[0] : box[1]]
-        seen = observed[w][box[0] : box[1]]
-        known = valid[w][box[0] : box[1]]
-        for y in range(bits.size):
-            more = bits[y] & ~there[y]
-            new[y] = more
-            there[y] |= more
-            body += np.uint64(popcount(more & known[y]))
-            overlap += np.uint64(popcount(more & seen[y]))
+    for i in range(limb.size):
+        new = limb[i] & ~image[i]
+        added[i] = new
+        image[i] |= new
+        body += np.uint64(popcount(new & valid[i]))
+        overlap += np.uint64(popcount(new & observed[i]))
     return body, overlap
 
 
 @jit
-def would_add(limb, box, observed, valid, image):
+def would_add(limb, image, observed, valid):
     """Return what `put` would, and put nothing."""
     body, overlap = NONE, NONE
-    for w in range(box[2], box[3] + 1):
-        bits = limb[w][box[0] : box[1]]
-        there = image[w][box[0] : box[1]]
-        seen = observed[w][box[0] : box[1]]
-        known = valid[w][box[0] : box[1]]
-        for y in range(bits.size):
-            more = bits[y] & ~there[y]
-            body += np.uint64(popcount(more & known[y]))
-            overlap += np.uint64(popcount(more & seen[y]))
+    for i in range(limb.size):
+        new = limb[i] & ~image[i]
+        body += np.uint64(popcount(new & valid[i]))
+        overlap += np.uint64(popcount(new & observed[i]))
     return body, overlap
 
 
 @jit
-def take_away(box, image, added):
-    """Clear the pixels of an image that `put` has added, within the limb's box."""
-    for w in range(box[2], box[3] + 1):
-        there = image[w][box[0] : box[1]]
-        new = added[w][box[0] : box[1]]
-        for y in range(there.size):
-            there[y] ^= new[y]
+def take_away(image, added):
+    """Clear the pixels of an image that `put` has added."""
+    for i in range(image.size):
+        image[i] ^= added[i]
 
 
 @jit
-def count_combinations(images, boxes, first, combinations, observed, valid, height, areas):
-    """Write the areas (m, 3) R, B, Y of combinations (m, L): image 0 with, of each limb, the candidate of that index.
+def count_combinations(images, spans, first, combinations, order, observed, valid, areas):
+    """Write the areas (m, 3) -Y, B, Y of combinations (m, L): image 0 with, of each limb, the candidate of that index.
 
-    `images` (1 + candidates, words, rows) has limb k's candidates from index `first[k]` on. Limbs are put one upon the
-    other, the last one only counted; those that a combination shares with the one before it, from the first on, stay.
+    `images` (1 + candidates, words) has limb k's candidates from index `first[k]` on, and their pixels lie in `spans`
+    (1 + candidates, 2). In the given order (m,), limbs are put one upon the other, the last one only counted; those
+    that a combination shares with the one before it, from the first on, stay.
     """
-    m, limbs = combinations.shape
-    silhouette = pixels_of(observed, height)
-    image, added = images[0].copy(), np.empty((limbs, *images[0].shape), np.uint64)
+    limbs = combinations.shape[1]
+    image, added = images[0].copy(), np.empty((limbs, images.shape[1]), np.uint64)
     body, overlap = np.zeros(limbs + 1, np.uint64), np.zeros(limbs + 1, np.uint64)
     held = np.full(limbs, -1)
-    body[0], overlap[0] = would_add(images[0], boxes[0], observed, valid, np.zeros_like(images[0]))
+    body[0], overlap[0] = would_add(image, np.zeros_like(image), observed, valid)
     standing = 0
-    for i in range(m):
+    for i in order:
         shared = 0
         while shared < standing and combinations[i, shared] == held[shared]:
             shared += 1
         for k in range(standing - 1, shared - 1, -1):
-            take_away(boxes[first[k] + held[k]], image, added[k])
+            a, b = spans[first[k] + held[k]]
+            take_away(image[a:b], added[k, a:b])
         for k in range(shared, limbs):
             at = first[k] + combinations[i, k]
+            a, b = spans[at]
             if k < limbs - 1:
                 held[k] = combinations[i, k]
-                more, shown = put(images[at], boxes[at], observed, valid, image, added[k])
+                more, shown = put(images[at, a:b], image[a:b], added[k, a:b], observed[a:b], valid[a:b])
             else:
-                more, shown = would_add(images[at], boxes[at], observed, valid, image)
+                more, shown = would_add(images[at, a:b], image[a:b], observed[a:b], valid[a:b])
             body[k + 1], overlap[k + 1] = body[k] + more, overlap[k] + shown
         standing = limbs - 1
-        areas[i, 0] = silhouette - overlap[limbs]
-        areas[i, 1] = body[limbs] - overlap[limbs]
-        areas[i, 2] = overlap[limbs]
+        y = np.int64(overlap[limbs])
+        areas[i, 0] = -y
+        areas[i, 1] = np.int64(body[limbs]) - y
+        areas[i, 2] = y
