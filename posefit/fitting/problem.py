@@ -159,7 +159,7 @@ class CoarseFirst:
         self._kept = np.sort(np.argsort(self._costs, kind="stable")[:kept])
         return np.asarray(self._population[self._kept])
 
-    def tell(self, proposals: Array, costs: Array) -> None:
+    def tell(self, proposals: Array, costs: Array) -> None:  # noqa: ARG002 - they are what `ask` returned
         """Tell the optimiser its population, with the costs (k,) of what `ask` returned."""
         told = np.fmax(self._costs, np.fmax.reduce(costs))
         told[self._kept] = costs

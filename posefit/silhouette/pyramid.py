@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from posefit.geometry.camera import Camera
+from posefit.silhouette.drawn import belongs
 from posefit.silhouette.mask import Silhouette
 
 
@@ -31,7 +32,7 @@ def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
     coarse = Silhouette.of(mask, valid)
     # given instead of found, so that what is aligned to the borders stands where it stands at full size
     vars(coarse)["extent"] = tuple((np.array(silhouette.extent) - first - 0.5) / factor + 0.5)
-    return coarse
+    return belongs(coarse, silhouette)
 
 
 def _first(factor: int, size: tuple[int, int]) -> int:
