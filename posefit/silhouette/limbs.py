@@ -14,8 +14,7 @@ from posefit.geometry.limbs import LIMBS, check_limbs, rows_of, turns_of
 from posefit.geometry.skeleton import ANGLES, BONES
 from posefit.silhouette import drawn, several
 from posefit.silhouette.cost import Areas, view_of
-from posefit.silhouette.mask import Silhouette
-from posefit.silhouette.rasteriser import PAD
+from posefit.silhouette.mask import Silhouette, pack
 
 HIDDEN = -1e6  # metres: no pixel is within a disc of a negative radius, and a bone with such ends is not drawn
 STEP = 32  # words that a loop takes at a time in vector registers; what is left over it takes one by one
@@ -108,8 +107,8 @@ class LimbMasks:
         radii = np.where(theirs[:, :, None], body.radii, HIDDEN)
         radii.setflags(write=False)  # as a body's are: numba would compile another kernel
         places = writeable(np.tile(np.asarray(translation, dtype=np.float64), (len(each), 1)))
-        words = (camera.width + 63) // 64
-        images = np.zeros((len(each), words, camera.height + PAD), dtype=np.uint64)
+        empty = pack(np.zeros((camera.height, camera.width), dtype=bool))
+        images = np.zeros((len(each), *empty.shape), dtype=np.uint64)
         boxes = np.zeros((len(each), 4), dtype=np.int64)
         several.draw_bones(body.skeleton.chain, radii, view_of(camera), each, places, images, boxes)
         there = (boxes[:, 0] < boxes[:, 1]) & (boxes[:, 2] <= boxes[:, 3])

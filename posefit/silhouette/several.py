@@ -11,13 +11,13 @@ from posefit.silhouette.rasteriser import BLOCK, NONE, draw_pose, scratch
 
 
 @jit
-def pixels_of(silhouette, height):
+def pixels_of(bits):
     """Return how many pixels of a bit image are set."""
     pixels = NONE
-    for w in range(silhouette.shape[0]):
-        row = silhouette[w][:height]
-        for y in range(row.size):
-            pixels += np.uint64(popcount(row[y]))
+    for w in range(bits.shape[0]):
+        column = bits[w]
+        for y in range(column.size):
+            pixels += np.uint64(popcount(column[y]))
     return pixels
 
 
@@ -30,7 +30,7 @@ def count_areas_of_all(chain, radii, view, observed, valid, poses, translations,
     work = scratch(view, chain.parents.size, poses.shape[1])
     silhouettes = np.empty(observed.shape[0], np.uint64)
     for s in range(silhouettes.size):
-        silhouettes[s] = pixels_of(observed[s], view.height)
+        silhouettes[s] = pixels_of(observed[s])
     for i in range(poses.shape[0]):
         image, box = draw_pose(chain, radii, view, poses[i], translations[i], work)
         for s in range(silhouettes.size):
