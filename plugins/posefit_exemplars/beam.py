@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from posefit.arrays import Array
-from posefit_exemplars.exemplars import Codes, Exemplars, Rows
+from posefit_exemplars.exemplars import Codes, Exemplars, Rows, turned
 
 BINS = 36  # of a full turn: two states of one pose in one bin are one
 SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
@@ -24,6 +24,7 @@ class Steps:
     spread: float  # metres, root mean square over joints, that a pose may be off where its clip goes on
     turning: float  # radians that it may turn away
     jump: float  # the cost of a step to anywhere
+    straying: float  # metres that the root may be off where its clip goes on
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,7 @@ class Beam:
     yaws: Array  # (n,) radians
     parents: Rows  # (n,) row of the frame before, or -1
     totals: Array  # (n,)
-    places: Array = field(repr=False)  # (n, 3) metres where the root is
+    places: Array = field(repr=False)  # (n, 3) metres where the root is, or is expected
 
     def __len__(self) -> int:
         return len(self.states)
@@ -71,8 +72,8 @@ def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps) -> B
     speeds; a yaw half the square of its turn away from the clip's own.
     """
     ahead = [exemplars.after(beam.states, seconds * speed) for speed in SPEEDS]
-    codes, turned = ahead[SPEEDS.index(1.0)]
-    facing = beam.yaws + turned
+    codes, turns, ways = ahead[SPEEDS.index(1.0)]
+    facing, places = beam.yaws + turns, beam.places + turned(ways, beam.yaws)
     bins = bins_of(facing)
     centres = exemplars.codes[exemplars.centres]
     near = min(NEAR, len(centres))
@@ -82,7 +83,7 @@ def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps) -> B
     for one in np.unique(bins):
         rows = np.flatnonzero(bins == one)
         states = exemplars.of_groups(np.unique(groups[rows]))
-        away = np.minimum.reduce([_squares(code[rows], exemplars.codes[states]) for code, _ in ahead])
+        away = np.minimum.reduce([_squares(code[rows], exemplars.codes[states]) for code, *_ in ahead])
         costs = beam.totals[rows, None] + away / (2.0 * steps.spread**2)
         from_row = costs.argmin(axis=0)
         least = costs[from_row, np.arange(len(states))]
@@ -90,7 +91,7 @@ def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps) -> B
         parents = rows[from_row[kept]]
         for turn in (0.0, -TURN, TURN):
             totals = least[kept] + 0.5 * (turn / steps.turning) ** 2
-            found.append(Beam(states[kept], facing[parents] + turn, parents, totals, beam.places[parents]))
+            found.append(Beam(states[kept], facing[parents] + turn, parents, totals, places[parents]))
     return joined_beams(*found)
 
 

@@ -25,6 +25,7 @@ class Exemplars:
 
     poses: Array = field(repr=False)
     codes: Codes = field(repr=False)  # (K, D) metres
+    paths: Array = field(repr=False)  # (K, 3) metres: where the clip's root was
     times: Array = field(repr=False)  # (K,) seconds since the clip's first frame
     clips: Rows = field(repr=False)  # (K,) number of the clip
     lasts: Rows = field(repr=False)  # (clips,) a clip's last pose
@@ -45,6 +46,7 @@ class Exemplars:
             if len(motion) < 2:
                 raise ValueError(f"{motion.name} must have at least 2 frames to be followed, got 1")
         poses = np.concatenate([motion.poses for motion in motions])
+        paths = np.concatenate([motion.translations for motion in motions])
         times = np.concatenate([np.arange(len(motion)) / motion.fps for motion in motions])
         clips = np.repeat(np.arange(len(motions)), [len(motion) for motion in motions])
         codes = coded(skeleton, poses)
@@ -54,15 +56,16 @@ class Exemplars:
         members = np.argsort(owners, kind="stable")
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
         lasts = np.searchsorted(clips, np.arange(len(motions)), "right") - 1
-        return cls(poses[kept], codes, times[kept], clips, lasts, centres, members, bounds)
+        return cls(poses[kept], codes, paths[kept], times[kept], clips, lasts, centres, members, bounds)
 
     def __len__(self) -> int:
         return len(self.poses)
 
-    def after(self, states: Rows, seconds: float) -> tuple[Codes, Array]:
-        """Return the codes (n, D) of what came so long after some states, and how far their clips had turned (n,).
+    def after(self, states: Rows, seconds: float) -> tuple[Codes, Array, Array]:
+        """Return codes (n, D) of what came so long after some states, how far they turned (n,) and went (n, 3).
 
-        Between two poses it is interpolated; a clip that ends goes on with its last pose.
+        The way is that of a body whose yaw was 0. Between two poses all is interpolated; a clip that ends goes on with
+        its last pose.
         """
         last = self.lasts[self.clips[states]]
         length = 1.0 + float(self.times.max())  # of the line on which all clips lie one after the other
@@ -74,11 +77,20 @@ class Exemplars:
         share = np.clip((wanted - self.times[before]) / gap, 0.0, 1.0)
         codes = (1.0 - share)[:, None] * self.codes[before] + share[:, None] * self.codes[following]
         yaws = (1.0 - share) * self.poses[before, 0] + share * self.poses[following, 0]
-        return codes.astype(np.float32), yaws - self.poses[states, 0]
+        paths = (1.0 - share)[:, None] * self.paths[before] + share[:, None] * self.paths[following]
+        ways = turned(paths - self.paths[states], -self.poses[states, 0])
+        return codes.astype(np.float32), yaws - self.poses[states, 0], ways
 
     def of_groups(self, chosen: Rows) -> Rows:
         """Return the poses of some groups."""
         return np.concatenate([self.members[self.bounds[g] : self.bounds[g + 1]] for g in chosen])
+
+
+def turned(vectors: Array, yaws: Array) -> Array:
+    """Return vectors (n, 3) turned about the vertical by yaws (n,)."""
+    sine, cosine = np.sin(yaws), np.cos(yaws)
+    x, y, z = vectors.T
+    return np.column_stack([cosine * x + sine * z, y, cosine * z - sine * x])
 
 
 def coded(skeleton: Skeleton, poses: Array) -> Codes:

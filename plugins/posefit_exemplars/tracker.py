@@ -75,7 +75,7 @@ class ExemplarTracker:
         beams = [elsewhere]
         if before is not None:
             beams.append(stepped(self.exemplars, before, seconds, self.steps).best(around))
-        beam = self._at(look, joined_beams(*beams).best(around + len(elsewhere)))
+        beam = self._at(look, joined_beams(*beams).best(around + len(elsewhere)), before is not None)
         costs = look.small(self._poses(beam), beam.places)
         used = (looked + len(beam)) * look.share
         beam = beam.chosen(np.argsort(beam.totals + costs / self.temperature, kind="stable")[:full])
@@ -94,7 +94,7 @@ class ExemplarTracker:
         centres = self.exemplars.centres
         count = int(np.clip((most - taken * OF_A_GROUP) // len(yaws), 1, len(centres)))
         states, facing = np.repeat(centres[:count], len(yaws)), np.tile(yaws, count)
-        beam = self._at(look, self._begun(states, facing, before))
+        beam = self._at(look, self._begun(states, facing, before), False)
         best = np.argsort(look.small(self._poses(beam), beam.places), kind="stable")[:taken]
         found = [self._some(int(row) // len(yaws), rng) for row in best]
         states = np.concatenate(found)
@@ -117,8 +117,13 @@ class ExemplarTracker:
         poses[:, 0] = beam.yaws
         return poses
 
-    def _at(self, look: Look, beam: Beam) -> Beam:
-        return replace(beam, places=look.placed(self._poses(beam), beam.places))
+    def _at(self, look: Look, beam: Beam, begun: bool = True) -> Beam:
+        """Return states where they stand; how far that is from where they were expected costs them something."""
+        places = look.placed(self._poses(beam), beam.places)
+        if not begun or self.task.translation == "known":
+            return replace(beam, places=places)
+        off = ((places - beam.places) ** 2).sum(axis=1)
+        return replace(beam, places=places, totals=beam.totals + 0.5 * off / self.steps.straying**2)
 
     def _told(self, waiting: "deque[_Seen]") -> Frame:
         """Return the oldest frame that waits, on the best way to the newest."""
@@ -148,6 +153,7 @@ def exemplars(
     turning_degrees: float = 8.0,
     jump: float = 12.0,
     temperature: float = 2.0,
+    straying: float = 0.05,
     lag: int = 15,
 ) -> ExemplarTracker:
     """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
@@ -157,14 +163,20 @@ def exemplars(
         turning_degrees: how far a body may turn away from its clip in a frame; above 0.
         jump: what a step to any other pose costs, in units of cost over the temperature; 0 or more.
         temperature: what silhouette costs are divided by; above 0. Costs of frames err together, so more than 1.
+        straying: metres that a root nobody knows may be off where its clip goes on; above 0.
         lag: frames that are seen before a pose is told, 0 or more.
     """
-    for name, value in (("spread", spread), ("turning_degrees", turning_degrees), ("temperature", temperature)):
+    for name, value in (
+        ("spread", spread),
+        ("turning_degrees", turning_degrees),
+        ("temperature", temperature),
+        ("straying", straying),
+    ):
         if not value > 0.0:
             raise ValueError(f"{name} must be above 0, got {value}")
     if not jump >= 0.0:
         raise ValueError(f"jump must be 0 or more, got {jump}")
     if lag < 0:
         raise ValueError(f"lag must be 0 or more, got {lag}")
-    steps = Steps(spread, math.radians(turning_degrees), jump)
+    steps = Steps(spread, math.radians(turning_degrees), jump, straying)
     return ExemplarTracker(task, Exemplars.of(task.training, task.body.skeleton), steps, temperature, lag)
