@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from posefit.arrays import Array
-from posefit_exemplars.exemplars import Codes, Exemplars, Rows, turned_about
+from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 
 BINS = 36  # of a full turn: two states of one pose in one bin are one
 SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
@@ -73,7 +73,7 @@ def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps) -> B
     """
     ahead = [exemplars.after(beam.states, seconds * speed) for speed in SPEEDS]
     codes, turns, ways = ahead[SPEEDS.index(1.0)]
-    facing, places = beam.yaws + turns, beam.places + turned_about(ways, beam.yaws)
+    facing, places = beam.yaws + turns, beam.places + about_vertical(ways, beam.yaws)
     bins = bins_of(facing)
     centres = exemplars.codes[exemplars.centres]
     near = min(NEAR, len(centres))

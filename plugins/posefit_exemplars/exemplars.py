@@ -78,7 +78,7 @@ class Exemplars:
         codes = (1.0 - share)[:, None] * self.codes[before] + share[:, None] * self.codes[following]
         yaws = (1.0 - share) * self.poses[before, 0] + share * self.poses[following, 0]
         paths = (1.0 - share)[:, None] * self.paths[before] + share[:, None] * self.paths[following]
-        ways = turned_about(paths - self.paths[states], -self.poses[states, 0])
+        ways = about_vertical(paths - self.paths[states], -self.poses[states, 0])
         return codes.astype(np.float32), yaws - self.poses[states, 0], ways
 
     def of_groups(self, chosen: Rows) -> Rows:
@@ -86,7 +86,7 @@ class Exemplars:
         return np.concatenate([self.members[self.bounds[g] : self.bounds[g + 1]] for g in chosen])
 
 
-def turned_about(vectors: Array, yaws: Array) -> Array:
+def about_vertical(vectors: Array, yaws: Array) -> Array:
     """Return vectors (n, 3) turned about the vertical by yaws (n,)."""
     sine, cosine = np.sin(yaws), np.cos(yaws)
     x, y, z = vectors.T
