@@ -111,7 +111,8 @@ class Line:
 
 def test_only_the_best_of_a_small_look_go_on_and_the_others_cost_no_less() -> None:
     class Small:
-        factors: list[int] = []
+        def __init__(self) -> None:
+            self.factors: list[int] = []
 
         def coarser(self, factor: int) -> "Small":
             self.factors.append(factor)
