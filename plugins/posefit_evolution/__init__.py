@@ -1,4 +1,4 @@
-"""Evolution strategies for posefit: `cma`, on the library cmaes.
+"""Evolution strategies for posefit: `cma`, of its own speed.
 
 `cma.CMAES` is covariance matrix adaptation after Hansen's tutorial (2016), with the restarts of Auger and Hansen
 (2005), in a box whose constraints it keeps. `pycma`, an adapter, has the other implementation.
