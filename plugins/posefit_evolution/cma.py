@@ -65,8 +65,10 @@ class CMAES:
         """Adapt mean, step size and covariance, and restart where the search has come to an end."""
         if len(proposals) != self._population:
             raise ValueError(f"tell must get a population of {self._population}, got {len(proposals)}")
-        known = bearable(costs)
-        self._strategy.learn(proposals, known)
+        known, mean = bearable(costs), self._strategy.mean
+        # the mean goes on past the end of a circle, and so must what it learns from
+        round_trip = self._space.periodic.any()
+        self._strategy.learn(mean + self._space.towards(mean, proposals) if round_trip else proposals, known)
         self._home, self._asked = proposals[known.argmin()].copy(), None
         if self._strategy.ended():
             self._population *= self._growth  # AUGER2005 (restart)

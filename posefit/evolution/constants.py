@@ -33,7 +33,7 @@ class Constants:
 
     @classmethod
     def of(cls, dimensions: int, population: int) -> "Constants":
-        """Return the constants of a population (lambda, 2 or more) in so many dimensions (n)."""
+        """Return the constants of a population (lambda, 4 or more) in so many dimensions (n)."""
         n, mu = dimensions, population // 2
         raw = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))  # HANSEN2016 (49)
         mu_eff, mu_eff_minus = _worth(raw[:mu]), _worth(raw[mu:])

@@ -57,7 +57,8 @@ def adapt(proposals, order, weights, rates, generation, sigma, mean, axes, lengt
     for k in range(n):
         weight = weights[k]
         if weight < 0.0:
-            turned[:] = 0.0
+            for j in range(d):
+                turned[j] = 0.0
             for i in range(d):
                 for j in range(d):
                     turned[j] += axes[i, j] * steps[k, i]
