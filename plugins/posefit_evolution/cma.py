@@ -5,6 +5,7 @@ strategy with increasing population size, CEC 2005.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.evolution.constants import usual_population
@@ -15,6 +16,7 @@ from posefit.fitting.check import at_least, positive
 
 SPREAD = 0.5  # sigma_0 in an unknown place, in half-ranges of the box
 GROWTH = 2  # IPOP: each restart has a population so many times as large
+ATTEMPTS = 10  # before a proposal is moved: fewer leave it at the box's sides more often, more change no costs
 
 
 class CMAES:
@@ -22,13 +24,14 @@ class CMAES:
 
     The strategy learns the covariance from evolution paths, the better half of a population and, against it, the worse
     one (active CMA), and its step size by cumulation (CSA). When the search stagnates it restarts from a fresh draw
-    with a larger population (IPOP). A proposal that breaks a constraint is moved towards the mean until it keeps it,
-    and the strategy learns from where it was moved to.
+    with a larger population (IPOP). A proposal that breaks a constraint is drawn again, and at last moved towards the
+    mean until it keeps it; the strategy learns from where it was moved to.
 
     Settings:
         population (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen 2016.
         spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
         growth: a restart's population is so many times as large, 1 or more. Auger and Hansen 2005.
+        redraws: of a proposal that breaks a constraint before it is moved, 0 or more. Ours.
         lag: axes are decomposed anew every lag / (d (c_1 + c_mu)) generations, 0 or more. Hansen 2016, B.2.
     """
 
@@ -40,14 +43,17 @@ class CMAES:
         population: int = 0,
         spread: float = SPREAD,
         growth: int = GROWTH,
+        redraws: int = ATTEMPTS,
         lag: float = LAG,
     ) -> None:
         if population != 0:
             at_least("population", population, 5)
         positive("spread", spread)
         at_least("growth", growth, 1)
+        at_least("redraws", redraws, 0)
         at_least("lag", lag, 0.0)
-        self._space, self._rng, self._spread, self._growth, self._lag = space, rng, spread, growth, lag
+        self._space, self._rng, self._spread, self._growth = space, rng, spread, growth
+        self._redraws, self._lag = redraws, lag
         self._population = max(population or usual_population(space.dimensions), 5)
         self._asked: Array | None = None
         self._begin(space.start.spread if space.start is not None else np.full(space.dimensions, spread))
@@ -55,11 +61,24 @@ class CMAES:
     def ask(self) -> Array:
         """Return the next population (n, d)."""
         if self._asked is None:
-            self._asked = self._strategy.sample(self._rng, self._population)
-            if not self._space.feasible(self._asked).all():
+            asked = self._space.wrap(self._strategy.sample(self._rng, self._population))
+            broken = np.flatnonzero(~self._space.feasible(asked))
+            if len(broken) and self._redraws:
+                broken = self._redraw(asked, broken)
+            if len(broken):
                 mean = self._space.repair(self._strategy.mean[None], self._home)[0]
-                self._asked = self._space.repair(self._asked, mean)
+                asked[broken] = self._space.repair(asked[broken], mean)
+            self._asked = asked
         return self._asked.copy()
+
+    def _redraw(self, asked: Array, broken: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Put new draws that break no constraint in some rows of (n, d); return the rows for which there were none."""
+        again = self._space.wrap(self._strategy.sample(self._rng, len(broken) * self._redraws))
+        works = self._space.feasible(again).reshape(-1, self._redraws)
+        first, mended = works.argmax(axis=1), works.any(axis=1)
+        chosen = again.reshape(*works.shape, -1)[np.arange(len(broken)), first]
+        asked[broken[mended]] = chosen[mended]
+        return broken[~mended]
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Adapt mean, step size and covariance, and restart where the search has come to an end."""
