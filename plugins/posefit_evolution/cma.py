@@ -16,7 +16,7 @@ from posefit.fitting.check import at_least, positive
 
 SPREAD = 0.5  # sigma_0 in an unknown place, in half-ranges of the box
 GROWTH = 2  # IPOP: each restart has a population so many times as large
-ATTEMPTS = 10  # before a proposal is moved: fewer leave it at the box's sides more often, more change no costs
+ATTEMPTS = 4  # ours: without, a search from anywhere begins at the sides of the box; more find nothing better
 
 
 class CMAES:
@@ -56,7 +56,7 @@ class CMAES:
         self._redraws, self._lag = redraws, lag
         self._population = max(population or usual_population(space.dimensions), 5)
         self._asked: Array | None = None
-        self._begin(space.start.spread if space.start is not None else np.full(space.dimensions, spread))
+        self._strategy = self._begun(space.start.spread if space.start is not None else np.full(space.dimensions, spread))
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
@@ -91,11 +91,12 @@ class CMAES:
         self._home, self._asked = proposals[known.argmin()].copy(), None
         if self._strategy.ended():
             self._population *= self._growth  # AUGER2005 (restart)
-            self._begin(np.full(self._space.dimensions, self._spread))
+            self._strategy = self._begun(np.full(self._space.dimensions, self._spread))
 
-    def _begin(self, spread: Array) -> None:
+    def _begun(self, spread: Array) -> Strategy:
+        """Return a strategy around the prediction, or else around a fresh draw."""
         start = self._space.start
         self._home = self._space.draw(self._rng, 1)[0]
         if start is not None and self._space.feasible(start.mean[None])[0]:
             self._home = start.mean.copy()
-        self._strategy = Strategy(self._home, spread, self._population, lag=self._lag)
+        return Strategy(self._home, spread, self._population, lag=self._lag)

@@ -30,8 +30,8 @@ class Strategy:
         self.mean, self.sigma, self.generation = np.array(mean, dtype=np.float64), size, 0
         self.covariance = np.diag(np.maximum(spread / size, LEAST) ** 2)
         self.step_path, self.path = np.zeros(d), np.zeros(d)
-        self._constants = Constants.of(d, population)
-        rates = self._constants.rates
+        constants = Constants.of(d, population)
+        self._weights, self._rates, rates = constants.weights, tuple(constants.rates), constants.rates
         self._every = max(1, math.floor(lag / (d * (rates.c_1 + rates.c_mu))))  # HANSEN2016 (B.2)
         self._recent, self._small = np.zeros(2 * (10 + math.ceil(30 * d / population))), SMALL * size
         self._decompose()
@@ -39,7 +39,7 @@ class Strategy:
     def sample(self, rng: np.random.Generator, count: int) -> Array:
         """Return so many draws (count, d)."""
         normal = rng.standard_normal((count, len(self.mean)))  # HANSEN2016 (38)
-        steps = normal @ (self._axes * self._lengths).T  # HANSEN2016 (39)
+        steps = normal @ self._scaled  # HANSEN2016 (39)
         return self.mean + self.sigma * steps  # HANSEN2016 (40)
 
     def learn(self, proposals: Array, costs: Array) -> None:
@@ -48,9 +48,8 @@ class Strategy:
         self.generation += 1
         slot = 2 * self.generation % len(self._recent)
         self._recent[slot : slot + 2] = costs[order[0]], costs[order[-1]]
-        weights, rates = self._constants.weights, tuple(self._constants.rates)
         moved = self.mean, self._axes, self._lengths, self.step_path, self.path, self.covariance
-        self.sigma = adapt(writeable(proposals), order, weights, rates, self.generation, self.sigma, *moved)
+        self.sigma = adapt(writeable(proposals), order, self._weights, self._rates, self.generation, self.sigma, *moved)
         if self.generation % self._every == 0:
             self._decompose()
 
@@ -66,3 +65,4 @@ class Strategy:
             values = np.where(values < 0.0, MENDED, values)
             self.covariance = (self._axes * values) @ self._axes.T
         self._lengths = np.sqrt(values)
+        self._scaled: Array = (self._axes * self._lengths).T

@@ -15,6 +15,7 @@ RAW = np.array([1.252763, 0.559616, 0.154151, -0.133531, -0.356675, -0.538997])
 MU_EFF = 2.028615  # 1.966530^2 / (1.569415 + 0.313170 + 0.023763)
 MU_EFF_MINUS = 2.431917  # 1.029203^2 / (0.017831 + 0.127217 + 0.290518)
 SMALL = Constants.of(2, 6)
+EIGHT = Constants.of(3, 8)  # those of `learnt`
 
 
 class Rows(np.random.Generator):
@@ -40,7 +41,7 @@ class Generation:
     @property
     def step(self) -> Array:
         half = len(self.y) // 2
-        return np.asarray(self.after._constants.weights[:half] @ self.y[:half])
+        return np.asarray(EIGHT.weights[:half] @ self.y[:half])
 
     @property
     def root(self) -> Array:
@@ -64,7 +65,7 @@ def learnt(generations: int = 6, *, far: float = 0.0) -> Generation:
 
 def heeded(one: Generation) -> float:
     """h_sigma, page 28: whether the path is not too long for the covariance to follow; the first generation is 1."""
-    rates, g = one.after._constants.rates, one.after.generation
+    rates, g = EIGHT.rates, one.after.generation
     long = np.linalg.norm(one.after.step_path) / np.sqrt(1.0 - (1.0 - rates.c_sigma) ** (2 * (g + 1)))
     return float(long < (1.4 + 2.0 / 4.0) * rates.chi)
 
@@ -117,7 +118,7 @@ def test_eq_42_the_mean_moves_by_a_step_size_times_the_step() -> None:  # HANSEN
 
 def test_eq_43_the_step_sizes_path_adds_the_step_as_it_would_be_on_a_sphere() -> None:  # HANSEN2016 (43)
     one = learnt()
-    rates = one.after._constants.rates
+    rates = EIGHT.rates
     fresh = np.sqrt(rates.c_sigma * (2.0 - rates.c_sigma) * rates.mu_eff) * one.root @ one.step
     np.testing.assert_allclose(one.after.step_path, (1.0 - rates.c_sigma) * one.before["step_path"] + fresh, rtol=1e-10)
 
@@ -125,7 +126,7 @@ def test_eq_43_the_step_sizes_path_adds_the_step_as_it_would_be_on_a_sphere() ->
 def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> None:  # HANSEN2016 (44)
     for far in (0.0, 2.0):
         one = learnt(far=far)
-        rates = one.after._constants.rates
+        rates = EIGHT.rates
         share = np.linalg.norm(one.after.step_path) / rates.chi
         grown = float(one.before["sigma"]) * np.exp(rates.c_sigma / rates.d_sigma * (share - 1.0))
         assert one.after.sigma == pytest.approx(grown, rel=1e-12)
@@ -135,13 +136,13 @@ def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> 
 def test_h_sigma_stops_the_covariances_path_where_the_step_sizes_is_too_long() -> None:  # HANSEN2016 (h_sigma)
     near, far = learnt(), learnt(far=5.0)
     assert (heeded(near), heeded(far)) == (1.0, 0.0)
-    c_c = far.after._constants.rates.c_c
+    c_c = EIGHT.rates.c_c
     np.testing.assert_allclose(far.after.path, (1.0 - c_c) * far.before["path"], rtol=1e-12)
 
 
 def test_eq_45_the_covariances_path_adds_the_step() -> None:  # HANSEN2016 (45)
     one = learnt()
-    rates = one.after._constants.rates
+    rates = EIGHT.rates
     fresh = heeded(one) * np.sqrt(rates.c_c * (2.0 - rates.c_c) * rates.mu_eff) * one.step
     np.testing.assert_allclose(one.after.path, (1.0 - rates.c_c) * one.before["path"] + fresh, rtol=1e-10)
 
@@ -169,8 +170,7 @@ def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -
 @pytest.mark.parametrize("far", [0.0, 5.0])
 def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step(far: float) -> None:  # HANSEN2016 (47)
     one = learnt(far=far)
-    constants, h = one.after._constants, heeded(one)
-    rates, w = constants.rates, constants.weights
+    h, rates, w = heeded(one), EIGHT.rates, EIGHT.weights
     lengths = np.linalg.norm(one.y @ one.root, axis=1)
     rank_mu = sum(
         wi * (1.0 if wi >= 0.0 else 3.0 / long**2) * np.outer(yi, yi)
