@@ -56,7 +56,8 @@ class CMAES:
         self._redraws, self._lag = redraws, lag
         self._population = max(population or usual_population(space.dimensions), 5)
         self._asked: Array | None = None
-        self._strategy = self._begun(space.start.spread if space.start is not None else np.full(space.dimensions, spread))
+        anywhere = np.full(space.dimensions, spread)
+        self._strategy = self._begun(anywhere if space.start is None else space.start.spread)
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
