@@ -30,7 +30,7 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
     if as_json:
         click.echo(json.dumps(figures))
         return
-    for group in ("vector_env", "many", "optimisers"):
+    for group in [name for name, value in figures.items() if isinstance(value, dict)]:
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
     for name, value in figures.items():
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
