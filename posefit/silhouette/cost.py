@@ -1,6 +1,7 @@
 """The two-way silhouette cost of many poses, over one view or several."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,11 +40,12 @@ def areas(
     chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
     observed, valid = silhouette.bits
 
-    def count(part: slice) -> None:
-        rows = poses[part], translations[part], out[part]
+    def count(_part: slice, *rows: NDArray[Any]) -> None:
         kernels.count_areas(chain, radii, view, observed, valid, *rows)  # SAPSO (3)
 
-    work_through(parts_of(len(poses), threads), threads, _nothing, count)
+    work_through(
+        parts_of(len(poses), threads), threads, lambda part: (poses[part], translations[part], out[part]), count
+    )
     return out
 
 
@@ -69,10 +71,12 @@ def areas_of_all(
         return out.transpose(1, 0, 2)
     observed, valid = (np.stack(bits) for bits in zip(*(silhouette.bits for silhouette in silhouettes), strict=True))
 
-    def count(part: slice) -> None:
-        several.count_areas_of_all(chain, radii, view, observed, valid, poses[part], translations[part], out[part])
+    def count(_part: slice, *rows: NDArray[Any]) -> None:
+        several.count_areas_of_all(chain, radii, view, observed, valid, *rows)
 
-    work_through(parts_of(len(poses), threads), threads, _nothing, count)
+    work_through(
+        parts_of(len(poses), threads), threads, lambda part: (poses[part], translations[part], out[part]), count
+    )
     return np.ascontiguousarray(out.transpose(1, 0, 2))
 
 
@@ -91,10 +95,6 @@ def _checked(
         if silhouette.mask.shape != (camera.height, camera.width):
             raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
     return poses, translations
-
-
-def _nothing(part: slice) -> tuple[()]:  # noqa: ARG001 - a part's rows are all that counting needs
-    return ()
 
 
 def paint(
