@@ -39,13 +39,15 @@ def areas(
     out = np.empty((len(poses), 3), dtype=np.int64)
     chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
     observed, valid = silhouette.bits
+    parts = parts_of(len(poses), threads)
+    if len(parts) == 1:
+        kernels.count_areas(chain, radii, view, observed, valid, poses, translations, out)  # SAPSO (3)
+        return out
 
     def count(_part: slice, *rows: NDArray[Any]) -> None:
-        kernels.count_areas(chain, radii, view, observed, valid, *rows)  # SAPSO (3)
+        kernels.count_areas(chain, radii, view, observed, valid, *rows)
 
-    work_through(
-        parts_of(len(poses), threads), threads, lambda part: (poses[part], translations[part], out[part]), count
-    )
+    work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
     return out
 
 
