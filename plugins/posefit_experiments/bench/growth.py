@@ -1,6 +1,5 @@
 """How the time of a pose grows: with the picture's size, poses in a call, views and dimensions."""
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -56,7 +55,7 @@ def growths() -> list[Growth]:
     jobs: dict[str, Callable[[], object]]
     jobs = {f"{name} {k}": _job(one, USUAL) for name, some in problems.items() for k, one in enumerate(some)}
     jobs |= {f"poses {k}": _job(usual, count) for k, count in enumerate(POSES)}
-    seconds = fastest(jobs, time.thread_time)
+    seconds = fastest(jobs)
 
     def grown(name: str, what: str, at: Sequence[int], labels: Sequence[str], logarithmic: bool = False) -> Growth:
         counts = at if name == "poses" else [USUAL] * len(at)

@@ -1,6 +1,5 @@
 """How long a pose takes among thousands, against several silhouettes, as limbs, and at half and quarter size."""
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -70,5 +69,5 @@ def many_figures() -> dict[str, float]:
         for factor, name in NAMES.items():
             costs = one.coarser(factor).evaluate
             jobs[f"{size}_{name}"] = (lambda costs=costs: costs(proposals[:400]), 400)  # type: ignore[misc]
-    seconds = fastest({name: job for name, (job, _) in jobs.items()}, time.thread_time)
+    seconds = fastest({name: job for name, (job, _) in jobs.items()})
     return {name: 1e6 * seconds[name] / poses for name, (_, poses) in jobs.items()}

@@ -9,21 +9,15 @@ ROUNDS = 12  # of all jobs in turn; of each, the fastest run counts
 TURN = 0.05  # seconds; a job runs again until its turn is over
 
 
-def fastest(jobs: dict[str, Callable[[], object]], clock: Callable[[], float] = time.perf_counter) -> dict[str, float]:
-    """Return the fastest run of each job in seconds; they take turns, so that a slow moment falls on all.
-
-    Jobs of one thread may be timed by `time.thread_time`, which stands still while another process runs.
-    """
+def fastest(jobs: dict[str, Callable[[], object]]) -> dict[str, float]:
+    """Return the fastest run of each job in seconds; they take turns, so that a slow moment falls on all."""
     seconds = dict.fromkeys(jobs, np.inf)
     for job in jobs.values():
         job()
     for _ in range(ROUNDS):
         for name, job in jobs.items():
-            began = clock()
-            until = began + TURN
-            while began < until:
+            until = time.perf_counter() + TURN
+            while (began := time.perf_counter()) < until:
                 job()
-                ended = clock()
-                seconds[name] = min(seconds[name], ended - began)
-                began = ended
+                seconds[name] = min(seconds[name], time.perf_counter() - began)
     return seconds
