@@ -21,6 +21,16 @@ def jit(function: Callable[..., Any]) -> Any:
     return compiled(function)
 
 
+def inlined(function: Callable[..., Any]) -> Any:
+    """Return a plain function of arrays that becomes part of the compiled functions that call it.
+
+    A call costs as much as filling a few blocks of pixels: each array is counted as in use, and then as not.
+    """
+    import numba
+
+    return numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, inline="always")(function)
+
+
 def writeable(values: ArrayLike) -> Array:
     """Return values as a float64 array in C order that may be written to, the same array where it is one.
 

@@ -4,7 +4,7 @@
 |---|---|
 | a mask, its unknown pixels, and both as bits | mask.py |
 | areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
-| a body drawn as spans of bits, compiled | rasteriser.py |
+| a body drawn as spans of bits, compiled | rasteriser.py, lanes.py |
 | its pixels counted against silhouettes, compiled | kernels.py, popcount.py |
 | a person told from a background, pixel by pixel | foreground.py |
 | what goes wrong with a mask on its way from a camera, made on purpose | corruption.py |

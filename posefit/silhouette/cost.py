@@ -124,7 +124,7 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         writeable(pose),
         writeable(translation),
     )
-    return unpack(bits, camera.width)
+    return unpack(bits, camera.width, camera.height)
 
 
 @lru_cache(maxsize=1)
