@@ -1,5 +1,6 @@
 """Arrays and compiled loops, as every floor of the house uses them."""
 
+import os
 from collections.abc import Callable
 from typing import Any
 
@@ -15,9 +16,7 @@ def jit(function: Callable[..., Any]) -> Any:
 
     Rounding may differ from strict IEEE order only where a product and a sum are contracted, or in a zero's sign.
     """
-    import numba
-
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+    compiled = _numba().njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
     return compiled(function)
 
 
@@ -26,9 +25,20 @@ def inlined(function: Callable[..., Any]) -> Any:
 
     A call costs as much as filling a few blocks of pixels: each array is counted as in use, and then as not.
     """
+    compiled = _numba().njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, inline="always")
+    return compiled(function)
+
+
+def _numba() -> Any:
+    """Return numba; a processor named by NUMBA_CPU_NAME has its own instructions, and none of this machine's besides.
+
+    numba takes the name for the order of instructions only: x86-64-v3 would still have AVX-512 where this machine has.
+    """
+    if "NUMBA_CPU_NAME" in os.environ:
+        os.environ.setdefault("NUMBA_CPU_FEATURES", "")
     import numba
 
-    return numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, inline="always")(function)
+    return numba
 
 
 def writeable(values: ArrayLike) -> Array:

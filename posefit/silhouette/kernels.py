@@ -7,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import inlined, jit
 from posefit.silhouette.popcount import popcount
-from posefit.silhouette.rasteriser import NONE, STRIP, draw_pose, scratch
+from posefit.silhouette.rasteriser import NONE, STRIP_PIXELS, draw_pose, scratch
 
 
 @inlined
@@ -35,7 +35,7 @@ def paint_bits(image, box, value, pixels):
     words = image.reshape(-1).view(np.uint32).reshape(image.shape[0], 2 * image.shape[1])
     for y in range(2 * box[0], min(2 * box[1], height)):
         for w in range(box[2], box[3] + 1):
-            x = STRIP * w
+            x = STRIP_PIXELS * w
             word = words[w, y]
             while (word != 0) & (x < width):
                 if word & np.uint32(1):

@@ -11,9 +11,8 @@ from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.extending import intrinsic, overload
 
-LANES = 8
+BLOCK = 8  # rows filled at a time
 _STRIP = 32  # bits of a lane
-_WORD = np.uint64(0xFFFFFFFF)
 
 
 def root(x: Any) -> Any:
@@ -32,8 +31,8 @@ def set_spans(pixels: Any, place: Any, stride: Any, spans: Any) -> None:
     `spans` (16,) are eight first bits, from 0 on, and eight that come after a last one, 64 at most; a span that ends
     before it begins is empty. Bits from 32 on are those of the farther words.
     """
-    for k in range(LANES):
-        first, stop = int(spans[k]), max(int(spans[k]), int(spans[LANES + k]))
+    for k in range(BLOCK):
+        first, stop = int(spans[k]), max(int(spans[k]), int(spans[BLOCK + k]))
         bits = ((1 << stop) - (1 << first)) & 0xFFFFFFFFFFFFFFFF if first < 2 * _STRIP else 0
         pixels[place + k] |= np.uint32(bits & 0xFFFFFFFF)
         pixels[place + stride + k] |= np.uint32(bits >> _STRIP)
@@ -51,11 +50,11 @@ def _set_spans_compiled(pixels, place, stride, spans):  # type: ignore[no-untype
 
 def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """Write `set_spans` as instructions for eight lanes of 32 bits."""
-    vector = ir.VectorType(ir.IntType(32), LANES)
+    vector = ir.VectorType(ir.IntType(32), BLOCK)
     pixels, place, stride, spans = arguments
 
     def splat(value: int) -> Any:
-        return ir.Constant(vector, [value] * LANES)
+        return ir.Constant(vector, [value] * BLOCK)
 
     def lanes_at(kind: Any, array: Any, index: Any) -> Any:
         data = context.make_array(kind)(context, builder, array).data
@@ -70,7 +69,7 @@ def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> 
         builder.store(builder.or_(builder.load(words, align=4), bits), words, align=4)
 
     first, stop = (
-        builder.load(lanes_at(signature.args[3], spans, ir.Constant(ir.IntType(64), at)), align=4) for at in (0, LANES)
+        builder.load(lanes_at(signature.args[3], spans, ir.Constant(ir.IntType(64), at)), align=4) for at in (0, BLOCK)
     )
     stop = builder.select(builder.icmp_signed(">", stop, first), stop, first)
     add_bits(place, builder.xor(shifted(builder.shl, first), shifted(builder.shl, stop)))  # bits from k on

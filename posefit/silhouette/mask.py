@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Bits
-from posefit.silhouette.rasteriser import STRIP, strips_and_words
+from posefit.silhouette.rasteriser import STRIP_PIXELS, strips_and_words
 
 Mask = NDArray[np.bool_]  # (height, width)
 
@@ -16,7 +16,7 @@ def pack(mask: Mask) -> Bits:
     """Return the bit image (strips, words) of a mask (height, width)."""
     height, width = mask.shape
     strips, words = strips_and_words(width, height)
-    octets = np.zeros((2 * words, STRIP // 8 * strips), dtype=np.uint8)
+    octets = np.zeros((2 * words, STRIP_PIXELS // 8 * strips), dtype=np.uint8)
     packed = np.packbits(mask, axis=1, bitorder="little")
     octets[:height, : packed.shape[1]] = packed
     return np.ascontiguousarray(octets.view("<u4").T.astype(np.uint32)).view(np.uint64)

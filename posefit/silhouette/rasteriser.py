@@ -15,14 +15,13 @@ import numpy as np
 
 from posefit.arrays import Array, inlined, jit
 from posefit.geometry.kernels import place_joints
-from posefit.silhouette.lanes import root, set_spans
+from posefit.silhouette.lanes import BLOCK, root, set_spans
 
-BLOCK = 8  # rows filled at a time
-STRIP = 32  # pixels
+STRIP_PIXELS = 32  # pixels
 NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
 NONE = np.uint64(0)
 _FLAT = 1e-9  # a tangent flatter than this lies between rows of pixels
-_ZERO, _ONE, _WINDOW = np.float32(0), np.float32(1), np.float32(2 * STRIP)
+_ZERO, _ONE, _WINDOW = np.float32(0), np.float32(1), np.float32(2 * STRIP_PIXELS)
 _HUGE, _NAN = np.float32(1e9), np.float32(np.nan)
 
 # Scratch rows, each LANES long and one lane a bone, in one flat array: offsets known to the compiler are what lets
@@ -58,7 +57,7 @@ class View(NamedTuple):
 @jit
 def strips_and_words(width, height):
     """Return the shape of an image's bit image."""
-    return 2 * ((width + 2 * STRIP - 1) // (2 * STRIP)), (height + BLOCK - 1) // BLOCK * (BLOCK // 2)
+    return 2 * ((width + 2 * STRIP_PIXELS - 1) // (2 * STRIP_PIXELS)), (height + BLOCK - 1) // BLOCK * (BLOCK // 2)
 
 
 @inlined
@@ -92,8 +91,8 @@ def outline(ends, lines, bounds, strips, width, height):
         first = np.int32(top) // BLOCK
         bounds[_BLOCK + k] = first
         bounds[_BLOCKS + k] = (np.int32(bottom) + (BLOCK - 1)) // BLOCK - first if drawn else 0
-        bounds[_FIRST + k] = min(np.int32(left) // STRIP, strips - 2)
-        bounds[_LAST + k] = (np.int32(right) - 1) // STRIP
+        bounds[_FIRST + k] = min(np.int32(left) // STRIP_PIXELS, strips - 2)
+        bounds[_LAST + k] = (np.int32(right) - 1) // STRIP_PIXELS
         bounds[_ROW + k] = BLOCK * (first + 1) - np.int32(top)
         lines[_X0 + k] = u0
         lines[_Y0 + k] = v0 - top
@@ -145,9 +144,9 @@ def windows(step, bounds, lines, keys, strips, stride):
         bounds[_COUNT + k] = bounds[_BLOCKS + k] if step < wide else 0
         place = strip * stride + BLOCK * bounds[_BLOCK + k]
         keys[k] = (np.int64(place) << 32) + np.int64(bounds[_ROW + k] * LANES + k)
-        column = np.float32(np.int32(STRIP * strip))
+        column = np.float32(np.int32(STRIP_PIXELS * strip))
         lines[_COLUMN + k] = column
-        lines[_STOP + k] = min(np.float32(np.int32(STRIP * (bounds[_LAST + k] + 1))) - column, _WINDOW)
+        lines[_STOP + k] = min(np.float32(np.int32(STRIP_PIXELS * (bounds[_LAST + k] + 1))) - column, _WINDOW)
         most = max(most, np.int32(wide))
     return most
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import jit
-from posefit.silhouette.lanes import LANES, root, set_spans
+from posefit.silhouette.lanes import BLOCK, root, set_spans
 
 
 @jit
@@ -23,8 +23,8 @@ def test_spans_set_the_bits_from_the_first_to_the_one_before_the_stop(setting) -
     before = np.arange(40, dtype=np.uint32)
     pixels = before.copy()
     setting(pixels, 3, 20, spans)
-    for k in range(LANES):
-        bits = set(range(spans[k], spans[LANES + k])) if spans[k] < 64 else set()
+    for k in range(BLOCK):
+        bits = set(range(spans[k], spans[BLOCK + k])) if spans[k] < 64 else set()
         near, far = sum(1 << x for x in bits if x < 32), sum(1 << x - 32 for x in bits if x >= 32)
         assert pixels[3 + k] == before[3 + k] | near
         assert pixels[23 + k] == before[23 + k] | far
@@ -36,7 +36,7 @@ def test_spans_set_the_bits_from_the_first_to_the_one_before_the_stop(setting) -
 @pytest.mark.parametrize("setting", [set_spans, compiled_spans])
 def test_a_span_that_ends_before_it_begins_is_empty(setting, stop: int) -> None:  # type: ignore[no-untyped-def]
     pixels = np.zeros(16, np.uint32)
-    setting(pixels, 0, 8, np.array([0, 1, 31, 32, 33, 63, 64, 65] + [stop] * LANES, np.int32))
+    setting(pixels, 0, 8, np.array([0, 1, 31, 32, 33, 63, 64, 65] + [stop] * BLOCK, np.int32))
     assert not pixels.any()
 
 

@@ -11,7 +11,11 @@ from posefit.cli.output import say
 @click.option("--threads", type=int, help="How many `all threads` are; by default every core.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def bench_command(threads: int | None, as_json: bool) -> None:
-    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run."""
+    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
+
+    `cpu` tells for which processor the loops are compiled, and which instructions it has. It is this machine's, or the
+    one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
+    """
     from posefit_experiments.bench.experiment import loop_figures
 
     if threads is not None and threads < 1:
@@ -21,7 +25,7 @@ def bench_command(threads: int | None, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(figures))
         return
-    for group in ("vector_env", "optimisers", "optimisers_28"):
+    for group in ("vector_env", "optimisers", "optimisers_28", "cpu"):
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
     for name, value in figures.items():
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
