@@ -10,13 +10,20 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Bits = NDArray[np.uint64]  # 64 pixels a number
 
+if "NUMBA_CPU_NAME" in os.environ:
+    # A processor that is named has its own instructions and none besides. numba, not yet imported, takes the name for
+    # their order only: x86-64-v3 would still have AVX-512 where this machine has it.
+    os.environ.setdefault("NUMBA_CPU_FEATURES", "")
+
 
 def jit(function: Callable[..., Any]) -> Any:
     """Return a plain function of arrays compiled by numba, once a machine; it may run in several threads at once.
 
     Rounding may differ from strict IEEE order only where a product and a sum are contracted, or in a zero's sign.
     """
-    compiled = _numba().njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+    import numba
+
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
     return compiled(function)
 
 
@@ -25,20 +32,10 @@ def inlined(function: Callable[..., Any]) -> Any:
 
     A call costs as much as filling a few blocks of pixels: each array is counted as in use, and then as not.
     """
-    compiled = _numba().njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, inline="always")
-    return compiled(function)
-
-
-def _numba() -> Any:
-    """Return numba; a processor named by NUMBA_CPU_NAME has its own instructions, and none of this machine's besides.
-
-    numba takes the name for the order of instructions only: x86-64-v3 would still have AVX-512 where this machine has.
-    """
-    if "NUMBA_CPU_NAME" in os.environ:
-        os.environ.setdefault("NUMBA_CPU_FEATURES", "")
     import numba
 
-    return numba
+    compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, inline="always")
+    return compiled(function)
 
 
 def writeable(values: ArrayLike) -> Array:
