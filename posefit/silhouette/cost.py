@@ -156,4 +156,4 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         writeable(pose),
         writeable(translation),
     )
-    return unpack(bits, camera.width)
+    return unpack(bits, camera.width, camera.height)

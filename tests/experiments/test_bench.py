@@ -1,6 +1,10 @@
 """`posefit bench`: what it tells, and what is timed."""
 
 import json
+import os
+import platform
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +22,7 @@ from posefit_experiments.bench import experiment, optimisers, timing
 from posefit_experiments.bench.growth import Growth, growth_table
 from posefit_experiments.bench.kernel import bench_problem, opencv_costs
 from posefit_experiments.bench.optimisers import Stopwatch, wide_space
+from posefit_experiments.bench.processor import instructions, processor
 
 
 class Line:
@@ -59,7 +64,7 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         "kernel_us_per_pose_1_thread", "kernel_us_per_pose_all_threads", "opencv_us_per_pose",
         "opencv_batched_us_per_pose", "sapso_frame_ms", "sapso_overhead", "kernel_speedup",
         "kernel_speedup_over_batched", "threads", "threads_speedup", "poses_per_second_1_thread",
-        "mean_cost_difference_to_opencv", "vector_env", "many", "optimisers", "optimisers_28", "size", "poses",
+        "mean_cost_difference_to_opencv", "vector_env", "many", "optimisers", "optimisers_28", "size", "poses", "cpu",
     }  # fmt: skip
     assert set(figures["many"]) == {
         "evaluate_40", "evaluate_4000", "areas_40", "areas_4000", "silhouettes_alone", "silhouettes_together",
@@ -120,3 +125,24 @@ def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tup
     assert ours[0] == 0.0
     assert theirs[0] < 4.0
     assert np.abs(ours - theirs).mean() < 1.0
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names are of x86-64")
+def test_the_instructions_of_a_named_processor_are_told() -> None:
+    # the levels of the x86-64 psABI: v2 has SSE4.2, v3 AVX2, v4 AVX-512
+    levels = {"x86-64": "SSE2", "x86-64-v2": "SSE4", "sandybridge": "AVX", "x86-64-v3": "AVX2", "x86-64-v4": "AVX-512"}
+    assert {name: instructions(name) for name in levels} == levels
+    assert instructions("x86-64-v4", "-avx512f") == "AVX2"
+    assert set(processor()) == {"name", "compiled_for", "features"}
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names are of x86-64")
+def test_loops_have_the_instructions_of_the_processor_that_is_named_and_no_others() -> None:
+    told = "import posefit.silhouette.kernels; from posefit_experiments.bench.processor import processor; "
+    for name, features in (("x86-64-v3", "AVX2"), ("x86-64-v2", "SSE4")):
+        environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CPU_FEATURES"}
+        code = told + "print(processor()['compiled_for'], processor()['features'])"
+        shown = subprocess.run(
+            [sys.executable, "-c", code], env={**environment, "NUMBA_CPU_NAME": name}, capture_output=True, check=True
+        )
+        assert shown.stdout.split() == [name.encode(), features.encode()]

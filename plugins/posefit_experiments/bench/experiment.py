@@ -13,6 +13,7 @@ from posefit_experiments.bench.environments import vector_env
 from posefit_experiments.bench.kernel import SIZE, bench_problem, opencv_costs
 from posefit_experiments.bench.many import many_figures
 from posefit_experiments.bench.optimisers import OURS, PARTICLES, optimiser_us, wide_space
+from posefit_experiments.bench.processor import processor
 from posefit_experiments.bench.timing import fastest
 from posefit_swarm.sapso import SAPSO
 
@@ -71,5 +72,6 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "optimisers": {name: round(us, 3) for name, us in optimiser_us(alone.space).items()},
         "optimisers_28": {name: round(us, 3) for name, us in optimiser_us(wide_space(alone.space), OURS).items()},
         "size": list(SIZE),
+        "cpu": processor(),
         "poses": POSES,
     }

@@ -15,7 +15,11 @@ from posefit.cli.output import say
 @click.option("--growth", is_flag=True, help="Time how a pose's cost grows with size, poses, views and dimensions.")
 @click.option("--pictures", metavar="DIR", help="With --growth: write a figure of each, growth-*.png, to DIR.")
 def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: str | None) -> None:
-    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run."""
+    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
+
+    `cpu` tells for which processor the loops are compiled, and which instructions it has. It is this machine's, or the
+    one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
+    """
     if pictures is not None and not growth:
         raise ValueError("pictures are of --growth, got --pictures without it")
     if growth:
