@@ -40,14 +40,18 @@ __all__ = list(_HOME)
 register(
     id="posefit/Fit-v0",
     entry_point="posefit_envs.fit:FitEnv",
-    vector_entry_point="posefit_envs.fit_vector:FitVectorEnv",
+    vector_entry_point="posefit_envs.vector.fit:FitVectorEnv",
 )
 register(
     id="posefit/Track-v0",
     entry_point="posefit_envs.track:TrackEnv",
-    vector_entry_point="posefit_envs.track_vector:TrackVectorEnv",
+    vector_entry_point="posefit_envs.vector.track:TrackVectorEnv",
 )
-register(id="posefit/Configure-v0", entry_point="posefit_envs.configure:ConfigureEnv")
+register(
+    id="posefit/Configure-v0",
+    entry_point="posefit_envs.configure:ConfigureEnv",
+    vector_entry_point="posefit_envs.vector.configure:ConfigureVectorEnv",
+)
 
 
 def __getattr__(name: str) -> Any:

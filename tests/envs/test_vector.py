@@ -14,7 +14,7 @@ from posefit import minimise
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import check_vector_env, drive, to_sb3_vec_env
-from posefit_envs.fit_vector import FitVectorEnv
+from posefit_envs.vector.fit import FitVectorEnv
 
 FIT: list[dict[str, Any]] = [
     {},
@@ -23,17 +23,30 @@ FIT: list[dict[str, Any]] = [
     {"target_cost": 30.0},
     {"view_degrees": [0.0, 90.0], "translation": "aligned", "max_evaluations": 5},
     {"translation": "searched", "prior": "union", "mismatch_percent": 5.0, "instance": 9, "max_evaluations": 6},
+    {"mismatch_percent": 10.0, "view_degrees": [0.0, 90.0, 200.0], "prior": "full", "max_evaluations": 7},
+    {"noise": {"holes": 0.3, "shadow": 0.5}, "translation": "searched", "size": (70, 50), "max_evaluations": 8},
+    {"translation": "aligned", "mismatch_percent": 10.0, "noise": {"jitter": 0.8}, "max_evaluations": 6},
+    {"motion": "run", "split": "test", "size": (36, 36), "errors": False, "max_evaluations": 5},
 ]
 TRACK: list[dict[str, Any]] = [
     {"frames": 3, "evaluations_per_frame": 4},
     {"instance": 3, "frames": 4, "evaluations_per_frame": 3},
     {"frames": 2, "evaluations_per_frame": 5, "translation": "aligned", "view_degrees": [0.0, 70.0]},
+    {"frames": 3, "evaluations_per_frame": 3, "translation": "searched", "mismatch_percent": 10.0, "prior": "full"},
+    {"frames": 2, "evaluations_per_frame": 2, "noise": {"holes": 0.4, "blobs": 0.4}, "errors": False},
 ]
 
 
-@pytest.mark.parametrize(
-    ("name", "arguments"), [("posefit/Fit-v0", one) for one in FIT] + [("posefit/Track-v0", one) for one in TRACK]
-)
+CONFIGURE: list[dict[str, Any]] = [
+    {"particles": 5, "iterations": 4},
+    {"particles": 7, "iterations": 6, "translation": "aligned", "view_degrees": [0.0, 70.0], "mismatch_percent": 8.0},
+    {"particles": 4, "iterations": 3, "instance": 3, "prior": "full", "translation": "searched", "errors": False},
+    {"particles": 6, "iterations": 30, "noise": {"shadow": 0.6}, "prior": "loose"},
+]
+CASES = {"posefit/Fit-v0": FIT, "posefit/Track-v0": TRACK, "posefit/Configure-v0": CONFIGURE}
+
+
+@pytest.mark.parametrize(("name", "arguments"), [(name, one) for name, many in CASES.items() for one in many])
 def test_a_vector_environment_equals_single_ones(name: str, arguments: dict[str, Any]) -> None:
     vector = gym.make_vec(name, num_envs=4, **arguments)
     assert type(vector.unwrapped).__module__.startswith("posefit_envs")
