@@ -57,7 +57,7 @@ class World:
     @property
     def body(self) -> Body:
         """The true body."""
-        return Body.of(_source(self.motion).skeleton)
+        return _body(self.motion)
 
     @property
     def learned(self) -> Prior:
@@ -208,6 +208,11 @@ def _number(number: Any) -> int:
 @lru_cache(maxsize=32)
 def _source(motion: str) -> Motion:
     return motion_of(motion, None, FPS)
+
+
+@lru_cache(maxsize=32)
+def _body(motion: str) -> Body:
+    return Body.of(_source(motion).skeleton)
 
 
 @lru_cache(maxsize=32)

@@ -392,7 +392,7 @@ def test_arguments_that_make_no_sense_are_named(name: str, arguments: dict[str, 
     with pytest.raises(error.Error, match=message) as caught:
         gym.make(name, **arguments)
     assert isinstance(caught.value, ValueError) or "render_mode" in arguments
-    if name != "posefit/Configure-v0" and "render_mode" not in arguments:
+    if "render_mode" not in arguments:
         with pytest.raises(error.Error, match=message):
             gym.make_vec(name, num_envs=2, **arguments)
 

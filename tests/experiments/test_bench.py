@@ -55,13 +55,12 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         "kernel_speedup_over_batched", "threads", "threads_speedup", "poses_per_second_1_thread",
         "mean_cost_difference_to_opencv", "vector_env", "optimisers", "size", "poses",
     }  # fmt: skip
-    assert set(figures["vector_env"]) == {
-        "kernel_us",
-        "us_per_proposal",
-        "overhead_us",
-        "sync_us_per_proposal",
-        "times_sync",
-    }
+    cases = figures["vector_env"]
+    learning = cases.pop("fit_learning")
+    assert set(learning) == {"steps_per_second", "sync_steps_per_second", "times_sync"}
+    assert {"fit_shared", "fit_each", "track_each", "configure_each"} <= set(cases)
+    for case in cases.values():
+        assert set(case) == {"kernel_us", "us_per_proposal", "overhead_us", "sync_us_per_proposal", "times_sync"}
     assert {"sapso", "pso", "random", "cma", "particle", "annealed", "scipy:dual_annealing"} <= set(
         figures["optimisers"]
     )

@@ -47,7 +47,7 @@ class ConfigureVectorEnv(SearchVectorEnv):
         check_swarm(particles, iterations)
         selection = select(**arguments)
         super().__init__(num_envs, selection, spaces_of_swarm(), render_mode, max_episode_steps)
-        self._particles, self._iterations = int(particles), int(iterations)
+        self.particles, self._iterations = int(particles), int(iterations)
         self._stage = Stage(self.world, num_envs)
         self._swarms: list[SteeredSwarm | None] = [None] * num_envs
         self._truths = np.empty((num_envs, ANGLES))
@@ -128,7 +128,7 @@ class ConfigureVectorEnv(SearchVectorEnv):
         return infos
 
     def _begin(self, i: int, number: int) -> None:
-        swarm = SteeredSwarm(self.world, number, self._generator(i), self._particles, self._iterations)
+        swarm = SteeredSwarm(self.world, number, self._generator(i), self.particles, self._iterations)
         self._swarms[i], self._truths[i] = swarm, swarm.episode.instance.truth.poses[0]
         self._stage.put(i, swarm.episode.scenery, swarm.episode.space)
 

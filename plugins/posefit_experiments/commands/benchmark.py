@@ -23,5 +23,7 @@ def bench_command(threads: int | None, as_json: bool) -> None:
         return
     for group in ("vector_env", "optimisers"):
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
+    for case in [name for name, value in figures.items() if isinstance(value, dict)]:
+        figures |= {f"{case}.{name}": value for name, value in figures.pop(case).items()}
     for name, value in figures.items():
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
