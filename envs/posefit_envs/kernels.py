@@ -24,8 +24,8 @@ class Scenes(NamedTuple):
     places: Array  # (n, views, 3) the cameras' translations
     focals: Array  # (n, views, 2) pixels
     centres: Array  # (n, views, 2) pixels
-    observed: Bits  # (n, views, words, height + PAD)
-    valid: Bits  # (n, views, words, height + PAD)
+    observed: Bits  # (n, views, ...) bit images
+    valid: Bits  # (n, views, ...) bit images
     totals: NDArray[np.int64]  # (n, views) pixels of the silhouettes
     backdrops: NDArray[np.uint16]  # (n, height, width, views)
 

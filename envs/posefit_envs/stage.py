@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.fitting.problem import over_views
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.drawn import count_poses
-from posefit.silhouette.rasteriser import PAD
+from posefit.silhouette.mask import pack
 from posefit_envs.instance import World
 from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes, within_scenes
 from posefit_envs.search import BODY, Image, Scenery
@@ -41,7 +41,7 @@ class Stage:
 
     def __init__(self, world: World, rows: int) -> None:
         views, (width, height) = len(world.view_degrees), world.size
-        words, bones = (width + 63) // 64, len(BONES)
+        bones, bits = len(BONES), pack(np.zeros((height, width), dtype=bool)).shape
         self._width, self._height = width, height
         self._prior, self._aligned = world.learned, world.translation == "aligned"
         self._chain = world.body.skeleton.chain
@@ -54,8 +54,8 @@ class Stage:
             np.empty((rows, views, 3)),
             np.empty((rows, views, 2)),
             np.empty((rows, views, 2)),
-            np.empty((rows, views, words, height + PAD), dtype=np.uint64),
-            np.empty((rows, views, words, height + PAD), dtype=np.uint64),
+            np.empty((rows, views, *bits), dtype=np.uint64),
+            np.empty((rows, views, *bits), dtype=np.uint64),
             np.empty((rows, views), dtype=np.int64),
             np.empty((rows, height, width, views), dtype=np.uint16),
         )
