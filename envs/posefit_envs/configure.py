@@ -1,7 +1,7 @@
 """Configure-v0: dynamic algorithm configuration. The action steers a swarm that searches for the pose."""
 
 from collections.abc import Sequence
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -19,6 +19,7 @@ from posefit_swarm.flock import Flock, speed_limits
 
 PARTICLES, ITERATIONS = 40, 60
 ACCELERATION, ALPHA, REDRAWS = 2.0, 0.15, 20  # as SAPSO's, but for fewer redraws
+FIRST = 1.0  # the temperature at which a first population is settled, where nothing is refused
 INERTIA = (0.0, 1.2)  # what the first number of an action stands for
 LOG_TEMPERATURE = (-3.0, 1.5)  # the second: powers of ten
 SPREAD = (0.0, 0.3)  # the third: standard deviations in half-ranges of the box
@@ -104,17 +105,17 @@ class ConfigureEnv(gym.Env[State, Any]):
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
         search = self._search = SteeredSwarm(self.world, number, self.np_random, self._particles, self._iterations)
-        search.settle(search.problem.evaluate(search.flock.moved), 1.0)
+        search.settle(search.problem.evaluate(search.flock.moved), FIRST)
         if self.render_mode == "human":
             self.render()
-        return states([search])[0], self._info(search)
+        return standings([search]).states[0], self._info(search)
 
     def step(self, action: Any) -> tuple[State, float, bool, bool, dict[str, Any]]:
         """Fly one iteration."""
         search = self._current()
         if search.left == 0:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
-        inertia, temperature, spread = steering(self._door.proposals(action, (3,)))
+        (inertia,), (temperature,), (spread,) = steering(self._door.proposals(action, (3,))[None])
         before = search.best
         search.fly(inertia)
         flock, space = search.flock, search.episode.space
@@ -123,7 +124,7 @@ class ConfigureEnv(gym.Env[State, Any]):
         search.settle(search.problem.evaluate(flock.moved), temperature)
         if self.render_mode == "human":
             self.render()
-        return states([search])[0], before - search.best, search.left == 0, False, self._info(search)
+        return standings([search]).states[0], before - search.best, search.left == 0, False, self._info(search)
 
     def _info(self, search: "SteeredSwarm") -> dict[str, Any]:
         info = {"best_cost": search.best, "evaluations": search.used, "instance": search.episode.instance.number}
@@ -196,29 +197,40 @@ class SteeredSwarm:
         self.used += len(costs)
 
 
-def steering(action: Array) -> tuple[float, float, float]:
-    """Return the inertia, the temperature and the spread of a kick that an action (3,) in [-1, 1] stands for."""
-    inertia, power, spread = (
-        low + float(part) * (high - low)
-        for part, (low, high) in zip(0.5 * (action + 1.0), (INERTIA, LOG_TEMPERATURE, SPREAD), strict=True)
-    )
-    return inertia, 10.0**power, spread
+def steering(actions: Array) -> tuple[list[float], list[float], list[float]]:
+    """Return the inertias, temperatures and deviations of kicks that actions (n, 3) in [-1, 1] stand for."""
+    low, high = np.array([INERTIA, LOG_TEMPERATURE, SPREAD]).T
+    inertias, powers, spreads = (low + 0.5 * (actions + 1.0) * (high - low)).T.tolist()
+    return inertias, [10.0**power for power in powers], spreads
 
 
-def states(swarms: Sequence[SteeredSwarm]) -> State:
-    """Return the observations (n, 8) of swarms with equally many particles."""
-    costs, n = np.stack([swarm.costs for swarm in swarms]) / 100.0, len(swarms)
+class Standings(NamedTuple):
+    """How far swarms have come."""
+
+    best: Array  # (n,) lowest costs so far
+    leaders: Array  # (n, d) the proposals that cost so little
+    states: State  # (n, 8) observations
+
+
+def standings(swarms: Sequence[SteeredSwarm]) -> Standings:
+    """Return how far swarms have come that have equally many particles."""
+    flocks, n = [swarm.flock for swarm in swarms], len(swarms)
+    costs, bests = np.stack([swarm.costs for swarm in swarms]) / 100.0, np.stack([flock.best for flock in flocks])
+    best_costs = np.stack([flock.best_cost for flock in flocks])
+    leading = best_costs.argmin(axis=1)
+    best = best_costs[np.arange(n), leading]
     values = [
-        np.array([swarm.best for swarm in swarms]) / 100.0,
+        best / 100.0,
         costs.min(axis=1),
         costs.mean(axis=1),
         costs.std(axis=1),
-        np.stack([swarm.flock.best for swarm in swarms]).std(axis=1).mean(axis=1),
-        np.abs(np.stack([swarm.flock.velocity for swarm in swarms])).reshape(n, -1).mean(axis=1) / ALPHA,
+        bests.std(axis=1).mean(axis=1),
+        np.abs(np.stack([flock.velocity for flock in flocks])).reshape(n, -1).mean(axis=1) / ALPHA,
         np.stack([swarm.accepted for swarm in swarms]).mean(axis=1),
         [swarm.budget for swarm in swarms],
     ]
-    return np.clip(np.array(values, dtype=np.float32).T, 0.0, 1.0)
+    states = np.clip(np.array(values, dtype=np.float32).T, 0.0, 1.0)
+    return Standings(best, bests[np.arange(n), leading], states)
 
 
 def spaces_of_swarm() -> tuple[spaces.Box, spaces.Box]:

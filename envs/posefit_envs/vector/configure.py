@@ -12,13 +12,14 @@ from posefit.fitting.box import MANY, REDRAWS, fold
 from posefit.fitting.metrics import pose_error_degrees
 from posefit.geometry.skeleton import ANGLES
 from posefit_envs.configure import (
+    FIRST,
     ITERATIONS,
     PARTICLES,
     State,
     SteeredSwarm,
     check_swarm,
     spaces_of_swarm,
-    states,
+    standings,
     steering,
 )
 from posefit_envs.drawing import portray
@@ -59,22 +60,21 @@ class ConfigureVectorEnv(SearchVectorEnv):
 
     def step(self, actions: Any) -> tuple[State, Array, Flags, Flags, Infos]:
         """Fly one iteration in each environment; one whose episode has ended resets instead."""
-        steered = self._door.proposals(actions, self._shape)
+        inertias, temperatures, kicks = steering(self._door.proposals(actions, self._shape))
         stepping = self._renew_ended()
-        swarms, flying = self._current(), np.flatnonzero(stepping)
-        before, kicks, temperatures = np.zeros(self.num_envs), np.zeros(self.num_envs), np.ones(self.num_envs)
-        for i in flying.tolist():
-            inertia, temperatures[i], kicks[i] = steering(steered[i])
-            before[i] = swarms[i].best
-            swarms[i].fly(inertia)
-        self._kick(np.flatnonzero(kicks > 0.0), kicks)
-        self._settle(temperatures, self._stage.everyone)
+        swarms, before = self._current(), self._standings.best
+        for i in np.flatnonzero(stepping).tolist():
+            swarms[i].fly(inertias[i])
+        deviations = np.where(stepping, kicks, 0.0)
+        self._kick(np.flatnonzero(deviations > 0.0), deviations)
+        self._settle(np.where(stepping, temperatures, FIRST), self._stage.everyone)
         terminated = stepping & np.array([swarm.left == 0 for swarm in swarms])
         truncated = stepping & (self._steps >= self._longest)
         self._ended = terminated | truncated
-        infos = self._infos()
-        rewards = np.where(stepping, before - infos["best_cost"], 0.0)
-        return states(swarms), rewards, terminated, truncated, masked(np.ones_like(stepping), infos)
+        best = self._standings.best
+        rewards = np.where(stepping, before - best, 0.0)
+        infos = masked(np.ones_like(stepping), self._infos())
+        return self._standings.states, rewards, terminated, truncated, infos
 
     def _kick(self, rows: NDArray[np.int64], deviations: Array) -> None:
         """Scatter the moves of some swarms, by so many half-ranges (n,): `box.scatter` for all of them together."""
@@ -109,22 +109,21 @@ class ConfigureVectorEnv(SearchVectorEnv):
             flock.moved = moved
 
     def _settle(self, temperatures: Array, rows: NDArray[np.int64]) -> None:
-        """Evaluate the moves of some swarms, and settle them at temperatures (n,)."""
+        """Evaluate the moves of some swarms, settle them at temperatures (n,), and see how far all have come."""
         swarms = self._current()
         costs = self._stage.costs(np.stack([swarm.flock.moved for swarm in swarms]), rows)
-        for i in rows.tolist():
-            swarms[i].settle(costs[i], float(temperatures[i]))
+        for i, temperature in zip(rows.tolist(), temperatures[rows].tolist(), strict=True):
+            swarms[i].settle(costs[i], temperature)
+        self._standings = standings(swarms)
 
     def _infos(self) -> Infos:
-        swarms = self._current()
         infos: Infos = {
-            "best_cost": np.array([swarm.best for swarm in swarms]),
-            "evaluations": np.array([swarm.used for swarm in swarms]),
+            "best_cost": self._standings.best,
+            "evaluations": np.array([swarm.used for swarm in self._current()]),
             "instance": self._numbers.copy(),
         }
         if self._selection.errors:
-            leaders = np.stack([swarm.leader for swarm in swarms])
-            infos["error_degrees"] = pose_error_degrees(self._truths, self._stage.poses(leaders))
+            infos["error_degrees"] = pose_error_degrees(self._truths, self._stage.poses(self._standings.leaders))
         return infos
 
     def _begin(self, i: int, number: int) -> None:
@@ -133,8 +132,8 @@ class ConfigureVectorEnv(SearchVectorEnv):
         self._stage.put(i, swarm.episode.scenery, swarm.episode.space)
 
     def _opened(self, begun: Flags) -> tuple[State, Infos]:
-        self._settle(np.ones(self.num_envs), np.flatnonzero(begun))
-        return states(self._current()), self._infos()
+        self._settle(np.full(self.num_envs, FIRST), np.flatnonzero(begun))
+        return self._standings.states, self._infos()
 
     def render(self) -> Any:
         """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
