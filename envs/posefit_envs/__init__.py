@@ -13,13 +13,13 @@ Stable-Baselines3, and `check_vector_env` compares any vector environment with s
 
 | looking for | file |
 |---|---|
-| Fit-v0, alone and many at once | fit.py, fit_vector.py |
-| Track-v0, alone and many at once | track.py, track_vector.py |
+| Fit-v0, Track-v0 | fit.py, track.py |
 | Configure-v0: dynamic algorithm configuration | configure.py |
+| each of them many at once; seeds and masks of vector environments | vector/ |
 | the arguments; what an instance's number stands for (as in sweeps: `posefit.footage.instance`) | instance.py |
-| proposals become poses, costs and pictures; actions that are not allowed | search.py |
+| what is seen in a frame; actions that are not allowed | search.py |
+| proposals become poses, costs and pictures, in many scenes at once; compiled | stage.py, kernels.py |
 | what is rendered | drawing.py |
-| seeds and masks of vector environments | batch.py |
 | optimisers that search an environment; Stable-Baselines3 | driving.py, sb3.py |
 | a checker for vector environments | checker.py |
 """
