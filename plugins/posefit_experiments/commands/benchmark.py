@@ -21,7 +21,7 @@ def bench_command(threads: int | None, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(figures))
         return
-    for group in ("vector_env", "optimisers"):
+    for group in ("vector_env", "optimisers", "optimisers_28"):
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
     for case in [name for name, value in figures.items() if isinstance(value, dict)]:
         figures |= {f"{case}.{name}": value for name, value in figures.pop(case).items()}
