@@ -77,7 +77,7 @@ class ConfigureEnv(gym.Env[State, Any]):
     ## Version History
     - v0: first version. Before its release its instances changed: number n is now the motion, speed, phase and view of
       a sweep's instance n, and 0 the motion as it is. Results from before cannot be compared with later ones.
-      Also before its release: `errors=False`, and a vector form of its own. Nothing else changes with it.
+      Its vector form and `errors` came later, before its release as well, and change nothing by default.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
