@@ -43,6 +43,7 @@ def test_scenes_together_are_what_the_library_says_of_each_alone(arguments: dict
             np.testing.assert_array_equal(seen.areas[row, view], counted)
 
 
+@pytest.mark.pure
 def test_rows_that_are_left_out_show_nothing_proposed() -> None:
     world = select().world
     episodes = [Episode(world, number, 10) for number in (3, 17)]
