@@ -1,6 +1,8 @@
 """`posefit bench`."""
 
 import json
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import click
 
@@ -21,9 +23,14 @@ def bench_command(threads: int | None, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(figures))
         return
-    for group in ("vector_env", "optimisers", "optimisers_28"):
-        figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
-    for case in [name for name, value in figures.items() if isinstance(value, dict)]:
-        figures |= {f"{case}.{name}": value for name, value in figures.pop(case).items()}
-    for name, value in figures.items():
+    for name, value in _named(figures):
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
+
+
+def _named(figures: Mapping[str, Any], group: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every figure with its name, those of a group as `group.name`."""
+    for name, value in figures.items():
+        if isinstance(value, Mapping):
+            yield from _named(value, f"{group}{name}.")
+        else:
+            yield f"{group}{name}", value
