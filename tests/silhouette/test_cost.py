@@ -13,10 +13,11 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion.library import average_skeleton
-from posefit.silhouette.cost import LEAST_SHARE, areas, mismatch, project, view_of
+from posefit.silhouette.cost import areas, mismatch, project, view_of
 from posefit.silhouette.kernels import add_mismatch, paint_bits
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import draw_pose, scratch
+from posefit.silhouette.sharing import LEAST_SHARE
 
 counts = st.tuples(*[st.integers(0, 10**9)] * 3)
 

@@ -11,6 +11,7 @@ from posefit.fitting.optimiser import minimise
 from posefit.sweep.command import cores
 from posefit_experiments.bench.environments import vector_env
 from posefit_experiments.bench.kernel import SIZE, bench_problem, opencv_costs
+from posefit_experiments.bench.many import many_figures
 from posefit_experiments.bench.optimisers import OURS, PARTICLES, optimiser_us, wide_space
 from posefit_experiments.bench.timing import fastest
 from posefit_swarm.sapso import SAPSO
@@ -68,6 +69,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "vector_env": {
             case: {name: round(value, 3) for name, value in one.items()} for case, one in vector_env().items()
         },
+        "many": {name: round(us, 3) for name, us in many_figures().items()},
         "optimisers": {name: round(us, 3) for name, us in optimiser_us(alone.space).items()},
         "optimisers_28": {name: round(us, 3) for name, us in optimiser_us(wide_space(alone.space), OURS).items()},
         "size": list(SIZE),

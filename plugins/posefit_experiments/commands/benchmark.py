@@ -2,6 +2,8 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import click
@@ -12,8 +14,15 @@ from posefit.cli.output import say
 @click.command("bench")
 @click.option("--threads", type=int, help="How many `all threads` are; by default every core.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def bench_command(threads: int | None, as_json: bool) -> None:
+@click.option("--growth", is_flag=True, help="Time how a pose's cost grows with size, poses, views and dimensions.")
+@click.option("--pictures", metavar="DIR", help="With --growth: write a figure of each, growth-*.png, to DIR.")
+def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: str | None) -> None:
     """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run."""
+    if pictures is not None and not growth:
+        raise ValueError("pictures are of --growth, got --pictures without it")
+    if growth:
+        _growth(as_json, pictures)
+        return
     from posefit_experiments.bench.experiment import loop_figures
 
     if threads is not None and threads < 1:
@@ -34,3 +43,17 @@ def _named(figures: Mapping[str, Any], group: str = "") -> Iterator[tuple[str, A
             yield from _named(value, f"{group}{name}.")
         else:
             yield f"{group}{name}", value
+
+
+def _growth(as_json: bool, pictures: str | None) -> None:
+    from posefit_experiments.bench.growth import draw_growths, growth_table, growths
+
+    if pictures is not None and find_spec("matplotlib") is None:
+        raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
+    say("timing; this takes half a minute ...")
+    found = growths()
+    told = {one.name: dict(zip(one.labels, one.us, strict=True)) for one in found}
+    click.echo(json.dumps(told) if as_json else growth_table(found))
+    if pictures is not None:
+        for path in draw_growths(found, Path(pictures)):
+            say(f"{path}")
