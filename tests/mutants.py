@@ -202,6 +202,18 @@ MUTANTS = (
         (("self._follower.commit(proposal)", "self._follower.commit(0.5 * proposal)"),),
         "tests/envs/test_environments.py::test_track_proposals_mean_what_the_tracker_makes_of_them",
     ),
+    Mutant(
+        "every scene's body is as thick as the first one's",
+        "envs/posefit_envs/kernels.py",
+        (("draw_pose(own, scenes.radii[i]", "draw_pose(own, scenes.radii[0]"),),
+        "tests/envs/test_stage.py::test_scenes_together_are_what_the_library_says_of_each_alone",
+    ),
+    Mutant(
+        "a vector environment hands out the pictures of the step before",
+        "envs/posefit_envs/stage.py",
+        (("np.empty_like(self._scenes.backdrops) if whole", "self._scenes.backdrops if whole"),),
+        "tests/envs/test_vector.py::test_a_vector_environment_equals_single_ones",
+    ),
 )
 
 

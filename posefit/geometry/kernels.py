@@ -24,7 +24,7 @@ class Chain(NamedTuple):
 
 def chain(parents: NDArray[np.int64], angles: NDArray[np.int64], axes: Array, offsets: Array) -> Chain:
     """Return the constant part of every bone's transform, from rest frames (26, 3, 3) and bone vectors (26, 3)."""
-    before = np.array([np.eye(3) if p == 0 else axes[p - 1] for p in parents])
+    before = np.concatenate([np.eye(3)[None], axes])[parents]
     turns = np.swapaxes(before, 1, 2) @ axes
     own = np.einsum("bji,bj->bi", axes, offsets)
     turned = np.abs(turns - np.eye(3)).max(axis=(1, 2)) > 1e-12

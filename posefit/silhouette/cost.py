@@ -99,43 +99,6 @@ def _checked(
     return poses, translations
 
 
-def paint(
-    body: Body,
-    camera: Camera,
-    silhouette: Silhouette,
-    poses: Array,
-    translations: Array,
-    pixels: NDArray[np.uint16],
-    value: int,
-) -> Areas:
-    """Return R, B, Y (n, 3) as `areas` does, and OR `value` into the pixels (n, height, width) of each pose's body.
-
-    Raises ValueError where a shape does not fit.
-    """
-    poses, translations = writeable(poses), writeable(translations)
-    n, shape = len(poses), (camera.height, camera.width)
-    if poses.shape != (n, ANGLES) or translations.shape != (n, 3):
-        raise ValueError(f"poses must have shape (n, {ANGLES}) with translations (n, 3), got {poses.shape}")
-    if silhouette.mask.shape != shape or pixels.shape != (n, *shape):
-        raise ValueError(f"mask and pixels must have shape {shape}, got {silhouette.mask.shape}, {pixels.shape[1:]}")
-    drawn.count_poses(n, silhouette)
-    out = np.empty((n, 3), dtype=np.int64)
-    observed, valid = silhouette.bits
-    kernels.count_areas(
-        body.skeleton.chain,
-        body.radii,
-        view_of(camera),
-        observed,
-        valid,
-        poses,
-        translations,
-        out,
-        np.uint16(value),
-        pixels,
-    )
-    return out
-
-
 def mismatch(areas: Areas, beta: float = BETA) -> Array:
     """Return the cost (n,) of areas R, B, Y (n, 3), 0 to 100. SAPSO (4), Reading S2."""
     costs = np.zeros(len(areas))

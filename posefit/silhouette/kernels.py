@@ -45,11 +45,8 @@ def paint_bits(image, box, value, pixels):
 
 
 @jit
-def count_areas(chain, radii, view, observed, valid, poses, translations, areas, value=None, pixels=None):
-    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid.
-
-    Where `pixels` (n, height, width) are given, `value` is ORed into each body's; numba compiles either case apart.
-    """
+def count_areas(chain, radii, view, observed, valid, poses, translations, areas):
+    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid."""
     work = scratch(view, chain.parents.size, poses.shape[1])
     silhouette = NONE
     for w in range(observed.shape[0]):
@@ -57,8 +54,6 @@ def count_areas(chain, radii, view, observed, valid, poses, translations, areas,
             silhouette += np.uint64(popcount(observed[w, y]))
     for i in range(poses.shape[0]):
         image, box = draw_pose(chain, radii, view, poses[i], translations[i], work)
-        if pixels is not None:
-            paint_bits(image, box, value, pixels[i])
         body, overlap = count(image, observed, valid, box)
         areas[i, 0] = silhouette - overlap
         areas[i, 1] = body - overlap

@@ -66,19 +66,18 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         "kernel_speedup_over_batched", "threads", "threads_speedup", "poses_per_second_1_thread",
         "mean_cost_difference_to_opencv", "vector_env", "many", "optimisers", "optimisers_28", "size", "poses", "cpu",
     }  # fmt: skip
+    cases = figures["vector_env"]
+    learning = cases.pop("fit_learning")
+    assert set(learning) == {"steps_per_second", "sync_steps_per_second", "times_sync"}
+    assert {"fit_shared", "fit_each", "track_each", "configure_each"} <= set(cases)
+    for case in cases.values():
+        assert set(case) == {"kernel_us", "us_per_proposal", "overhead_us", "sync_us_per_proposal", "times_sync"}
     assert set(figures["many"]) == {
         "evaluate_40", "evaluate_4000", "areas_40", "areas_4000", "silhouettes_alone", "silhouettes_together",
         "limb_combination", "limb_combination_any_order", "all_sizes", "320x240_full", "320x240_half",
         "320x240_quarter", "1280x960_full", "1280x960_half", "1280x960_quarter",
     }  # fmt: skip
     assert all(us > 0.0 for us in figures["many"].values())
-    assert set(figures["vector_env"]) == {
-        "kernel_us",
-        "us_per_proposal",
-        "overhead_us",
-        "sync_us_per_proposal",
-        "times_sync",
-    }
     assert {"sapso", "pso", "random", "cma", "particle", "annealed", "scipy:dual_annealing"} <= set(
         figures["optimisers"]
     )

@@ -1,8 +1,10 @@
 """`posefit bench`."""
 
 import json
+from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -34,10 +36,17 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
     if as_json:
         click.echo(json.dumps(figures))
         return
-    for group in [name for name, value in figures.items() if isinstance(value, dict)]:
-        figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
-    for name, value in figures.items():
+    for name, value in _named(figures):
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
+
+
+def _named(figures: Mapping[str, Any], group: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every figure with its name, those of a group as `group.name`."""
+    for name, value in figures.items():
+        if isinstance(value, Mapping):
+            yield from _named(value, f"{group}{name}.")
+        else:
+            yield f"{group}{name}", value
 
 
 def _growth(as_json: bool, pictures: str | None) -> None:
