@@ -1,10 +1,8 @@
 """`posefit bench`."""
 
-import json
-
 import click
 
-from posefit.cli.output import say
+from posefit.cli.output import json_line, say
 
 
 @click.command("bench")
@@ -19,7 +17,7 @@ def bench_command(threads: int | None, as_json: bool) -> None:
     say("timing; this takes half a minute ...")
     figures = loop_figures(threads)
     if as_json:
-        click.echo(json.dumps(figures))
+        click.echo(json_line(figures))
         return
     for group in ("vector_env", "optimisers"):
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
