@@ -23,7 +23,7 @@ def bench_command(threads: int | None, as_json: bool, compiling: bool) -> None:
     if as_json:
         click.echo(json_line(figures))
         return
-    for group in ("vector_env", "optimisers"):
+    for group in ("vector_env", "optimisers", "optimisers_28"):
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
     for name, value in figures.items():
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
