@@ -26,6 +26,7 @@ _held: set[Path] = set()  # of this process, which only the thread that holds nu
 def compiled_once(dispatcher: Any) -> Any:
     """Return a function of numba's, cached where there is a folder for it, that one process at a time compiles."""
     from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.types import unliteral
 
     with suppress(RuntimeError):  # there is no folder for it
         dispatcher.enable_caching()
@@ -36,6 +37,10 @@ def compiled_once(dispatcher: Any) -> Any:
     path = Path(folder) / f"{function.__module__}.{function.__qualname__}.lock"
 
     def compile_in_turn(signature: Any) -> Any:
+        if isinstance(
+            signature, tuple
+        ):  # a number written out in a call would be a type of its own
+            signature = tuple(unliteral(one) for one in signature)
         # a thread of this process that waits for another process must not hold what a second thread needs to go on
         with global_compiler_lock, in_turn(path):
             return _compiled(alone, signature)

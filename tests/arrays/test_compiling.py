@@ -11,7 +11,7 @@ import pytest
 
 from posefit.arrays.compiling import in_turn
 
-# two loops, the first of which calls the second, the third, which calls itself, and one that no type fits
+# a loop that calls another, one that calls itself, one that calls another twice, and one that no type fits
 LOOPS = """
 from posefit.arrays import jit
 
@@ -29,6 +29,15 @@ def inner(values, i):
 @jit
 def halved(n):
     return 0 if n < 2 else 1 + halved(n // 2)
+
+@jit
+def first(values):
+    one = 1
+    return picked(values, 0) + picked(values, values.size - 2 * one)
+
+@jit
+def picked(values, i):
+    return values[i]
 
 @jit
 def impossible(values):
@@ -148,6 +157,14 @@ import resource
 resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 """
     assert Counter(compiled(start(script + ALL))) == ONCE
+
+
+def test_a_number_written_out_in_a_call_is_no_signature_of_its_own(start, tmp_path):
+    (tmp_path / "go").touch()
+    script = """
+assert loops.first(np.arange(3.0, 6.0)) == 7.0
+"""
+    assert Counter(compiled(start(script))) == {"first array(float64, 1d, C)": 1, "picked array(float64, 1d, C)": 1}
 
 
 HOLD = """
