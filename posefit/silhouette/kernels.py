@@ -75,9 +75,8 @@ def add_mismatch(areas, scale, beta, costs):
         costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)
 
 
-@jit
 def draw_bits(chain, radii, view, pose, translation):
-    """Return the bit image of one body."""
+    """Return the bit image of one body. Not compiled itself: it draws a picture, and calls what is compiled anyway."""
     work = scratch(view, chain.parents.size, pose.size)
     image, _ = draw_pose(chain, radii, view, pose, translation, work)
     image[:, view.height :] = NONE
