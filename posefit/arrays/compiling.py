@@ -38,7 +38,7 @@ def compiled_once(dispatcher: Any) -> Any:
 
     def compile_in_turn(signature: Any) -> Any:
         if isinstance(signature, tuple):  # a number written out in a call would be a type of its own
-            signature = tuple(unliteral(one) for one in signature)
+            signature = tuple(unliteral(one) for one in signature)  # type: ignore[no-untyped-call]
         # a thread of this process that waits for another process must not hold what a second thread needs to go on
         with global_compiler_lock, in_turn(path):
             return _compiled(alone, signature)
