@@ -214,6 +214,18 @@ MUTANTS = (
         (("np.empty_like(self._scenes.backdrops) if whole", "self._scenes.backdrops if whole"),),
         "tests/envs/test_vector.py::test_a_vector_environment_equals_single_ones",
     ),
+    Mutant(
+        "nobody waits for a process that compiles",
+        "posefit/arrays/compiling.py",
+        (("            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)\n", ""),),
+        "tests/arrays/test_compiling.py::test_two_processes_that_start_on_an_empty_cache_compile_each_function_once_in_all",
+    ),
+    Mutant(
+        "a bone's turn moves what hangs on its parent",
+        "plugins/posefit_vsmm/kernels.py",
+        (("0.5 if _HANGS[joint, j] else 0.0", "0.5 if _HANGS[pivot, j] else 0.0"),),
+        "tests/sources/test_vsmm_steps.py::test_the_points_are_projected_and_their_jacobian_is_right",
+    ),
 )
 
 

@@ -10,6 +10,7 @@ from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.clusters import clustered
 from posefit_priors.kernels import distance, near, recover
 
 COMPONENTS = 6  # m, section 2.1
@@ -131,11 +132,3 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
 def reach_of(centres: Array, latents: Array, quantile: float) -> Array:
     """Return chi (): this quantile of the distances D of training latents (n, m) from their nearest centres (K, m)."""
     return np.array(np.quantile([distance(centres, latent) for latent in latents], quantile))  # Reading S5
-
-
-def clustered(latents: Array, clusters: int, seed: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return the centres (K, m) that K-means finds among latents (n, m), and each one's cluster (n,)."""
-    from sklearn.cluster import KMeans
-
-    found = KMeans(clusters, n_init=10, random_state=seed).fit(latents)
-    return np.array(found.cluster_centers_, dtype=np.float64), np.asarray(found.labels_, dtype=np.int64)

@@ -14,8 +14,9 @@ from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
 from posefit.reading import cut, parsed_json
 from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.clusters import clustered
 from posefit_priors.kernels import near, recover
-from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, clustered, reach_of
+from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, reach_of
 
 MODULES = ("decomposition", "manifold", "preprocessing", "random_projection", "cross_decomposition")
 DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}}

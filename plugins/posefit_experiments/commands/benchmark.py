@@ -1,6 +1,5 @@
 """`posefit bench`."""
 
-import json
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Any
 
 import click
 
-from posefit.cli.output import say
+from posefit.cli.output import json_line, say
 
 
 @click.command("bench")
@@ -16,7 +15,8 @@ from posefit.cli.output import say
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--growth", is_flag=True, help="Time how a pose's cost grows with size, poses, views and dimensions.")
 @click.option("--pictures", metavar="DIR", help="With --growth: write a figure of each, growth-*.png, to DIR.")
-def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: str | None) -> None:
+@click.option("--compile", "compiling", is_flag=True, help="Time what compiles for the default sweep instead.")
+def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: str | None, compiling: bool) -> None:
     """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
 
     `cpu` tells for which processor the loops are compiled, and which instructions it has. It is this machine's, or the
@@ -27,6 +27,9 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
     if growth:
         _growth(as_json, pictures)
         return
+    if compiling:
+        _compile(as_json)
+        return
     from posefit_experiments.bench.experiment import loop_figures
 
     if threads is not None and threads < 1:
@@ -34,7 +37,7 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
     say("timing; this takes half a minute ...")
     figures = loop_figures(threads)
     if as_json:
-        click.echo(json.dumps(figures))
+        click.echo(json_line(figures))
         return
     for name, value in _named(figures):
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
@@ -57,7 +60,16 @@ def _growth(as_json: bool, pictures: str | None) -> None:
     say("timing; this takes half a minute ...")
     found = growths()
     told = {one.name: dict(zip(one.labels, one.us, strict=True)) for one in found}
-    click.echo(json.dumps(told) if as_json else growth_table(found))
+    click.echo(json_line(told) if as_json else growth_table(found))
     if pictures is not None:
         for path in draw_growths(found, Path(pictures)):
             say(f"{path}")
+
+
+def _compile(as_json: bool) -> None:
+    from posefit_experiments.bench.compiling import compile_figures, compile_lines
+
+    say("compiling everything from an empty cache; this takes up to a minute ...")
+    figures = compile_figures()
+    for line in [json_line(figures)] if as_json else compile_lines(figures):
+        click.echo(line)

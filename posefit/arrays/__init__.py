@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from posefit.arrays.compiling import compiled_once
+
 Array = NDArray[np.float64]
 Bits = NDArray[np.uint64]  # 64 pixels a number
 
@@ -23,8 +25,8 @@ def jit(function: Callable[..., Any]) -> Any:
     """
     import numba
 
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-    return compiled(function)
+    compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})(function)
+    return compiled if compiled is function else compiled_once(compiled)  # numba may be told to compile nothing
 
 
 def inlined(function: Callable[..., Any]) -> Any:
