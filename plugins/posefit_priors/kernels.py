@@ -70,21 +70,19 @@ def recover_loose(latents, components, mean, loose, angles):
 def near_and_bearable(latents, components, mean, loose, low, high, centres, reach, allowed):
     """Write which latents (n, m + k) are near a cluster and bend no loose joint past low and high, but for rounding."""
     m = components.shape[0]
-    angles, bends = np.empty(loose.size), np.empty((m, loose.size))
-    for c in range(m):
-        for k in range(loose.size):
-            bends[c, k] = components[c, loose[k]]
+    bends = np.empty((loose.size, m))
+    for k in range(loose.size):
+        for c in range(m):
+            bends[k, c] = components[c, loose[k]]
     for i in range(latents.shape[0]):
         allowed[i] = close(centres, latents, i, reach[()])
-        if not allowed[i]:
-            continue
-        for k in range(loose.size):
-            angles[k] = mean[loose[k]] + latents[i, m + k]
-        for c in range(m):
-            for k in range(loose.size):
-                angles[k] += latents[i, c] * bends[c, k]
-        for k in range(loose.size):
-            allowed[i] &= angles[k] >= low[k] - ROUNDING and angles[k] <= high[k] + ROUNDING
+        k = 0
+        while allowed[i] and k < loose.size:
+            angle = mean[loose[k]] + latents[i, m + k]
+            for c in range(m):
+                angle += latents[i, c] * bends[k, c]
+            allowed[i] = low[k] - ROUNDING <= angle <= high[k] + ROUNDING
+            k += 1
 
 
 @jit

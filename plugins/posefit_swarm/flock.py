@@ -12,6 +12,8 @@ from posefit_swarm.kernels import fly, mend, settle, settle_and_fly
 FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
 SPARE = 2048  # ours: how many numbers are drawn at once for redraws, beside those that one particle may need
 
+Weights = tuple[float, float]  # omega, and the acceleration c1 = c2
+
 
 class Flock:
     """What swarms share. `moved` (n, d) are the particles after their move, which is not accepted yet.
@@ -69,33 +71,20 @@ class Flock:
 
     def fly(self, omega: float, acceleration: float) -> None:
         """Move every particle by SAPSO (1) and (2), so that it meets the constraints. Reading S7."""
-        self._finish(0, self._draws(len(self.moved)), omega, acceleration)
+        self._finish(0, self._draws(len(self.moved)), (omega, acceleration))
 
     def settle_and_fly(
         self, proposals: Array, costs: Array, temperature: float, kept: float, omega: float, acceleration: float
     ) -> None:
-        """Do both at once, as one after the other."""
+        """Do one after the other, in one compiled call."""
         costs = self._told(proposals, costs)
-        rand = self._draws(len(costs), len(costs))
+        told = costs, temperature, kept, self.accepted
+        rand, weights = self._draws(len(costs), len(costs)), (omega, acceleration)
         self._restock()
-        reached, self._used = settle_and_fly(
-            costs,
-            temperature,
-            kept,
-            self.accepted,
-            self._everyone,
-            rand,
-            self._spare,
-            self._used,
-            self._apart,
-            omega,
-            acceleration,
-            self._swarm(),
-            self._flown,
-            self.moved,
-            self._stuck,
-        )
-        self._finish(reached, rand, omega, acceleration)
+        draws = rand, self._spare, self._used, self._apart
+        moves = self._flown, self.moved, self._stuck
+        reached, self._used = settle_and_fly(*told, self._everyone, *draws, *weights, self._swarm(), *moves)
+        self._finish(reached, rand, weights)
 
     def _swarm(self) -> tuple[Any, ...]:
         """Return what the swarm knows, as the compiled loops want it."""
@@ -121,24 +110,25 @@ class Flock:
         if self._used + most > len(self._spare):
             self._spare, self._used = self._rng.random(most + SPARE), 0
 
-    def _finish(self, reached: int, rand: Array, omega: float, acceleration: float) -> None:
+    def _finish(self, reached: int, rand: Array, weights: Weights) -> None:
         """Move the particles from number `reached` on, and then see to constraint 2."""
-        pull: tuple[Any, ...] = omega, acceleration, self.swarm_best, self._swarm()
-        self._move(reached, self._everyone, rand, pull, (self._flown, self.moved, self._stuck))
+        if reached < len(self.moved):
+            self._move(reached, self._everyone, rand, weights, (self._flown, self.moved, self._stuck))
         works = self._space.feasible(self.moved)
         if np.count_nonzero(works) < len(works):
-            self._redraw(np.flatnonzero(~works), pull)
+            self._redraw(np.flatnonzero(~works), weights)
         self.velocity, self._flown = self._flown, self.velocity
 
     def _move(
-        self, reached: int, rows: NDArray[np.int64], rand: Array, pull: tuple[Any, ...], moves: tuple[Any, ...]
+        self, reached: int, rows: NDArray[np.int64], rand: Array, weights: Weights, moves: tuple[Any, ...]
     ) -> None:
-        """Write the moves of some particles (k,), velocities, positions and who is stuck, from number `reached` on."""
+        """Write the moves of particles (k,), velocities, positions and who is stuck, from number `reached` on."""
+        pull = *weights, self.swarm_best, self._swarm()
         while reached < len(rows):
             self._restock()
             reached, self._used = fly(rows, reached, rand, self._spare, self._used, self._apart, *pull, *moves)
 
-    def _redraw(self, broken: NDArray[np.int64], pull: tuple[Any, ...]) -> None:
+    def _redraw(self, broken: NDArray[np.int64], weights: Weights) -> None:
         """Draw rand() anew for whole particles that break a constraint, or stop them."""
         stopped, broken = broken[self._stuck[broken]], broken[~self._stuck[broken]]
         left, many = self._redraws, FIRST_REDRAWS
@@ -146,7 +136,7 @@ class Flock:
             many = min(left, many)
             rows = np.repeat(broken, many)
             moves = np.empty((len(rows), self.moved.shape[1])), np.empty((len(rows), self.moved.shape[1]))
-            self._move(0, rows, self._draws(len(rows)), pull, (*moves, np.empty(len(rows), dtype=bool)))
+            self._move(0, rows, self._draws(len(rows)), weights, (*moves, np.empty(len(rows), dtype=bool)))
             # SAPSO A1.2c
             broken = mend(broken, self._space.feasible(moves[1]), *moves, self._flown, self.moved)
             left, many = left - many, self._redraws

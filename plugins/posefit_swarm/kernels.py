@@ -46,8 +46,8 @@ def fly(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_best
 
     The last 2 k d numbers of `rand` are the draws of rand(): one for each coordinate's pull towards the personal best,
     then one for each towards the swarm's. A coordinate out of the box has its two drawn again, from `spare` after the
-    first `used`, at most `redraws` times. `stuck` (k,) says of whom to draw again is no use: a coordinate would be out
-    of the box whatever was drawn, and then none was drawn again, or it is so after all redraws.
+    first `used`, at most `redraws` times. `stuck` (k,) says who was stopped at the border: a coordinate would be out of
+    the box whatever was drawn, and then none was drawn again, or one was so after all redraws.
 
     Returns `first` and `used` as they are then: the first is k, or whose turn it was when `spare` held too little.
     """
@@ -70,9 +70,8 @@ def fly(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_best
                 x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
                 hope &= periodic[j] or reachable(omega, acceleration, x, v, p, g, low[j], high[j])
         stuck[k] = not hope
-        if inside or stuck[k]:
-            continue
-        for j in range(d):
+        j = 0
+        while j < d and not (inside or stuck[k]):
             left = redraws
             while left > 0 and abs(moved[k, j]) > 1.0:
                 r1, r2 = spare[used], spare[used + 1]
@@ -80,7 +79,11 @@ def fly(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_best
                 v, x = flight(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
                 flown[k, j], moved[k, j] = v, x
                 left, used = left - 1, used + 2
-            stuck[k] |= redraws > 0 and abs(moved[k, j]) > 1.0
+            stuck[k] = redraws > 0 and abs(moved[k, j]) > 1.0
+            j += 1
+        if stuck[k]:
+            for j in range(d):
+                flown[k, j], moved[k, j] = 0.0, min(max(moved[k, j], -1.0), 1.0)
     return rows.size, used
 
 

@@ -13,7 +13,7 @@ from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit_experiments.bench import experiment, optimisers, timing
+from posefit_experiments.bench import experiment, frame, optimisers, timing
 from posefit_experiments.bench.kernel import bench_problem, opencv_costs
 from posefit_experiments.bench.optimisers import Stopwatch
 
@@ -53,7 +53,7 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         "kernel_us_per_pose_1_thread", "kernel_us_per_pose_all_threads", "opencv_us_per_pose",
         "opencv_batched_us_per_pose", "sapso_frame_ms", "sapso_overhead", "kernel_speedup",
         "kernel_speedup_over_batched", "threads", "threads_speedup", "poses_per_second_1_thread",
-        "mean_cost_difference_to_opencv", "vector_env", "optimisers", "size", "poses",
+        "mean_cost_difference_to_opencv", "vector_env", "optimisers", "size", "poses", "frame", "sapso_loose_overhead",
     }  # fmt: skip
     assert set(figures["vector_env"]) == {
         "kernel_us",
@@ -66,9 +66,29 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         figures["optimisers"]
     )
     assert all(us > 0.0 for us in figures["optimisers"].values())
+    assert set(figures["frame"]) == {"sapso+pca", "sapso+loose", "pso+pca", "annealed+pca"}
+    assert figures["sapso_loose_overhead"] == pytest.approx(figures["frame"]["sapso+loose"]["overhead"], abs=1e-3)
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0
     assert CliRunner().invoke(main, ["bench", "--threads", "0"]).exit_code == 2
+
+
+@pytest.mark.parametrize("name", frame.METHODS)
+def test_the_parts_of_a_frame_do_again_what_the_track_did(name: str) -> None:
+    walk = frame.Walk(bench_problem(), *frame.METHODS[name])
+    assert [sum(len(costs) for _, costs in search.told) for search in walk.searches] == [2440] * frame.FRAMES
+    for found, search in zip(walk.frames, walk.searches, strict=True):
+        assert found.cost == min(costs.min() for _, costs in search.told)
+    np.testing.assert_array_equal(walk.swarm(), walk.searches[-1].told[-1][0])
+
+
+def test_a_profile_of_a_frame_adds_up() -> None:
+    # 4 frames in 40 ms, of which 20 are drawn, 4 decoded and 8 the optimiser's: 8 are left
+    profile = frame.profile(0.040, {"kernel": 0.020, "prior": 0.004, "swarm": 0.008})
+    assert profile == pytest.approx({
+        "ms": 10.0, "kernel_ms": 5.0, "prior_ms": 1.0, "swarm_ms": 2.0, "driver_ms": 2.0,
+        "kernel_share": 0.5, "prior_share": 0.1, "swarm_share": 0.2, "driver_share": 0.2, "overhead": 40 / 24,
+    })  # fmt: skip
 
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])

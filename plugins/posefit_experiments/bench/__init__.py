@@ -3,6 +3,7 @@
     experiment.py    all figures, from one run
     kernel.py        the problem, and the same costs drawn by OpenCV
     optimisers.py    ask and tell of every optimiser
+    frame.py         where the time of a tracked frame goes
     environments.py  steps of environments
     timing.py        jobs take turns, and the fastest run of each counts
 

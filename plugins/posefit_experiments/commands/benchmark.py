@@ -21,7 +21,9 @@ def bench_command(threads: int | None, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(figures))
         return
-    for group in ("vector_env", "optimisers"):
+    parts = figures["frame"].items()
+    figures["frame"] = {f"{name}.{key}": value for name, profile in parts for key, value in profile.items()}
+    for group in ("vector_env", "optimisers", "frame"):
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
     for name, value in figures.items():
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
