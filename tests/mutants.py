@@ -50,6 +50,18 @@ MUTANTS = (
         "tests/sources/test_sapso.py::test_eq_7_velocities_of_the_first_population_keep_within_the_limits",
     ),
     Mutant(
+        "CMA-ES learns from the long way round a circle",
+        "plugins/posefit_evolution/cma.py",
+        (("if round_trip else proposals", "if False else proposals"),),
+        "tests/plugins/test_evolution.py::test_a_target_at_the_seam_of_a_circle_is_found[1]",
+    ),
+    Mutant(
+        "the covariance of CMA-ES follows its path however long the step size's is",
+        "posefit/evolution/kernels.py",
+        (("heeded = 1.0 if long / settled < (1.4 + 2.0 / (d + 1.0)) * chi else 0.0", "heeded = 1.0"),),
+        "tests/sources/test_hansen2016.py::test_h_sigma_stops_the_covariances_path_where_the_step_sizes_is_too_long",
+    ),
+    Mutant(
         "Wald's two error rates are swapped",
         "plugins/posefit_vsmm/switching.py",
         (

@@ -25,6 +25,7 @@ TABLE = {  # the heads of the leaderboard's columns, and what they hold
     COLUMNS[_ERROR].head: _ERROR,
     "low": "low",
     "high": "high",
+    "alike": "letters",
     **{COLUMNS[name].head: name for name in _OTHERS},
     "runs": "runs",
 }

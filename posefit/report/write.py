@@ -13,6 +13,7 @@ from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 
 NAMED = 20  # instances that are named where they are not compared
+ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired runs, Holm, 5 %"
 
 Say = Callable[[str], None]
 
@@ -69,9 +70,12 @@ def leaderboard_lines(found: dict[str, Any]) -> list[str]:
         ends = "" if row["low"] is None else f"{row['low']:.2f} to {row['high']:.2f}"
         skill = "-" if row["skill_mean_pose"] is None else f"{row['skill_mean_pose']:.2f}"
         error = "-" if row["error"] is None else f"{row['error']:.2f}"
-        lines.append(f"{row['name'][:32]:32} {error:>9} {ends:>15} {skill:>7}")
-    head = [f"{'':32} {'error deg':>9} {'95 % interval':>15} {'skill':>7}"] if lines else []
-    return [*_gap_lines(found["header"], found["gaps"]), *head, *lines, _written(found["out"])]
+        lines.append(f"{row['name'][:32]:32} {error:>9} {ends:>15} {skill:>7}  {row['letters']}".rstrip())
+    if lines:
+        lettered = any(row["letters"] for row in found["leaderboard"])
+        head = f"{'':32} {'error deg':>9} {'95 % interval':>15} {'skill':>7}"
+        lines = [f"{head}  alike" if lettered else head, *lines, *([ALIKE] if lettered else [])]
+    return [*_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
 
 
 def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:

@@ -19,6 +19,7 @@ together. Randomness comes from a numpy Generator alone.
 | runs side by side, and what is left of a sweep with gaps | paired, blocked design | pairing.py |
 | the mean of the middle half, and how sure it is | interquartile mean, studentised bootstrap | intervals.py |
 | which method is better, judged by order alone | Friedman, Nemenyi, Wilcoxon, Holm | ranks.py |
+| which methods share a letter, as no test tells them apart | compact letter display | letters.py |
 | how probably a run of one beats a run of another | probability of improvement, Mann-Whitney's U | improvement.py |
 | shares of runs and targets reached in time, or within an error | ECDF, ERT, performance profiles | profiles.py |
 """

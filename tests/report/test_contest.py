@@ -54,6 +54,17 @@ def test_a_method_that_shares_too_few_runs_is_kept_apart(tmp_path: Path) -> None
     assert rows[2]["error"] == pytest.approx(0.505)
 
 
+def test_methods_share_a_letter_where_no_test_tells_them_apart(tmp_path: Path) -> None:
+    # 12 blocks: b is behind a in each, p = 2 / 2^12, times 3 after Holm; a and c differ by chance alone
+    errors = full({"a": 1.0, "b": 2.0}, instances=6)
+    errors |= {("c", i, s): error + 0.001 * (-1) ** i for (_, i, s), error in full({"a": 1.0}, instances=6).items()}
+    assert {row["name"]: row["letters"] for row in leaderboard(contest(tmp_path, errors))} == {
+        "a": "a",
+        "c": "a",
+        "b": "b",
+    }
+
+
 def test_a_method_with_a_few_gaps_takes_part_and_the_gaps_are_counted(tmp_path: Path) -> None:
     errors = full({"a": 1.0, "b": 2.0}, instances=4)
     del errors["b", 3, 1]

@@ -62,7 +62,7 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert done.exit_code == 0, done.stderr
     assert done.stdout.splitlines()[-1] == f"written to {out}: open it in any browser"
     assert done.stdout.startswith("1 cell failed, left out of all figures: random@pca 1\n")
-    assert [line.split()[:2] for line in done.stdout.splitlines()[3:-1]] == [
+    assert [line.split()[:2] for line in done.stdout.splitlines()[3:-2]] == [
         ["sapso@pca", "1.06"],
         ["random@pca", "2.06"],
     ]
@@ -102,7 +102,7 @@ def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_abo
         "  2 x its process died of SIGSEGV",
         "left out of the comparison, for every method: 1 instance",
         "  walk, view 45, instance 1: no run of sapso@pca",
-        f"{'':32} error deg   95 % interval   skill",
+        f"{'':32} error deg   95 % interval   skill  alike",
     ]
     header = Page(tmp_path / "report.html").data["header"]
     assert header["failed_by"] == {"sapso@pca": 2}

@@ -23,7 +23,7 @@ def bench_command(threads: int | None, as_json: bool) -> None:
         return
     parts = figures["frame"].items()
     figures["frame"] = {f"{name}.{key}": value for name, profile in parts for key, value in profile.items()}
-    for group in ("vector_env", "optimisers", "frame"):
+    for group in ("vector_env", "optimisers", "optimisers_28", "frame"):
         figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
     for name, value in figures.items():
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")

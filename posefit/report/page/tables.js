@@ -125,6 +125,13 @@ function leaderboard() {
           return given(row.low) ? `${number(row.low, 2)} – ${number(row.high, 2)}` : "one seed";
         },
       },
+      {
+        title: "alike",
+        text: true,
+        about: "Methods that share a letter are not told apart: Wilcoxon's signed ranks, Holm, 5 %",
+        value: (row) => (row.base ? "" : row.letters),
+        show: (row) => (row.base ? "" : row.letters),
+      },
       ...FIGURES.slice(1).map((name) => figure(name, (row) => row[name])),
       {
         title: "runs",
