@@ -72,7 +72,8 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     assert set(figures["optimisers_28"]) == {"sapso", "pso", "random", "cma", "particle", "annealed"}
     assert all(us > 0.0 for name in ("optimisers", "optimisers_28") for us in figures[name].values())
-        "frame", "sapso_loose_overhead",
+    assert set(figures["frame"]) == {"sapso+pca", "sapso+loose", "pso+pca", "annealed+pca"}
+    assert figures["sapso_loose_overhead"] == pytest.approx(figures["frame"]["sapso+loose"]["overhead"], abs=1e-3)
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0
     assert CliRunner().invoke(main, ["bench", "--threads", "0"]).exit_code == 2
