@@ -104,9 +104,9 @@ class SearchSpace:
         proposals = writeable(proposals)
         n = len(proposals)
         inside, latents = np.empty(n, dtype=bool), np.empty((n, len(self.prior.low)))
-        within(proposals, self.centre, self.half, inside, latents)
-        inside &= self.prior.feasible(latents)
-        return inside
+        everyone = within(proposals, self.centre, self.half, inside, latents)
+        allowed = self.prior.feasible(latents)
+        return allowed if everyone else allowed & inside
 
     def wrap(self, proposals: Array) -> Array:
         """Return proposals with their periodic coordinates brought into [-1, 1)."""
