@@ -162,16 +162,16 @@ class _Search:
 
     @property
     def leader(self) -> Array:
-        return self._flock.swarm_best.copy()
+        return np.array(self._flock.best[self._flock.best_cost.argmin()])
 
     def _evaluate(self, temperature: float) -> None:
         self._costs = self.problem.evaluate(self._flock.moved)
-        self._flock.settle(self._flock.moved, self._costs, temperature)
+        self._accepted, _ = self._flock.settle(self._flock.moved, self._costs, temperature)
         self.used += len(self._costs)
 
     def fly(self, inertia: float, temperature: float, spread: float) -> None:
         flock, space = self._flock, self.episode.space
-        flock.fly(inertia, ACCELERATION)
+        flock.fly(inertia, ACCELERATION, self.leader)
         if spread > 0.0:
             flock.moved = space.scatter(self._rng, flock.moved, np.full(space.dimensions, spread))
         self._evaluate(temperature)
@@ -186,7 +186,7 @@ class _Search:
             costs.std(),
             flock.best.std(axis=0).mean(),
             np.abs(flock.velocity).mean() / ALPHA,
-            flock.accepted.mean(),
+            self._accepted.mean(),
             self.left / self._iterations,
         ]
         return np.clip(np.array(values, dtype=np.float32), 0.0, 1.0)

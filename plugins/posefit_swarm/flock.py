@@ -12,7 +12,7 @@ from posefit_swarm.kernels import fly, mend, settle, settle_and_fly
 FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
 SPARE = 2048  # ours: how many numbers are drawn at once for redraws, beside those that one particle may need
 
-Weights = tuple[float, float]  # omega, and the acceleration c1 = c2
+Pull = tuple[float, float, Array]  # omega, the acceleration c1 = c2, and the swarm's best (d,)
 
 
 class Flock:
@@ -51,40 +51,39 @@ class Flock:
         self.velocity = self._first_velocities()
         self.position, self.cost = self.moved.copy(), np.full(particles, np.inf)
         self.best, self.best_cost = self.moved.copy(), np.full(particles, np.inf)
-        self.accepted, self._stuck = np.zeros(particles, dtype=bool), np.zeros(particles, dtype=bool)
-        self._flown = np.empty_like(self.moved)  # room for the next velocities
+        # room for the next velocities, and for who was stopped at the border
+        self._flown, self._stuck = np.empty_like(self.moved), np.zeros(particles, dtype=bool)
 
-    @property
-    def swarm_best(self) -> Array:
-        """The best position (d,) that any particle has been at."""
-        best: Array = self.best[self.best_cost.argmin()]
-        return best
+    def settle(
+        self, proposals: Array, costs: Array, temperature: float, kept: float = 1.0
+    ) -> tuple[NDArray[np.bool_], int]:
+        """Accept or refuse each move, remember the bests; return who was accepted (n,) and the swarm's best row.
 
-    def settle(self, proposals: Array, costs: Array, temperature: float, kept: float = 1.0) -> None:
-        """Accept or refuse each move, whose costs are (n,), and remember who was `accepted` (n,) and the bests.
-
-        `proposals` are what `moved` was. Of those that are refused each keeps `kept` times its velocity.
+        `proposals` are what `moved` was. A particle whose move is refused keeps `kept` times its velocity.
         """
-        costs = self._told(proposals, costs)
+        costs, accepted = self._told(proposals, costs), np.empty(len(self.moved), dtype=bool)
         chances = self._rng.random(len(costs))
-        settle(self.moved, costs, chances, temperature, kept, self._swarm(), self.accepted)
+        return accepted, settle(self.moved, costs, chances, temperature, kept, self._swarm(), accepted)
 
-    def fly(self, omega: float, acceleration: float) -> None:
+    def fly(self, omega: float, acceleration: float, swarm_best: Array) -> None:
         """Move every particle by SAPSO (1) and (2), so that it meets the constraints. Reading S7."""
-        self._finish(0, self._draws(len(self.moved)), (omega, acceleration))
+        self._finish(0, self._draws(len(self.moved)), (omega, acceleration, swarm_best))
 
     def settle_and_fly(
         self, proposals: Array, costs: Array, temperature: float, kept: float, omega: float, acceleration: float
-    ) -> None:
-        """Do one after the other, in one compiled call."""
-        costs = self._told(proposals, costs)
-        told = costs, temperature, kept, self.accepted
-        rand, weights = self._draws(len(costs), len(costs)), (omega, acceleration)
+    ) -> NDArray[np.bool_]:
+        """Settle and fly on towards the best then, in one compiled call; return who was accepted (n,)."""
+        costs, accepted = self._told(proposals, costs), np.empty(len(self.moved), dtype=bool)
+        told = costs, temperature, kept, accepted
+        rand = self._draws(len(costs), len(costs))
         self._restock()
         draws = rand, self._spare, self._used, self._apart
         moves = self._flown, self.moved, self._stuck
-        reached, self._used = settle_and_fly(*told, self._everyone, *draws, *weights, self._swarm(), *moves)
-        self._finish(reached, rand, weights)
+        leader, reached, self._used = settle_and_fly(
+            *told, self._everyone, *draws, omega, acceleration, self._swarm(), *moves
+        )
+        self._finish(reached, rand, (omega, acceleration, self.best[leader]))
+        return accepted
 
     def _swarm(self) -> tuple[Any, ...]:
         """Return what the swarm knows, as the compiled loops want it."""
@@ -110,25 +109,23 @@ class Flock:
         if self._used + most > len(self._spare):
             self._spare, self._used = self._rng.random(most + SPARE), 0
 
-    def _finish(self, reached: int, rand: Array, weights: Weights) -> None:
+    def _finish(self, reached: int, rand: Array, pull: Pull) -> None:
         """Move the particles from number `reached` on, and then see to constraint 2."""
         if reached < len(self.moved):
-            self._move(reached, self._everyone, rand, weights, (self._flown, self.moved, self._stuck))
+            self._move(reached, self._everyone, rand, pull, (self._flown, self.moved, self._stuck))
         works = self._space.feasible(self.moved)
         if np.count_nonzero(works) < len(works):
-            self._redraw(np.flatnonzero(~works), weights)
+            self._redraw(np.flatnonzero(~works), pull)
         self.velocity, self._flown = self._flown, self.velocity
 
-    def _move(
-        self, reached: int, rows: NDArray[np.int64], rand: Array, weights: Weights, moves: tuple[Any, ...]
-    ) -> None:
+    def _move(self, reached: int, rows: NDArray[np.int64], rand: Array, pull: Pull, moves: tuple[Any, ...]) -> None:
         """Write the moves of particles (k,), velocities, positions and who is stuck, from number `reached` on."""
-        pull = *weights, self.swarm_best, self._swarm()
+        swarm = self._swarm()
         while reached < len(rows):
             self._restock()
-            reached, self._used = fly(rows, reached, rand, self._spare, self._used, self._apart, *pull, *moves)
+            reached, self._used = fly(rows, reached, rand, self._spare, self._used, self._apart, *pull, swarm, *moves)
 
-    def _redraw(self, broken: NDArray[np.int64], weights: Weights) -> None:
+    def _redraw(self, broken: NDArray[np.int64], pull: Pull) -> None:
         """Draw rand() anew for whole particles that break a constraint, or stop them."""
         stopped, broken = broken[self._stuck[broken]], broken[~self._stuck[broken]]
         left, many = self._redraws, FIRST_REDRAWS
@@ -136,7 +133,7 @@ class Flock:
             many = min(left, many)
             rows = np.repeat(broken, many)
             moves = np.empty((len(rows), self.moved.shape[1])), np.empty((len(rows), self.moved.shape[1]))
-            self._move(0, rows, self._draws(len(rows)), weights, (*moves, np.empty(len(rows), dtype=bool)))
+            self._move(0, rows, self._draws(len(rows)), pull, (*moves, np.empty(len(rows), dtype=bool)))
             # SAPSO A1.2c
             broken = mend(broken, self._space.feasible(moves[1]), *moves, self._flown, self.moved)
             left, many = left - many, self._redraws

@@ -135,10 +135,14 @@ def settle_and_fly(
     moved,
     stuck,
 ):
-    """Settle the moves of a whole swarm and let it fly on towards its new best, with one block of draws for both."""
+    """Settle the moves of a whole swarm and let it fly on towards its new best, with one block of draws for both.
+
+    Returns the swarm's best row, and what `fly` returns.
+    """
     leader = settle(moved, costs, rand, temperature, kept, swarm, accepted)
     swarm_best = swarm[2][leader]
-    return fly(rows, 0, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, flown, moved, stuck)
+    first, used = fly(rows, 0, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, flown, moved, stuck)
+    return leader, first, used
 
 
 @jit

@@ -79,12 +79,12 @@ class SAPSO:
         flock, how = self._flock, (self._temperature, self._kept)
         if self._iteration < self._iterations:
             omega = inertia(self._iteration, self._iterations, self._inertia)
-            flock.settle_and_fly(proposals, costs, *how, omega, self._acceleration)
+            accepted = flock.settle_and_fly(proposals, costs, *how, omega, self._acceleration)
         else:
-            flock.settle(proposals, costs, *how)
+            accepted, _ = flock.settle(proposals, costs, *how)
         if self._iteration > 0:
             # SAPSO A1.2e, Reading S6
-            self._temperature *= self._cooling ** (np.count_nonzero(flock.accepted) if self._cool_each else 1)
+            self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
         self._iteration += 1
 
 

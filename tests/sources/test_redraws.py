@@ -107,7 +107,7 @@ def test_a_swarm_that_runs_out_of_numbers_draws_more(monkeypatch: pytest.MonkeyP
     swarm = Flock(space, np.random.default_rng(0), 50, speed_limits(space, REACH, "symmetric"), 100, "dimension")
     # 0.95 + 0.3 * 0.1 + 2 rand() * 0.02, twice: uniform from 0.98, in the box if r1 + r2 <= 0.5, 1 in 8
     swarm.position[:], swarm.best[:], swarm.velocity[:] = 0.95, 0.97, 0.1
-    swarm.fly(0.3, ACCELERATION)
+    swarm.fly(0.3, ACCELERATION, swarm.best[0])
     assert len(swarm._spare) == 2 * 100 * 4
     assert (swarm.velocity > 0.0).all()  # so none was stopped
     assert swarm.moved.min() >= 0.98
@@ -122,7 +122,7 @@ def test_a_particle_whose_redraws_all_fail_is_stopped_in_the_box(monkeypatch: py
     swarm.position[:], swarm.best[:], swarm.velocity[:] = 0.95, 0.97, 0.1
     swarm.position[:, 1] = swarm.best[:, 1] = 0.0
     swarm.velocity[:, 1] = 0.01
-    swarm.fly(0.3, ACCELERATION)
+    swarm.fly(0.3, ACCELERATION, swarm.best[0])
     stopped = (swarm.velocity == 0.0).all(axis=1)
     assert stopped.mean() == pytest.approx((7 / 8) ** 3, abs=0.08)
     np.testing.assert_array_equal(swarm.moved[stopped, 0], 1.0)  # clipped

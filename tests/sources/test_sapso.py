@@ -347,7 +347,7 @@ def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border(rand: Any) ->
     optimiser = SAPSO(space, Fixed(1.0), particles=2, redraws=0, alpha=1.0, rand=rand)
     optimiser._flock.position[:], optimiser._flock.best[:] = 0.9, 0.9
     optimiser._flock.velocity[:] = 0.5
-    optimiser._flock.fly(0.9, 2.0)
+    optimiser._flock.fly(0.9, 2.0, np.full(4, 0.9))
     np.testing.assert_array_equal(optimiser._flock.moved, 1.0)
     np.testing.assert_array_equal(optimiser._flock.velocity, 0.0)
 
@@ -370,7 +370,7 @@ def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
     for kind, alike in (("scalar", True), ("dimension", False)):
         optimiser = SAPSO(space, np.random.default_rng(0), particles=1, rand=kind, alpha=9.0)  # type: ignore[arg-type]
         optimiser._flock.position[:], optimiser._flock.best[:], optimiser._flock.velocity[:] = 0.0, 0.1, 0.0
-        optimiser._flock.fly(0.9, 2.0)
+        optimiser._flock.fly(0.9, 2.0, np.full(4, 0.1))
         assert (np.ptp(optimiser._flock.moved) < 1e-12) == alike
 
 
