@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit_experiments.bench import experiment, frame, optimisers, timing
+from posefit_experiments.bench import experiment, optimisers, timing
+from posefit_experiments.bench.growth import Growth, growth_table
 from posefit_experiments.bench.kernel import bench_problem, opencv_costs
 from posefit_experiments.bench.optimisers import Stopwatch, wide_space
 
@@ -57,9 +59,15 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         "kernel_us_per_pose_1_thread", "kernel_us_per_pose_all_threads", "opencv_us_per_pose",
         "opencv_batched_us_per_pose", "sapso_frame_ms", "sapso_overhead", "kernel_speedup",
         "kernel_speedup_over_batched", "threads", "threads_speedup", "poses_per_second_1_thread",
-        "mean_cost_difference_to_opencv", "vector_env", "optimisers", "optimisers_28", "size", "poses",
+        "mean_cost_difference_to_opencv", "vector_env", "many", "optimisers", "optimisers_28", "size", "poses",
         "frame", "sapso_loose_overhead",
     }  # fmt: skip
+    assert set(figures["many"]) == {
+        "evaluate_40", "evaluate_4000", "areas_40", "areas_4000", "silhouettes_alone", "silhouettes_together",
+        "limb_combination", "limb_combination_any_order", "all_sizes", "320x240_full", "320x240_half",
+        "320x240_quarter", "1280x960_full", "1280x960_half", "1280x960_quarter",
+    }  # fmt: skip
+    assert all(us > 0.0 for us in figures["many"].values())
     assert set(figures["vector_env"]) == {
         "kernel_us",
         "us_per_proposal",
@@ -79,22 +87,27 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     assert CliRunner().invoke(main, ["bench", "--threads", "0"]).exit_code == 2
 
 
-@pytest.mark.parametrize("name", frame.METHODS)
-def test_the_parts_of_a_frame_do_again_what_the_track_did(name: str) -> None:
-    walk = frame.Walk(bench_problem(), *frame.METHODS[name])
-    assert [sum(len(costs) for _, costs in search.told) for search in walk.searches] == [2440] * frame.FRAMES
-    for found, search in zip(walk.frames, walk.searches, strict=True):
-        assert found.cost == min(costs.min() for _, costs in search.told)
-    np.testing.assert_array_equal(walk.swarm(), walk.searches[-1].told[-1][0])
+@pytest.mark.slow
+def test_growth_is_a_table_and_four_figures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(timing, "ROUNDS", 1)
+    monkeypatch.setattr(timing, "TURN", 1e-6)
+    found = CliRunner().invoke(main, ["bench", "--growth", "--json", "--pictures", str(tmp_path / "new")])
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert list(told) == ["size", "poses", "views", "dimensions"]
+    assert list(told["size"]) == ["80 x 60", "160 x 120", "320 x 240", "640 x 480", "1280 x 720", "1920 x 1080"]
+    assert "9" in told["dimensions"]
+    assert all(us > 0.0 for row in told.values() for us in row.values())
+    assert {path.name for path in (tmp_path / "new").iterdir()} == {f"growth-{name}.png" for name in told}
+    assert CliRunner().invoke(main, ["bench", "--pictures", str(tmp_path)]).exit_code == 2
 
 
-def test_a_profile_of_a_frame_adds_up() -> None:
-    # 4 frames in 40 ms, of which 20 are drawn, 4 decoded and 8 the optimiser's: 8 are left
-    profile = frame.profile(0.040, {"kernel": 0.020, "prior": 0.004, "swarm": 0.008})
-    assert profile == pytest.approx({
-        "ms": 10.0, "kernel_ms": 5.0, "prior_ms": 1.0, "swarm_ms": 2.0, "driver_ms": 2.0,
-        "kernel_share": 0.5, "prior_share": 0.1, "swarm_share": 0.2, "driver_share": 0.2, "overhead": 40 / 24,
-    })  # fmt: skip
+def test_a_table_of_growth_has_a_line_for_each_point() -> None:
+    one = Growth("size", "pixels", [1, 4], ["1 x 1", "2 x 2"], [1.5, 2.25], True)
+    assert [line.split() for line in growth_table([one, one]).splitlines()] == [
+        ["grows", "to", "us", "a", "pose"],
+        *[["pixels", "1", "x", "1", "1.500"], ["pixels", "2", "x", "2", "2.250"]] * 2,
+    ]
 
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])

@@ -5,6 +5,8 @@
     optimisers.py    ask and tell of every optimiser, in 9 dimensions and of ours in 28
     frame.py         where the time of a tracked frame goes
     environments.py  steps of environments
+    many.py          thousands of poses, several silhouettes, limbs, half and quarter size
+    growth.py        how the time of a pose grows: `posefit bench --growth`
     timing.py        jobs take turns, and the fastest run of each counts
 
 Nothing here runs beside anything else, so nothing is given to the sweep engine.
