@@ -84,7 +84,9 @@ class PCA:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
-        return np.asarray(near(self.centres, writeable(latents), self.reach))
+        allowed = np.empty(len(latents), dtype=bool)
+        near(self.centres, writeable(latents), self.reach, allowed)
+        return allowed
 
     def arrays(self) -> dict[str, Any]:
         """Return what was learned, by name."""

@@ -65,6 +65,7 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         "opencv_batched_us_per_pose", "sapso_frame_ms", "sapso_overhead", "kernel_speedup",
         "kernel_speedup_over_batched", "threads", "threads_speedup", "poses_per_second_1_thread",
         "mean_cost_difference_to_opencv", "vector_env", "many", "optimisers", "optimisers_28", "size", "poses", "cpu",
+        "frame", "sapso_loose_overhead",
     }  # fmt: skip
     cases = figures["vector_env"]
     learning = cases.pop("fit_learning")
@@ -83,6 +84,8 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     assert set(figures["optimisers_28"]) == {"sapso", "pso", "random", "cma", "particle", "annealed"}
     assert all(us > 0.0 for name in ("optimisers", "optimisers_28") for us in figures[name].values())
+    assert set(figures["frame"]) == {"sapso+pca", "sapso+loose", "pso+pca", "annealed+pca"}
+    assert figures["sapso_loose_overhead"] == pytest.approx(figures["frame"]["sapso+loose"]["overhead"], abs=1e-3)
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0
     assert CliRunner().invoke(main, ["bench", "--threads", "0"]).exit_code == 2
