@@ -7,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import jit
 from posefit.silhouette.popcount import popcount
-from posefit.silhouette.rasteriser import BLOCK, NONE, draw_pose, scratch
+from posefit.silhouette.rasteriser import NONE, draw_pose, scratch
 
 
 @jit
@@ -46,7 +46,7 @@ def count_areas_of_all(chain, radii, view, observed, valid, poses, translations,
             areas[i, s, 1] = body - overlap
             areas[i, s, 2] = overlap
         for w in range(box[2], box[3] + 1):
-            image[w][box[0] : box[1] + BLOCK] = NONE
+            image[w][box[0] : box[1]] = NONE
 
 
 @jit
@@ -60,7 +60,7 @@ def draw_bones(chain, radii, view, poses, translations, images, boxes):
         image, box = draw_pose(chain, radii[i], view, poses[i], translations[i], work)
         for w in range(box[2], box[3] + 1):
             images[i, w][box[0] : box[1]] = image[w][box[0] : box[1]]
-            image[w][box[0] : box[1] + BLOCK] = NONE
+            image[w][box[0] : box[1]] = NONE
         for k in range(4):
             boxes[i, k] = box[k]
 
