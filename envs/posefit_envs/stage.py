@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import final
 
 import numpy as np
@@ -13,6 +14,7 @@ from posefit.fitting.problem import over_views
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import pack
+from posefit.silhouette.sharing import LEAST_SHARE, work_through
 from posefit_envs.instance import World
 from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes, within_scenes
 from posefit_envs.search import BODY, Image, Scenery
@@ -36,13 +38,13 @@ class Evaluated:
 class Stage:
     """Scenes of one world side by side, a row each. Whatever they differ in is stacked, so that one call does all.
 
-    A row has the same bits whatever the others hold, and whatever number of rows there is.
+    A row has the same bits whatever the others hold, whatever number of rows there is, and however many `threads` draw.
     """
 
-    def __init__(self, world: World, rows: int) -> None:
+    def __init__(self, world: World, rows: int, threads: int = 1) -> None:
         views, (width, height) = len(world.view_degrees), world.size
         bones, bits = len(BONES), pack(np.zeros((height, width), dtype=bool)).shape
-        self._width, self._height = width, height
+        self._width, self._height, self._threads = width, height, threads
         self._prior, self._aligned = world.learned, world.translation == "aligned"
         self._chain = world.body.skeleton.chain
         self._sceneries: list[Scenery | None] = [None] * rows
@@ -142,18 +144,15 @@ class Stage:
         views = self._scenes.places.shape[1]
         count_poses(len(rows) * k * views)
         areas = np.zeros((views, n, k, 3), dtype=np.int64)
-        draw_scenes(
-            self._chain,
-            self._read(),
-            self._width,
-            self._height,
-            rows,
-            poses,
-            translations,
-            areas,
-            np.uint16(BODY),
-            pictures,
-        )
+        scenes = self._read()
+
+        def draw(part: slice) -> None:
+            at = self._chain, scenes, self._width, self._height, rows[part]
+            draw_scenes(*at, poses, translations, areas, np.uint16(BODY), pictures)
+
+        shares = max(min(self._threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
+        cuts = [len(rows) * share // shares for share in range(shares + 1)]
+        work_through([slice(a, b) for a, b in pairwise(cuts)], self._threads, lambda _: (), draw)
         # every pixel of a scene is known, so that the silhouettes of one speak for all
         costs = over_views(list(areas.reshape(views, n * k, 3)), self._silhouettes)
         return costs.reshape(n, k), areas

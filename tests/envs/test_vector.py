@@ -121,6 +121,18 @@ def test_errors_are_told_unless_nobody_asks_for_them() -> None:
         gym.make_vec("posefit/Fit-v0", num_envs=2, errors="no")
 
 
+def test_threads_change_nothing() -> None:
+    for name in CASES:
+        one, three = (gym.make_vec(name, num_envs=50, threads=threads) for threads in (1, 3))
+        np.testing.assert_array_equal(one.reset(seed=2)[0], three.reset(seed=2)[0])
+        for _ in range(2):
+            actions = one.action_space.sample()
+            for first, other in zip(one.step(actions)[:4], three.step(actions)[:4], strict=True):
+                np.testing.assert_array_equal(first, other)
+    with pytest.raises(error.Error, match="threads must be at least 1, got 0"):
+        gym.make_vec("posefit/Fit-v0", num_envs=2, threads=0)
+
+
 def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
     # environments 0 to 2 of seven are those of three: their seeds are the same, and so are their actions
     for name in CASES:

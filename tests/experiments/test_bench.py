@@ -70,7 +70,7 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     cases = figures["vector_env"]
     learning = cases.pop("fit_learning")
     assert set(learning) == {"steps_per_second", "sync_steps_per_second", "times_sync"}
-    assert {"fit_shared", "fit_each", "track_each", "configure_each"} <= set(cases)
+    assert set(cases) == {"fit_shared", "fit_each", "track_each", "configure_each", "configure_all_threads"}
     for case in cases.values():
         assert set(case) == {"kernel_us", "us_per_proposal", "overhead_us", "sync_us_per_proposal", "times_sync"}
     assert set(figures["many"]) == {

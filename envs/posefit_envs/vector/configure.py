@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.box import MANY, REDRAWS, fold
+from posefit.fitting.check import whole
 from posefit.fitting.metrics import pose_error_degrees
 from posefit.geometry.skeleton import ANGLES
 from posefit_envs.configure import (
@@ -23,7 +24,7 @@ from posefit_envs.configure import (
     steering,
 )
 from posefit_envs.drawing import portray
-from posefit_envs.instance import Arguments, select
+from posefit_envs.instance import Arguments, approved, select
 from posefit_envs.stage import Stage
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
@@ -31,6 +32,7 @@ from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 class ConfigureVectorEnv(SearchVectorEnv):
     """`num_envs` environments as `posefit_envs.configure.ConfigureEnv`, with the same arguments.
 
+    So many `threads` draw; it is one unless somebody says otherwise, and changes nothing but the time.
     Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an episode's last
     one resets, as `AutoresetMode.NEXT_STEP` says.
     """
@@ -41,6 +43,7 @@ class ConfigureVectorEnv(SearchVectorEnv):
         *,
         particles: int = PARTICLES,
         iterations: int = ITERATIONS,
+        threads: int = 1,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
@@ -49,7 +52,7 @@ class ConfigureVectorEnv(SearchVectorEnv):
         selection = select(**arguments)
         super().__init__(num_envs, selection, spaces_of_swarm(), render_mode, max_episode_steps)
         self.particles, self._iterations = int(particles), int(iterations)
-        self._stage = Stage(self.world, num_envs)
+        self._stage = Stage(self.world, num_envs, approved(whole, "threads", threads, 1))
         self._swarms: list[SteeredSwarm | None] = [None] * num_envs
         self._truths = np.empty((num_envs, ANGLES))
 

@@ -7,11 +7,12 @@ from gymnasium import error
 
 from posefit import PoseProblem, SearchSpace
 from posefit.arrays import Array
+from posefit.fitting.check import whole
 from posefit.fitting.metrics import pose_error_degrees
 from posefit.geometry.skeleton import ANGLES
 from posefit_envs.drawing import portray
 from posefit_envs.fit import MAX_EVALUATIONS, TARGET_COST, Episode, check_budget, spaces_of
-from posefit_envs.instance import Arguments, select
+from posefit_envs.instance import Arguments, approved, select
 from posefit_envs.search import Image
 from posefit_envs.stage import Evaluated, Stage
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
@@ -20,6 +21,7 @@ from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 class FitVectorEnv(SearchVectorEnv):
     """`num_envs` environments as `posefit_envs.fit.FitEnv`, with the same arguments.
 
+    So many `threads` draw; it is one unless somebody says otherwise, and changes nothing but the time.
     Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an episode's last
     one resets, as `AutoresetMode.NEXT_STEP` says.
     """
@@ -30,6 +32,7 @@ class FitVectorEnv(SearchVectorEnv):
         *,
         target_cost: float = TARGET_COST,
         max_evaluations: int = MAX_EVALUATIONS,
+        threads: int = 1,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
@@ -38,7 +41,7 @@ class FitVectorEnv(SearchVectorEnv):
         selection = select(**arguments)
         super().__init__(num_envs, selection, spaces_of(selection.world), render_mode, max_episode_steps)
         self._target, self._most = float(target_cost), int(max_evaluations)
-        self._stage = Stage(self.world, num_envs)
+        self._stage = Stage(self.world, num_envs, approved(whole, "threads", threads, 1))
         self._episodes: list[Episode | None] = [None] * num_envs
         self._truths, self._best = np.empty((num_envs, ANGLES)), np.full(num_envs, np.inf)
         self._last: Evaluated | None = None

@@ -23,6 +23,7 @@ from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 class TrackVectorEnv(SearchVectorEnv):
     """`num_envs` environments as `posefit_envs.track.TrackEnv`, with the same arguments.
 
+    So many `threads` draw; it is one unless somebody says otherwise, and changes nothing but the time.
     Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an episode's last
     one resets, as `AutoresetMode.NEXT_STEP` says.
     """
@@ -35,6 +36,7 @@ class TrackVectorEnv(SearchVectorEnv):
         *,
         frames: int = FRAMES,
         evaluations_per_frame: int = EVALUATIONS,
+        threads: int = 1,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
@@ -44,7 +46,7 @@ class TrackVectorEnv(SearchVectorEnv):
         selection = select(**arguments)
         super().__init__(num_envs, selection, spaces_of(selection.world), render_mode, max_episode_steps)
         self._frames, self._most = int(frames), int(evaluations_per_frame)
-        self._stage = Stage(self.world, num_envs)
+        self._stage = Stage(self.world, num_envs, approved(whole, "threads", threads, 1))
         self._passages: list[Passage | None] = [None] * num_envs
         # of the current frame: proposals made, the truth, what the last and the best proposal came to
         n, d = self._shape

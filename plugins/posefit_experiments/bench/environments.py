@@ -19,14 +19,16 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-def vector_env() -> dict[str, dict[str, float]]:
+def vector_env(threads: int) -> dict[str, dict[str, float]]:
     """Return what a step of 40 environments takes a proposal, in microseconds: natively, and one by one.
 
     In `fit_shared` all have one instance, elsewhere each has its own. `kernel_us` is the cost of as many proposals
-    through the library. `fit_learning` is what a learner has: random instances, episodes of 40 steps, and their resets,
-    in steps a second. The environments are found by name, as by users.
+    through the library. In `configure_all_threads` so many `threads` draw. `fit_learning` is what a learner has: random
+    instances, episodes of 40 steps, and their resets, in steps a second. The environments are found by name, as by
+    users.
     """
     kernel, vectors = _kernel(), {name: _pair(env, arguments) for name, (env, arguments) in CASES.items()}
+    vectors["configure_all_threads"] = _pair(*CASES["configure_each"], threads)
     learning = _pair("Fit-v0", {"max_evaluations": EPISODE, "target_cost": -1.0})
     jobs: dict[str, Callable[[], object]] = {"kernel": kernel}
     for name, envs in vectors.items():
@@ -56,13 +58,14 @@ def vector_env() -> dict[str, dict[str, float]]:
     return figures
 
 
-def _pair(name: str, arguments: dict[str, Any]) -> dict[str, Any]:
-    """Return a vector environment of ours and Gymnasium's, reset."""
+def _pair(name: str, arguments: dict[str, Any], threads: int = 1) -> dict[str, Any]:
+    """Return a vector environment of ours, which draws with so many threads, and Gymnasium's, reset."""
     import gymnasium
 
+    full = f"posefit_envs:posefit/{name}"
     made: dict[str, Any] = {
-        kind: gymnasium.make_vec(f"posefit_envs:posefit/{name}", ENVIRONMENTS, way, **arguments)
-        for kind, way in (("native", None), ("sync", "sync"))
+        "native": gymnasium.make_vec(full, ENVIRONMENTS, threads=threads, **arguments),
+        "sync": gymnasium.make_vec(full, ENVIRONMENTS, "sync", **arguments),
     }
     for env in made.values():
         env.reset(seed=0)

@@ -72,7 +72,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "poses_per_second_1_thread": 1.0 / one,
         "mean_cost_difference_to_opencv": float(difference.mean()),
         "vector_env": {
-            case: {name: round(value, 3) for name, value in one.items()} for case, one in vector_env().items()
+            case: {name: round(value, 3) for name, value in one.items()} for case, one in vector_env(many).items()
         },
         "many": {name: round(us, 3) for name, us in many_figures().items()},
         "optimisers": {name: round(us, 3) for name, us in optimiser_us(alone.space).items()},
