@@ -42,14 +42,10 @@ def unpack_scenes(proposals, centres, halves, anchors, first, poses, translation
 
 
 @jit
-def within_scenes(proposals, centres, halves, first, inside, latents):
+def within_scenes(proposals, centres, halves, inside, latents):
     """Write which proposals (n, k, d) lie in their boxes, and the latents of all."""
     for i in range(proposals.shape[0]):
-        lie, found = within(proposals[i], centres[i], halves[i], first)
-        for k in range(lie.size):
-            inside[i, k] = lie[k]
-            for j in range(found.shape[1]):
-                latents[i, k, j] = found[k, j]
+        within(proposals[i], centres[i], halves[i], inside[i], latents[i])
 
 
 @jit

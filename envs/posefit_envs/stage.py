@@ -120,9 +120,9 @@ class Stage:
 
     def feasible(self, proposals: Array, rows: Rows) -> NDArray[np.bool_]:
         """Return which proposals (m, k, d), of the scenes in these rows (m,), lie in the box and mean a pose."""
-        (m, k, d), first = proposals.shape, self._first
-        inside, latents = np.empty((m, k), dtype=bool), np.empty((m, k, d - first))
-        within_scenes(proposals, self._centres[rows], self._halves[rows], first, inside, latents)
+        m, k, d = proposals.shape
+        inside, latents = np.empty((m, k), dtype=bool), np.empty((m, k, d - self._first))
+        within_scenes(proposals, self._centres[rows], self._halves[rows], inside, latents)
         return inside & self._prior.feasible(latents.reshape(m * k, -1)).reshape(m, k)
 
     def _unpacked(self, proposals: Array) -> tuple[Array, Array]:
