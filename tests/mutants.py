@@ -149,6 +149,36 @@ MUTANTS = (
         "tests/experiments/test_bench.py::test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths",
     ),
     Mutant(
+        "a smaller picture looks along the corners of blocks, not along its pixels' centres",
+        "posefit/silhouette/pyramid.py",
+        (("(camera.centre - first - 0.5) / factor + 0.5", "camera.centre / factor"),),
+        "tests/silhouette/test_pyramid.py::test_a_body_seen_small_is_the_body_drawn_at_full_size_and_looked_at_there",
+    ),
+    Mutant(
+        "a smaller silhouette is aligned to its own borders",
+        "posefit/silhouette/pyramid.py",
+        (('vars(coarse)["extent"]', 'vars(coarse)["other"]'),),
+        "tests/fitting/test_many.py::test_a_proposal_means_the_same_pose_at_every_size[aligned]",
+    ),
+    Mutant(
+        "a limb stays where another combination has another one",
+        "posefit/silhouette/several.py",
+        (("take_away(image[a:b], added[k, a:b])", "pass"),),
+        "tests/silhouette/test_limbs.py::test_any_combinations_in_any_order_do_so_too",
+    ),
+    Mutant(
+        "poses that another thread draws are counted for nobody",
+        "posefit/silhouette/sharing.py",
+        (("submit(copy_context().run, take_turns)", "submit(take_turns)"),),
+        "tests/silhouette/test_sharing.py::test_poses_that_other_threads_draw_are_counted_for_the_one_who_asked",
+    ),
+    Mutant(
+        "who was only seen small may cost less than who was seen whole",
+        "posefit/fitting/problem.py",
+        (("np.fmax(self._costs, np.fmax.reduce(costs))", "self._costs.copy()"),),
+        "tests/fitting/test_many.py::test_only_the_best_of_a_small_look_go_on_and_the_others_cost_no_less",
+    ),
+    Mutant(
         "the upper reach of `loose` is taken from the least training angle",
         "plugins/posefit_priors/loose.py",
         (("self.angles_high - most[self.loose]", "self.angles_high - least[self.loose]"),),

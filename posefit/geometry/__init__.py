@@ -3,6 +3,7 @@
 | looking for | file |
 |---|---|
 | 27 joints, 26 bones, 66 angles, and where the joints of a pose are | skeleton.py |
+| which bones, and which angles of a pose, belong to a limb | limbs.py |
 | cones around the bones, and builds | body.py |
 | root and joint angles as rotations. Reading S3 | rotation.py |
 | a pinhole camera | camera.py |

@@ -1,10 +1,7 @@
 """The two-way silhouette cost of many poses, over one view or several."""
 
-import os
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
-from functools import lru_cache
-from itertools import pairwise
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +10,13 @@ from posefit.arrays import Array, writeable
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
-from posefit.silhouette import drawn, kernels
+from posefit.silhouette import drawn, kernels, several
 from posefit.silhouette.mask import Mask, Silhouette, unpack
 from posefit.silhouette.rasteriser import View
+from posefit.silhouette.sharing import parts_of, work_through
 
 SCALE = 100.0  # S
 BETA = 0.5  # beta
-LEAST_SHARE = 16  # poses; a smaller share of work is not worth handing to another thread
 
 Areas = NDArray[np.int64]  # (n, 3): R, B, Y
 
@@ -37,6 +34,58 @@ def areas(
     R is silhouette without body, B body without silhouette, Y both; unknown pixels are in none. A bone with an end
     nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`.
     """
+    poses, translations = _checked(camera, [silhouette], poses, translations)
+    drawn.count_poses(len(poses), silhouette)
+    out = np.empty((len(poses), 3), dtype=np.int64)
+    chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
+    observed, valid = silhouette.bits
+    parts = parts_of(len(poses), threads)
+    if len(parts) == 1:
+        kernels.count_areas(chain, radii, view, observed, valid, poses, translations, out)  # SAPSO (3)
+        return out
+
+    def count(_part: slice, *rows: NDArray[Any]) -> None:
+        kernels.count_areas(chain, radii, view, observed, valid, *rows)
+
+    work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
+    return out
+
+
+def areas_of_all(
+    body: Body,
+    camera: Camera,
+    silhouettes: Sequence[Silhouette],
+    poses: Array,
+    translations: Array,
+    threads: int = 1,
+) -> Areas:
+    """Return R, B, Y (silhouettes, n, 3) of poses (n, 66) against each of several silhouettes of one camera.
+
+    The same counts as `areas` has for each silhouette alone, but each pose is drawn only once. Each comparison is
+    one of the poses that are counted as drawn. Raises ValueError where a shape does not fit.
+    """
+    poses, translations = _checked(camera, silhouettes, poses, translations)
+    for silhouette in silhouettes:
+        drawn.count_poses(len(poses), silhouette)
+    out = np.empty((len(poses), len(silhouettes), 3), dtype=np.int64)
+    chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
+    if not silhouettes:
+        return out.transpose(1, 0, 2)
+    observed, valid = (np.stack(bits) for bits in zip(*(silhouette.bits for silhouette in silhouettes), strict=True))
+
+    def count(_part: slice, *rows: NDArray[Any]) -> None:
+        several.count_areas_of_all(chain, radii, view, observed, valid, *rows)
+
+    work_through(
+        parts_of(len(poses), threads), threads, lambda part: (poses[part], translations[part], out[part]), count
+    )
+    return np.ascontiguousarray(out.transpose(1, 0, 2))
+
+
+def _checked(
+    camera: Camera, silhouettes: Sequence[Silhouette], poses: Array, translations: Array
+) -> tuple[Array, Array]:
+    """Return poses and translations as the loops want them. Raises ValueError where a shape does not fit."""
     # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
     poses, translations = writeable(poses), writeable(translations)
     n = len(poses)
@@ -44,27 +93,10 @@ def areas(
         raise ValueError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
     if translations.shape != (n, 3):
         raise ValueError(f"translations must have shape {(n, 3)}, got {translations.shape}")
-    if silhouette.mask.shape != (camera.height, camera.width):
-        raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
-    drawn.count_poses(n, silhouette)
-    out = np.empty((n, 3), dtype=np.int64)
-    chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
-    observed, valid = silhouette.bits
-
-    shares = min(threads, n // LEAST_SHARE)
-    if shares <= 1:
-        kernels.count_areas(chain, radii, view, observed, valid, poses, translations, out)  # SAPSO (3)
-        return out
-
-    def work(part: slice) -> None:
-        kernels.count_areas(chain, radii, view, observed, valid, poses[part], translations[part], out[part])
-
-    cuts = [n * share // shares for share in range(shares + 1)]
-    others = [_submit(threads, work, slice(a, b)) for a, b in pairwise(cuts[1:])]
-    work(slice(0, cuts[1]))
-    for other in others:
-        other.result()
-    return out
+    for silhouette in silhouettes:
+        if silhouette.mask.shape != (camera.height, camera.width):
+            raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
+    return poses, translations
 
 
 def paint(
@@ -125,17 +157,3 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         writeable(translation),
     )
     return unpack(bits, camera.width, camera.height)
-
-
-@lru_cache(maxsize=1)
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads - 1, thread_name_prefix="posefit")
-
-
-if hasattr(os, "register_at_fork"):
-    # The threads of a pool do not live on in a forked child; without this its first call would wait for ever.
-    os.register_at_fork(after_in_child=_pool.cache_clear)
-
-
-def _submit(threads: int, work: Callable[[slice], None], part: slice) -> "Future[None]":
-    return _pool(threads).submit(work, part)

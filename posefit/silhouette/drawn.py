@@ -46,6 +46,13 @@ class PoseCount:
         return mine
 
 
+def belongs(silhouette: Silhouette, origin: Silhouette) -> Silhouette:
+    """Return a silhouette, known from now on to whoever knows the one that it was made of."""
+    if _owners and (owner := _owners.get(origin)) is not None:
+        _owners[silhouette] = owner
+    return silhouette
+
+
 _current: ContextVar[PoseCount | None] = ContextVar("drawn", default=None)
 _owners: WeakKeyDictionary[Silhouette, PoseCount] = WeakKeyDictionary()
 

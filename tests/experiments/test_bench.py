@@ -6,6 +6,7 @@ import platform
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit_experiments.bench import experiment, optimisers, timing
+from posefit_experiments.bench.growth import Growth, growth_table
 from posefit_experiments.bench.kernel import bench_problem, opencv_costs
 from posefit_experiments.bench.optimisers import Stopwatch, wide_space
 from posefit_experiments.bench.processor import instructions, processor
@@ -62,8 +64,14 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         "kernel_us_per_pose_1_thread", "kernel_us_per_pose_all_threads", "opencv_us_per_pose",
         "opencv_batched_us_per_pose", "sapso_frame_ms", "sapso_overhead", "kernel_speedup",
         "kernel_speedup_over_batched", "threads", "threads_speedup", "poses_per_second_1_thread",
-        "mean_cost_difference_to_opencv", "vector_env", "optimisers", "optimisers_28", "size", "poses", "cpu",
+        "mean_cost_difference_to_opencv", "vector_env", "many", "optimisers", "optimisers_28", "size", "poses", "cpu",
     }  # fmt: skip
+    assert set(figures["many"]) == {
+        "evaluate_40", "evaluate_4000", "areas_40", "areas_4000", "silhouettes_alone", "silhouettes_together",
+        "limb_combination", "limb_combination_any_order", "all_sizes", "320x240_full", "320x240_half",
+        "320x240_quarter", "1280x960_full", "1280x960_half", "1280x960_quarter",
+    }  # fmt: skip
+    assert all(us > 0.0 for us in figures["many"].values())
     assert set(figures["vector_env"]) == {
         "kernel_us",
         "us_per_proposal",
@@ -79,6 +87,29 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0
     assert CliRunner().invoke(main, ["bench", "--threads", "0"]).exit_code == 2
+
+
+@pytest.mark.slow
+def test_growth_is_a_table_and_four_figures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(timing, "ROUNDS", 1)
+    monkeypatch.setattr(timing, "TURN", 1e-6)
+    found = CliRunner().invoke(main, ["bench", "--growth", "--json", "--pictures", str(tmp_path / "new")])
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert list(told) == ["size", "poses", "views", "dimensions"]
+    assert list(told["size"]) == ["80 x 60", "160 x 120", "320 x 240", "640 x 480", "1280 x 720", "1920 x 1080"]
+    assert "9" in told["dimensions"]
+    assert all(us > 0.0 for row in told.values() for us in row.values())
+    assert {path.name for path in (tmp_path / "new").iterdir()} == {f"growth-{name}.png" for name in told}
+    assert CliRunner().invoke(main, ["bench", "--pictures", str(tmp_path)]).exit_code == 2
+
+
+def test_a_table_of_growth_has_a_line_for_each_point() -> None:
+    one = Growth("size", "pixels", [1, 4], ["1 x 1", "2 x 2"], [1.5, 2.25], True)
+    assert [line.split() for line in growth_table([one, one]).splitlines()] == [
+        ["grows", "to", "us", "a", "pose"],
+        *[["pixels", "1", "x", "1", "1.500"], ["pixels", "2", "x", "2", "2.250"]] * 2,
+    ]
 
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])

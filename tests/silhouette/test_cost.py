@@ -13,9 +13,10 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion.library import average_skeleton
-from posefit.silhouette.cost import LEAST_SHARE, areas, mismatch, paint, project
+from posefit.silhouette.cost import areas, mismatch, paint, project
 from posefit.silhouette.kernels import add_mismatch
 from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.sharing import LEAST_SHARE
 
 counts = st.tuples(*[st.integers(0, 10**9)] * 3)
 

@@ -11,6 +11,7 @@ from posefit.fitting.optimiser import minimise
 from posefit.sweep.command import cores
 from posefit_experiments.bench.environments import vector_env
 from posefit_experiments.bench.kernel import SIZE, bench_problem, opencv_costs
+from posefit_experiments.bench.many import many_figures
 from posefit_experiments.bench.optimisers import OURS, PARTICLES, optimiser_us, wide_space
 from posefit_experiments.bench.processor import processor
 from posefit_experiments.bench.timing import fastest
@@ -67,6 +68,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "poses_per_second_1_thread": 1.0 / one,
         "mean_cost_difference_to_opencv": float(difference.mean()),
         "vector_env": {name: round(value, 3) for name, value in vector_env().items()},
+        "many": {name: round(us, 3) for name, us in many_figures().items()},
         "optimisers": {name: round(us, 3) for name, us in optimiser_us(alone.space).items()},
         "optimisers_28": {name: round(us, 3) for name, us in optimiser_us(wide_space(alone.space), OURS).items()},
         "size": list(SIZE),

@@ -1,0 +1,49 @@
+"""Which bones and angles belong to a limb."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, angle_index
+
+# The chains of bones between the joints where several begin; what is left, from the root to the thorax, is the torso.
+LIMBS: Mapping[str, Sequence[str]] = {
+    "left leg": ("lhipjoint", "lfemur", "ltibia", "lfoot", "ltoes"),
+    "right leg": ("rhipjoint", "rfemur", "rtibia", "rfoot", "rtoes"),
+    "left arm": ("lclavicle", "lhumerus", "lradius", "lwrist", "lhand"),
+    "right arm": ("rclavicle", "rhumerus", "rradius", "rwrist", "rhand"),
+    "head": ("lowerneck", "upperneck", "head"),
+}
+
+
+def check_limbs(limbs: Mapping[str, Sequence[str]]) -> None:
+    """Return nothing. Raises ValueError where a bone is unknown, is in two limbs, or hangs from another limb's bone."""
+    if not limbs:
+        raise ValueError("limbs must be at least one, got none")
+    of = np.full(len(JOINTS), -1)  # the limb of the bone that ends in a joint, -1 for the torso and the root
+    for number, (name, bones) in enumerate(limbs.items()):
+        for bone in bones:
+            if bone not in BONES:
+                raise ValueError(f"limbs must be of {', '.join(BONES)}, got {bone!r} in {name!r}")
+            if of[JOINTS.index(bone)] >= 0:
+                raise ValueError(f"limbs must not share a bone, got {bone!r} twice, the second time in {name!r}")
+            of[JOINTS.index(bone)] = number
+    for joint in range(1, len(JOINTS)):
+        before = of[PARENTS[joint]]
+        if before >= 0 and of[joint] != before:
+            names = list(limbs)
+            raise ValueError(
+                f"limbs must hold all bones that hang from theirs, got {names[before]!r} without {JOINTS[joint]!r}"
+            )
+
+
+def rows_of(bones: Sequence[str]) -> NDArray[np.intp]:
+    """Return the numbers of bones, rows of a body's radii, by name."""
+    return np.array([BONES.index(bone) for bone in bones], dtype=np.intp)
+
+
+def turns_of(bones: Sequence[str]) -> NDArray[np.intp]:
+    """Return where in a pose (66,) the angles stand that turn bones."""
+    starts = [angle_index(JOINTS.index(bone)) for bone in bones]
+    return np.array([start + axis for start in starts if start >= 0 for axis in range(3)], dtype=np.intp)

@@ -1,0 +1,64 @@
+"""Work on many poses in parts that stay in a core's cache, shared by several threads."""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
+from functools import lru_cache
+from itertools import pairwise
+from threading import Lock
+from typing import Any
+
+PART = 384  # poses: what is decoded of them is 0.5 MB, and stays in the cache of a core
+SHARED_PART = 128  # where several threads take parts in turn: the last one to be done is waited for
+LEAST_SHARE = 16  # poses; a smaller share of work is not worth handing to another thread
+
+
+def parts_of(n: int, threads: int) -> list[slice]:
+    """Return slices that n rows are worked through in: about as long each, so many that each thread has a share."""
+    shares = max(min(threads, n // LEAST_SHARE), 1)
+    if shares == 1 and n <= PART:
+        return [slice(0, n)]
+    longest = PART if shares == 1 else SHARED_PART
+    count = shares * max(-(-n // (shares * longest)), 1)
+    return [slice(a, b) for a, b in pairwise(n * part // count for part in range(count + 1))]
+
+
+def work_through(
+    parts: Sequence[slice], threads: int, take: Callable[[slice], Sequence[Any]], work: Callable[..., None]
+) -> None:
+    """Call `work(part, *take(part))` for every part.
+
+    `take` is called by one thread at a time, so that it may be anybody's code; `work` by several at once.
+    """
+    if len(parts) == 1 or threads == 1:
+        for part in parts:
+            work(part, *take(part))
+        return
+    waiting, turn = iter(parts), Lock()
+
+    def take_turns() -> None:
+        while True:
+            with turn:
+                part = next(waiting, None)
+                if part is None:
+                    return
+                taken = take(part)
+            work(part, *taken)
+
+    # in a copy of this thread's context, where it is known who counts the poses
+    others = [_pool(threads).submit(copy_context().run, take_turns) for _ in range(min(threads, len(parts)) - 1)]
+    take_turns()
+    for other in others:
+        if not other.cancel():
+            other.result()
+
+
+@lru_cache(maxsize=1)
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads - 1, thread_name_prefix="posefit")
+
+
+if hasattr(os, "register_at_fork"):
+    # The threads of a pool do not live on in a forked child; without this its first call would wait for ever.
+    os.register_at_fork(after_in_child=_pool.cache_clear)

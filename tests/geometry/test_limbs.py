@@ -1,0 +1,41 @@
+"""Bones and angles of limbs."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from posefit.geometry.body import Body
+from posefit.geometry.limbs import LIMBS, check_limbs, rows_of, turns_of
+from posefit.geometry.skeleton import BONES, JOINTS, PARENTS
+from posefit.motion.library import average_skeleton
+
+
+def test_the_limbs_and_the_torso_are_all_bones_once() -> None:
+    check_limbs(LIMBS)
+    torso = {"lowerback", "upperback", "thorax"}
+    assert sorted([*torso, *(bone for bones in LIMBS.values() for bone in bones)]) == sorted(BONES)
+    # a limb is one chain: each bone but the first hangs from the one before it
+    for bones in LIMBS.values():
+        assert all(JOINTS[PARENTS[JOINTS.index(b)]] == a for a, b in pairwise(bones))
+
+
+@pytest.mark.parametrize("name", LIMBS)
+def test_a_limbs_angles_move_all_of_its_bones_and_no_other(name: str) -> None:
+    skeleton = Body.of(average_skeleton()).skeleton
+    pose = np.zeros(66)
+    pose[turns_of(LIMBS[name])] = 0.3
+    moved = np.abs(skeleton.joints(pose) - skeleton.joints(np.zeros(66))).max(axis=1) > 1e-9
+    assert set(np.flatnonzero(moved[1:])) == set(rows_of(LIMBS[name]))
+
+
+def test_limbs_that_do_not_hang_together_are_refused() -> None:
+    with pytest.raises(ValueError, match="limbs must be at least one"):
+        check_limbs({})
+    with pytest.raises(ValueError, match="got 'tail' in 'back'"):
+        check_limbs({"back": ["tail"]})
+    with pytest.raises(ValueError, match="must not share a bone, got 'lhand' twice, the second time in 'b'"):
+        check_limbs({"a": ["lhand"], "b": ["lhand"]})
+    with pytest.raises(ValueError, match="got 'forearm' without 'lwrist'"):
+        check_limbs({"forearm": ["lradius"], "hand": ["lhand"]})
+    check_limbs({"hand": ["lwrist", "lhand"], "toes": ["rtoes"]})
