@@ -25,7 +25,7 @@ def pixels_of(bits):
 def count_areas_of_all(chain, radii, view, observed, valid, poses, translations, areas):
     """Write the areas (n, silhouettes, 3) R, B, Y of poses (n, 66), each drawn once.
 
-    `observed` and `valid` are bit images (silhouettes, words, rows), observed within valid.
+    `observed` and `valid` are bit images (silhouettes, strips, words), observed within valid.
     """
     work = scratch(view, chain.parents.size, poses.shape[1])
     silhouettes = np.empty(observed.shape[0], np.uint64)
@@ -51,9 +51,9 @@ def count_areas_of_all(chain, radii, view, observed, valid, poses, translations,
 
 @jit
 def draw_bones(chain, radii, view, poses, translations, images, boxes):
-    """Write the bit images (n, words, rows) and boxes (n, 4) of poses (n, 66), whose bones have radii (n, 26, 2).
+    """Write the bit images (n, strips, words) and boxes (n, 4) of poses (n, 66), whose bones have radii (n, 26, 2).
 
-    A box is its first row, the row after its last, its first word and its last one, as `rasteriser` makes it.
+    A box is as `rasteriser` makes it.
     """
     work = scratch(view, chain.parents.size, poses.shape[1])
     for i in range(poses.shape[0]):
