@@ -10,13 +10,11 @@ into an error; POSEFIT_LOAD_SECONDS is how long each may take to load, 60 where 
 import os
 import sys
 import threading
-import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib.metadata import EntryPoint
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 import pluggy
 
@@ -31,8 +29,7 @@ SECONDS = 60.0  # as large libraries need on a slow disk
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Plugin(Generic[T]):
+class Plugin(NamedTuple, Generic[T]):
     """One entry point, and what became of it."""
 
     name: str
@@ -60,8 +57,8 @@ def load(
     """
     owners = dict(taken or {})
     plugins: list[Plugin[T]] = []
-    for point in sorted(points, key=_built_ins_first):
-        plugin = _plugin(point, specs, collected, named, variables, owners)
+    for owner, point in sorted(_owned(points), key=_built_ins_first):
+        plugin = _plugin(point, owner, specs, collected, named, variables, owners)
         plugins.append(plugin)
         if plugin.state == "broken":
             message = f"plugin {plugin.name!r} of {plugin.distribution} {plugin.version} is left out: {plugin.cause}"
@@ -74,13 +71,14 @@ def load(
 
 def _plugin(
     point: EntryPoint,
+    owner: tuple[str, str],
     specs: Any,
     collected: Callable[[Any, str, str], Iterable[T]],
     named: Callable[[T], str],
     variables: Mapping[str, str],
     owners: Mapping[str, str],
 ) -> Plugin[T]:
-    distribution, version = (point.dist.name, point.dist.version) if point.dist else ("unknown", "")
+    distribution, version = owner
     reason = _left_out(point.name, distribution, variables)
     if reason:
         return Plugin(point.name, distribution, version, "left out", reason)
@@ -101,6 +99,8 @@ def _plugin(
         cause = f"{type(error).__name__}: {error}"
         if isinstance(error, TimeoutError) and not error.args:
             cause = f"it must load within {seconds:g} s, and did not"
+        import traceback
+
         told = "".join(traceback.format_exception(error))
         return Plugin(point.name, distribution, version, "broken", cause, traceback=told)
     return Plugin(point.name, distribution, version, "loaded", offers=tuple(mine.values()))
@@ -132,8 +132,19 @@ def _told_late(label: str, seconds: float) -> Iterator[None]:
         timer.join()
 
 
-def _built_ins_first(point: EntryPoint) -> tuple[bool, str]:
-    return point.dist is None or point.dist.name != PROJECT, point.name
+def _owned(points: Iterable[EntryPoint]) -> Iterator[tuple[tuple[str, str], EntryPoint]]:
+    """Yield each entry point with the name and the version of its distribution, read once."""
+    known: dict[int, tuple[str, str]] = {}
+    for point in points:
+        dist = point.dist
+        if dist is not None and id(dist) not in known:
+            known[id(dist)] = dist.name, dist.version
+        yield known.get(id(dist), ("unknown", "")), point
+
+
+def _built_ins_first(owned: tuple[tuple[str, str], EntryPoint]) -> tuple[bool, str]:
+    (distribution, _), point = owned
+    return distribution != PROJECT, point.name
 
 
 def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:

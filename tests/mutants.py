@@ -50,6 +50,18 @@ MUTANTS = (
         "tests/sources/test_sapso.py::test_eq_7_velocities_of_the_first_population_keep_within_the_limits",
     ),
     Mutant(
+        "CMA-ES learns from the long way round a circle",
+        "plugins/posefit_evolution/cma.py",
+        (("if round_trip else proposals", "if False else proposals"),),
+        "tests/plugins/test_evolution.py::test_a_target_at_the_seam_of_a_circle_is_found[1]",
+    ),
+    Mutant(
+        "the covariance of CMA-ES follows its path however long the step size's is",
+        "posefit/evolution/kernels.py",
+        (("heeded = 1.0 if long / settled < (1.4 + 2.0 / (d + 1.0)) * chi else 0.0", "heeded = 1.0"),),
+        "tests/sources/test_hansen2016.py::test_h_sigma_stops_the_covariances_path_where_the_step_sizes_is_too_long",
+    ),
+    Mutant(
         "Wald's two error rates are swapped",
         "plugins/posefit_vsmm/switching.py",
         (
@@ -137,6 +149,36 @@ MUTANTS = (
         "tests/experiments/test_bench.py::test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths",
     ),
     Mutant(
+        "a smaller picture looks along the corners of blocks, not along its pixels' centres",
+        "posefit/silhouette/pyramid.py",
+        (("(camera.centre - first - 0.5) / factor + 0.5", "camera.centre / factor"),),
+        "tests/silhouette/test_pyramid.py::test_a_body_seen_small_is_the_body_drawn_at_full_size_and_looked_at_there",
+    ),
+    Mutant(
+        "a smaller silhouette is aligned to its own borders",
+        "posefit/silhouette/pyramid.py",
+        (('vars(coarse)["extent"]', 'vars(coarse)["other"]'),),
+        "tests/fitting/test_many.py::test_a_proposal_means_the_same_pose_at_every_size[aligned]",
+    ),
+    Mutant(
+        "a limb stays where another combination has another one",
+        "posefit/silhouette/several.py",
+        (("take_away(image[a:b], added[k, a:b])", "pass"),),
+        "tests/silhouette/test_limbs.py::test_any_combinations_in_any_order_do_so_too",
+    ),
+    Mutant(
+        "poses that another thread draws are counted for nobody",
+        "posefit/silhouette/sharing.py",
+        (("submit(copy_context().run, take_turns)", "submit(take_turns)"),),
+        "tests/silhouette/test_sharing.py::test_poses_that_other_threads_draw_are_counted_for_the_one_who_asked",
+    ),
+    Mutant(
+        "who was only seen small may cost less than who was seen whole",
+        "posefit/fitting/problem.py",
+        (("np.fmax(self._costs, np.fmax.reduce(costs))", "self._costs.copy()"),),
+        "tests/fitting/test_many.py::test_only_the_best_of_a_small_look_go_on_and_the_others_cost_no_less",
+    ),
+    Mutant(
         "the upper reach of `loose` is taken from the least training angle",
         "plugins/posefit_priors/loose.py",
         (("self.angles_high - most[self.loose]", "self.angles_high - least[self.loose]"),),
@@ -159,6 +201,30 @@ MUTANTS = (
         "envs/posefit_envs/track.py",
         (("self._follower.commit(proposal)", "self._follower.commit(0.5 * proposal)"),),
         "tests/envs/test_environments.py::test_track_proposals_mean_what_the_tracker_makes_of_them",
+    ),
+    Mutant(
+        "every scene's body is as thick as the first one's",
+        "envs/posefit_envs/kernels.py",
+        (("draw_pose(own, scenes.radii[i]", "draw_pose(own, scenes.radii[0]"),),
+        "tests/envs/test_stage.py::test_scenes_together_are_what_the_library_says_of_each_alone",
+    ),
+    Mutant(
+        "a vector environment hands out the pictures of the step before",
+        "envs/posefit_envs/stage.py",
+        (("np.empty_like(self._scenes.backdrops) if whole", "self._scenes.backdrops if whole"),),
+        "tests/envs/test_vector.py::test_a_vector_environment_equals_single_ones",
+    ),
+    Mutant(
+        "nobody waits for a process that compiles",
+        "posefit/arrays/compiling.py",
+        (("            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)\n", ""),),
+        "tests/arrays/test_compiling.py::test_two_processes_that_start_on_an_empty_cache_compile_each_function_once_in_all",
+    ),
+    Mutant(
+        "a bone's turn moves what hangs on its parent",
+        "plugins/posefit_vsmm/kernels.py",
+        (("0.5 if _HANGS[joint, j] else 0.0", "0.5 if _HANGS[pivot, j] else 0.0"),),
+        "tests/sources/test_vsmm_steps.py::test_the_points_are_projected_and_their_jacobian_is_right",
     ),
 )
 

@@ -13,13 +13,13 @@ Stable-Baselines3, and `check_vector_env` compares any vector environment with s
 
 | looking for | file |
 |---|---|
-| Fit-v0, alone and many at once | fit.py, fit_vector.py |
-| Track-v0, alone and many at once | track.py, track_vector.py |
+| Fit-v0, Track-v0 | fit.py, track.py |
 | Configure-v0: dynamic algorithm configuration | configure.py |
+| each of them many at once; seeds and masks of vector environments | vector/ |
 | the arguments; what an instance's number stands for (as in sweeps: `posefit.footage.instance`) | instance.py |
-| proposals become poses, costs and pictures; actions that are not allowed | search.py |
+| what is seen in a frame; actions that are not allowed | search.py |
+| proposals become poses, costs and pictures, in many scenes at once; compiled | stage.py, kernels.py |
 | what is rendered | drawing.py |
-| seeds and masks of vector environments | batch.py |
 | optimisers that search an environment; Stable-Baselines3 | driving.py, sb3.py |
 | a checker for vector environments | checker.py |
 """
@@ -40,14 +40,18 @@ __all__ = list(_HOME)
 register(
     id="posefit/Fit-v0",
     entry_point="posefit_envs.fit:FitEnv",
-    vector_entry_point="posefit_envs.fit_vector:FitVectorEnv",
+    vector_entry_point="posefit_envs.vector.fit:FitVectorEnv",
 )
 register(
     id="posefit/Track-v0",
     entry_point="posefit_envs.track:TrackEnv",
-    vector_entry_point="posefit_envs.track_vector:TrackVectorEnv",
+    vector_entry_point="posefit_envs.vector.track:TrackVectorEnv",
 )
-register(id="posefit/Configure-v0", entry_point="posefit_envs.configure:ConfigureEnv")
+register(
+    id="posefit/Configure-v0",
+    entry_point="posefit_envs.configure:ConfigureEnv",
+    vector_entry_point="posefit_envs.vector.configure:ConfigureVectorEnv",
+)
 
 
 def __getattr__(name: str) -> Any:

@@ -1,5 +1,6 @@
 """Does a vector environment do what single ones do? A checker for anyone's, since Gymnasium has none."""
 
+import copy
 from collections.abc import Callable
 from typing import Any
 
@@ -14,8 +15,8 @@ def check_vector_env(
     """Return nothing. Raises AssertionError where a vector environment and single ones from `make` come apart.
 
     Spaces, observations, rewards, ends, infos with their masks and the automatic reset are compared, step by step, with
-    the same actions; environment i is seeded with `seed` + i. `vector` has just been made, and its autoreset mode must
-    be NEXT_STEP or SAME_STEP.
+    the same actions; environment i is seeded with `seed` + i. What was returned must not change in the next step.
+    `vector` has just been made, and its autoreset mode must be NEXT_STEP or SAME_STEP.
     """
     n = vector.num_envs
     singles = [make() for _ in range(n)]
@@ -34,8 +35,10 @@ def check_vector_env(
     vector.action_space.seed(seed)
     for step in range(steps):
         actions = vector.action_space.sample()
+        returned = (observations, infos), copy.deepcopy((observations, infos))
         observations, rewards, terminated, truncated, infos = vector.step(actions)
         assert observations in vector.observation_space, f"step {step}: observations must lie in the observation space"
+        _same_later(f"step {step}", *returned)
         for i, single in enumerate(singles):
             where = f"environment {i}, step {step}"
             if ended[i]:  # NEXT_STEP: this step resets, and its action counts for nothing
@@ -57,6 +60,14 @@ def check_vector_env(
     vector.close()
     for single in singles:
         single.close()
+
+
+def _same_later(where: str, now: Any, then: Any) -> None:
+    """Compare what was returned a step ago, observations and infos, with its copy."""
+    _same(f"{where}: the observations before it", now[0], then[0])
+    for key, value in then[1].items():
+        if not key.startswith(("final_", "_final_")):  # objects, which a reset makes anew
+            _same(f"{where}: the info {key} before it", now[1][key], value)
 
 
 def _same(where: str, ours: Any, theirs: Any) -> None:

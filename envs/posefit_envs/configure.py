@@ -1,22 +1,25 @@
 """Configure-v0: dynamic algorithm configuration. The action steers a swarm that searches for the pose."""
 
-from typing import Any, Unpack
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Unpack
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import error, spaces
 from numpy.typing import NDArray
 
+from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import Episode
-from posefit_envs.instance import Arguments, approved, errors_in_degrees, select
+from posefit_envs.instance import Arguments, World, approved, select
 from posefit_envs.search import Doorkeeper
 from posefit_swarm.flock import Flock, speed_limits
 
 PARTICLES, ITERATIONS = 40, 60
 ACCELERATION, ALPHA, REDRAWS = 2.0, 0.15, 20  # as SAPSO's, but for fewer redraws
+FIRST = 1.0  # the temperature at which a first population is settled, where nothing is refused
 INERTIA = (0.0, 1.2)  # what the first number of an action stands for
 LOG_TEMPERATURE = (-3.0, 1.5)  # the second: powers of ten
 SPREAD = (0.0, 0.3)  # the third: standard deviations in half-ranges of the box
@@ -65,7 +68,8 @@ class ConfigureEnv(gym.Env[State, Any]):
     Terminates after `iterations` iterations. It is never truncated.
 
     ## Information
-    `best_cost`, `evaluations`, `error_degrees` of the best pose against the truth, and `instance`; a reset too.
+    `best_cost`, `evaluations`, `instance`, and unless `errors=False` `error_degrees`, of the best pose against the
+    truth; a reset too.
 
     ## Arguments
     As in `Fit-v0`, with `particles=40` and `iterations=60` instead of `target_cost` and `max_evaluations`.
@@ -73,6 +77,7 @@ class ConfigureEnv(gym.Env[State, Any]):
     ## Version History
     - v0: first version. Before its release its instances changed: number n is now the motion, speed, phase and view of
       a sweep's instance n, and 0 the motion as it is. Results from before cannot be compared with later ones.
+      Its vector form and `errors` came later, before its release as well, and change nothing by default.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
@@ -86,44 +91,48 @@ class ConfigureEnv(gym.Env[State, Any]):
         **arguments: Unpack[Arguments],
     ) -> None:
         check_mode(render_mode)
-        for name, value in (("particles", particles), ("iterations", iterations)):
-            approved(whole, name, value, 2)
+        check_swarm(particles, iterations)
         self.render_mode = render_mode
         self._selection = select(**arguments)
         self.world = self._selection.world
         self._particles, self._iterations = int(particles), int(iterations)
-        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
-        self.observation_space = spaces.Box(0.0, 1.0, (8,), np.float32)
+        self.action_space, self.observation_space = spaces_of_swarm()  # type: ignore[assignment]
         self._door = Doorkeeper(3)
-        self._search: _Search | None = None
+        self._search: SteeredSwarm | None = None
         self._screen = Screen(self.metadata["render_fps"])
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[State, dict[str, Any]]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        episode = Episode(self.world, number, self._particles * (self._iterations + 1))
-        rng = np.random.default_rng(int(self.np_random.integers(2**63)))
-        self._search = _Search(episode, rng, self._particles, self._iterations)
+        search = self._search = SteeredSwarm(self.world, number, self.np_random, self._particles, self._iterations)
+        search.settle(search.problem.evaluate(search.flock.moved), FIRST)
         if self.render_mode == "human":
             self.render()
-        return self._search.state(), self._search.info()
+        return standings([search]).states[0], self._info(search)
 
     def step(self, action: Any) -> tuple[State, float, bool, bool, dict[str, Any]]:
         """Fly one iteration."""
         search = self._current()
         if search.left == 0:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
-        share = 0.5 * (self._door.proposals(action, (3,)) + 1.0)
-        inertia, power, spread = (
-            low + float(part) * (high - low)
-            for part, (low, high) in zip(share, (INERTIA, LOG_TEMPERATURE, SPREAD), strict=True)
-        )
+        (inertia,), (temperature,), (spread,) = steering(self._door.proposals(action, (3,))[None])
         before = search.best
-        search.fly(inertia, 10.0**power, spread)
+        search.fly(inertia)
+        flock, space = search.flock, search.episode.space
+        if spread > 0.0:
+            flock.moved = space.scatter(search.rng, flock.moved, np.full(space.dimensions, spread))
+        search.settle(search.problem.evaluate(flock.moved), temperature)
         if self.render_mode == "human":
             self.render()
-        return search.state(), before - search.best, search.left == 0, False, search.info()
+        return standings([search]).states[0], before - search.best, search.left == 0, False, self._info(search)
+
+    def _info(self, search: "SteeredSwarm") -> dict[str, Any]:
+        info = {"best_cost": search.best, "evaluations": search.used, "instance": search.episode.instance.number}
+        if self._selection.errors:
+            poses, _ = search.episode.space.decode(search.leader[None])
+            info |= search.episode.instance.errors(0, poses[0])
+        return info
 
     def render(self) -> Any:
         """Return the picture (height, width, 3) of the best pose, or show it, as `render_mode` asks."""
@@ -139,63 +148,103 @@ class ConfigureEnv(gym.Env[State, Any]):
         """Close the window, if there is one."""
         self._screen.close()
 
-    def _current(self) -> "_Search":
+    def _current(self) -> "SteeredSwarm":
         if self._search is None:
             raise error.ResetNeeded("reset must come before anything else")
         return self._search
 
 
-class _Search:
-    """A swarm in the middle of its search."""
+class SteeredSwarm:
+    """A swarm in the middle of its search: whoever holds it has its moves evaluated, and settles them."""
 
-    def __init__(self, episode: Episode, rng: np.random.Generator, particles: int, iterations: int) -> None:
-        self.episode, self._rng = episode, rng
-        self.problem = episode.scenery.problem(episode.space)
-        limits = speed_limits(episode.space, ALPHA, "symmetric")
-        self._flock = Flock(episode.space, rng, particles, limits, REDRAWS, "dimension")
-        self._iterations, self.left, self.used = iterations, iterations, 0
-        self._evaluate(1.0)
+    def __init__(
+        self, world: World, number: int, generator: np.random.Generator, particles: int, iterations: int
+    ) -> None:
+        self.episode = Episode(world, number, particles * (iterations + 1))
+        self.rng = np.random.default_rng(int(generator.integers(2**63)))
+        space = self.episode.space
+        self.flock = Flock(space, self.rng, particles, speed_limits(space, ALPHA, "symmetric"), REDRAWS, "dimension")
+        self.left, self.used, self._iterations = iterations, 0, iterations
+
+    @property
+    def problem(self) -> PoseProblem:
+        """The problem that is searched."""
+        return self.episode.scenery.problem(self.episode.space)
 
     @property
     def best(self) -> float:
-        return float(self._flock.best_cost.min())
+        """The lowest cost so far."""
+        return float(self.flock.best_cost.min())
 
     @property
     def leader(self) -> Array:
-        return np.array(self._flock.best[self._flock.best_cost.argmin()])
+        """The proposal (d,) that costs so little."""
+        return np.array(self.flock.best[self.flock.best_cost.argmin()])
 
-    def _evaluate(self, temperature: float) -> None:
-        self._costs = self.problem.evaluate(self._flock.moved)
-        self._accepted, _ = self._flock.settle(self._flock.moved, self._costs, temperature)
-        self.used += len(self._costs)
+    @property
+    def budget(self) -> float:
+        """The share of the iterations that is left."""
+        return self.left / self._iterations
 
-    def fly(self, inertia: float, temperature: float, spread: float) -> None:
-        flock, space = self._flock, self.episode.space
-        flock.fly(inertia, ACCELERATION, self.leader)
-        if spread > 0.0:
-            flock.moved = space.scatter(self._rng, flock.moved, np.full(space.dimensions, spread))
-        self._evaluate(temperature)
+    def fly(self, inertia: float) -> None:
+        """Move every particle, for another iteration."""
+        self.flock.fly(inertia, ACCELERATION, self.leader)
         self.left -= 1
 
-    def state(self) -> State:
-        flock, costs = self._flock, self._costs / 100.0
-        values = [
-            self.best / 100.0,
-            costs.min(),
-            costs.mean(),
-            costs.std(),
-            flock.best.std(axis=0).mean(),
-            np.abs(flock.velocity).mean() / ALPHA,
-            self._accepted.mean(),
-            self.left / self._iterations,
-        ]
-        return np.clip(np.array(values, dtype=np.float32), 0.0, 1.0)
+    def settle(self, costs: Array, temperature: float) -> None:
+        """Accept or refuse each particle's move, which has these costs (particles,)."""
+        self.costs = costs
+        self.accepted, _ = self.flock.settle(self.flock.moved, costs, temperature)
+        self.used += len(costs)
 
-    def info(self) -> dict[str, Any]:
-        poses, _ = self.problem.decode(self.leader[None])
-        return {
-            "best_cost": self.best,
-            "evaluations": self.used,
-            "error_degrees": float(errors_in_degrees(self.episode.instance.truth, 0, poses)[0]),
-            "instance": self.episode.instance.number,
-        }
+
+def steering(actions: Array) -> tuple[list[float], list[float], list[float]]:
+    """Return the inertias, temperatures and deviations of kicks that actions (n, 3) in [-1, 1] stand for."""
+    low, high = np.array([INERTIA, LOG_TEMPERATURE, SPREAD]).T
+    inertias, powers, spreads = (low + 0.5 * (actions + 1.0) * (high - low)).T.tolist()
+    return inertias, [10.0**power for power in powers], spreads
+
+
+class Standings(NamedTuple):
+    """How far swarms have come."""
+
+    best: Array  # (n,) lowest costs so far
+    leaders: Array  # (n, d) the proposals that cost so little
+    states: State  # (n, 8) observations
+
+
+def standings(swarms: Sequence[SteeredSwarm]) -> Standings:
+    """Return how far swarms have come that have equally many particles."""
+    flocks, n = [swarm.flock for swarm in swarms], len(swarms)
+    costs, bests = _stacked([swarm.costs for swarm in swarms]) / 100.0, _stacked([flock.best for flock in flocks])
+    best_costs = _stacked([flock.best_cost for flock in flocks])
+    leading = best_costs.argmin(axis=1)
+    best = best_costs[np.arange(n), leading]
+    values = [
+        best / 100.0,
+        costs.min(axis=1),
+        costs.mean(axis=1),
+        costs.std(axis=1),
+        bests.std(axis=1).mean(axis=1),
+        np.abs(_stacked([flock.velocity for flock in flocks])).reshape(n, -1).mean(axis=1) / ALPHA,
+        _stacked([swarm.accepted for swarm in swarms]).mean(axis=1),
+        [swarm.budget for swarm in swarms],
+    ]
+    states = np.clip(np.array(values, dtype=np.float32).T, 0.0, 1.0)
+    return Standings(best, bests[np.arange(n), leading], states)
+
+
+def _stacked(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+    """Return equal arrays (n, ...) as one; of a single one no copy is made, as its view takes a tenth of the time."""
+    return arrays[0][None] if len(arrays) == 1 else np.stack(arrays)
+
+
+def spaces_of_swarm() -> tuple[spaces.Box, spaces.Box]:
+    """Return the action space and the observation space."""
+    return spaces.Box(-1.0, 1.0, (3,), np.float32), spaces.Box(0.0, 1.0, (8,), np.float32)
+
+
+def check_swarm(particles: int, iterations: int) -> None:
+    """Return nothing. Raises ArgumentError where a number makes no sense."""
+    for name, value in (("particles", particles), ("iterations", iterations)):
+        approved(whole, name, value, 2)

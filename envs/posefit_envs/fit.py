@@ -10,8 +10,9 @@ from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.check import finite_number, whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
-from posefit_envs.instance import Arguments, Instance, World, approved, errors_in_degrees, instance, select
-from posefit_envs.search import Doorkeeper, Evaluated, Image, look
+from posefit_envs.instance import Arguments, Instance, World, approved, instance, select
+from posefit_envs.search import Doorkeeper, Image
+from posefit_envs.stage import Evaluated, Stage
 
 MAX_EVALUATIONS = 200
 TARGET_COST = 2.0
@@ -53,8 +54,8 @@ class FitEnv(gym.Env[Image, Any]):
     Terminates when the best cost is at or below `target_cost`; truncates after `max_evaluations` proposals.
 
     ## Information
-    `cost`, `best_cost`, `evaluations`, `error_degrees` of the proposal against the truth, `areas` (views, 3) R, B, Y in
-    pixels, and `instance`; a reset gives `instance` alone.
+    `cost`, `best_cost`, `evaluations`, `areas` (views, 3) R, B, Y in pixels, `instance`, and unless `errors=False`
+    `error_degrees` of the proposal against the truth; a reset gives `instance` alone.
 
     ## Arguments
     - `motion="walk"`: a built-in motion, or an .amc or .bvh file.
@@ -66,11 +67,13 @@ class FitEnv(gym.Env[Image, Any]):
     - `noise=None`: what is wrong with the silhouette, such as `{"holes": 0.3, "shadow": 0.5}`; see
       `posefit.silhouette.corruption`.
     - `mismatch_percent=0.0`: how far bones and radii of the fitted body are off at most.
+    - `errors=True`: whether infos hold errors against the truth; a learner that does not read them may do without.
     - `target_cost=2.0`, `max_evaluations=200`.
 
     ## Version History
     - v0: first version. Before its release its instances changed: number n is now the motion, speed, phase and view of
       a sweep's instance n, and 0 the motion as it is. Results from before cannot be compared with later ones.
+      `errors` came later, before its release as well, and changes nothing by default.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
@@ -92,6 +95,7 @@ class FitEnv(gym.Env[Image, Any]):
         self.action_space, self.observation_space = spaces_of(self.world)  # type: ignore[assignment]
         self._shape = action_shape(self.world)
         self._door = Doorkeeper(self._shape[0])
+        self._stage = Stage(self.world, 1)
         self._episode: Episode | None = None
         self._screen = Screen(self.metadata["render_fps"])
 
@@ -105,6 +109,7 @@ class FitEnv(gym.Env[Image, Any]):
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
         self._episode = Episode(self.world, number, self._most)
+        self._stage.put(0, self._episode.scenery, self._episode.space)
         if self.render_mode == "human":
             self.render()
         return self._episode.scenery.picture, {"instance": number}
@@ -115,8 +120,8 @@ class FitEnv(gym.Env[Image, Any]):
         if episode.ended:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
         proposal = self._door.proposals(action, self._shape)
-        outcome = look(episode.scenery, episode.space, proposal[None])
-        info = episode.take(outcome, 0)
+        outcome = self._stage.look(proposal[None], self._stage.everyone)
+        info = episode.take(outcome, self._selection.errors)
         terminated = episode.best_cost <= self._target
         truncated = not terminated and episode.evaluations >= self._most
         episode.ended = terminated or truncated
@@ -154,20 +159,20 @@ class Episode:
         self.pose: Array | None = None
         self.translation: Array | None = None
 
-    def take(self, outcome: Evaluated, row: int) -> dict[str, Any]:
-        """Remember a proposal's outcome and return its information."""
-        self.cost = float(outcome.costs[row])
+    def take(self, outcome: Evaluated, errors: bool) -> dict[str, Any]:
+        """Remember a proposal's outcome and return its information, with `errors` against the truth or without."""
+        self.cost = float(outcome.costs[0])
         self.best_cost = min(self.best_cost, self.cost)
         self.evaluations += 1
-        self.pose, self.translation = outcome.poses[row], outcome.translations[row]
-        return {
+        self.pose, self.translation = outcome.poses[0], outcome.translations[0]
+        info = {
             "cost": self.cost,
             "best_cost": self.best_cost,
             "evaluations": self.evaluations,
-            "error_degrees": float(errors_in_degrees(self.instance.truth, 0, self.pose[None])[0]),
-            "areas": outcome.areas[row].copy(),
+            "areas": outcome.areas[0],
             "instance": self.instance.number,
         }
+        return info | self.instance.errors(0, self.pose) if errors else info
 
     @property
     def label(self) -> str:

@@ -6,7 +6,7 @@ The motion, its speed and phase, and from where it is seen, are those of a sweep
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, TypedDict
 
 import numpy as np
@@ -15,6 +15,7 @@ from gymnasium import error
 from posefit import Body, Camera, Motion, Observation, SearchSpace, Silhouette, Task
 from posefit.arrays import Array
 from posefit.fitting.check import finite_number
+from posefit.fitting.metrics import pose_error_degrees
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.footage.instance import motion_of_instance, variation
@@ -56,7 +57,7 @@ class World:
     @property
     def body(self) -> Body:
         """The true body."""
-        return Body.of(_source(self.motion).skeleton)
+        return _body(self.motion)
 
     @property
     def learned(self) -> Prior:
@@ -77,15 +78,17 @@ class Arguments(TypedDict, total=False):
     size: Sequence[int]
     noise: Mapping[str, float] | None
     mismatch_percent: float
+    errors: bool
 
 
 @dataclass(frozen=True)
 class Selection:
-    """A world, and which of its instances come."""
+    """A world, which of its instances come, and whether their infos hold errors against the truth."""
 
     world: World
     instance: int | None
     split: str
+    errors: bool
 
     def number(self, options: Mapping[str, Any] | None, generator: Callable[[], np.random.Generator]) -> int:
         """Return the number of the next instance: of a reset's options, the one that is fixed, or one drawn.
@@ -109,6 +112,7 @@ def select(
     size: Sequence[int] = SIZE,
     noise: Mapping[str, float] | None = None,
     mismatch_percent: float = 0.0,
+    errors: bool = True,
     **unknown: Any,
 ) -> Selection:
     """Return what the arguments describe.
@@ -135,6 +139,8 @@ def select(
         raise ArgumentError(f"mismatch_percent must lie in 0 to 50, got {mismatch_percent}")
     if isinstance(train, str) or not all(isinstance(one, str) for one in train or ()):
         raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {quoted(train)}")
+    if not isinstance(errors, bool):
+        raise ArgumentError(f"errors must be true or false, got {quoted(errors)}")
     made = World(
         motion,
         views,
@@ -149,7 +155,7 @@ def select(
         assert made.learned is not None
     except (ValueError, ImportError) as mistake:  # unknown motions and priors are named there
         raise ArgumentError(str(mistake)) from None
-    return Selection(made, instance, split)
+    return Selection(made, instance, split, errors)
 
 
 def _unknown(name: str) -> str:
@@ -205,6 +211,11 @@ def _source(motion: str) -> Motion:
 
 
 @lru_cache(maxsize=32)
+def _body(motion: str) -> Body:
+    return Body.of(_source(motion).skeleton)
+
+
+@lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
     from posefit.motion import library
 
@@ -230,6 +241,15 @@ class Instance:
         if frame not in self._sceneries:
             self._sceneries[frame] = Scenery(self.task, self.observations[frame])
         return self._sceneries[frame]
+
+    @cached_property
+    def joints(self) -> Array:
+        """The true joints (T, 27, 3) in metres, in the world."""
+        return self.truth.skeleton.joints(self.truth.poses, self.truth.translations)
+
+    def errors(self, frame: int, pose: Array) -> dict[str, float]:
+        """Return by its name in an info the error of a pose (66,) against the truth of a frame."""
+        return {"error_degrees": float(pose_error_degrees(self.truth.poses[frame][None], pose[None])[0])}
 
     def space(self, prior: Prior) -> SearchSpace:
         """Return the box in which the first frame's pose is sought."""
@@ -268,10 +288,3 @@ def _truth(name: str, number: int, frames: int) -> Motion:
         return motion_of_instance(name if name in library.names() else _source(name), number, frames=frames, fps=FPS)
     except ValueError as mistake:  # a file that is too short
         raise error.Error(str(mistake)) from None
-
-
-def errors_in_degrees(truth: Motion, frame: int, poses: Array) -> Array:
-    """Return the error (n,) in degrees of poses (n, 66) in a frame. SAPSO (8)."""
-    from posefit.fitting.metrics import pose_error_degrees
-
-    return pose_error_degrees(np.broadcast_to(truth.poses[frame], poses.shape), poses)

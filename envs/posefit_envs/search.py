@@ -1,7 +1,6 @@
-"""Proposals become poses, costs and pictures: for one environment or for many at once, with the same bits."""
+"""What is seen in a frame, and actions that are allowed."""
 
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,8 +9,6 @@ from numpy.typing import NDArray
 
 from posefit import Observation, PoseProblem, SearchSpace, Task
 from posefit.arrays import Array
-from posefit.fitting.alignment import align
-from posefit.silhouette.cost import paint
 
 Image = NDArray[np.uint8]  # (height, width, 2 views): observed, body, observed, body, ...
 BODY = 0xFF00 if sys.byteorder == "little" else 0x00FF  # the byte of a pixel's pair that shows the body
@@ -38,37 +35,6 @@ class Scenery:
     def problem(self, space: SearchSpace) -> PoseProblem:
         """Return the problem of finding the pose in a space."""
         return PoseProblem(self.task.body, self.task.cameras, self.observation.silhouettes, space, blank=True)
-
-
-@dataclass(frozen=True, eq=False)
-class Evaluated:
-    """What proposals came to, a row each."""
-
-    poses: Array  # (n, 66)
-    translations: Array  # (n, 3)
-    costs: Array  # (n,)
-    areas: NDArray[np.int64]  # (n, views, 3)
-    pictures: Image  # (n, height, width, 2 views)
-
-
-def look(scenery: Scenery, space: SearchSpace, proposals: Array) -> Evaluated:
-    """Return what proposals (n, d) of one space come to."""
-    poses, translations = space.decode(proposals)
-    return look_at(scenery, scenery.problem(space), poses, translations)
-
-
-def look_at(scenery: Scenery, problem: PoseProblem, poses: Array, translations: Array) -> Evaluated:
-    """Return what poses (n, 66), not aligned yet, come to."""
-    task, silhouettes = scenery.task, scenery.observation.silhouettes
-    if problem.space.translation == "aligned":
-        translations = align(task.body, task.cameras, silhouettes, poses, translations)
-    pixels = np.empty((len(poses), *scenery.backdrop.shape), dtype=np.uint16)
-    pixels[:] = scenery.backdrop
-    counts = [
-        paint(task.body, camera, silhouette, poses, translations, pixels[..., k], BODY)
-        for k, (camera, silhouette) in enumerate(zip(task.cameras, silhouettes, strict=True))
-    ]
-    return Evaluated(poses, translations, problem.combined(counts), np.stack(counts, axis=1), pixels.view(np.uint8))
 
 
 class Doorkeeper:
@@ -100,11 +66,3 @@ class Doorkeeper:
                 self._said = True
             np.clip(proposals, -1.0, 1.0, out=proposals)
         return proposals
-
-
-def distinct(things: Sequence[object], rows: Sequence[int]) -> dict[int, list[int]]:
-    """Return the rows that share one thing, by the thing's identity."""
-    groups: dict[int, list[int]] = {}
-    for row in rows:
-        groups.setdefault(id(things[row]), []).append(row)
-    return groups

@@ -1,6 +1,5 @@
 """Track-v0: a sequence of silhouettes, some proposals for each."""
 
-from dataclasses import replace
 from typing import Any, Unpack
 
 import gymnasium as gym
@@ -14,8 +13,9 @@ from posefit.fitting.check import whole
 from posefit.fitting.tracker import Follower, Prediction
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import action_shape, check_budget, spaces_of
-from posefit_envs.instance import Arguments, Instance, World, approved, errors_in_degrees, instance, select
-from posefit_envs.search import Doorkeeper, Evaluated, Image, Scenery, look, look_at
+from posefit_envs.instance import Arguments, Instance, World, approved, instance, select
+from posefit_envs.search import Doorkeeper, Image
+from posefit_envs.stage import Evaluated, Stage
 
 FRAMES = 20
 EVALUATIONS = 100  # a frame
@@ -45,10 +45,10 @@ class TrackEnv(gym.Env[Image, Any]):
     Terminates when the last frame's pose is committed. It is never truncated.
 
     ## Information
-    `cost`, `best_cost`, `evaluations` of the frame, `error_degrees` of the proposal, `areas` (views, 3), `frame`,
-    `instance`. The step that commits a pose adds `committed_frame`, `committed_cost`, `committed_pose` (66,),
-    `committed_error_degrees` and `committed_mpjpe_mm`; `frame` is then the next one. A reset gives `instance` and
-    `frame`.
+    `cost`, `best_cost`, `evaluations` of the frame, `areas` (views, 3), `frame`, `instance`, and unless `errors=False`
+    `error_degrees` of the proposal. The step that commits a pose adds `committed_frame`, `committed_cost`,
+    `committed_pose` (66,), and unless `errors=False` `committed_error_degrees` and `committed_mpjpe_mm`; `frame` is
+    then the next one. A reset gives `instance` and `frame`.
 
     ## Arguments
     As in `Fit-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `target_cost` and `max_evaluations`.
@@ -56,6 +56,7 @@ class TrackEnv(gym.Env[Image, Any]):
     ## Version History
     - v0: first version. Before its release its instances changed: number n is now the motion, speed, phase and view of
       a sweep's instance n, and 0 the motion as it is. Results from before cannot be compared with later ones.
+      `errors` came later, before its release as well, and changes nothing by default.
     """
 
     metadata = {"render_modes": list(MODES), "render_fps": 30}  # noqa: RUF012, as Gymnasium has it
@@ -78,41 +79,50 @@ class TrackEnv(gym.Env[Image, Any]):
         self.action_space, self.observation_space = spaces_of(self.world)  # type: ignore[assignment]
         self._shape = action_shape(self.world)
         self._door = Doorkeeper(self._shape[0])
-        self._course: TrackEpisode | None = None
+        self._stage = Stage(self.world, 1)
+        self._episode: TrackEpisode | None = None
         self._screen = Screen(self.metadata["render_fps"])
 
     @property
     def search_space(self) -> SearchSpace:
         """The space of the current frame. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return self._current().space
+        return self._current().passage.space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Image, dict[str, Any]]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        self._course = TrackEpisode(self.world, number, self._frames, self._most)
+        passage = Passage(self.world, number, self._frames, self._most)
+        self._episode = TrackEpisode(passage, self._most, self._selection.errors)
+        self._stage.put(0, passage.scenery, passage.space)
         if self.render_mode == "human":
             self.render()
-        return self._course.scenery.picture, {"instance": number, "frame": 0}
+        return passage.scenery.picture, {"instance": number, "frame": 0}
 
     def step(self, action: Any) -> tuple[Image, float, bool, bool, dict[str, Any]]:
         """Propose a pose for the current frame."""
-        course = self._current()
-        if course.ended:
+        episode, stage = self._current(), self._stage
+        passage, frame = episode.passage, episode.passage.frame
+        if passage.ended:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
         proposal = self._door.proposals(action, self._shape)
-        outcome = look(course.scenery, course.space, proposal[None])
-        picture, info = course.take(proposal, outcome, 0)
+        outcome = stage.look(proposal[None], stage.everyone)
+        info = episode.take(proposal, outcome)
+        if passage.frame != frame:
+            assert episode.pose is not None
+            assert episode.place is not None
+            stage.put(0, passage.scenery, passage.space)
+            stage.show(episode.pose[None], episode.place[None], stage.everyone, outcome.pictures)
         if self.render_mode == "human":
             self.render()
-        return picture, -info["cost"], course.ended, False, info
+        return outcome.pictures[0], -info["cost"], passage.ended, False, info
 
     def render(self) -> Any:
         """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
         if self.render_mode is None:
             return None
-        course = self._current()
-        picture = portray(course.scenery, course.pose, course.place, course.label)
+        episode = self._current()
+        picture = portray(episode.passage.scenery, episode.pose, episode.place, episode.label)
         return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
 
     def close(self) -> None:
@@ -120,69 +130,33 @@ class TrackEnv(gym.Env[Image, Any]):
         self._screen.close()
 
     def _current(self) -> "TrackEpisode":
-        if self._course is None:
+        if self._episode is None:
             raise error.ResetNeeded("reset must come before anything else")
-        return self._course
+        return self._episode
 
 
-class TrackEpisode:
-    """The state of one sequence that is followed."""
+class Passage:
+    """A sequence that is followed, as far as it has come: the frame, its scenery, and the space of its pose."""
 
     def __init__(self, world: World, number: int, frames: int, evaluations: int) -> None:
         self.instance: Instance = instance(world, number, frames, evaluations)
         self._follower = Follower(self.instance.task, world.learned, Prediction())
-        self._frames, self._most, self.frame, self.ended = frames, evaluations, 0, False
-        self.pose: Array | None = None
-        self.place: Array | None = None
-        self.cost = np.inf
+        self._frames, self.frame, self.ended = frames, 0, False
         self._enter()
 
     def _enter(self) -> None:
         """Begin with the current frame."""
         self.scenery = self.instance.scenery(self.frame)
         self.space = self._follower.space(self.instance.observations[self.frame])
-        self.best_cost, self.evaluations = np.inf, 0
-        self._best: tuple[Array, Array, Array] | None = None
 
-    def take(self, proposal: Array, outcome: Evaluated, row: int) -> tuple[Image, dict[str, Any]]:
-        """Remember a proposal's outcome; return the picture to observe and the information."""
-        self.cost = float(outcome.costs[row])
-        self.pose, self.place = outcome.poses[row], outcome.translations[row]
-        self.evaluations += 1
-        if self.cost < self.best_cost:
-            self.best_cost, self._best = self.cost, (proposal.copy(), self.pose, self.place)
-        info = {
-            "cost": self.cost,
-            "best_cost": self.best_cost,
-            "evaluations": self.evaluations,
-            "error_degrees": float(errors_in_degrees(self.instance.truth, self.frame, self.pose[None])[0]),
-            "areas": outcome.areas[row].copy(),
-            "instance": self.instance.number,
-        }
-        picture = outcome.pictures[row]
-        if self.evaluations >= self._most:
-            info |= self._commit()
-            if not self.ended:
-                assert self.pose is not None
-                assert self.place is not None
-                picture = paint_pose(self.scenery, self.space, self.pose, self.place)
-        return picture, info | {"frame": self.frame}
-
-    def _commit(self) -> dict[str, Any]:
-        """Commit the best pose and go on to the next frame, if there is one."""
-        assert self._best is not None
-        proposal, self.pose, self.place = self._best
-        truth, frame = self.instance.truth, self.frame
-        skeleton = self.instance.task.body.skeleton
-        ours = skeleton.joints(self.pose[None], np.asarray(self.place)[None])
-        theirs = truth.skeleton.joints(truth.poses[frame][None], truth.translations[frame][None])
-        info = {
-            "committed_frame": frame,
-            "committed_cost": self.best_cost,
-            "committed_pose": self.pose.copy(),
-            "committed_error_degrees": float(errors_in_degrees(truth, frame, self.pose[None])[0]),
-            "committed_mpjpe_mm": float(metrics.mpjpe_mm(theirs, ours)[0]),
-        }
+    def commit(self, proposal: Array, pose: Array, place: Array, cost: float, errors: bool) -> dict[str, Any]:
+        """Commit the best pose, go on to the next frame, if there is one, and return what is said of it."""
+        frame, made = self.frame, self.instance
+        info = {"committed_frame": frame, "committed_cost": cost, "committed_pose": pose.copy()}
+        if errors:
+            ours = made.task.body.skeleton.joints(pose[None], place[None])
+            info |= {f"committed_{name}": error for name, error in made.errors(frame, pose).items()}
+            info["committed_mpjpe_mm"] = float(metrics.mpjpe_mm(made.joints[frame][None], ours)[0])
         self._follower.commit(proposal)
         self.ended = frame + 1 >= self._frames
         if not self.ended:
@@ -190,16 +164,55 @@ class TrackEpisode:
             self._enter()
         return info
 
+
+class TrackEpisode:
+    """The state of one sequence that is followed."""
+
+    def __init__(self, passage: Passage, evaluations: int, errors: bool) -> None:
+        self.passage, self._most, self._errors = passage, evaluations, errors
+        self.pose: Array | None = None
+        self.place: Array | None = None
+        self.cost = np.inf
+        self._enter()
+
+    def _enter(self) -> None:
+        self.best_cost, self.evaluations = np.inf, 0
+        self._best: tuple[Array, Array, Array] | None = None
+
+    def take(self, proposal: Array, outcome: Evaluated) -> dict[str, Any]:
+        """Remember a proposal's outcome and return its information; commit the best where the frame's budget ends."""
+        passage = self.passage
+        self.cost = float(outcome.costs[0])
+        self.pose, self.place = outcome.poses[0], outcome.translations[0]
+        self.evaluations += 1
+        if self.cost < self.best_cost:
+            self.best_cost, self._best = self.cost, (proposal.copy(), self.pose, self.place)
+        info = {
+            "cost": self.cost,
+            "best_cost": self.best_cost,
+            "evaluations": self.evaluations,
+            "areas": outcome.areas[0],
+            "instance": passage.instance.number,
+        }
+        if self._errors:
+            info |= passage.instance.errors(passage.frame, self.pose)
+        if self.evaluations >= self._most:
+            assert self._best is not None
+            best, self.pose, self.place = self._best
+            info |= passage.commit(best, self.pose, self.place, self.best_cost, self._errors)
+            if not passage.ended:
+                self._enter()
+        return info | {"frame": passage.frame}
+
     @property
     def label(self) -> str:
         """What is written into the picture."""
-        if self.pose is None:
-            return f"instance {self.instance.number}, frame {self.frame}"
-        best = "" if np.isinf(self.best_cost) else f", best {self.best_cost:.1f}"
-        return f"frame {self.frame}, cost {self.cost:.1f}{best}"
+        return track_label(self.passage, None if self.pose is None else self.cost, self.best_cost)
 
 
-def paint_pose(scenery: Scenery, space: SearchSpace, pose: Array, place: Array) -> Image:
-    """Return the picture (height, width, 2 views) of a frame with a pose that stays where it is."""
-    still = scenery.problem(replace(space, translation="known", anchor=place))
-    return np.array(look_at(scenery, still, pose[None], place[None]).pictures[0])
+def track_label(passage: Passage, cost: float | None, best_cost: float) -> str:
+    """Return what is written into a picture, where the last proposal's cost is None before the first one."""
+    if cost is None:
+        return f"instance {passage.instance.number}, frame {passage.frame}"
+    best = "" if np.isinf(best_cost) else f", best {best_cost:.1f}"
+    return f"frame {passage.frame}, cost {cost:.1f}{best}"

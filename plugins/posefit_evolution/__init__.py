@@ -1,7 +1,8 @@
-"""Evolution strategies for posefit: `cma`, on the library cmaes.
+"""Evolution strategies for posefit: `cma`.
 
 `cma.CMAES` is covariance matrix adaptation after Hansen's tutorial (2016), with the restarts of Auger and Hansen
-(2005), in a box whose constraints it keeps. `pycma`, an adapter, has the other implementation.
+(2005), in a box whose constraints it keeps; the strategy itself is `posefit.evolution`. `pycma`, an adapter, has the
+other implementation.
 
 >>> import posefit
 >>> track = posefit.track("walk", optimiser="cma", frames=(0, 3))

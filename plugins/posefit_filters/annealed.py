@@ -5,11 +5,13 @@ J. Deutscher, I. Reid, Articulated body motion capture by stochastic search, Int
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.check import at_least, between, positive
-from posefit_filters.kernels import sharpness, systematic, weigh
+from posefit_filters.kernels import sharpness
+from posefit_filters.resampling import systematic, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10
@@ -77,7 +79,7 @@ class Annealed:
         self._particles = space.scatter(self._rng, moved, spread)  # DEUTSCHER2005 (next frame)
         self._space, self._layer = space, 0
 
-    def _survivors(self) -> tuple[Array, Array]:
+    def _survivors(self) -> tuple[NDArray[np.int64], Array]:
         """Return which rows (n,) survive, and the weights (n,) of all."""
         weights = weigh(self._costs, sharpness(self._costs, self._survival))
         return systematic(weights, self._rng.random()), weights

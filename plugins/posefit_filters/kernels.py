@@ -1,6 +1,6 @@
-"""From costs to weights, and from weights to the particles that survive, in numba: plain functions over arrays."""
+"""How sharply costs are weighed so that a share of the particles survives, in numba: plain functions over arrays."""
 
-import numpy as np
+import math
 
 from posefit.arrays import jit
 
@@ -8,29 +8,23 @@ HALVINGS = 60  # ours: bisection steps; a double has 53 bits
 
 
 @jit
-def weigh(costs, beta):
-    """Return the weights (n,), exp(-beta cost), which sum to 1. A cost that is nan or infinite weighs nothing."""
-    weights = np.zeros(costs.size)
-    lowest = np.inf
-    for cost in costs:
-        if cost < lowest:
-            lowest = cost
-    if not np.isfinite(lowest):  # nothing is known: all weigh alike
-        weights[:] = 1.0 / costs.size
-        return weights
-    for i in range(costs.size):
-        if np.isfinite(costs[i]):
-            weights[i] = np.exp(-beta * (costs[i] - lowest))  # GORDON1993 (likelihood)
-    return weights / weights.sum()
+def survival(costs, beta):
+    """Return the share of particles (0 to 1) that survives resampling by weights exp(-beta cost): D / n.
 
-
-@jit
-def survival(weights):
-    """Return the share of particles (0 to 1) that survive resampling: D / n, D = 1 / sum of squared weights.
-
-    D is the effective sample size (ESS) of Kish, the survival diagnostic of MacCormick.
+    D = 1 / sum of the squared weights, which sum to 1, is the effective sample size (ESS) of Kish; the share is the
+    survival diagnostic of MacCormick. A cost that is nan or infinite weighs nothing; where all do, all weigh alike.
     """
-    return 1.0 / (weights**2).sum() / weights.size  # DEUTSCHER2005 (survival)
+    lowest = math.inf
+    for i in range(costs.size):
+        if math.isfinite(costs[i]) and costs[i] < lowest:
+            lowest = costs[i]
+    total, squares = 0.0, 0.0
+    for i in range(costs.size):
+        if math.isfinite(costs[i]):
+            weight = math.exp(-beta * (costs[i] - lowest))
+            total += weight
+            squares += weight * weight
+    return total * total / squares / costs.size if squares > 0.0 else 1.0  # DEUTSCHER2005 (survival)
 
 
 @jit
@@ -40,9 +34,9 @@ def sharpness(costs, wanted):
     The survival rate falls as beta rises, so bisection finds it.
     """
     low, high = 0.0, 1.0
-    if survival(weigh(costs, low)) <= wanted:
+    if survival(costs, low) <= wanted:
         return 0.0
-    while survival(weigh(costs, high)) > wanted:
+    while survival(costs, high) > wanted:
         low, high = high, 2.0 * high
         if high > 1e12:  # as many particles as that share the lowest cost
             return high
@@ -50,25 +44,8 @@ def sharpness(costs, wanted):
         middle = 0.5 * (low + high)
         if not low < middle < high:
             break
-        if survival(weigh(costs, middle)) > wanted:  # DEUTSCHER2005 (beta)
+        if survival(costs, middle) > wanted:  # DEUTSCHER2005 (beta)
             low = middle
         else:
             high = middle
     return 0.5 * (low + high)
-
-
-@jit
-def systematic(weights, u):
-    """Return which rows (n,) survive: as often as their weight asks, one of the two whole numbers next to n times it.
-
-    This is systematic resampling. `u` in [0, 1) is where the comb of n evenly spaced teeth begins.
-    """
-    rows = np.empty(weights.size, np.int64)
-    i, total = 0, weights[0]
-    for k in range(weights.size):
-        tooth = (k + u) / weights.size
-        while total <= tooth and i < weights.size - 1:
-            i += 1
-            total += weights[i]
-        rows[k] = i  # GORDON1993 (resampling)
-    return rows

@@ -10,21 +10,6 @@ from posefit.arrays import jit
 
 
 @jit
-def product(first, second):
-    """Return the product (4,) of two quaternions (4,)."""
-    a, b, c, d = first
-    e, f, g, h = second
-    return np.array(
-        [
-            a * e - b * f - c * g - d * h,
-            a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f,
-            a * h + b * g - c * f + d * e,
-        ]
-    )
-
-
-@jit
 def plus(state, error):
     """Return the state (3 + 4 n,) moved by an error (3 + 3 n,)."""
     moved = np.empty(state.size)

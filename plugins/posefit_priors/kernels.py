@@ -7,6 +7,8 @@ import numpy as np
 
 from posefit.arrays import jit
 
+ROUNDING = 1e-9  # radians by which a joint may pass its limit
+
 
 @jit
 def recover(latents, components, mean, angles):
@@ -32,12 +34,22 @@ def distance(centres, latent):
 
 
 @jit
-def near(centres, latents, reach):
-    """Return which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
-    within = np.empty(latents.shape[0], np.bool_)
+def close(centres, latents, i, reach):
+    """Return whether the row i of latents (n, m or more) is nearer to a centre (K, m) than `reach`, by distance D."""
+    for c in range(centres.shape[0]):
+        total = 0.0
+        for j in range(centres.shape[1]):
+            total += abs(centres[c, j] - latents[i, j])
+        if total / centres.shape[1] < reach:  # SAPSO 2.2 constraint 2
+            return True
+    return False
+
+
+@jit
+def near(centres, latents, reach, allowed):
+    """Write which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
     for i in range(latents.shape[0]):
-        within[i] = distance(centres, latents[i]) < reach[()]  # SAPSO 2.2 constraint 2
-    return within
+        allowed[i] = close(centres, latents, i, reach[()])
 
 
 @jit
@@ -55,18 +67,22 @@ def recover_loose(latents, components, mean, loose, angles):
 
 
 @jit
-def near_and_bearable(latents, components, mean, loose, low, high, centres, reach):
-    """Return which latents (n, m + k) are near a cluster and bend no loose joint too far."""
+def near_and_bearable(latents, components, mean, loose, low, high, centres, reach, allowed):
+    """Write which latents (n, m + k) are near a cluster and bend no loose joint past low and high, but for rounding."""
     m = components.shape[0]
-    allowed = np.empty(latents.shape[0], np.bool_)
+    bends = np.empty((loose.size, m))
+    for k in range(loose.size):
+        for c in range(m):
+            bends[k, c] = components[c, loose[k]]
     for i in range(latents.shape[0]):
-        allowed[i] = distance(centres, latents[i, :m]) < reach[()]
-        for k in range(loose.size):
+        allowed[i] = close(centres, latents, i, reach[()])
+        k = 0
+        while allowed[i] and k < loose.size:
             angle = mean[loose[k]] + latents[i, m + k]
             for c in range(m):
-                angle += latents[i, c] * components[c, loose[k]]
-            allowed[i] &= (angle >= low[k]) & (angle <= high[k])
-    return allowed
+                angle += latents[i, c] * bends[k, c]
+            allowed[i] = low[k] - ROUNDING <= angle <= high[k] + ROUNDING
+            k += 1
 
 
 @jit

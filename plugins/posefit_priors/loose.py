@@ -18,7 +18,6 @@ ARMS_DEGREES = 45.0
 LEGS_DEGREES = 15.0
 SLACK = 1.5  # how many times as far as chi a pose may be from the nearest cluster
 ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
-ROUNDING = 1e-9  # radians by which a joint may pass its limit
 _SHAPES = {"loose": ("k",), "angles_low": ("k",), "angles_high": ("k",), "low": ("d",), "high": ("d",)}
 
 
@@ -100,19 +99,12 @@ class Loose:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, d) the components allow and the joint limits too (n,)."""
-        pca = self._pca
-        return np.asarray(
-            near_and_bearable(
-                writeable(latents),
-                pca.components,
-                pca.mean,
-                self.loose,
-                self.angles_low - ROUNDING,
-                self.angles_high + ROUNDING,
-                pca.centres,
-                pca.reach,
-            )
+        pca, allowed = self._pca, np.empty(len(latents), dtype=bool)
+        limits = self.angles_low, self.angles_high
+        near_and_bearable(
+            writeable(latents), pca.components, pca.mean, self.loose, *limits, pca.centres, pca.reach, allowed
         )
+        return allowed
 
     def save(self, path: str | Path) -> None:
         """Write the learned space to an .npz file."""

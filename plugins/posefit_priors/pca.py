@@ -10,6 +10,7 @@ from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.clusters import clustered
 from posefit_priors.kernels import distance, near, recover
 
 COMPONENTS = 6  # m, section 2.1
@@ -83,7 +84,9 @@ class PCA:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
-        return np.asarray(near(self.centres, writeable(latents), self.reach))
+        allowed = np.empty(len(latents), dtype=bool)
+        near(self.centres, writeable(latents), self.reach, allowed)
+        return allowed
 
     def arrays(self) -> dict[str, Any]:
         """Return what was learned, by name."""
@@ -131,11 +134,3 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
 def reach_of(centres: Array, latents: Array, quantile: float) -> Array:
     """Return chi (): this quantile of the distances D of training latents (n, m) from their nearest centres (K, m)."""
     return np.array(np.quantile([distance(centres, latent) for latent in latents], quantile))  # Reading S5
-
-
-def clustered(latents: Array, clusters: int, seed: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return the centres (K, m) that K-means finds among latents (n, m), and each one's cluster (n,)."""
-    from sklearn.cluster import KMeans
-
-    found = KMeans(clusters, n_init=10, random_state=seed).fit(latents)
-    return np.array(found.cluster_centers_, dtype=np.float64), np.asarray(found.labels_, dtype=np.int64)

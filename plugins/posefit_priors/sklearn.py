@@ -14,8 +14,9 @@ from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
 from posefit.reading import cut, parsed_json
 from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.clusters import clustered
 from posefit_priors.kernels import near, recover
-from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, clustered, reach_of
+from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, reach_of
 
 MODULES = ("decomposition", "manifold", "preprocessing", "random_projection", "cross_decomposition")
 DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}}
@@ -93,7 +94,9 @@ class Transformed:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). As SAPSO 2.2."""
-        return np.asarray(near(self.centres, writeable(latents), self.reach))
+        allowed = np.empty(len(latents), dtype=bool)
+        near(self.centres, writeable(latents), self.reach, allowed)
+        return allowed
 
     def save(self, path: str | Path) -> None:
         """Write what the space was learned from to an .npz file; `load` learns it again."""

@@ -16,8 +16,9 @@ from posefit.arrays import Array, writeable
 from posefit.fitting.check import at_least, positive
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.clusters import clustered
 from posefit_priors.kernels import mahalanobis, recover
-from posefit_priors.pca import check_components, clustered, principal
+from posefit_priors.pca import check_components, principal
 
 COMPONENTS = 0.95  # share of the variance, as the paper asks of its own spaces
 CLUSTERS = 12

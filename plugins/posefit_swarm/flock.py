@@ -5,18 +5,32 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
 from posefit.fitting.box import Space
-from posefit_swarm.kernels import fly, mend, redrawable, settle
+from posefit_swarm.kernels import fly, mend, settle, settle_and_fly
 
-FIRST_REDRAWS = 6  # ours: how many redraws are made at once at first; then all that are left
+FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
+SPARE = 2048  # ours: how many numbers are drawn at once for redraws, beside those that one particle may need
+
+Pull = tuple[float, float, Array]  # omega, the acceleration c1 = c2, and the swarm's best (d,)
 
 
 class Flock:
     """What swarms share. `moved` (n, d) are the particles after their move, which is not accepted yet.
 
-    `rand` is fresh for every "dimension" or one "scalar" a particle (Reading S8); `redraws` of it are made before a
-    particle that breaks a constraint is stopped (Reading S7).
+    `rand` is fresh for every "dimension" or one "scalar" a particle (Reading S8). What breaks a constraint has it drawn
+    again, at most `redraws` times, before the particle is stopped (Reading S7).
+
+    Constraint 1: only the coordinate that left the box is drawn again, which has the distribution of drawing the whole
+    particle again. Given positions, velocities and bests, a particle's next coordinates X_1 ... X_d are independent,
+    each with draws of its own, and the box is the product of intervals B_1 ... B_d. So P(X | X in the box) is the
+    product of all P(X_j | X_j in B_j), and each of these is what drawing X_j until it lies in B_j gives. The limit is
+    each coordinate's own: a particle is stopped for a coordinate that fails in all its redraws, and not because no
+    redraw brings all coordinates back together. A coordinate that no rand() brings back stops its particle at once.
+
+    Constraint 2 is no product, so a particle that breaks it is drawn again as a whole, every coordinate until it is in
+    the box: P(X | X in the box and feasible). A "scalar" makes a particle's coordinates depend on each other, and so
+    the whole particle is drawn again for either constraint.
     """
 
     def __init__(
@@ -30,54 +44,100 @@ class Flock:
     ) -> None:
         self._space, self._rng, self._limits = space, rng, limits
         self._redraws, self._scalar = redraws, rand == "scalar"
+        self._apart = 0 if self._scalar else redraws  # of a coordinate by itself
+        self._spare, self._used = np.empty(0), 0  # numbers for those
         self._everyone = np.arange(particles)
         self.moved = space.draw(rng, particles)
         self.velocity = self._first_velocities()
         self.position, self.cost = self.moved.copy(), np.full(particles, np.inf)
         self.best, self.best_cost = self.moved.copy(), np.full(particles, np.inf)
+        # room for the next velocities, and for who was stopped at the border
+        self._flown, self._stuck = np.empty_like(self.moved), np.zeros(particles, dtype=bool)
 
-    def settle(self, proposals: Array, costs: Array, temperature: float) -> tuple[NDArray[np.bool_], int]:
-        """Accept or refuse each move, remember the bests; return who was accepted (n,) and the swarm's best row."""
-        if proposals.shape != self.moved.shape or len(costs) != len(self.moved):
-            raise ValueError(f"tell must get the population of shape {self.moved.shape}, got {proposals.shape}")
-        accepted = np.empty(len(costs), dtype=bool)
-        leader = settle(
-            proposals,
-            np.asarray(costs, dtype=np.float64),
-            self._rng.random(len(costs)),
-            temperature,
-            self.position,
-            self.cost,
-            self.best,
-            self.best_cost,
-            accepted,
-        )
-        return accepted, int(leader)
+    def settle(
+        self, proposals: Array, costs: Array, temperature: float, kept: float = 1.0
+    ) -> tuple[NDArray[np.bool_], int]:
+        """Accept or refuse each move, remember the bests; return who was accepted (n,) and the swarm's best row.
+
+        `proposals` are what `moved` was. A particle whose move is refused keeps `kept` times its velocity.
+        """
+        costs, accepted = self._told(proposals, costs), np.empty(len(self.moved), dtype=bool)
+        chances = self._rng.random(len(costs))
+        return accepted, settle(self.moved, costs, chances, temperature, kept, self._swarm(), accepted)
 
     def fly(self, omega: float, acceleration: float, swarm_best: Array) -> None:
         """Move every particle by SAPSO (1) and (2), so that it meets the constraints. Reading S7."""
-        pull: tuple[Any, ...] = omega, acceleration, self.position, self.velocity, self.best, swarm_best
-        pull += (*self._limits, self._space.periodic)
-        feasible = self._space.feasible
-        self.velocity, self.moved = self._attempt(self._everyone, pull)
-        broken = np.flatnonzero(~feasible(self.moved))
-        if not len(broken):
-            return
-        stopped = np.zeros(len(self.moved), dtype=bool)
-        stopped[broken] = True
+        self._finish(0, self._draws(len(self.moved)), (omega, acceleration, swarm_best))
+
+    def settle_and_fly(
+        self, proposals: Array, costs: Array, temperature: float, kept: float, omega: float, acceleration: float
+    ) -> NDArray[np.bool_]:
+        """Settle and fly on towards the best then, in one compiled call; return who was accepted (n,)."""
+        costs, accepted = self._told(proposals, costs), np.empty(len(self.moved), dtype=bool)
+        told = costs, temperature, kept, accepted
+        rand = self._draws(len(costs), len(costs))
+        self._restock()
+        draws = rand, self._spare, self._used, self._apart
+        moves = self._flown, self.moved, self._stuck
+        leader, reached, self._used = settle_and_fly(
+            *told, self._everyone, *draws, omega, acceleration, self._swarm(), *moves
+        )
+        self._finish(reached, rand, (omega, acceleration, self.best[leader]))
+        return accepted
+
+    def _swarm(self) -> tuple[Any, ...]:
+        """Return what the swarm knows, as the compiled loops want it."""
+        known = self.position, self.cost, self.best, self.best_cost, self.velocity
+        return *known, *self._limits, self._space.periodic
+
+    def _told(self, proposals: Array, costs: Array) -> Array:
+        """Return costs (n,). Raises ValueError where they, or the proposals, are not those of the population."""
+        if proposals.shape != self.moved.shape or len(costs) != len(self.moved):
+            raise ValueError(f"tell must get the population of shape {self.moved.shape}, got {proposals.shape}")
+        return writeable(costs)
+
+    def _draws(self, particles: int, before: int = 0) -> Array:
+        """Return draws of rand() for a move of so many particles, and so many for something else before them."""
+        dimensions = self.moved.shape[1]
+        each = 1 if self._scalar else dimensions  # Reading S8
+        drawn: Array = self._rng.random(before + 2 * particles * each)
+        return np.concatenate([drawn[:before], np.repeat(drawn[before:], dimensions)]) if self._scalar else drawn
+
+    def _restock(self) -> None:
+        """Draw more numbers for redraws, where another particle might need more than there are."""
+        most = 2 * self._apart * self.moved.shape[1]
+        if self._used + most > len(self._spare):
+            self._spare, self._used = self._rng.random(most + SPARE), 0
+
+    def _finish(self, reached: int, rand: Array, pull: Pull) -> None:
+        """Move the particles from number `reached` on, and then see to constraint 2."""
+        if reached < len(self.moved):
+            self._move(reached, self._everyone, rand, pull, (self._flown, self.moved, self._stuck))
+        works = self._space.feasible(self.moved)
+        if np.count_nonzero(works) < len(works):
+            self._redraw(np.flatnonzero(~works), pull)
+        self.velocity, self._flown = self._flown, self.velocity
+
+    def _move(self, reached: int, rows: NDArray[np.int64], rand: Array, pull: Pull, moves: tuple[Any, ...]) -> None:
+        """Write the moves of particles (k,), velocities, positions and who is stuck, from number `reached` on."""
+        swarm = self._swarm()
+        while reached < len(rows):
+            self._restock()
+            reached, self._used = fly(rows, reached, rand, self._spare, self._used, self._apart, *pull, swarm, *moves)
+
+    def _redraw(self, broken: NDArray[np.int64], pull: Pull) -> None:
+        """Draw rand() anew for whole particles that break a constraint, or stop them."""
+        stopped, broken = broken[self._stuck[broken]], broken[~self._stuck[broken]]
         left, many = self._redraws, FIRST_REDRAWS
-        # what no draw could bring back into the box need not be drawn again
-        broken = redrawable(broken, *pull)
         while left > 0 and len(broken):
             many = min(left, many)
-            flown, moved = self._attempt(np.repeat(broken, many), pull)
+            rows = np.repeat(broken, many)
+            moves = np.empty((len(rows), self.moved.shape[1])), np.empty((len(rows), self.moved.shape[1]))
+            self._move(0, rows, self._draws(len(rows)), pull, (*moves, np.empty(len(rows), dtype=bool)))
             # SAPSO A1.2c
-            still = mend(broken, feasible(moved), flown, moved, self.velocity, self.moved)
-            stopped[broken], stopped[still] = False, True
-            broken, left, many = still, left - many, self._redraws
-        rows = np.flatnonzero(stopped)
-        if len(rows):
-            self._halt(rows)
+            broken = mend(broken, self._space.feasible(moves[1]), *moves, self._flown, self.moved)
+            left, many = left - many, self._redraws
+        self._halt(np.concatenate([stopped, broken]))
 
     def _first_velocities(self) -> Array:
         shape, start = self.moved.shape, self._space.start
@@ -90,20 +150,10 @@ class Flock:
 
     def _halt(self, rows: NDArray[np.int64]) -> None:
         """Clip particles into the box and stop them; where that breaks constraint 2, they stay where they were."""
-        clipped = np.minimum(np.maximum(self.moved[rows], -1.0), 1.0)
-        self.moved[rows] = np.where(self._space.feasible(clipped)[:, None], clipped, self.position[rows])
-        self.velocity[rows] = 0.0
-
-    def _attempt(self, rows: NDArray[np.int64], pull: tuple[Any, ...]) -> tuple[Array, Array]:
-        """Return new velocities and positions (k, d) of some particles, with fresh draws of rand()."""
-        shape = (len(rows), self._space.dimensions)
-        if self._scalar:  # Reading S8
-            rand = np.repeat(self._rng.random((2, len(rows), 1)), shape[1], axis=2)
-        else:
-            rand = self._rng.random((2, *shape))
-        flown, moved = np.empty(shape), np.empty(shape)
-        fly(rows, rand, *pull, flown, moved)
-        return flown, moved
+        if len(rows):
+            clipped = np.minimum(np.maximum(self.moved[rows], -1.0), 1.0)
+            self.moved[rows] = np.where(self._space.feasible(clipped)[:, None], clipped, self.position[rows])
+            self._flown[rows] = 0.0
 
 
 def speed_limits(space: Space, alpha: float, kind: Literal["symmetric", "literal"]) -> tuple[Array, Array]:

@@ -1,31 +1,12 @@
-"""How particles fly, in numba: plain functions over arrays, shapes checked by the callers."""
+"""How particles fly, in numba: plain functions over arrays, shapes checked by the callers.
+
+`swarm` is what a flock knows, as a tuple: positions (n, d) and their costs (n,), personal bests (n, d) and their costs
+(n,), velocities (n, d), the lowest and highest velocities (d,) and which coordinates are periodic (d,).
+"""
 
 import math
 
-import numpy as np
-
 from posefit.arrays import jit
-
-
-@jit
-def fly(rows, rand, omega, acceleration, position, velocity, best, swarm_best, low, high, periodic, flown, moved):
-    """Write the next velocities and positions (k, d) of particles `rows` (k,), velocities kept within low and high.
-
-    `rand` (2, k, d) scales the accelerations towards the personal and the swarm's best; a periodic coordinate flies the
-    short way round and wraps.
-    """
-    for k in range(rows.size):
-        i = rows[k]
-        for j in range(low.size):
-            x = position[i, j]
-            to_personal, to_swarm = best[i, j] - x, swarm_best[j] - x
-            if periodic[j]:
-                to_personal, to_swarm = wrap(to_personal), wrap(to_swarm)
-            phi1, phi2 = acceleration * rand[0, k, j], acceleration * rand[1, k, j]
-            v = omega * velocity[i, j] + phi1 * to_personal + phi2 * to_swarm  # SAPSO (1)
-            v = min(max(v, low[j]), high[j])
-            flown[k, j] = v
-            moved[k, j] = wrap(x + v) if periodic[j] else x + v  # SAPSO (2)
 
 
 @jit
@@ -35,23 +16,133 @@ def wrap(x):
 
 
 @jit
-def redrawable(broken, omega, acceleration, position, velocity, best, swarm_best, low, high, periodic):
-    """Return those of the broken particles that some rand() in [0, 1] would keep within the box."""
-    left = 0
-    kept = np.empty_like(broken)
-    for i in broken:
-        hope = True
-        for j in range(low.size):
-            if not periodic[j]:
-                x, v = position[i, j], omega * velocity[i, j]
-                a, b = acceleration * (best[i, j] - x), acceleration * (swarm_best[j] - x)
-                least = min(max(v + min(a, 0.0) + min(b, 0.0), low[j]), high[j])
-                most = min(max(v + max(a, 0.0) + max(b, 0.0), low[j]), high[j])
-                hope &= x + least <= 1.0 and x + most >= -1.0
-        if hope:
-            kept[left] = i
-            left += 1
-    return kept[:left]
+def flight(r1, r2, omega, acceleration, x, v, best, swarm_best, low, high, periodic):
+    """Return the next velocity, kept within low and high, and the next position of one coordinate of a particle.
+
+    A periodic coordinate flies the short way round and wraps.
+    """
+    to_personal, to_swarm = best - x, swarm_best - x
+    if periodic:
+        to_personal, to_swarm = wrap(to_personal), wrap(to_swarm)
+    phi1, phi2 = acceleration * r1, acceleration * r2
+    v = omega * v + phi1 * to_personal + phi2 * to_swarm  # SAPSO (1)
+    v = min(max(v, low), high)
+    x = x + v  # SAPSO (2)
+    return v, wrap(x) if periodic else x
+
+
+@jit
+def reachable(omega, acceleration, x, v, best, swarm_best, low, high):
+    """Return whether some rand() in [0, 1] would keep one coordinate, which is not periodic, in the box."""
+    a, b = acceleration * (best - x), acceleration * (swarm_best - x)
+    least = min(max(omega * v + min(a, 0.0) + min(b, 0.0), low), high)
+    most = min(max(omega * v + max(a, 0.0) + max(b, 0.0), low), high)
+    return x + least <= 1.0 and x + most >= -1.0
+
+
+@jit
+def fly(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, flown, moved, stuck):
+    """Write the next velocities and positions (k, d) of particles `rows` (k,), from the one that is `first` among them.
+
+    The last 2 k d numbers of `rand` are the draws of rand(): one for each coordinate's pull towards the personal best,
+    then one for each towards the swarm's. A coordinate out of the box has its two drawn again, from `spare` after the
+    first `used`, at most `redraws` times. `stuck` (k,) says who was stopped at the border: a coordinate would be out of
+    the box whatever was drawn, and then none was drawn again, or one was so after all redraws.
+
+    Returns `first` and `used` as they are then: the first is k, or whose turn it was when `spare` held too little.
+    """
+    position, _, best, _, velocity, low, high, periodic = swarm
+    d = low.size
+    personal, swarms = rand.size - 2 * rows.size * d, rand.size - rows.size * d
+    for k in range(first, rows.size):
+        if used + 2 * redraws * d > spare.size:
+            return k, used
+        i = rows[k]
+        inside, hope = True, True
+        for j in range(d):
+            r1, r2 = rand[personal + k * d + j], rand[swarms + k * d + j]
+            x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
+            v, x = flight(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
+            flown[k, j], moved[k, j] = v, x
+            inside &= abs(x) <= 1.0
+        if not inside:
+            for j in range(d):
+                x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
+                hope &= periodic[j] or reachable(omega, acceleration, x, v, p, g, low[j], high[j])
+        stuck[k] = not hope
+        j = 0
+        while j < d and not (inside or stuck[k]):
+            left = redraws
+            while left > 0 and abs(moved[k, j]) > 1.0:
+                r1, r2 = spare[used], spare[used + 1]
+                x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
+                v, x = flight(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
+                flown[k, j], moved[k, j] = v, x
+                left, used = left - 1, used + 2
+            stuck[k] = redraws > 0 and abs(moved[k, j]) > 1.0
+            j += 1
+        if stuck[k]:
+            for j in range(d):
+                flown[k, j], moved[k, j] = 0.0, min(max(moved[k, j], -1.0), 1.0)
+    return rows.size, used
+
+
+@jit
+def settle(moved, costs, chances, temperature, kept, swarm, accepted):
+    """Accept or refuse each move by the annealing rule and update the personal bests; return the swarm's best row.
+
+    The rule is Metropolis' criterion: a rise of the cost is accepted with probability exp(-rise / temperature). The
+    first n of `chances` are the draws for it. A particle whose move is refused keeps `kept` times its velocity.
+    """
+    position, position_costs, best, best_costs, velocity, _, _, _ = swarm
+    leader = 0
+    for i in range(costs.size):
+        rise = costs[i] - position_costs[i]
+        # true of a first cost, which replaces +inf; false of nan
+        same = costs[i] == position_costs[i]  # both may be infinite
+        accepted[i] = rise <= 0.0 or same or math.exp(-rise / temperature) > chances[i]  # SAPSO A1.2d
+        for j in range(moved.shape[1]):
+            if accepted[i]:
+                position[i, j] = moved[i, j]
+            else:
+                velocity[i, j] *= kept
+        if accepted[i]:
+            position_costs[i] = costs[i]
+        if position_costs[i] < best_costs[i]:  # SAPSO A1.2b
+            for j in range(moved.shape[1]):
+                best[i, j] = position[i, j]
+            best_costs[i] = position_costs[i]
+        if best_costs[i] < best_costs[leader]:
+            leader = i
+    return leader
+
+
+@jit
+def settle_and_fly(
+    costs,
+    temperature,
+    kept,
+    accepted,
+    rows,
+    rand,
+    spare,
+    used,
+    redraws,
+    omega,
+    acceleration,
+    swarm,
+    flown,
+    moved,
+    stuck,
+):
+    """Settle the moves of a whole swarm and let it fly on towards its new best, with one block of draws for both.
+
+    Returns the swarm's best row, and what `fly` returns.
+    """
+    leader = settle(moved, costs, rand, temperature, kept, swarm, accepted)
+    swarm_best = swarm[2][leader]
+    first, used = fly(rows, 0, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, flown, moved, stuck)
+    return leader, first, used
 
 
 @jit
@@ -69,23 +160,3 @@ def mend(broken, works, flown, moved, velocity, position):
             broken[left] = broken[k]
             left += 1
     return broken[:left].copy()
-
-
-@jit
-def settle(moved, costs, chances, temperature, position, position_costs, best, best_costs, accepted):
-    """Accept or refuse each move by the annealing rule and update the personal bests; return the swarm's best row.
-
-    The rule is Metropolis' criterion: a rise of the cost is accepted with probability exp(-rise / temperature).
-    """
-    for i in range(costs.size):
-        rise = costs[i] - position_costs[i]
-        # true of a first cost, which replaces +inf; false of nan
-        same = costs[i] == position_costs[i]  # both may be infinite
-        accepted[i] = rise <= 0.0 or same or math.exp(-rise / temperature) > chances[i]  # SAPSO A1.2d
-        if accepted[i]:
-            position[i] = moved[i]
-            position_costs[i] = costs[i]
-        if position_costs[i] < best_costs[i]:  # SAPSO A1.2b
-            best[i] = position[i]
-            best_costs[i] = position_costs[i]
-    return best_costs.argmin()

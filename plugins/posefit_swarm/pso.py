@@ -78,9 +78,7 @@ class PSO:
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Remember the bests and fly on."""
-        _, leader = self._flock.settle(proposals, costs, ALWAYS)  # KENNEDY1995 (pbest, gbest)
-        omega, acceleration = self._weights()
-        self._flock.fly(omega, acceleration, self._flock.best[leader].copy())
+        self._flock.settle_and_fly(proposals, costs, ALWAYS, 1.0, *self._weights())  # KENNEDY1995 (pbest, gbest)
         self._iteration += 1
 
     def _weights(self) -> tuple[float, float]:

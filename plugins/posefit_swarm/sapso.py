@@ -62,7 +62,7 @@ class SAPSO:
         one_of("rejected_velocity", rejected_velocity, ("kept", "zeroed"))
         self._iterations, self._inertia, self._acceleration = iterations, inertia, acceleration
         self._temperature, self._cooling, self._stop = temperature, cooling, stop_temperature
-        self._cool_each, self._zero_rejected = cool == "acceptance", rejected_velocity == "zeroed"
+        self._cool_each, self._kept = cool == "acceptance", 1.0 if rejected_velocity == "kept" else 0.0  # Reading S11
         self._iteration, self._dimensions = 0, space.dimensions
         limits = speed_limits(space, alpha, velocity_limits)
         self._flock = Flock(space, rng, particles, limits, redraws, rand)  # SAPSO A1.1
@@ -76,16 +76,15 @@ class SAPSO:
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Accept or refuse the move, remember the best, and fly on."""
-        flock = self._flock
-        accepted, leader = flock.settle(proposals, costs, self._temperature)
-        if self._zero_rejected:
-            flock.velocity[~accepted] = 0.0
+        flock, how = self._flock, (self._temperature, self._kept)
+        if self._iteration < self._iterations:
+            omega = inertia(self._iteration, self._iterations, self._inertia)
+            accepted = flock.settle_and_fly(proposals, costs, *how, omega, self._acceleration)
+        else:
+            accepted, _ = flock.settle(proposals, costs, *how)
         if self._iteration > 0:
             # SAPSO A1.2e, Reading S6
             self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
-        if self._iteration < self._iterations:
-            omega = inertia(self._iteration, self._iterations, self._inertia)
-            flock.fly(omega, self._acceleration, flock.best[leader].copy())
         self._iteration += 1
 
 

@@ -8,7 +8,8 @@ from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.silhouette.cost import areas, mismatch
-from posefit_imm.kernels import minus, plus, product
+from posefit_imm.kernels import minus, plus
+from posefit_imm.quaternions import product
 from posefit_vsmm.motion import MotionModel
 from posefit_vsmm.state import ERROR, Reliance, decode, encode, free_errors
 

@@ -16,9 +16,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
-from posefit_imm.kernels import product
+from posefit_imm.quaternions import product
 from posefit_vsmm import kernels
-from posefit_vsmm.state import Reliance, free_errors
+from posefit_vsmm.state import ERROR, STATE, Reliance, free_errors
 
 FPS = 30.0  # the rate that the models were fitted at (Reading V6)
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
@@ -44,12 +44,16 @@ class MotionModel:
 
     def step(self, state: Array) -> tuple[Array, Array]:
         """Return the state (43,) one frame later, and the Jacobian (33, 33) of its error by the error before."""
-        moved, jacobian = kernels.step(self.matrix, self.offset, self.share, self.leg, state)
+        moved, jacobian = np.empty(STATE), np.zeros((ERROR, ERROR))
+        count = (STATE - 3) // 4
+        scratch = np.empty(count), np.empty(4 * count), np.empty(4 * count), np.empty((4 * count, 3))
+        flow = np.empty((STATE, ERROR - 3))
+        kernels.step(self.matrix, self.offset, self.share, self.leg, state, *scratch, flow, moved, jacobian)
         return moved, jacobian
 
     def nearest(self, state: Array) -> Array:
         """Return a state (43,) with its place and heading, in the typical pose that is nearest to it."""
-        back, quaternions = without_heading(state[3:].reshape(-1, 4))
+        back, quaternions = without_heading(state)
         alike = np.abs(np.einsum("nij,ij->ni", self.poses.reshape(len(self.poses), -1, 4), quaternions))
         pose = self.poses[np.arccos(np.minimum(alike, 1.0)).sum(axis=1).argmin()].copy()
         pose[:4] = product(back, pose[:4])
@@ -105,10 +109,11 @@ def leg_of(skeleton: Skeleton) -> float:
     return float(skeleton.lengths[[SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]].sum())
 
 
-def without_heading(quaternions: Array) -> tuple[Array, Array]:
-    """Return the heading (4,) of quaternions (10, 4), and they without it, with w positive.
+def without_heading(state: Array) -> tuple[Array, Array]:
+    """Return the heading (4,) of a state (43,), and its quaternions (10, 4) without it, with w positive.
 
     The heading is the part of the first one that turns about the vertical.
     """
-    back, found, _ = kernels.headed(quaternions)
-    return back, found
+    found = np.empty((len(state) // 4, 4))
+    w, y = kernels.headed(state, found.reshape(-1), np.empty(len(found)))
+    return np.array([w, 0.0, y, 0.0]), found

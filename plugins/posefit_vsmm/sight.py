@@ -13,13 +13,15 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import BONES, Skeleton
+from posefit.geometry.kernels import place_joints
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit_imm import Measurement
 from posefit_vsmm.detection.joints import OWN, Errors, detected
 from posefit_vsmm.detection.preprocess import Lines
-from posefit_vsmm.kernels import points_and_jacobian
+from posefit_vsmm.kernels import bend, points_and_jacobian
 from posefit_vsmm.motion import leg_of
-from posefit_vsmm.state import ERROR, Reliance
+from posefit_vsmm.points import POINTS
+from posefit_vsmm.state import ERROR, FIRST_BONE, Reliance
 
 NEAREST = 0.05  # metres: what is nearer to the camera than that is taken to be so far away
 NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected
@@ -43,7 +45,17 @@ class Figure:
 
     def points(self, state: Array) -> tuple[Array, Array]:
         """Return the points (17, 3) in metres of a state (43,), and their Jacobian (17, 3, 33) by its error."""
-        found, jacobian = points_and_jacobian(self.skeleton.chain, state, self.reliance.matrix, self.reliance.offset)
+        matrix, offset = self.reliance.matrix, self.reliance.offset
+        pose, chained = np.empty(ANGLES), np.empty(matrix.shape)
+        bend(state, matrix, offset, np.empty(matrix.shape[1]), pose, chained)
+        sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
+        frames, joints = np.empty((len(JOINTS), 3, 3)), np.empty((len(JOINTS), 3))
+        place_joints(self.skeleton.chain, pose, state[:3], sines, cosines, frames, joints)
+        count = len(POINTS)
+        found, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))
+        others = np.empty((count, 3, len(offset)))
+        points_and_jacobian(sines, cosines, frames, joints, found, jacobian, others)
+        jacobian[:, :, FIRST_BONE:] += (others.reshape(-1, len(offset)) @ chained).reshape(count, 3, -1)
         return found, jacobian
 
     def seen(self, camera: Camera, state: Array) -> tuple[Array, Array]:

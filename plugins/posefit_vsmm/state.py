@@ -9,7 +9,6 @@ that it holds: see `Reliance`.
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import (
@@ -58,6 +57,8 @@ class Reliance:
 
 def encode(poses: Array, translations: Array) -> Array:
     """Return the states (n, 43) of poses (n, 66) and translations (n, 3); signs are those that change least."""
+    from scipy.spatial.transform import Rotation  # a quarter of a second to import
+
     root = rotation_from_root_angles(poses[:, :3])
     held = rotation_from_joint_angles(poses[:, HELD_ANGLES].reshape(len(poses), -1, 3))
     rotations = np.concatenate([root[:, None], held], axis=1)
@@ -77,6 +78,8 @@ def free_errors(skeleton: Skeleton) -> Array:
 
 def decode(states: Array, reliance: Reliance) -> tuple[Array, Array]:
     """Return the poses (n, 66) and the translations (n, 3) of states (n, 43)."""
+    from scipy.spatial.transform import Rotation  # a quarter of a second to import
+
     n = len(states)
     quaternions = Rotation.from_quat(states[:, 3:].reshape(-1, 4), scalar_first=True)
     rotations = quaternions.as_matrix().reshape(n, -1, 3, 3)

@@ -4,7 +4,6 @@ The commands stand in `following`, `sweeping` and `plugins`; plugins add others,
 is imported when it runs.
 """
 
-import traceback
 from collections.abc import Callable
 from functools import wraps
 from typing import Any
@@ -75,6 +74,8 @@ def _unended(callback: Callable[..., Any]) -> Callable[..., Any]:
             with exits_told(MISTAKE):
                 return callback(*arguments, **options)
         except SystemExit as error:
+            import traceback
+
             where = traceback.extract_tb(error.__traceback__)[-1]
             raise ValueError(
                 f"nothing may end the program, got SystemExit: {error.code} in {where.filename}:{where.lineno}"

@@ -1,13 +1,12 @@
 """`posefit track`, `fit` and `extract`."""
 
-import json
 from contextlib import nullcontext
 from typing import Any
 
 import click
 
 from posefit.cli.options import EXTRACTION, TRACK, frame_range, options
-from posefit.cli.output import progress, results_alone, say
+from posefit.cli.output import json_line, progress, results_alone, say
 
 
 @click.command()
@@ -28,7 +27,7 @@ def track(as_json: bool, **options: Any) -> None:
     with results_alone() if as_json else nullcontext():
         result = run(progress=progress, say=say, **_arguments(options))
     if as_json:
-        click.echo(json.dumps(result.summary))
+        click.echo(json_line(result.summary))
         return
     from posefit.tracking.table import table
 
@@ -47,7 +46,7 @@ def fit(as_json: bool, **options: Any) -> None:
     with results_alone() if as_json else nullcontext():
         result = run(say=say, **_arguments(options))
     if as_json:
-        click.echo(json.dumps({**result.summary, "pose_degrees": _degrees(result.pose)}))
+        click.echo(json_line({**result.summary, "pose_degrees": _degrees(result.pose)}))
         return
     from posefit.tracking.table import table
 
@@ -75,7 +74,7 @@ def extract(video: str, out: str, as_json: bool, frames: Any, **options: Any) ->
     for warning in result["warnings"]:
         say(f"warning: {warning}")
     if as_json:
-        click.echo(json.dumps(result))
+        click.echo(json_line(result))
         return
     click.echo(
         f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border, "

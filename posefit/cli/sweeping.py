@@ -1,6 +1,5 @@
 """`posefit sweep` and `posefit report`."""
 
-import json
 from collections.abc import Iterator
 from contextlib import nullcontext
 from itertools import islice
@@ -9,7 +8,7 @@ from typing import Any
 import click
 
 from posefit.cli.options import ENGINE, options
-from posefit.cli.output import results_alone, say
+from posefit.cli.output import json_line, results_alone, say
 
 LINES = 1000  # that are printed at a time
 
@@ -52,7 +51,7 @@ def sweep(
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
         tally, status = command.run_plan(plan, out, where=where, retry_quarantined=retry_quarantined, say=say)
-    click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
+    click.echo(json_line({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
     context.exit(status)
 
 
@@ -77,5 +76,5 @@ def report(ledger: str, out: str, as_json: bool, **others: Any) -> None:
     from posefit.report.write import leaderboard_lines, write_report
 
     found = write_report(ledger, out, say=say, **others)
-    for line in [json.dumps(found)] if as_json else leaderboard_lines(found):
+    for line in [json_line(found)] if as_json else leaderboard_lines(found):
         click.echo(line)

@@ -82,8 +82,10 @@ class Space(Protocol):
 def draw(space: Space, rng: np.random.Generator, count: int) -> Array:
     """Return a first population (count, d) of feasible proposals, from the start or uniform. SAPSO (6).
 
-    Each is redrawn at most 100 times (Reading S7); one still out of the box is then folded back into it. What is
-    infeasible even so becomes the start's mean, or the copy of one that is feasible. Where nothing around the start is
+    What breaks a constraint is redrawn at most 100 times (Reading S7). Out of the box that is a coordinate by itself:
+    the coordinates of (6) are independent and the box is a product, so that this has the distribution of redrawing the
+    whole proposal. One still out of the box is then folded back into it. What the prior finds infeasible is redrawn as
+    a whole, and then becomes the start's mean, or the copy of one that is feasible. Where nothing around the start is
     feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is.
     """
     drawn = _drawn(space, space.start, rng, count)
@@ -102,8 +104,6 @@ def _drawn(space: Space, start: Start | None, rng: np.random.Generator, count: i
         wanted = wanted[~space.feasible(drawn[wanted])]
         if not len(wanted):
             return drawn
-    drawn[wanted] = fold(space, drawn[wanted])
-    wanted = wanted[~space.feasible(drawn[wanted])]
     if start is not None and space.feasible(start.mean[None])[0]:
         drawn[wanted] = start.mean
         return drawn
@@ -115,9 +115,17 @@ def _drawn(space: Space, start: Start | None, rng: np.random.Generator, count: i
 
 
 def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array:
+    """Return proposals (count, d) from the start or uniform, in the box, whatever the prior finds of them."""
     if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
-    return space.wrap(rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
+    drawn = space.wrap(rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
+    for _ in range(REDRAWS):
+        outside = np.abs(drawn) > 1.0
+        if not outside.any():
+            return drawn
+        columns = outside.nonzero()[1]  # periodic ones are never among them
+        drawn[outside] = rng.normal(start.mean[columns], start.spread[columns])
+    return fold(space, drawn)
 
 
 def scatter(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:

@@ -90,13 +90,18 @@ def unpack_proposals(proposals, centre, half, anchor, first, poses, translations
 
 
 @jit
-def within(proposals, centre, half, first):
-    """Return which proposals (n, d) lie in the box, and the latents of all."""
-    n, d = proposals.shape
-    inside, latents = np.ones(n, np.bool_), np.empty((n, d - first))
-    for i in range(n):
+def within(proposals, centre, half, inside, latents):
+    """Write which proposals (n, d) lie in the box (n,), and the latents (n, m), their last coordinates, of all.
+
+    Returns whether all lie in it.
+    """
+    d = centre.size
+    first, everyone = d - latents.shape[1], True
+    for i in range(inside.size):
+        inside[i] = True
         for j in range(d):
             inside[i] &= abs(proposals[i, j]) <= 1.0
         for j in range(first, d):
             latents[i, j - first] = centre[j] + half[j] * proposals[i, j]
-    return inside, latents
+        everyone &= inside[i]
+    return everyone

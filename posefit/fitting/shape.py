@@ -7,7 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.evolution.constants import usual_population
+from posefit.evolution.strategy import Strategy
 from posefit.fitting.alignment import align
+from posefit.fitting.box import REDRAWS
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -129,19 +132,25 @@ class _Frames:
 
     def search(self, start: Array, chosen: NDArray[np.int64], rng: np.random.Generator) -> Array:
         """Return the factors (17,) that fit the chosen frames best, by CMA-ES in spreads of their logarithms."""
-        from cmaes import CMA  # here, as it loads scipy.stats, which takes more than a second
-
-        bounds = np.tile([-REACH, REACH], (len(NAMES), 1))
         mean = np.clip(np.log(start) / SPREAD, -REACH, REACH)
-        search = CMA(mean, 0.5, bounds=bounds, seed=int(rng.integers(2**31)))
+        population = usual_population(len(NAMES))
+        strategy = Strategy(mean, np.full(len(NAMES), 0.5), population)
         best, least = mean, np.inf
         for _ in range(GENERATIONS):
-            told = []
-            for _ in range(search.population_size):
-                asked = search.ask()
-                cost = self.cost(np.exp(SPREAD * asked), chosen) + PULL * float(asked @ asked)
-                told.append((asked, cost))
-                if cost < least:
-                    best, least = asked, cost
-            search.tell(told)
+            asked = _within_reach(strategy, rng, population)
+            costs = np.array([self.cost(np.exp(SPREAD * one), chosen) + PULL * float(one @ one) for one in asked])
+            if costs.min() < least:
+                best, least = asked[costs.argmin()], costs.min()
+            strategy.learn(asked, costs)
         return np.asarray(np.exp(SPREAD * best))
+
+
+def _within_reach(strategy: Strategy, rng: np.random.Generator, count: int) -> Array:
+    """Return so many draws (count, d): what is out of reach is drawn again, and at last clipped."""
+    asked = strategy.sample(rng, count)
+    for _ in range(REDRAWS):
+        beyond = np.flatnonzero((np.abs(asked) > REACH).any(axis=1))
+        if not len(beyond):
+            break
+        asked[beyond] = strategy.sample(rng, len(beyond))
+    return np.clip(asked, -REACH, REACH)

@@ -102,8 +102,11 @@ class SearchSpace:
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, d) lie in the box and mean a pose to the prior (n,). SAPSO 2.2."""
         proposals = writeable(proposals)
-        inside, latents = within(proposals, self.centre, self.half, self.dimensions - len(self.prior.low))
-        return np.asarray(inside & self.prior.feasible(latents))
+        n = len(proposals)
+        inside, latents = np.empty(n, dtype=bool), np.empty((n, len(self.prior.low)))
+        everyone = within(proposals, self.centre, self.half, inside, latents)
+        allowed = self.prior.feasible(latents)
+        return allowed if everyone else allowed & inside
 
     def wrap(self, proposals: Array) -> Array:
         """Return proposals with their periodic coordinates brought into [-1, 1)."""

@@ -7,6 +7,7 @@ as noise, comes from a generator of its own, so that it changes none of this.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class Variation:
         return [view + self.turn_degrees for view in view_degrees]
 
 
+@lru_cache(maxsize=256)
 def variation(number: int) -> Variation:
     """Return how an instance differs from the motion as it is, whatever the motion."""
     if number == 0:

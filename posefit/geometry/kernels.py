@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, jit
+from posefit.arrays import Array, inlined, jit
 
 # pi in two parts, so that angles of many turns keep their digits; then Taylor's coefficients on [-pi/2, pi/2],
 # where the first term left out is below 1e-10.
@@ -24,14 +24,14 @@ class Chain(NamedTuple):
 
 def chain(parents: NDArray[np.int64], angles: NDArray[np.int64], axes: Array, offsets: Array) -> Chain:
     """Return the constant part of every bone's transform, from rest frames (26, 3, 3) and bone vectors (26, 3)."""
-    before = np.array([np.eye(3) if p == 0 else axes[p - 1] for p in parents])
+    before = np.concatenate([np.eye(3)[None], axes])[parents]
     turns = np.swapaxes(before, 1, 2) @ axes
     own = np.einsum("bji,bj->bi", axes, offsets)
     turned = np.abs(turns - np.eye(3)).max(axis=(1, 2)) > 1e-12
     return Chain(parents.astype(np.int64), angles.astype(np.int64), turns, turned, own)
 
 
-@jit
+@inlined
 def sines_cosines(angles, sines, cosines):
     """Write the sine and cosine of each angle. A plain loop of polynomials, so that it runs in vector registers."""
     for i in range(angles.size):
@@ -58,7 +58,7 @@ def sines_cosines(angles, sines, cosines):
         cosines[i] = sign * (1.0 + z * c)
 
 
-@jit
+@inlined
 def place_joints(chain, pose, translation, sines, cosines, frames, joints):
     """Write the joints (27, 3) of one pose (66,); `sines`, `cosines` (66,) and `frames` (27, 3, 3) are scratch."""
     sines_cosines(pose, sines, cosines)

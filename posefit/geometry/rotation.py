@@ -3,40 +3,38 @@
 Angles are radians. Matrices act on column vectors: `v_parent = rotation @ v_child`.
 """
 
-from typing import Final, Literal
-
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
 
-Order = Literal["YXZ", "xyz"]
-
 # Reading S3: yaw about the vertical is outermost, then pitch, then roll. With the paper's x, y, z order
 # the middle angle is the yaw, and a side view sits on the singularity.
-ROOT_ORDER: Final = "YXZ"
+ROOT_ORDER = (1, 0, 2)
 # Acclaim files: rx first, so that the matrix is Rz @ Ry @ Rx.
-JOINT_ORDER: Final = "xyz"
+JOINT_ORDER = (2, 1, 0)
+LOCKED = 1e-7  # radians from the singularity, where the outer and the inner axis are one
 
 
 def rotation_from_root_angles(angles: Array) -> Array:
     """Return the rotations (..., 3, 3) of root angles (..., 3): yaw, pitch, roll. Reading S3."""
-    return _matrices(ROOT_ORDER, angles)
+    yaw, pitch, roll = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
+    return _about(1, yaw) @ _about(0, pitch) @ _about(2, roll)
 
 
 def root_angles_from_rotation(rotations: Array) -> Array:
     """Return yaw, pitch, roll (..., 3) of rotations (..., 3, 3). Reading S3."""
-    return _angles(ROOT_ORDER, rotations)
+    return angles_about(ROOT_ORDER, rotations)
 
 
 def rotation_from_joint_angles(angles: Array) -> Array:
     """Return the rotations (..., 3, 3) of joint angles (..., 3), Rz @ Ry @ Rx."""
-    return _matrices(JOINT_ORDER, angles)
+    rx, ry, rz = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
+    return _about(2, rz) @ _about(1, ry) @ _about(0, rx)
 
 
 def joint_angles_from_rotation(rotations: Array) -> Array:
     """Return rx, ry, rz (..., 3) of rotations (..., 3, 3), so that Rz @ Ry @ Rx gives them back."""
-    return _angles(JOINT_ORDER, rotations)
+    return angles_about(JOINT_ORDER, rotations)[..., ::-1].copy()
 
 
 def wrapped(angles: Array) -> Array:
@@ -48,18 +46,38 @@ def wrapped(angles: Array) -> Array:
 def geodesic(first: Array, second: Array) -> Array:
     """Return the angle (...), 0 to pi, of the rotation that takes `first` to `second`, both (..., 3, 3)."""
     relative = np.swapaxes(first, -1, -2) @ second
-    return np.asarray(_as_batch(relative).magnitude()).reshape(relative.shape[:-2])
+    twist = relative - np.swapaxes(relative, -1, -2)  # twice the sine of the angle times the axis
+    sine = 0.5 * np.sqrt(twist[..., 2, 1] ** 2 + twist[..., 0, 2] ** 2 + twist[..., 1, 0] ** 2)
+    return np.asarray(np.arctan2(sine, 0.5 * (np.trace(relative, axis1=-2, axis2=-1) - 1.0)))
 
 
-def _as_batch(rotations: Array) -> Rotation:
-    return Rotation.from_matrix(np.asarray(rotations, dtype=np.float64).reshape(-1, 3, 3))
+def _about(axis: int, angles: Array) -> Array:
+    """Return the rotations (..., 3, 3) about an axis by angles (...)."""
+    sines, cosines = np.sin(angles), np.cos(angles)
+    rotations = np.zeros((*np.shape(angles), 3, 3))
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    rotations[..., axis, axis] = 1.0
+    rotations[..., j, j] = rotations[..., k, k] = cosines
+    rotations[..., j, k], rotations[..., k, j] = -sines, sines
+    return rotations
 
 
-def _matrices(order: Order, angles: Array) -> Array:
-    angles = np.asarray(angles, dtype=np.float64)
-    return Rotation.from_euler(order, angles.reshape(-1, 3)).as_matrix().reshape(*angles.shape, 3)
+def angles_about(axes: tuple[int, int, int], rotations: Array) -> Array:
+    """Return the angles (..., 3) about three different axes, outermost first, of rotations (..., 3, 3).
 
-
-def _angles(order: Order, rotations: Array) -> Array:
-    # At the singularity one of the angles is free; scipy then takes zero for it.
-    return np.asarray(_as_batch(rotations).as_euler(order, suppress_warnings=True)).reshape(*np.shape(rotations)[:-1])
+    At the singularity one of the angles is free: that about z is zero there, or about y where z is in the middle.
+    """
+    i, j, k = axes
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    given = np.asarray(rotations, dtype=np.float64)
+    level = np.hypot(given[..., i, i], given[..., i, j])  # the cosine of the middle angle
+    locked = level < LOCKED
+    outer = np.arctan2(-sign * given[..., j, k], given[..., k, k])
+    inner = np.arctan2(-sign * given[..., i, j], given[..., i, i])
+    alone = np.arctan2(sign * given[..., k, j], given[..., j, j])  # the outer one where the inner is zero
+    if i > k:
+        alone, inner, outer = np.arctan2(sign * given[..., j, i], given[..., j, j]), outer, inner
+    outer, inner = np.where(locked, alone, outer), np.where(locked, 0.0, inner)
+    if i > k:
+        outer, inner = inner, outer
+    return np.stack([outer, np.arctan2(sign * given[..., i, k], level), inner], axis=-1)

@@ -100,6 +100,10 @@ def angle_index(joint: int) -> int:
     return 3 + 3 * INNER.index(joint) if joint in INNER else -1
 
 
+# (26,) of each bone: the joint it starts from, and where its angles are in a pose
+_STARTS, _TURNING = np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))])
+
+
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """Bone vectors at rest and the frames their angles are counted in. Lengths are metres."""
@@ -143,9 +147,7 @@ class Skeleton:
     @cached_property
     def chain(self) -> kernels.Chain:
         """The constant arrays that the kinematics kernel wants."""
-        return kernels.chain(
-            np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))]), self.axes, self.offsets
-        )
+        return kernels.chain(_STARTS, _TURNING, self.axes, self.offsets)
 
     def joints(self, poses: Array, translations: Array | None = None) -> Array:
         """Return joint positions (..., 27, 3) in metres, world frame, of poses (..., 66).

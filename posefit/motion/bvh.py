@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import (
+    angles_about,
     joint_angles_from_rotation,
     root_angles_from_rotation,
     rotation_from_joint_angles,
@@ -72,6 +72,8 @@ def read_bvh(path: str | Path, *, metres_per_unit: float = 1.0) -> Motion:
     """
     path, unit = Path(path), unit_length("metres_per_unit", metres_per_unit)
     bvh = _parsed(path)
+    from scipy.spatial.transform import Rotation  # a quarter of a second to import
+
     nodes = {node.name: node for node in bvh.nodes if not node.is_end_site()}
     missing = [f"{bone} ({NAMES[bone]})" for bone in JOINTS if not {bone, NAMES[bone]} & nodes.keys()]
     if missing:
@@ -195,9 +197,7 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
         lines.append(f"{tab}}}")
 
     visit(0, 0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # at a gimbal lock any of the solutions will do
-        angles = Rotation.from_matrix(rotations[order].reshape(-1, 3, 3)).as_euler("ZXY", degrees=True)
+    angles = np.degrees(angles_about((2, 0, 1), rotations[order]))  # ZXY; at a gimbal lock any of the solutions will do
     angles = np.swapaxes(angles.reshape(len(order), len(motion), 3), 0, 1).reshape(len(motion), -1)
     lines += ["MOTION", f"Frames: {len(motion)}", f"Frame Time: {1.0 / motion.fps!r}"]
     lines += [_plain(row) for row in np.hstack([motion.translations, angles])]

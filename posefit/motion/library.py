@@ -31,6 +31,7 @@ def _library() -> dict[str, Any]:
     return stored
 
 
+@lru_cache(maxsize=1)
 def names() -> tuple[str, ...]:
     """Return the names that `built_in` takes."""
     styles = tuple(_library()["motions"])
@@ -87,6 +88,7 @@ def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1
     return Motion(name, average_skeleton(), poses, translations, fps)
 
 
+@lru_cache(maxsize=64)
 def _model(name: str) -> tuple[list[int], Array, float, float]:
     """Return the free angles, the series of path and angles, the period in seconds and the pace in m/s."""
     _check(name)

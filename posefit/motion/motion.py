@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
@@ -78,6 +77,8 @@ class Motion:
         return Motion(self.name, self.skeleton, poses, translations, fps)
 
     def _root_angles(self, times: Array) -> Array:
+        from scipy.spatial.transform import Rotation, Slerp  # a quarter of a second to import
+
         rotations = Rotation.from_matrix(rotation_from_root_angles(self.poses[:, :3]))
         between = Slerp(np.arange(len(self)), rotations)(times).as_matrix()
         angles = np.unwrap(root_angles_from_rotation(between), axis=0)

@@ -1,6 +1,7 @@
 """The two-way silhouette cost of many poses, over one view or several."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +39,15 @@ def areas(
     out = np.empty((len(poses), 3), dtype=np.int64)
     chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
     observed, valid = silhouette.bits
+    parts = parts_of(len(poses), threads)
+    if len(parts) == 1:
+        kernels.count_areas(chain, radii, view, observed, valid, poses, translations, out)  # SAPSO (3)
+        return out
 
-    def count(part: slice) -> None:
-        rows = poses[part], translations[part], out[part]
-        kernels.count_areas(chain, radii, view, observed, valid, *rows)  # SAPSO (3)
+    def count(_part: slice, *rows: NDArray[Any]) -> None:
+        kernels.count_areas(chain, radii, view, observed, valid, *rows)
 
-    work_through(parts_of(len(poses), threads), threads, _nothing, count)
+    work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
     return out
 
 
@@ -69,10 +73,12 @@ def areas_of_all(
         return out.transpose(1, 0, 2)
     observed, valid = (np.stack(bits) for bits in zip(*(silhouette.bits for silhouette in silhouettes), strict=True))
 
-    def count(part: slice) -> None:
-        several.count_areas_of_all(chain, radii, view, observed, valid, poses[part], translations[part], out[part])
+    def count(_part: slice, *rows: NDArray[Any]) -> None:
+        several.count_areas_of_all(chain, radii, view, observed, valid, *rows)
 
-    work_through(parts_of(len(poses), threads), threads, _nothing, count)
+    work_through(
+        parts_of(len(poses), threads), threads, lambda part: (poses[part], translations[part], out[part]), count
+    )
     return np.ascontiguousarray(out.transpose(1, 0, 2))
 
 
@@ -91,47 +97,6 @@ def _checked(
         if silhouette.mask.shape != (camera.height, camera.width):
             raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
     return poses, translations
-
-
-def _nothing(part: slice) -> tuple[()]:  # noqa: ARG001 - a part's rows are all that counting needs
-    return ()
-
-
-def paint(
-    body: Body,
-    camera: Camera,
-    silhouette: Silhouette,
-    poses: Array,
-    translations: Array,
-    pixels: NDArray[np.uint16],
-    value: int,
-) -> Areas:
-    """Return R, B, Y (n, 3) as `areas` does, and OR `value` into the pixels (n, height, width) of each pose's body.
-
-    Raises ValueError where a shape does not fit.
-    """
-    poses, translations = writeable(poses), writeable(translations)
-    n, shape = len(poses), (camera.height, camera.width)
-    if poses.shape != (n, ANGLES) or translations.shape != (n, 3):
-        raise ValueError(f"poses must have shape (n, {ANGLES}) with translations (n, 3), got {poses.shape}")
-    if silhouette.mask.shape != shape or pixels.shape != (n, *shape):
-        raise ValueError(f"mask and pixels must have shape {shape}, got {silhouette.mask.shape}, {pixels.shape[1:]}")
-    drawn.count_poses(n, silhouette)
-    out = np.empty((n, 3), dtype=np.int64)
-    observed, valid = silhouette.bits
-    kernels.count_areas(
-        body.skeleton.chain,
-        body.radii,
-        view_of(camera),
-        observed,
-        valid,
-        poses,
-        translations,
-        out,
-        np.uint16(value),
-        pixels,
-    )
-    return out
 
 
 def mismatch(areas: Areas, beta: float = BETA) -> Array:
@@ -154,4 +119,4 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         writeable(pose),
         writeable(translation),
     )
-    return unpack(bits, camera.width)
+    return unpack(bits, camera.width, camera.height)

@@ -5,23 +5,24 @@ Bit images are as `rasteriser` makes them.
 
 import numpy as np
 
-from posefit.arrays import jit
+from posefit.arrays import Array, Bits, inlined, jit
+from posefit.geometry.kernels import Chain
 from posefit.silhouette.popcount import popcount
-from posefit.silhouette.rasteriser import BLOCK, NONE, below, draw_pose, scratch
+from posefit.silhouette.rasteriser import NONE, STRIP_PIXELS, View, draw_pose, scratch
 
 
-@jit
+@inlined
 def count(image, observed, valid, box):
     """Return the pixels of the body and of its overlap with the observed silhouette, and clear the image."""
     body, overlap = NONE, NONE
-    for w in range(box[2], box[3] + 1):
-        column = image[w][box[0] : box[1]]
-        seen = observed[w][box[0] : box[1]]
-        known = valid[w][box[0] : box[1]]
-        for y in range(column.size):
-            body += np.uint64(popcount(column[y] & known[y]))
-            overlap += np.uint64(popcount(column[y] & seen[y]))
-        image[w][box[0] : box[1] + BLOCK] = NONE
+    for strip in range(box[2], box[3] + 1):
+        words = image[strip][box[0] : box[1]]
+        seen = observed[strip][box[0] : box[1]]
+        known = valid[strip][box[0] : box[1]]
+        for i in range(words.size):
+            body += popcount(words[i] & known[i])
+            overlap += popcount(words[i] & seen[i])
+        words[:] = NONE
     return body, overlap
 
 
@@ -32,32 +33,28 @@ def paint_bits(image, box, value, pixels):
     Bits past the image's right border may be set and count for nothing: no pixel stands for them.
     """
     height, width = pixels.shape
-    for y in range(box[0], min(box[1], height)):
+    words = image.reshape(-1).view(np.uint32).reshape(image.shape[0], 2 * image.shape[1])
+    for y in range(2 * box[0], min(2 * box[1], height)):
         for w in range(box[2], box[3] + 1):
-            x = w << 6
-            word = image[w, y] & below(width - x)
-            while word != NONE:
-                if word & np.uint64(1):
+            x = STRIP_PIXELS * w
+            word = words[w, y]
+            while (word != 0) & (x < width):
+                if word & np.uint32(1):
                     pixels[y, x] |= value
-                word >>= np.uint64(1)
+                word >>= np.uint32(1)
                 x += 1
 
 
 @jit
-def count_areas(chain, radii, view, observed, valid, poses, translations, areas, value=None, pixels=None):
-    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid.
-
-    Where `pixels` (n, height, width) are given, `value` is ORed into each body's; numba compiles either case apart.
-    """
+def count_areas(chain, radii, view, observed, valid, poses, translations, areas):
+    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid."""
     work = scratch(view, chain.parents.size, poses.shape[1])
     silhouette = NONE
     for w in range(observed.shape[0]):
-        for y in range(view.height):
+        for y in range(observed.shape[1]):
             silhouette += np.uint64(popcount(observed[w, y]))
     for i in range(poses.shape[0]):
         image, box = draw_pose(chain, radii, view, poses[i], translations[i], work)
-        if pixels is not None:
-            paint_bits(image, box, value, pixels[i])
         body, overlap = count(image, observed, valid, box)
         areas[i, 0] = silhouette - overlap
         areas[i, 1] = body - overlap
@@ -75,10 +72,8 @@ def add_mismatch(areas, scale, beta, costs):
         costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)
 
 
-@jit
-def draw_bits(chain, radii, view, pose, translation):
-    """Return the bit image of one body."""
+def draw_bits(chain: Chain, radii: Array, view: View, pose: Array, translation: Array) -> Bits:
+    """Return the bit image of one body. Not compiled itself: it draws a picture, and calls what is compiled anyway."""
     work = scratch(view, chain.parents.size, pose.size)
     image, _ = draw_pose(chain, radii, view, pose, translation, work)
-    image[:, view.height :] = NONE
     return image

@@ -7,25 +7,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Bits
-from posefit.silhouette.rasteriser import PAD
+from posefit.silhouette.rasteriser import STRIP_PIXELS, strips_and_words
 
 Mask = NDArray[np.bool_]  # (height, width)
 
 
 def pack(mask: Mask) -> Bits:
-    """Return the bit image (words, height + PAD) of a mask (height, width)."""
+    """Return the bit image (strips, words) of a mask (height, width)."""
     height, width = mask.shape
-    words = (width + 63) // 64
-    octets = np.zeros((height + PAD, 8 * words), dtype=np.uint8)
+    strips, words = strips_and_words(width, height)
+    octets = np.zeros((2 * words, STRIP_PIXELS // 8 * strips), dtype=np.uint8)
     packed = np.packbits(mask, axis=1, bitorder="little")
     octets[:height, : packed.shape[1]] = packed
-    return np.ascontiguousarray(octets.view("<u8").T.astype(np.uint64))
+    return np.ascontiguousarray(octets.view("<u4").T.astype(np.uint32)).view(np.uint64)
 
 
-def unpack(bits: Bits, width: int) -> Mask:
+def unpack(bits: Bits, width: int, height: int) -> Mask:
     """Return the mask (height, width) of a bit image."""
-    octets = np.ascontiguousarray(bits.T.astype("<u8")).view(np.uint8)
-    return np.unpackbits(octets, axis=1, count=width, bitorder="little")[:-PAD].astype(bool)
+    rows = bits.view(np.uint32).T[:height]
+    octets = np.ascontiguousarray(rows.astype("<u4")).view(np.uint8)
+    return np.unpackbits(octets, axis=1, count=width, bitorder="little").astype(bool)
 
 
 @dataclass(frozen=True, eq=False)

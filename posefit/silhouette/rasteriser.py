@@ -1,7 +1,9 @@
 """The rasteriser: numba loops over arrays. Shapes are checked by the callers.
 
-A bit image is (words, height + PAD) uint64: bit i of image[w, y] is pixel (64 w + i, y). Words stand in columns, so
-that eight neighbouring rows are one vector register. A cone is the hull of two discs. In one row of pixels it spans
+A bit image is cut into strips, each 32 pixels wide: it is (strips, words) uint64, and the word image[s, i] holds two
+rows of its strip. Seen as (strips, rows) uint32, bit k of image[s, y] is pixel (32 s + k, y): eight neighbouring rows
+are one vector register of AVX2, whose lanes are as wide as those of the float32 numbers that they are made from.
+Strips are even in number, rows a multiple of eight. A cone is the hull of two discs. In one row of pixels it spans
 from the least to the greatest of at most six crossings: two with each disc, one with each of the two tangent
 segments. A pixel belongs to it when its centre lies within that span, borders included.
 """
@@ -11,28 +13,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-from posefit.arrays import Array, jit
+from posefit.arrays import Array, inlined, jit
 from posefit.geometry.kernels import place_joints
+from posefit.silhouette.lanes import BLOCK, root, set_spans
 
-BLOCK = 8  # rows filled at a time
-PAD = 2 * BLOCK  # rows below the image that a block may spill into
+STRIP_PIXELS = 32  # pixels
 NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
-_FLAT = 1e-9  # a tangent flatter than this lies between rows of pixels
-_HUGE = np.float32(1e9)
-ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 NONE = np.uint64(0)
-_ZERO, _ONE, _WORD = np.float32(0), np.float32(1), np.float32(64)
+_FLAT = 1e-9  # a tangent flatter than this lies between rows of pixels
+_ZERO, _ONE, _WINDOW = np.float32(0), np.float32(1), np.float32(2 * STRIP_PIXELS)
+_HUGE, _NAN = np.float32(1e9), np.float32(np.nan)
 
 # Scratch rows, each LANES long and one lane a bone, in one flat array: offsets known to the compiler are what lets
-# it see that the loop over bones in `outline` may run in vector registers.
+# it see that the loops over bones may run in vector registers.
 LANES = 32
-_U0, _V0, _R0, _U1, _V1, _R1 = (row * LANES for row in range(6))
-_SCRATCH_ENDS = 6 * LANES
-_TOP, _BOTTOM, _LEFT, _RIGHT = (row * LANES for row in range(4))
-_SCRATCH_BOUNDS = 4 * LANES
+_U0, _V0, _R0, _U1, _V1, _R1, _SEEN = (row * LANES for row in range(7))
+_SCRATCH_ENDS = 7 * LANES
+_BLOCK, _BLOCKS, _FIRST, _LAST, _COUNT, _ROW = (row * LANES for row in range(6))
+_SCRATCH_BOUNDS = 6 * LANES
 _X0, _Y0, _S0, _X1, _Y1, _S1 = (row * LANES for row in range(6))
 _XP, _MP, _PA, _PB, _XQ, _MQ, _QA, _QB = (row * LANES for row in range(6, 14))
-_SCRATCH_OUTLINE = 14 * LANES
+_COLUMN, _STOP = (row * LANES for row in range(14, 16))
+_SCRATCH_OUTLINE = 16 * LANES
+
+# A block to fill is one number: its first word as uint32 in the upper half; in the lower its first row, counted from
+# BLOCK rows above the cone's top so that none is negative, and in the lowest bits the cone.
+_NEXT = (BLOCK << 32) + BLOCK * LANES  # from a cone's block to the next
+_LISTED = 16  # blocks
+_NATURAL = 0x7FFFFFFF  # an index that is seen not to be negative needs no look at whether it counts from the end
 
 
 class View(NamedTuple):
@@ -47,14 +55,19 @@ class View(NamedTuple):
 
 
 @jit
-def below(k):
-    """Return a word whose lowest k bits are set, k from 0 to 64."""
-    return ALL if k > 63 else ~(ALL << np.uint64(k))
+def strips_and_words(width, height):
+    """Return the shape of an image's bit image."""
+    return 2 * ((width + 2 * STRIP_PIXELS - 1) // (2 * STRIP_PIXELS)), (height + BLOCK - 1) // BLOCK * (BLOCK // 2)
 
 
-@jit
-def outline(ends, lines, bounds, width, height):
-    """Write each cone's pixel bounds, and the discs and tangent segments that border it, rows counted from its top."""
+@inlined
+def outline(ends, lines, bounds, strips, width, height):
+    """Write each cone's bounds, and the discs and tangent segments that border it, rows counted from its top.
+
+    The bounds are its first block of rows and how many they are, none where it is not seen, and its first and last
+    strip. Blocks begin at every eighth row of the image: two cones' blocks are then the same words or none in common,
+    and a processor that has just written one can read it again at once.
+    """
     for k in range(LANES):
         u0, v0, r0 = ends[_U0 + k], ends[_V0 + k], ends[_R0 + k]
         u1, v1, r1 = ends[_U1 + k], ends[_V1 + k], ends[_R1 + k]
@@ -71,10 +84,16 @@ def outline(ends, lines, bounds, width, height):
         qx = along * dx + across * dy
         qy = along * dy - across * dx
         top = min(max(np.ceil(min(v0 - r0, v1 - r1)), 0.0), height)
-        bounds[_TOP + k] = np.int32(top)
-        bounds[_BOTTOM + k] = np.int32(max(min(np.floor(max(v0 + r0, v1 + r1)) + 1.0, height), 0.0))
-        bounds[_LEFT + k] = np.int32(min(max(np.ceil(min(u0 - r0, u1 - r1)), 0.0), width))
-        bounds[_RIGHT + k] = np.int32(max(min(np.floor(max(u0 + r0, u1 + r1)) + 1.0, width), 0.0))
+        bottom = max(min(np.floor(max(v0 + r0, v1 + r1)) + 1.0, height), 0.0)
+        left = min(max(np.ceil(min(u0 - r0, u1 - r1)), 0.0), width)
+        right = max(min(np.floor(max(u0 + r0, u1 + r1)) + 1.0, width), 0.0)
+        drawn = (top < bottom) & (left < right) & (ends[_SEEN + k] > 0.0)
+        first = np.int32(top) // BLOCK
+        bounds[_BLOCK + k] = first
+        bounds[_BLOCKS + k] = (np.int32(bottom) + (BLOCK - 1)) // BLOCK - first if drawn else 0
+        bounds[_FIRST + k] = min(np.int32(left) // STRIP_PIXELS, strips - 2)
+        bounds[_LAST + k] = (np.int32(right) - 1) // STRIP_PIXELS
+        bounds[_ROW + k] = BLOCK * (first + 1) - np.int32(top)
         lines[_X0 + k] = u0
         lines[_Y0 + k] = v0 - top
         lines[_S0 + k] = r0 * r0
@@ -99,78 +118,88 @@ def outline(ends, lines, bounds, width, height):
         lines[_QB + k] = max(a, b) if crosses else 0.0
 
 
-@jit
-def plan(bones, seen, bounds, box, items):
-    """Write the (bone, word, block) items to fill and the image's bounding box; return how many items.
+@inlined
+def bounding_box(bounds, box):
+    """Write the pixels' bounding box in the bit image: its first and last + 1 word, its first and last strip."""
+    top, bottom, left, right = np.int32(1 << 24), np.int32(0), np.int32(1 << 24), np.int32(-1)
+    for k in range(LANES):
+        drawn = bounds[_BLOCKS + k] > 0
+        top = min(top, bounds[_BLOCK + k] if drawn else top)
+        bottom = max(bottom, bounds[_BLOCK + k] + bounds[_BLOCKS + k] if drawn else bottom)
+        left = min(left, bounds[_FIRST + k] if drawn else left)
+        right = max(right, bounds[_LAST + k] if drawn else right)
+    box[0], box[1], box[2], box[3] = top * (BLOCK // 2), bottom * (BLOCK // 2), left, right
 
-    The usual cone, of few blocks in one or two words, is listed without a branch on its size: a mispredicted
-    branch costs as much as filling a block.
+
+@inlined
+def windows(step, bounds, lines, keys, strips, stride):
+    """Write where each cone's `step`-th window of two strips lies; return how many windows the widest cone has.
+
+    Most cones are no wider than a window, so that their spans are computed once.
     """
-    top, bottom, left, right = 1 << 30, 0, 1 << 30, -1
-    p = 0
+    most = np.int32(0)
+    for k in range(LANES):
+        wide = (bounds[_LAST + k] - bounds[_FIRST + k]) // 2 + 1 if bounds[_BLOCKS + k] > 0 else 0
+        strip = min(bounds[_FIRST + k] + 2 * step, strips - 2)
+        bounds[_COUNT + k] = bounds[_BLOCKS + k] if step < wide else 0
+        place = strip * stride + BLOCK * bounds[_BLOCK + k]
+        keys[k] = (np.int64(place) << 32) + np.int64(bounds[_ROW + k] * LANES + k)
+        column = np.float32(np.int32(STRIP_PIXELS * strip))
+        lines[_COLUMN + k] = column
+        lines[_STOP + k] = min(np.float32(np.int32(STRIP_PIXELS * (bounds[_LAST + k] + 1))) - column, _WINDOW)
+        most = max(most, np.int32(wide))
+    return most
+
+
+@inlined
+def list_blocks(bones, bounds, keys, blocks):
+    """Write the blocks to fill, each one number of place, row and cone; return how many.
+
+    They are listed so many at a time, whether or not a cone has them: a mispredicted branch costs as much as a block.
+    """
+    end = 0
     for j in range(bones):
-        y0, y1 = int(bounds[_TOP + j]), int(bounds[_BOTTOM + j])
-        x0, x1 = int(bounds[_LEFT + j]), int(bounds[_RIGHT + j])
-        drawn = seen[j] & (y0 < y1) & (x0 < x1)
-        blocks = (y1 - y0 + BLOCK - 1) // BLOCK if drawn else 0
-        first, last = x0 >> 6, (x1 - 1) >> 6
-        top = min(top, y0 if drawn else top)
-        bottom = max(bottom, y1 if drawn else bottom)
-        left = min(left, first if drawn else left)
-        right = max(right, last if drawn else right)
-        if (blocks <= 8) & (last - first <= 1):
-            key = (j << 32) | (first << 16)
-            for i in range(8):
-                items[p + i] = key + i
-            p += blocks
-            key += 1 << 16
-            for i in range(8):
-                items[p + i] = key + i
-            p += blocks if last > first else 0
-        elif drawn:
-            for w in range(first, last + 1):
-                for i in range(blocks):
-                    items[p] = (j << 32) | (w << 16) | i
-                    p += 1
-    box[0], box[1], box[2], box[3] = top, bottom, left, right
-    return p
+        count = int(bounds[_COUNT + j])
+        for i in range(0, count, _LISTED):
+            key, at = keys[j] + i * _NEXT, (end + i) & _NATURAL
+            for k in range(_LISTED):
+                blocks[at + k] = key + k * _NEXT
+        end += count
+    return end
 
 
-@jit
-def fill(rows, lines, j, row, column):
-    """Set the pixels of cone j in eight rows of one word: from `row` of the cone on, from pixel `column` on.
+@inlined
+def columns(spans, lines, j, row):
+    """Write the first column of cone j, and the one after its last, in a block's eight rows, `row` being the first.
 
-    Rows below the cone cross neither disc nor tangent and stay as they are.
+    They are counted from the first pixel of the cone's window. Rows above and below the cone are empty: what a row
+    does not cross is nan, which min and max pass over.
     """
+    column, stop = lines[_COLUMN + j], lines[_STOP + j]
     x0, y0, s0 = lines[_X0 + j], lines[_Y0 + j], lines[_S0 + j]
     x1, y1, s1 = lines[_X1 + j], lines[_Y1 + j], lines[_S1 + j]
     xp, mp, pa, pb = lines[_XP + j], lines[_MP + j], lines[_PA + j], lines[_PB + j]
     xq, mq, qa, qb = lines[_XQ + j], lines[_MQ + j], lines[_QA + j], lines[_QB + j]
     for k in range(BLOCK):
-        y = np.float32(row + k)
-        d = s0 - (y - y0) * (y - y0)
-        h = math.sqrt(max(d, _ZERO))
-        low = x0 - h if d >= _ZERO else _HUGE
-        high = x0 + h if d >= _ZERO else -_HUGE
-        d = s1 - (y - y1) * (y - y1)
-        h = math.sqrt(max(d, _ZERO))
-        low = min(low, x1 - h if d >= _ZERO else _HUGE)
-        high = max(high, x1 + h if d >= _ZERO else -_HUGE)
-        x = xp + mp * y
-        crosses = (y >= pa) & (y <= pb)
-        low = min(low, x if crosses else _HUGE)
-        high = max(high, x if crosses else -_HUGE)
-        x = xq + mq * y
-        crosses = (y >= qa) & (y <= qb)
-        low = min(low, x if crosses else _HUGE)
-        high = max(high, x if crosses else -_HUGE)
-        first = np.int32(np.ceil(min(max(low - column, _ZERO), _WORD)))
-        stop = np.int32(np.floor(min(max(high - column + _ONE, _ZERO), _WORD)))
-        rows[k] |= below(stop) & ~below(first)
+        y = row + np.float32(k - BLOCK)
+        h = root(s0 - (y - y0) * (y - y0))
+        low = min(_HUGE, x0 - h)
+        high = max(-_HUGE, x0 + h)
+        h = root(s1 - (y - y1) * (y - y1))
+        low = min(low, x1 - h)
+        high = max(high, x1 + h)
+        x = xp + mp * y if (y >= pa) & (y <= pb) else _NAN
+        low = min(low, x)
+        high = max(high, x)
+        x = xq + mq * y if (y >= qa) & (y <= qb) else _NAN
+        low = min(low, x)
+        high = max(high, x)
+        spans[k] = np.int32(np.ceil(max(low - column, _ZERO)))
+        spans[k + BLOCK] = np.int32(min(high - column + _ONE, stop))
 
 
-@jit
-def rasterise(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image):
+@inlined
+def rasterise(chain, radii, view, joints, ends, lines, bounds, spans, keys, blocks, box, pixels, image):
     """Set the pixels of every cone of one body in a clear bit image, and its bounding box. Overwrites `joints`."""
     rotation, translation = view.rotation, view.translation
     scale = math.sqrt(view.focal[0] * view.focal[1])
@@ -192,35 +221,44 @@ def rasterise(chain, radii, view, joints, seen, ends, lines, bounds, items, box,
         ends[_U1 + b] = joints[b + 1, 0]
         ends[_V1 + b] = joints[b + 1, 1]
         ends[_R1 + b] = joints[b + 1, 2] * radii[b, 1]
-        seen[b] = (joints[p, 2] > 0.0) & (joints[b + 1, 2] > 0.0)
-    outline(ends, lines, bounds, float(view.width), float(view.height))
-    pixels, stride = image.reshape(-1), image.shape[1]
-    for i in range(plan(chain.parents.size, seen, bounds, box, items)):
-        j, w, row = items[i] >> 32, (items[i] >> 16) & 0xFFFF, (items[i] & 0xFFFF) * BLOCK
-        at = w * stride + bounds[_TOP + j] + row
-        fill(pixels[at : at + BLOCK], lines, j, row, np.float32(64 * w))
+        ends[_SEEN + b] = min(joints[p, 2], joints[b + 1, 2])
+    strips, stride = image.shape[0], 2 * image.shape[1]
+    outline(ends, lines, bounds, strips, float(view.width), float(view.height))
+    bounding_box(bounds, box)
+    step = most = 0
+    while step <= most:
+        most = windows(step, bounds, lines, keys, strips, stride) - 1
+        for i in range(list_blocks(chain.parents.size, bounds, keys, blocks)):
+            block = blocks[i]
+            columns(spans, lines, block & (LANES - 1), np.float32((block & 0xFFFFFFFF) // LANES))
+            set_spans(pixels, block >> 32, stride, spans)
+        step += 1
 
 
 @jit
 def scratch(view, bones, angles):
     """Return the work arrays of one thread: for the kinematics, for the outlines, and a clear bit image."""
-    words = (view.width + 63) // 64
+    image = np.zeros(strips_and_words(view.width, view.height), np.uint64)
+    pixels = image.reshape(-1).view(np.uint32)
+    listed = bones * (view.height // BLOCK + 1) + _LISTED
     kinematics = (np.empty(angles), np.empty(angles), np.empty((bones + 1, 3, 3)), np.empty((bones + 1, 3)))
     outlines = (
-        np.zeros(bones, np.bool_),
         np.zeros(_SCRATCH_ENDS),
         np.zeros(_SCRATCH_OUTLINE, np.float32),
         np.zeros(_SCRATCH_BOUNDS, np.int32),
-        np.empty(bones * words * (view.height // BLOCK + 2) + 16, np.int64),
+        np.empty(2 * BLOCK, np.int32),
+        np.zeros(LANES, np.int64),
+        np.zeros(listed, np.int64),
         np.zeros(4, np.int64),
+        pixels,
     )
-    return kinematics, outlines, np.zeros((words, view.height + PAD), np.uint64)
+    return kinematics, outlines, image
 
 
 @jit
 def draw_pose(chain, radii, view, pose, translation, work):
     """Set the pixels of one body in the clear bit image of `work`, which `scratch` makes; return it and its box."""
-    (sines, cosines, frames, joints), (seen, ends, lines, bounds, items, box), image = work
+    (sines, cosines, frames, joints), (ends, lines, bounds, spans, keys, blocks, box, pixels), image = work
     place_joints(chain, pose, translation, sines, cosines, frames, joints)
-    rasterise(chain, radii, view, joints, seen, ends, lines, bounds, items, box, image)
+    rasterise(chain, radii, view, joints, ends, lines, bounds, spans, keys, blocks, box, pixels, image)
     return image, box

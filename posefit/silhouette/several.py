@@ -7,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import jit
 from posefit.silhouette.popcount import popcount
-from posefit.silhouette.rasteriser import BLOCK, NONE, draw_pose, scratch
+from posefit.silhouette.rasteriser import NONE, draw_pose, scratch
 
 
 @jit
@@ -25,7 +25,7 @@ def pixels_of(bits):
 def count_areas_of_all(chain, radii, view, observed, valid, poses, translations, areas):
     """Write the areas (n, silhouettes, 3) R, B, Y of poses (n, 66), each drawn once.
 
-    `observed` and `valid` are bit images (silhouettes, words, rows), observed within valid.
+    `observed` and `valid` are bit images (silhouettes, strips, words), observed within valid.
     """
     work = scratch(view, chain.parents.size, poses.shape[1])
     silhouettes = np.empty(observed.shape[0], np.uint64)
@@ -46,21 +46,21 @@ def count_areas_of_all(chain, radii, view, observed, valid, poses, translations,
             areas[i, s, 1] = body - overlap
             areas[i, s, 2] = overlap
         for w in range(box[2], box[3] + 1):
-            image[w][box[0] : box[1] + BLOCK] = NONE
+            image[w][box[0] : box[1]] = NONE
 
 
 @jit
 def draw_bones(chain, radii, view, poses, translations, images, boxes):
-    """Write the bit images (n, words, rows) and boxes (n, 4) of poses (n, 66), whose bones have radii (n, 26, 2).
+    """Write the bit images (n, strips, words) and boxes (n, 4) of poses (n, 66), whose bones have radii (n, 26, 2).
 
-    A box is its first row, the row after its last, its first word and its last one, as `rasteriser` makes it.
+    A box is as `rasteriser` makes it.
     """
     work = scratch(view, chain.parents.size, poses.shape[1])
     for i in range(poses.shape[0]):
         image, box = draw_pose(chain, radii[i], view, poses[i], translations[i], work)
         for w in range(box[2], box[3] + 1):
             images[i, w][box[0] : box[1]] = image[w][box[0] : box[1]]
-            image[w][box[0] : box[1] + BLOCK] = NONE
+            image[w][box[0] : box[1]] = NONE
         for k in range(4):
             boxes[i, k] = box[k]
 

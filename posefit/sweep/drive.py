@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from posefit.sweep.cell import Cell
@@ -15,6 +16,7 @@ from posefit.sweep.engines.engine import Engine, Outcome
 from posefit.sweep.plan import Plan
 
 PATIENCE = 0.2  # seconds between two looks at whether somebody wants to stop
+NEAR = 1000  # cells, among which those of different methods are looked for at the beginning
 ELSEWHERE = 0.5  # seconds between two looks at cells that other drivers run
 
 Say = Callable[[str], None]
@@ -109,7 +111,7 @@ class _Sweep:
             state = State.DONE if key in driver.ledger else State.QUARANTINED if key in lost else None
             settled.append(self._count(state))
         self._left = settled.count(False)  # cells that were not met yet
-        self._coming = (cell for cell, done in zip(cells, settled, strict=True) if not done)
+        self._coming = mingled((cell for cell, done in zip(cells, settled, strict=True) if not done), engine.window)
         self._again: deque[Cell] = deque()  # cells that failed, or that others ran
         self._elsewhere: list[Cell] = []
         self._running: dict[str, Claim] = {}
@@ -201,6 +203,24 @@ class _Sweep:
         self.tally.done += state is State.DONE
         self.tally.quarantined += state is State.QUARANTINED
         return state in (State.DONE, State.QUARANTINED)
+
+
+def mingled(cells: Iterator[Cell], count: Callable[[], int]) -> Iterator[Cell]:
+    """Yield cells in their order, but for the first `count()`, which are of different methods where there are any near.
+
+    Workers that begin at the same time would otherwise need the same compiled functions, and wait for each other.
+    """
+    wanted = count()
+    first: dict[str, Cell] = {}
+    passed: list[Cell] = []
+    for cell in islice(cells, NEAR):
+        if first.setdefault(cell.method, cell) is not cell:
+            passed.append(cell)
+        if len(first) >= wanted:
+            break
+    yield from first.values()
+    yield from passed
+    yield from cells
 
 
 def keys_of(cells: Cells) -> Iterator[str]:

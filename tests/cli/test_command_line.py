@@ -503,7 +503,19 @@ def test_evaluations_are_the_same_for_every_method() -> None:
 def test_help_loads_nothing_heavy() -> None:
     script = (
         "import sys; from posefit.cli import main; main(['--help'], standalone_mode=False);"
-        "print([m for m in ('numba', 'scipy', 'cv2', 'sklearn', 'numpy') if m in sys.modules])"
+        "print([m for m in ('numba', 'scipy', 'cv2', 'sklearn', 'numpy', 'pandas', 'tqdm') if m in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines()[-1] == "[]"
+
+
+def test_following_a_motion_loads_no_library_for_what_it_can_do_itself(tmp_path: Path) -> None:
+    script = (
+        "import sys; from posefit.cli import main\n"
+        "command = 'track walk --frames 0:2 --size 120x90 --particles 20 --iterations 3 --out'.split()\n"
+        f"main([*command, {str(tmp_path / 'out')!r}], standalone_mode=False)\n"
+        "slow = 'sklearn', 'scipy.stats', 'scipy.spatial', 'scipy.optimize', 'pandas', 'matplotlib', 'cmaes', 'skimage'\n"
+        "print([name for name in slow if name in sys.modules])"
     )
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert ran.stdout.splitlines()[-1] == "[]"

@@ -14,7 +14,7 @@ from posefit import minimise
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import check_vector_env, drive, to_sb3_vec_env
-from posefit_envs.fit_vector import FitVectorEnv
+from posefit_envs.vector.fit import FitVectorEnv
 
 FIT: list[dict[str, Any]] = [
     {},
@@ -23,17 +23,30 @@ FIT: list[dict[str, Any]] = [
     {"target_cost": 30.0},
     {"view_degrees": [0.0, 90.0], "translation": "aligned", "max_evaluations": 5},
     {"translation": "searched", "prior": "union", "mismatch_percent": 5.0, "instance": 9, "max_evaluations": 6},
+    {"mismatch_percent": 10.0, "view_degrees": [0.0, 90.0, 200.0], "prior": "full", "max_evaluations": 7},
+    {"noise": {"holes": 0.3, "shadow": 0.5}, "translation": "searched", "size": (70, 50), "max_evaluations": 8},
+    {"translation": "aligned", "mismatch_percent": 10.0, "noise": {"jitter": 0.8}, "max_evaluations": 6},
+    {"motion": "run", "split": "test", "size": (36, 36), "errors": False, "max_evaluations": 5},
 ]
 TRACK: list[dict[str, Any]] = [
     {"frames": 3, "evaluations_per_frame": 4},
     {"instance": 3, "frames": 4, "evaluations_per_frame": 3},
     {"frames": 2, "evaluations_per_frame": 5, "translation": "aligned", "view_degrees": [0.0, 70.0]},
+    {"frames": 3, "evaluations_per_frame": 3, "translation": "searched", "mismatch_percent": 10.0, "prior": "full"},
+    {"frames": 2, "evaluations_per_frame": 2, "noise": {"holes": 0.4, "blobs": 0.4}, "errors": False},
 ]
 
 
-@pytest.mark.parametrize(
-    ("name", "arguments"), [("posefit/Fit-v0", one) for one in FIT] + [("posefit/Track-v0", one) for one in TRACK]
-)
+CONFIGURE: list[dict[str, Any]] = [
+    {"particles": 5, "iterations": 4},
+    {"particles": 7, "iterations": 6, "translation": "aligned", "view_degrees": [0.0, 70.0], "mismatch_percent": 8.0},
+    {"particles": 4, "iterations": 3, "instance": 3, "prior": "full", "translation": "searched", "errors": False},
+    {"particles": 6, "iterations": 30, "noise": {"shadow": 0.6}, "prior": "loose"},
+]
+CASES = {"posefit/Fit-v0": FIT, "posefit/Track-v0": TRACK, "posefit/Configure-v0": CONFIGURE}
+
+
+@pytest.mark.parametrize(("name", "arguments"), [(name, one) for name, many in CASES.items() for one in many])
 def test_a_vector_environment_equals_single_ones(name: str, arguments: dict[str, Any]) -> None:
     vector = gym.make_vec(name, num_envs=4, **arguments)
     assert type(vector.unwrapped).__module__.startswith("posefit_envs")
@@ -62,22 +75,80 @@ def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
         def reset(self, *, seed: Any = None, options: Any = None) -> Any:
             return super().reset(seed=None if seed is None else [seed] * self.num_envs, options=options)
 
-    for wrong, message in ((Shifted, "reward must be"), (Masked, "info must have"), (SameSeed, "environment 1, reset")):
+    class Reused(FitVectorEnv):
+        def step(self, actions: Any) -> Any:
+            observations, *rest = super().step(actions)
+            self.mine = getattr(self, "mine", observations)
+            self.mine[:] = observations
+            return self.mine, *rest
+
+    for wrong, message in (
+        (Shifted, "reward must be"),
+        (Masked, "info must have"),
+        (SameSeed, "environment 1, reset"),
+        (Reused, "step 1: the observations before it must be"),
+    ):
         with pytest.raises(AssertionError, match=message):
             check_vector_env(wrong(3), lambda: gym.make("posefit/Fit-v0"), steps=10)
 
 
-def test_a_time_limit_truncates_a_vector_environment_too() -> None:
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("posefit/Fit-v0", {}),
+        ("posefit/Fit-v0", {"max_evaluations": 3}),
+        ("posefit/Fit-v0", {"target_cost": 99.0}),
+        ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
+        ("posefit/Configure-v0", {"particles": 3, "iterations": 3}),
+    ],
+)
+def test_a_time_limit_truncates_a_vector_environment_too(name: str, arguments: dict[str, Any]) -> None:
     check_vector_env(
-        gym.make_vec("posefit/Fit-v0", num_envs=3, max_episode_steps=3),
-        lambda: gym.make("posefit/Fit-v0", max_episode_steps=3),
+        gym.make_vec(name, num_envs=3, max_episode_steps=3, **arguments),
+        lambda: gym.make(name, max_episode_steps=3, **arguments),
         steps=12,
     )
 
 
+def test_errors_are_told_unless_nobody_asks_for_them() -> None:
+    for name in CASES:
+        for errors, told in ((True, {"error_degrees"}), (False, set())):
+            vector = gym.make_vec(name, num_envs=2, errors=errors)
+            vector.reset(seed=0)
+            infos = vector.step(vector.action_space.sample())[4]
+            assert {key for key in infos if "error" in key and not key.startswith("_")} == told
+    with pytest.raises(error.Error, match="errors must be true or false, got 'no'"):
+        gym.make_vec("posefit/Fit-v0", num_envs=2, errors="no")
+
+
+def test_threads_change_nothing() -> None:
+    for name in CASES:
+        one, three = (gym.make_vec(name, num_envs=50, threads=threads) for threads in (1, 3))
+        np.testing.assert_array_equal(one.reset(seed=2)[0], three.reset(seed=2)[0])
+        for _ in range(2):
+            actions = one.action_space.sample()
+            for first, other in zip(one.step(actions)[:4], three.step(actions)[:4], strict=True):
+                np.testing.assert_array_equal(first, other)
+    with pytest.raises(error.Error, match="threads must be at least 1, got 0"):
+        gym.make_vec("posefit/Fit-v0", num_envs=2, threads=0)
+
+
+def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
+    # environments 0 to 2 of seven are those of three: their seeds are the same, and so are their actions
+    for name in CASES:
+        few, many = (gym.make_vec(name, num_envs=n, mismatch_percent=5.0) for n in (3, 7))
+        first, others = few.reset(seed=11)[0], many.reset(seed=11)[0]
+        np.testing.assert_array_equal(first, others[:3])
+        for _ in range(3):
+            actions = many.action_space.sample()
+            one, other = few.step(actions[:3]), many.step(actions)
+            np.testing.assert_array_equal(one[0], other[0][:3])
+            np.testing.assert_array_equal(one[1], other[1][:3])
+
+
 def test_some_environments_can_be_reset_alone() -> None:
-    for name in ("posefit/Fit-v0", "posefit/Track-v0"):
-        vector = gym.make_vec(name, num_envs=3)
+    for name in CASES:
+        vector = gym.make_vec(name, num_envs=3, **({"particles": 4} if "Configure" in name else {}))
         with pytest.raises(error.ResetNeeded, match="the first reset must be of all"):
             vector.reset(options={"reset_mask": np.array([True, False, False])})
         vector.reset(seed=0)
@@ -85,24 +156,25 @@ def test_some_environments_can_be_reset_alone() -> None:
         _, infos = vector.reset(options={"reset_mask": np.array([False, True, False])})
         assert infos["_instance"].tolist() == [False, True, False]
         _, _, _, _, after = vector.step(vector.action_space.sample())
-        assert after["evaluations"].tolist() == [2, 1, 2]
+        first, second = (8, 12) if "Configure" in name else (1, 2)  # a first population counts, too
+        assert after["evaluations"].tolist() == [second, first, second]
         with pytest.raises(error.Error, match="reset_mask must be 3 booleans"):
             vector.reset(options={"reset_mask": [1, 0]})
-        assert before["evaluations"].tolist() == [1, 1, 1]
+        assert before["evaluations"].tolist() == [first] * 3
 
 
-@pytest.mark.parametrize("name", ["posefit/Fit-v0", "posefit/Track-v0"])
-def test_mistakes_are_named(name: str) -> None:
+@pytest.mark.parametrize(("name", "d"), [("posefit/Fit-v0", 9), ("posefit/Track-v0", 9), ("posefit/Configure-v0", 3)])
+def test_mistakes_are_named(name: str, d: int) -> None:
     vector = gym.make_vec(name, num_envs=3)
     with pytest.raises(error.ResetNeeded, match="reset must come before"):
-        vector.step(np.zeros((3, 9)))
+        vector.step(np.zeros((3, d)))
     with pytest.raises(error.Error, match="seed must be one number or 3, got 2"):
         vector.reset(seed=[1, 2])
     vector.reset(seed=0)
-    with pytest.raises(error.InvalidAction, match=r"actions must have shape \(3, 9\), got \(2, 9\)"):
-        vector.step(np.zeros((2, 9)))
+    with pytest.raises(error.InvalidAction, match=rf"actions must have shape \(3, {d}\), got \(2, {d}\)"):
+        vector.step(np.zeros((2, d)))
     with pytest.raises(error.InvalidAction, match="actions must be finite"):
-        vector.step(np.full((3, 9), np.nan))
+        vector.step(np.full((3, d), np.nan))
     with pytest.raises(error.UnsupportedMode, match="rgb_array for a vector environment, got human"):
         gym.make_vec(name, num_envs=3, render_mode="human")
     with pytest.raises(error.Error, match="num_envs must be at least 1, got 0"):
@@ -111,7 +183,7 @@ def test_mistakes_are_named(name: str) -> None:
         gym.make_vec(name, num_envs=3, colour="red")
 
 
-@pytest.mark.parametrize("name", ["posefit/Fit-v0", "posefit/Track-v0"])
+@pytest.mark.parametrize("name", CASES)
 def test_every_environment_has_its_picture(name: str) -> None:
     vector = gym.make_vec(name, num_envs=2, render_mode="rgb_array")
     vector.reset(seed=0)

@@ -1,7 +1,12 @@
 """`posefit bench`: what it tells, and what is timed."""
 
 import json
+import os
+import platform
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +19,10 @@ from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit_experiments.bench import experiment, optimisers, timing
+from posefit_experiments.bench.growth import Growth, growth_table
 from posefit_experiments.bench.kernel import bench_problem, opencv_costs
-from posefit_experiments.bench.optimisers import Stopwatch
+from posefit_experiments.bench.optimisers import Stopwatch, wide_space
+from posefit_experiments.bench.processor import instructions, processor
 
 
 class Line:
@@ -39,6 +46,10 @@ def test_a_stopwatch_ends_a_search_after_its_populations() -> None:
     assert watch.seconds > 0.0
 
 
+def test_the_wide_space_has_28_dimensions() -> None:
+    assert wide_space(bench_problem().space).dimensions == 28
+
+
 @pytest.mark.slow
 def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(timing, "ROUNDS", 1)
@@ -53,22 +64,54 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
         "kernel_us_per_pose_1_thread", "kernel_us_per_pose_all_threads", "opencv_us_per_pose",
         "opencv_batched_us_per_pose", "sapso_frame_ms", "sapso_overhead", "kernel_speedup",
         "kernel_speedup_over_batched", "threads", "threads_speedup", "poses_per_second_1_thread",
-        "mean_cost_difference_to_opencv", "vector_env", "optimisers", "size", "poses",
+        "mean_cost_difference_to_opencv", "vector_env", "many", "optimisers", "optimisers_28", "size", "poses", "cpu",
+        "frame", "sapso_loose_overhead",
     }  # fmt: skip
-    assert set(figures["vector_env"]) == {
-        "kernel_us",
-        "us_per_proposal",
-        "overhead_us",
-        "sync_us_per_proposal",
-        "times_sync",
-    }
+    cases = figures["vector_env"]
+    learning = cases.pop("fit_learning")
+    assert set(learning) == {"steps_per_second", "sync_steps_per_second", "times_sync"}
+    assert set(cases) == {"fit_shared", "fit_each", "track_each", "configure_each", "configure_all_threads"}
+    for case in cases.values():
+        assert set(case) == {"kernel_us", "us_per_proposal", "overhead_us", "sync_us_per_proposal", "times_sync"}
+    assert set(figures["many"]) == {
+        "evaluate_40", "evaluate_4000", "areas_40", "areas_4000", "silhouettes_alone", "silhouettes_together",
+        "limb_combination", "limb_combination_any_order", "all_sizes", "320x240_full", "320x240_half",
+        "320x240_quarter", "1280x960_full", "1280x960_half", "1280x960_quarter",
+    }  # fmt: skip
+    assert all(us > 0.0 for us in figures["many"].values())
     assert {"sapso", "pso", "random", "cma", "particle", "annealed", "scipy:dual_annealing"} <= set(
         figures["optimisers"]
     )
-    assert all(us > 0.0 for us in figures["optimisers"].values())
+    assert set(figures["optimisers_28"]) == {"sapso", "pso", "random", "cma", "particle", "annealed"}
+    assert all(us > 0.0 for name in ("optimisers", "optimisers_28") for us in figures[name].values())
+    assert set(figures["frame"]) == {"sapso+pca", "sapso+loose", "pso+pca", "annealed+pca"}
+    assert figures["sapso_loose_overhead"] == pytest.approx(figures["frame"]["sapso+loose"]["overhead"], abs=1e-3)
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0
     assert CliRunner().invoke(main, ["bench", "--threads", "0"]).exit_code == 2
+
+
+@pytest.mark.slow
+def test_growth_is_a_table_and_four_figures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(timing, "ROUNDS", 1)
+    monkeypatch.setattr(timing, "TURN", 1e-6)
+    found = CliRunner().invoke(main, ["bench", "--growth", "--json", "--pictures", str(tmp_path / "new")])
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert list(told) == ["size", "poses", "views", "dimensions"]
+    assert list(told["size"]) == ["80 x 60", "160 x 120", "320 x 240", "640 x 480", "1280 x 720", "1920 x 1080"]
+    assert "9" in told["dimensions"]
+    assert all(us > 0.0 for row in told.values() for us in row.values())
+    assert {path.name for path in (tmp_path / "new").iterdir()} == {f"growth-{name}.png" for name in told}
+    assert CliRunner().invoke(main, ["bench", "--pictures", str(tmp_path)]).exit_code == 2
+
+
+def test_a_table_of_growth_has_a_line_for_each_point() -> None:
+    one = Growth("size", "pixels", [1, 4], ["1 x 1", "2 x 2"], [1.5, 2.25], True)
+    assert [line.split() for line in growth_table([one, one]).splitlines()] == [
+        ["grows", "to", "us", "a", "pose"],
+        *[["pixels", "1", "x", "1", "1.500"], ["pixels", "2", "x", "2", "2.250"]] * 2,
+    ]
 
 
 @pytest.mark.parametrize("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])
@@ -84,3 +127,24 @@ def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tup
     assert ours[0] == 0.0
     assert theirs[0] < 4.0
     assert np.abs(ours - theirs).mean() < 1.0
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names are of x86-64")
+def test_the_instructions_of_a_named_processor_are_told() -> None:
+    # the levels of the x86-64 psABI: v2 has SSE4.2, v3 AVX2, v4 AVX-512
+    levels = {"x86-64": "SSE2", "x86-64-v2": "SSE4", "sandybridge": "AVX", "x86-64-v3": "AVX2", "x86-64-v4": "AVX-512"}
+    assert {name: instructions(name) for name in levels} == levels
+    assert instructions("x86-64-v4", "-avx512f") == "AVX2"
+    assert set(processor()) == {"name", "compiled_for", "features"}
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names are of x86-64")
+def test_loops_have_the_instructions_of_the_processor_that_is_named_and_no_others() -> None:
+    told = "import posefit.silhouette.kernels; from posefit_experiments.bench.processor import processor; "
+    for name, features in (("x86-64-v3", "AVX2"), ("x86-64-v2", "SSE4")):
+        environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CPU_FEATURES"}
+        code = told + "print(processor()['compiled_for'], processor()['features'])"
+        shown = subprocess.run(
+            [sys.executable, "-c", code], env={**environment, "NUMBA_CPU_NAME": name}, capture_output=True, check=True
+        )
+        assert shown.stdout.split() == [name.encode(), features.encode()]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import kstest, truncnorm
 
 from posefit import SearchSpace, Start
 from posefit.arrays import Array
@@ -87,6 +88,23 @@ def test_a_draw_from_a_start_on_the_edge_of_many_dimensions_is_no_heap_of_copies
     drawn = Toy(50, start=start).draw(np.random.default_rng(0), 40)
     assert len(np.unique(drawn, axis=0)) == 40
     assert (np.abs(drawn) <= 1.0).all()
+
+
+def test_a_draw_from_a_start_is_normal_within_the_box_and_redrawn_by_coordinates() -> None:
+    start = Start(np.array([1.0, 0.9, 0.0]), np.array([0.1, 0.2, 0.1]), np.zeros(3))
+    drawn = Toy(3, start=start).draw(np.random.default_rng(0), 5000)
+    # normal distributions cut off at 1: 0, 0.5 and 10 deviations above their means
+    for j, cut in enumerate((0.0, 0.5, 10.0)):
+        away = (drawn[:, j] - start.mean[j]) / start.spread[j]
+        assert kstest(away, truncnorm(-np.inf, cut).cdf).pvalue > 0.01
+    assert np.abs(np.corrcoef(drawn.T)[np.triu_indices(3, 1)]).max() < 0.045  # the standard error is 0.014
+
+
+def test_a_draw_around_a_mean_far_out_of_the_box_is_folded_into_it() -> None:
+    start = Start(np.array([5.2, 0.0]), np.array([0.01, 0.1]), np.zeros(2))
+    drawn = Toy(2, start=start).draw(np.random.default_rng(0), 50)
+    # a triangle wave of period 4: 5.2 is where 1.2 is, mirrored at 1
+    np.testing.assert_allclose(drawn[:, 0], 0.8, atol=0.05)
 
 
 def test_a_draw_where_nothing_is_feasible_says_so() -> None:

@@ -13,9 +13,10 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion.library import average_skeleton
-from posefit.silhouette.cost import areas, mismatch, paint, project
-from posefit.silhouette.kernels import add_mismatch
+from posefit.silhouette.cost import areas, mismatch, project, view_of
+from posefit.silhouette.kernels import add_mismatch, paint_bits
 from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.rasteriser import draw_pose, scratch
 from posefit.silhouette.sharing import LEAST_SHARE
 
 counts = st.tuples(*[st.integers(0, 10**9)] * 3)
@@ -175,24 +176,13 @@ def test_painting_fills_the_bodys_pixels_and_none_beyond_the_image(
 ) -> None:
     width, height = size
     view = Camera.around(np.zeros(3), 0.0, 2.5, size)
-    poses, places = np.zeros((3, ANGLES)), np.tile([aside, 0.1, 0.0], (3, 1))
-    seen = Silhouette.of(project(body, view, poses[0], np.zeros(3)))
-    room = np.full((3, height + 40, width + 100), 7, dtype=np.uint16)
-    pixels = room[:, :height, :width]
+    pose, place = np.zeros(ANGLES), np.array([aside, 0.1, 0.0])
+    chain, seen = body.skeleton.chain, view_of(view)
+    image, box = draw_pose(chain, body.radii, seen, pose, place, scratch(seen, chain.parents.size, ANGLES))
+    room = np.full((height + 40, width + 100), 7, dtype=np.uint16)
+    pixels = room[:height, :width]
     pixels[:] = 1
-    counts = paint(body, view, seen, poses, places, pixels, 0xFF00)
-    drawn = project(body, view, poses[0], places[0])
-    for image in pixels:
-        np.testing.assert_array_equal(image, np.where(drawn, 0xFF01, 1))
-    assert (room[:, height:] == 7).all()
-    assert (room[:, :, width:] == 7).all()
-    np.testing.assert_array_equal(counts, areas(body, view, seen, poses, places))
-
-
-def test_painting_names_what_does_not_fit(body: Body, camera: Camera) -> None:
-    seen = Silhouette.of(np.ones((72, 96)))
-    poses, places = np.zeros((2, ANGLES)), np.zeros((2, 3))
-    with pytest.raises(ValueError, match=r"poses must have shape \(n, 66\) with translations \(n, 3\), got \(2, 66\)"):
-        paint(body, camera, seen, poses, places[:1], np.zeros((2, 72, 96), dtype=np.uint16), 1)
-    with pytest.raises(ValueError, match=r"mask and pixels must have shape \(72, 96\), got \(72, 96\), \(70, 96\)"):
-        paint(body, camera, seen, poses, places, np.zeros((2, 70, 96), dtype=np.uint16), 1)
+    paint_bits(image, box, np.uint16(0xFF00), pixels)
+    np.testing.assert_array_equal(pixels, np.where(project(body, view, pose, place), 0xFF01, 1))
+    assert (room[height:] == 7).all()
+    assert (room[:, width:] == 7).all()

@@ -9,8 +9,9 @@ from posefit import Start
 from posefit.arrays import Array
 from posefit.testing.toy import Toy, ball, sphere
 from posefit_filters.annealed import Annealed
-from posefit_filters.kernels import sharpness, survival, systematic, weigh
+from posefit_filters.kernels import sharpness, survival
 from posefit_filters.particle import Particle
+from posefit_filters.resampling import systematic, weigh
 
 
 def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (likelihood)
@@ -63,18 +64,19 @@ def test_the_filter_agrees_with_a_kalman_filter() -> None:
 
 
 def test_survival_is_the_effective_share_of_particles() -> None:  # DEUTSCHER2005 (survival)
-    assert survival(np.full(8, 1 / 8)) == pytest.approx(1.0)
-    assert survival(np.array([1.0, 0.0, 0.0, 0.0])) == pytest.approx(0.25)
-    assert survival(np.array([0.5, 0.5, 0.0, 0.0])) == pytest.approx(0.5)
+    assert survival(np.full(8, 3.0), 2.0) == pytest.approx(1.0)
+    assert survival(np.array([3.0, np.inf, np.inf, np.nan]), 2.0) == pytest.approx(0.25)
+    assert survival(np.array([3.0, 3.0, np.inf, np.nan]), 2.0) == pytest.approx(0.5)
+    assert survival(np.full(3, np.nan), 2.0) == 1.0  # nothing is known: all weigh alike
     # 1 / (0.36 + 0.09 + 0.01) / 3 = 0.724638
-    assert survival(np.array([0.6, 0.3, 0.1])) == pytest.approx(0.724638, abs=1e-6)
+    assert survival(-np.log([0.6, 0.3, 0.1]), 1.0) == pytest.approx(0.724638, abs=1e-6)
 
 
 @pytest.mark.parametrize("wanted", [0.1, 0.3, 0.5, 0.9])
 def test_beta_lets_the_wanted_share_survive(wanted: float) -> None:  # DEUTSCHER2005 (beta)
     costs = np.random.default_rng(0).exponential(5.0, 300)
     beta = sharpness(costs, wanted)
-    assert survival(weigh(costs, beta)) == pytest.approx(wanted, abs=1e-9)
+    assert survival(costs, beta) == pytest.approx(wanted, abs=1e-9)
     assert sharpness(10.0 * costs, wanted) == pytest.approx(beta / 10.0)  # the cost's own scale does not matter
 
 

@@ -3,13 +3,20 @@
 import os
 import subprocess
 import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import posefit
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.footage.scene import synthetic
+from posefit.motion import library
+from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
+from posefit.tracking.opening import begun
 
 COMPILING = "compiling the kernels, once on this machine; this can take half a minute ..."
 
@@ -46,3 +53,31 @@ def test_a_tracker_that_needs_its_whole_budget_works_all_the_same() -> None:
     assert posefit.track("walk", tracker=Demanding, frames=(0, 2), size=(120, 90)).summary["frames"] == 2
     with pytest.raises(ValueError, match="evaluations must be at least 2000, got 400"):
         posefit.track("walk", tracker=Demanding, frames=(0, 2), size=(120, 90), evaluations=400)
+
+
+@pytest.mark.parametrize(("size", "rows"), [((320, 240), 240), ((640, 479), 479), ((640, 480), 240), ((960, 721), 240)])
+def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole_one(
+    size: tuple[int, int], rows: int
+) -> None:
+    motion = library.built_in("walk", frames=5)
+    scene = synthetic(motion, [90.0], size, [], (None, None))
+    task = Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
+    looked: list[int] = []
+
+    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        for seen in observations:
+            looked.append(task.cameras[0].height)
+            assert seen.silhouettes[0].mask.shape[0] == task.cameras[0].height
+            pose, where = motion.poses[:1], motion.translations[:1]
+            counts = areas(task.body, task.cameras[0], seen.silhouettes[0], pose, where)
+            yield Frame(pose[0], where[0], float(mismatch(counts)[0]), counts, 1, 0.0, np.empty(0))
+
+    begin = begun(task, scene.observations, follow, 3, 0)
+    # frames 0 and 3 of each start, and the best one's first once more where they were seen small
+    assert looked == [rows] * 6 + ([size[1]] if rows != size[1] else [])
+    (first,) = begin.before
+    whole = areas(
+        scene.body, scene.cameras[0], scene.observations[0].silhouettes[0], motion.poses[:1], motion.translations[:1]
+    )
+    np.testing.assert_array_equal(first.areas, whole)
+    assert begin.cameras is task.cameras

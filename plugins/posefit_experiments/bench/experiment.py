@@ -10,8 +10,11 @@ import numpy as np
 from posefit.fitting.optimiser import minimise
 from posefit.sweep.command import cores
 from posefit_experiments.bench.environments import vector_env
+from posefit_experiments.bench.frame import frame_profiles
 from posefit_experiments.bench.kernel import SIZE, bench_problem, opencv_costs
-from posefit_experiments.bench.optimisers import PARTICLES, optimiser_us
+from posefit_experiments.bench.many import many_figures
+from posefit_experiments.bench.optimisers import OURS, PARTICLES, optimiser_us, wide_space
+from posefit_experiments.bench.processor import processor
 from posefit_experiments.bench.timing import fastest
 from posefit_swarm.sapso import SAPSO
 
@@ -51,6 +54,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         cv2.setNumThreads(cv2_threads)
     difference = np.abs(alone.evaluate(proposals) - opencv_costs(alone, proposals))
     one = seconds["one"] / POSES
+    frames = frame_profiles(alone)
     whole = float(np.mean([seconds[f"frame {seed}"] for seed in range(SEEDS)]))
     return {
         "kernel_us_per_pose_1_thread": 1e6 * one,
@@ -59,14 +63,21 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "opencv_batched_us_per_pose": 1e6 * seconds["opencv_batched"] / len(few),
         "sapso_frame_ms": 1e3 * whole,
         "sapso_overhead": whole / (PARTICLES * (ITERATIONS + 1) * one),
+        "sapso_loose_overhead": frames["sapso+loose"]["overhead"],
+        "frame": {name: {key: round(part, 3) for key, part in profile.items()} for name, profile in frames.items()},
         "kernel_speedup": seconds["opencv"] / len(few) / one,
         "kernel_speedup_over_batched": seconds["opencv_batched"] / len(few) / one,
         "threads": many,
         "threads_speedup": seconds["one"] / seconds["all"],
         "poses_per_second_1_thread": 1.0 / one,
         "mean_cost_difference_to_opencv": float(difference.mean()),
-        "vector_env": {name: round(value, 3) for name, value in vector_env().items()},
+        "vector_env": {
+            case: {name: round(value, 3) for name, value in one.items()} for case, one in vector_env(many).items()
+        },
+        "many": {name: round(us, 3) for name, us in many_figures().items()},
         "optimisers": {name: round(us, 3) for name, us in optimiser_us(alone.space).items()},
+        "optimisers_28": {name: round(us, 3) for name, us in optimiser_us(wide_space(alone.space), OURS).items()},
         "size": list(SIZE),
+        "cpu": processor(),
         "poses": POSES,
     }

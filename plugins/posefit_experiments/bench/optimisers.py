@@ -2,30 +2,44 @@
 
 import sys
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, cast, final
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from posefit.arrays import Array
 from posefit.fitting.optimiser import Filter, Optimiser, minimise
 from posefit.fitting.space import SearchSpace
+from posefit.motion import library
 from posefit.registry import Offer, registry
 from posefit.settings import planned
+from posefit_priors.loose import Loose
 
 PARTICLES = 40
 POPULATIONS, SEARCHES = 30, 10  # of each optimiser
 PATIENCE = 3.0  # seconds for one optimiser; a slow one has fewer searches
+OURS = ("sapso", "pso", "random", "particle", "annealed", "cma")
+COMPONENTS = 9  # of the prior `loose`, which makes 28 dimensions with the root's 3 angles and 16 of the limbs
 
 
-def optimiser_us(space: SearchSpace) -> dict[str, float]:
-    """Return what ask and tell take a proposal, in microseconds, of each optimiser that is installed.
+def wide_space(space: SearchSpace) -> SearchSpace:
+    """Return a space with the prior `loose` instead of its own, of 28 dimensions."""
+    styles = [library.built_in(name, frames=60, fps=30.0) for name in library.other_styles("walk")]
+    return replace(space, prior=Loose(components=COMPONENTS).fit(np.concatenate([one.poses[:, 3:] for one in styles])))
+
+
+def optimiser_us(space: SearchSpace, names: Sequence[str] = ()) -> dict[str, float]:
+    """Return what ask and tell take a proposal, in microseconds, of the optimisers named, or of all installed.
 
     Populations of 40 (for `scipy:dual_annealing` 1), as the cost a distance that takes no time to speak of; of a
     filter, with the step to the next frame. The best of several searches, on one thread.
     """
     found = registry().offers["optimiser"]
-    names = [name for name, offer in found.items() if not offer.missing] + ["scipy:dual_annealing"]
-    return {name: 1e6 * _ask_and_tell(space, registry().offer("optimiser", name)) for name in names}
+    names = names or [*(name for name, offer in found.items() if not offer.missing), "scipy:dual_annealing"]
+    with threadpool_limits(1):  # as a track has it: BLAS is slower with more threads where matrices are small
+        return {name: 1e6 * _ask_and_tell(space, registry().offer("optimiser", name)) for name in names}
 
 
 @final

@@ -1,17 +1,35 @@
 """`posefit bench`."""
 
-import json
+from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
 import click
 
-from posefit.cli.output import say
+from posefit.cli.output import json_line, say
 
 
 @click.command("bench")
 @click.option("--threads", type=int, help="How many `all threads` are; by default every core.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def bench_command(threads: int | None, as_json: bool) -> None:
-    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run."""
+@click.option("--growth", is_flag=True, help="Time how a pose's cost grows with size, poses, views and dimensions.")
+@click.option("--pictures", metavar="DIR", help="With --growth: write a figure of each, growth-*.png, to DIR.")
+@click.option("--compile", "compiling", is_flag=True, help="Time what compiles for the default sweep instead.")
+def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: str | None, compiling: bool) -> None:
+    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
+
+    `cpu` tells for which processor the loops are compiled, and which instructions it has. It is this machine's, or the
+    one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
+    """
+    if pictures is not None and not growth:
+        raise ValueError("pictures are of --growth, got --pictures without it")
+    if growth:
+        _growth(as_json, pictures)
+        return
+    if compiling:
+        _compile(as_json)
+        return
     from posefit_experiments.bench.experiment import loop_figures
 
     if threads is not None and threads < 1:
@@ -19,9 +37,39 @@ def bench_command(threads: int | None, as_json: bool) -> None:
     say("timing; this takes half a minute ...")
     figures = loop_figures(threads)
     if as_json:
-        click.echo(json.dumps(figures))
+        click.echo(json_line(figures))
         return
-    for group in ("vector_env", "optimisers"):
-        figures |= {f"{group}.{name}": value for name, value in figures.pop(group).items()}
-    for name, value in figures.items():
+    for name, value in _named(figures):
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
+
+
+def _named(figures: Mapping[str, Any], group: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every figure with its name, those of a group as `group.name`."""
+    for name, value in figures.items():
+        if isinstance(value, Mapping):
+            yield from _named(value, f"{group}{name}.")
+        else:
+            yield f"{group}{name}", value
+
+
+def _growth(as_json: bool, pictures: str | None) -> None:
+    from posefit_experiments.bench.growth import draw_growths, growth_table, growths
+
+    if pictures is not None and find_spec("matplotlib") is None:
+        raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
+    say("timing; this takes half a minute ...")
+    found = growths()
+    told = {one.name: dict(zip(one.labels, one.us, strict=True)) for one in found}
+    click.echo(json_line(told) if as_json else growth_table(found))
+    if pictures is not None:
+        for path in draw_growths(found, Path(pictures)):
+            say(f"{path}")
+
+
+def _compile(as_json: bool) -> None:
+    from posefit_experiments.bench.compiling import compile_figures, compile_lines
+
+    say("compiling everything from an empty cache; this takes up to a minute ...")
+    figures = compile_figures()
+    for line in [json_line(figures)] if as_json else compile_lines(figures):
+        click.echo(line)

@@ -1,6 +1,5 @@
 """posefit's own measurements: `posefit reproduce accuracy`, `methods`, `views`, `degradation`, `builds`, `footage`."""
 
-import json
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import click
 
 from posefit.cli.options import box, frame_range
-from posefit.cli.output import progress, say
+from posefit.cli.output import json_line, progress, say
 from posefit_experiments.commands.options import CLIPS, JSON, LEDGER, seeds, workers
 
 bar = partial(progress, unit="run")
@@ -104,5 +103,5 @@ def footage_command(as_json: bool, **asked: Any) -> None:
 
 
 def _print(told: dict[str, Any], lines: Callable[[dict[str, Any]], Iterable[str]], as_json: bool) -> None:
-    for line in [json.dumps(told)] if as_json else lines(told):
+    for line in [json_line(told)] if as_json else lines(told):
         click.echo(line)

@@ -1,11 +1,10 @@
 """`posefit reproduce sapso` and `posefit reproduce vsmm`."""
 
-import json
 from functools import partial
 
 import click
 
-from posefit.cli.output import progress
+from posefit.cli.output import json_line, progress
 from posefit_experiments.commands.options import JSON, seeds, workers
 
 NEIGHBOURS = "Seconds of a frame are those beside so many neighbours."
@@ -22,7 +21,7 @@ def vsmm_command(seeds: int, searches: bool, out: str | None, workers: int, as_j
     from posefit_experiments.vsmm.report import patent_report, patent_table
 
     figures = patent_report(seeds, searches, out, workers, partial(progress, unit="run"))
-    click.echo(json.dumps(figures) if as_json else patent_table(figures))
+    click.echo(json_line(figures) if as_json else patent_table(figures))
     if out and not as_json:
         click.echo(f"written to {out}: look at figure-9-joints.png, figure-10-probabilities.png, figure-11-errors.png")
 
@@ -46,6 +45,6 @@ def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, w
     from posefit_experiments.sapso.text import paper_text
 
     told = paper_report(clips, seeds, QUICK if quick else Scale(), out, workers, partial(progress, unit="run"))
-    click.echo(json.dumps(told) if as_json else paper_text(told))
+    click.echo(json_line(told) if as_json else paper_text(told))
     if out and not as_json:
         click.echo(f"written to {out}: look at {', '.join(told['figures'])}")

@@ -105,7 +105,7 @@ def pairs(clip: Recorded) -> tuple[Array, Array]:
     step = round(clip.fps / FPS)  # Reading V6: all pairs of a recording so far apart
     before, after = [], []
     for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
-        back, here = without_heading(first[3:].reshape(-1, 4))
+        back, here = without_heading(first)
         turn = Rotation.from_quat(back, scalar_first=True).inv()
         there = second[3:].reshape(-1, 4).copy()
         there[0] = (turn * Rotation.from_quat(there[0], scalar_first=True)).as_quat(scalar_first=True)

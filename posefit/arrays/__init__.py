@@ -1,13 +1,21 @@
 """Arrays and compiled loops, as every floor of the house uses them."""
 
+import os
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from posefit.arrays.compiling import compiled_once
+
 Array = NDArray[np.float64]
 Bits = NDArray[np.uint64]  # 64 pixels a number
+
+if "NUMBA_CPU_NAME" in os.environ:
+    # A processor that is named has its own instructions and none besides. numba, not yet imported, takes the name for
+    # their order only: x86-64-v3 would still have AVX-512 where this machine has it.
+    os.environ.setdefault("NUMBA_CPU_FEATURES", "")
 
 
 def jit(function: Callable[..., Any]) -> Any:
@@ -17,7 +25,18 @@ def jit(function: Callable[..., Any]) -> Any:
     """
     import numba
 
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+    compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})(function)
+    return compiled if compiled is function else compiled_once(compiled)  # numba may be told to compile nothing
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Return a plain function of arrays that becomes part of the compiled functions that call it.
+
+    A call costs as much as filling a few blocks of pixels: each array is counted as in use, and then as not.
+    """
+    import numba
+
+    compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, inline="always")
     return compiled(function)
 
 

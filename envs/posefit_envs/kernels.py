@@ -1,0 +1,100 @@
+"""Many scenes at once: numba loops over stacked arrays, a row a scene. Shapes are checked by the callers.
+
+Each row is computed as one alone is, by the same inner functions, so that its bits do not depend on its neighbours.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array, Bits, jit
+from posefit.fitting.kernels import move_to_borders, unpack_proposals, within
+from posefit.geometry.kernels import Chain, place_joints
+from posefit.silhouette.kernels import count, paint_bits
+from posefit.silhouette.rasteriser import View, draw_pose, scratch
+
+
+class Scenes(NamedTuple):
+    """What the drawn scenes (n) differ in: bodies, cameras, silhouettes and pictures."""
+
+    offsets: Array  # (n, 26, 3) bones in their own frames
+    radii: Array  # (n, 26, 2)
+    rotations: Array  # (n, views, 3, 3) camera_from_world
+    places: Array  # (n, views, 3) the cameras' translations
+    focals: Array  # (n, views, 2) pixels
+    centres: Array  # (n, views, 2) pixels
+    observed: Bits  # (n, views, ...) bit images
+    valid: Bits  # (n, views, ...) bit images
+    totals: NDArray[np.int64]  # (n, views) pixels of the silhouettes
+    backdrops: NDArray[np.uint16]  # (n, height, width, views)
+
+
+@jit
+def unpack_scenes(proposals, centres, halves, anchors, first, poses, translations, latents):
+    """Write root angles, translations and latents of proposals (n, k, d); return whether all of them are finite."""
+    finite = True
+    for i in range(proposals.shape[0]):
+        finite &= unpack_proposals(
+            proposals[i], centres[i], halves[i], anchors[i], first, poses[i], translations[i], latents[i]
+        )
+    return finite
+
+
+@jit
+def within_scenes(proposals, centres, halves, inside, latents):
+    """Write which proposals (n, k, d) lie in their boxes, and the latents of all."""
+    for i in range(proposals.shape[0]):
+        within(proposals[i], centres[i], halves[i], inside[i], latents[i])
+
+
+@jit
+def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations):
+    """Move translations (n, k, 3) of some rows to where poses (n, k, 66) fill the borders (n, views, 4)."""
+    bones, many = chain.parents.size, poses.shape[1]
+    sines, cosines, origin = np.empty(poses.shape[2]), np.empty(poses.shape[2]), np.zeros(3)
+    frames, joints = np.empty((bones + 1, 3, 3)), np.empty((many, bones + 1, 3))
+    for i in rows:
+        own = Chain(chain.parents, chain.angles, chain.turns, chain.turned, scenes.offsets[i])
+        for k in range(many):
+            place_joints(own, poses[i, k], origin, sines, cosines, frames, joints[k])
+        move_to_borders(
+            joints,
+            joint_radii[i],
+            scenes.rotations[i],
+            scenes.places[i],
+            scenes.focals[i],
+            scenes.centres[i],
+            borders[i],
+            translations[i],
+        )
+
+
+@jit
+def draw_scenes(chain, scenes, width, height, rows, poses, translations, areas, value, pictures):
+    """Write the areas (views, n, k, 3) R, B, Y of poses (n, k, 66) in some rows, each in its own scene.
+
+    Where there are `pictures` (n, height, width, views), and k is 1, they become the backdrops with `value` in the
+    pixels of each body; those of other rows stay as they are.
+    """
+    views, bones = scenes.places.shape[1], chain.parents.size
+    rotations, places, focals, centres = scenes.rotations, scenes.places, scenes.focals, scenes.centres
+    work = scratch(
+        View(rotations[0, 0], places[0, 0], focals[0, 0], centres[0, 0], width, height), bones, poses.shape[2]
+    )
+    for i in rows:
+        own = Chain(chain.parents, chain.angles, chain.turns, chain.turned, scenes.offsets[i])
+        if pictures.size:
+            pixels, backdrop = pictures[i].reshape(-1), scenes.backdrops[i].reshape(-1)
+            for p in range(pixels.size):
+                pixels[p] = backdrop[p]
+        for v in range(views):
+            view = View(rotations[i, v], places[i, v], focals[i, v], centres[i, v], width, height)
+            for k in range(poses.shape[1]):
+                image, box = draw_pose(own, scenes.radii[i], view, poses[i, k], translations[i, k], work)
+                if pictures.size:
+                    paint_bits(image, box, value, pictures[i, :, :, v])
+                body, overlap = count(image, scenes.observed[i, v], scenes.valid[i, v], box)
+                areas[v, i, k, 0] = np.uint64(scenes.totals[i, v]) - overlap
+                areas[v, i, k, 1] = body - overlap
+                areas[v, i, k, 2] = overlap

@@ -1,0 +1,165 @@
+"""Proposals become poses, costs and pictures: each in a scene of its own, all scenes in one compiled call."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit import SearchSpace, Silhouette
+from posefit.arrays import Array
+from posefit.fitting.problem import over_views
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
+from posefit.silhouette.drawn import count_poses
+from posefit.silhouette.mask import pack
+from posefit.silhouette.sharing import LEAST_SHARE, work_through
+from posefit_envs.instance import World
+from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes, within_scenes
+from posefit_envs.search import BODY, Image, Scenery
+
+Rows = NDArray[np.int64]
+_FIXED = ("radii", "rotations", "places", "focals", "centres")  # cannot be written to where they come from
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """What proposals came to, a row a scene; rows of scenes that were left out mean nothing."""
+
+    poses: Array  # (n, 66)
+    translations: Array  # (n, 3)
+    costs: Array  # (n,)
+    areas: NDArray[np.int64]  # (n, views, 3), zero where a scene was left out
+    pictures: Image  # (n, height, width, 2 views)
+
+
+@final
+class Stage:
+    """Scenes of one world side by side, a row each. Whatever they differ in is stacked, so that one call does all.
+
+    A row has the same bits whatever the others hold, whatever number of rows there is, and however many `threads` draw.
+    """
+
+    def __init__(self, world: World, rows: int, threads: int = 1) -> None:
+        views, (width, height) = len(world.view_degrees), world.size
+        bones, bits = len(BONES), pack(np.zeros((height, width), dtype=bool)).shape
+        self._width, self._height, self._threads = width, height, threads
+        self._prior, self._aligned = world.learned, world.translation == "aligned"
+        self._chain = world.body.skeleton.chain
+        self._sceneries: list[Scenery | None] = [None] * rows
+        self._silhouettes: Sequence[Silhouette] = ()
+        self._scenes = Scenes(
+            np.empty((rows, bones, 3)),
+            np.empty((rows, bones, 2)),
+            np.empty((rows, views, 3, 3)),
+            np.empty((rows, views, 3)),
+            np.empty((rows, views, 2)),
+            np.empty((rows, views, 2)),
+            np.empty((rows, views, *bits), dtype=np.uint64),
+            np.empty((rows, views, *bits), dtype=np.uint64),
+            np.empty((rows, views), dtype=np.int64),
+            np.empty((rows, height, width, views), dtype=np.uint16),
+        )
+        self._joint_radii, self._borders = np.empty((rows, len(JOINTS))), np.empty((rows, views, 4))
+        self._first = 6 if world.translation == "searched" else 3
+        d = self._first + len(self._prior.low)
+        self._centres, self._halves, self._anchors = np.empty((rows, d)), np.empty((rows, d)), np.empty((rows, 3))
+        self.everyone: Rows = np.arange(rows)
+
+    def put(self, row: int, scenery: Scenery, space: SearchSpace) -> None:
+        """Make a row this scene, whose pose is sought in this space."""
+        self._centres[row], self._halves[row], self._anchors[row] = space.centre, space.half, space.anchor
+        if self._sceneries[row] is scenery:
+            return
+        self._sceneries[row], self._silhouettes = scenery, scenery.observation.silhouettes
+        body, scenes = scenery.task.body, self._scenes
+        scenes.offsets[row], scenes.radii[row] = body.skeleton.chain.offsets, body.radii
+        scenes.backdrops[row] = scenery.backdrop
+        for view, (camera, seen) in enumerate(zip(scenery.task.cameras, scenery.observation.silhouettes, strict=True)):
+            scenes.rotations[row, view], scenes.places[row, view] = camera.rotation, camera.translation
+            scenes.focals[row, view], scenes.centres[row, view] = camera.focal, camera.centre
+            scenes.observed[row, view], scenes.valid[row, view] = seen.bits
+            scenes.totals[row, view] = np.count_nonzero(seen.mask)
+        if self._aligned:
+            self._joint_radii[row] = body.joint_radii()
+            self._borders[row] = [seen.extent for seen in scenery.observation.silhouettes]
+
+    def pictures(self) -> Image:
+        """Return the pictures (n, height, width, 2 views) before anything was proposed."""
+        return np.array(self._scenes.backdrops).view(np.uint8)
+
+    def look(self, proposals: Array, rows: Rows) -> Evaluated:
+        """Return what proposals (n, d) come to in some rows; the others' pictures show nothing proposed."""
+        several, whole = proposals[:, None], len(rows) == len(self.everyone)
+        poses, translations = self.decode(several, rows)
+        pictures = np.empty_like(self._scenes.backdrops) if whole else np.array(self._scenes.backdrops)
+        costs, areas = self._drawn(poses, translations, rows, pictures)
+        counts = np.ascontiguousarray(areas[:, :, 0].swapaxes(0, 1))
+        return Evaluated(poses[:, 0], translations[:, 0], costs[:, 0], counts, pictures.view(np.uint8))
+
+    def costs(self, proposals: Array, rows: Rows) -> Array:
+        """Return the costs (n, k) of proposals (n, k, d), k in each scene, those of some rows."""
+        nowhere = np.empty((0, self._height, self._width, self._scenes.places.shape[1]), dtype=np.uint16)
+        return self._drawn(*self.decode(proposals, rows), rows, nowhere)[0]
+
+    def show(self, poses: Array, translations: Array, rows: Rows, pictures: Image) -> None:
+        """Draw poses (n, 66) that stay where they are in some rows, and write those rows' pictures."""
+        self._drawn(poses[:, None], translations[:, None], rows, pictures.view(np.uint16))
+
+    def decode(self, proposals: Array, rows: Rows) -> tuple[Array, Array]:
+        """Return the poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d), those of some rows aligned."""
+        poses, translations = self._unpacked(proposals)
+        if self._aligned:
+            align_scenes(self._chain, self._read(), self._joint_radii, self._borders, rows, poses, translations)
+        return poses, translations
+
+    def poses(self, proposals: Array) -> Array:
+        """Return the poses (n, 66) of proposals (n, d), wherever they stand."""
+        return self._unpacked(proposals[:, None])[0][:, 0]
+
+    def feasible(self, proposals: Array, rows: Rows) -> NDArray[np.bool_]:
+        """Return which proposals (m, k, d), of the scenes in these rows (m,), lie in the box and mean a pose."""
+        m, k, d = proposals.shape
+        inside, latents = np.empty((m, k), dtype=bool), np.empty((m, k, d - self._first))
+        within_scenes(proposals, self._centres[rows], self._halves[rows], inside, latents)
+        return inside & self._prior.feasible(latents.reshape(m * k, -1)).reshape(m, k)
+
+    def _unpacked(self, proposals: Array) -> tuple[Array, Array]:
+        (n, k, d), first = proposals.shape, self._first
+        poses, translations, latents = np.empty((n, k, ANGLES)), np.empty((n, k, 3)), np.empty((n, k, d - first))
+        finite = unpack_scenes(
+            proposals, self._centres, self._halves, self._anchors, first, poses, translations, latents
+        )
+        assert finite, "actions are checked, and spaces are finite"
+        angles = self._prior.inverse_transform(latents.reshape(n * k, -1))
+        poses[..., 3:] = angles.reshape(n, k, -1)
+        return poses, translations
+
+    def _drawn(
+        self, poses: Array, translations: Array, rows: Rows, pictures: NDArray[np.uint16]
+    ) -> tuple[Array, NDArray[np.int64]]:
+        """Return the costs (n, k) and areas (views, n, k, 3) of poses (n, k, 66) in some rows; write their pictures."""
+        n, k = poses.shape[:2]
+        views = self._scenes.places.shape[1]
+        count_poses(len(rows) * k * views)
+        areas = np.zeros((views, n, k, 3), dtype=np.int64)
+        scenes = self._read()
+
+        def draw(part: slice) -> None:
+            at = self._chain, scenes, self._width, self._height, rows[part]
+            draw_scenes(*at, poses, translations, areas, np.uint16(BODY), pictures)
+
+        shares = max(min(self._threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
+        cuts = [len(rows) * share // shares for share in range(shares + 1)]
+        work_through([slice(a, b) for a, b in pairwise(cuts)], self._threads, lambda _: (), draw)
+        # every pixel of a scene is known, so that the silhouettes of one speak for all
+        costs = over_views(list(areas.reshape(views, n * k, 3)), self._silhouettes)
+        return costs.reshape(n, k), areas
+
+    def _read(self) -> Scenes:
+        """Return the scenes as the inner loops were compiled for others; for writeable arrays they would be again."""
+        fixed = {name: getattr(self._scenes, name).view() for name in _FIXED}
+        for array in fixed.values():
+            array.flags.writeable = False
+        return self._scenes._replace(**fixed)

@@ -1,0 +1,7 @@
+"""Many environments at once: a population of proposals is one compiled call, whatever the instances are.
+
+| looking for | file |
+|---|---|
+| Fit-v0, Track-v0, Configure-v0 | fit.py, track.py, configure.py |
+| what they share: seeds, instances, masks of a reset and of infos | batch.py |
+"""

@@ -1,0 +1,148 @@
+"""What vector environments share: seeds, instances, masks of a reset and of infos."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import Space, error
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from posefit.fitting.check import whole
+from posefit_envs.drawing import MODES, check_mode
+from posefit_envs.instance import Selection, approved
+from posefit_envs.search import Doorkeeper
+
+Flags = NDArray[np.bool_]  # (n,)
+Infos = dict[str, Any]
+
+
+class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
+    """`num_envs` environments whose states are rows of arrays.
+
+    Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an episode's last
+    one resets, as `AutoresetMode.NEXT_STEP` says.
+    """
+
+    metadata = {  # noqa: RUF012, as Gymnasium has it
+        "render_modes": list(MODES),
+        "render_fps": 10,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int,
+        selection: Selection,
+        spaces: tuple[Space[Any], Space[Any]],
+        render_mode: str | None,
+        max_episode_steps: int | None,
+    ) -> None:
+        approved(whole, "num_envs", num_envs, 1)
+        check_mode(render_mode)
+        if render_mode == "human":
+            raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self._selection, self.world = selection, selection.world
+        self.single_action_space, self.single_observation_space = spaces
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._shape = self.action_space.shape or ()
+        self._door = Doorkeeper(self._shape[1])
+        self._longest = np.inf if max_episode_steps is None else max_episode_steps
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._begun = False
+        self._numbers = np.zeros(num_envs, dtype=np.int64)
+        self._steps = np.zeros(num_envs, dtype=np.int64)
+        self._ended = np.zeros(num_envs, dtype=bool)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, Infos]:
+        """Begin with an instance each; `options={"instance": 17}` chooses one for all, "reset_mask" some to begin."""
+        seeds, mask = seeds_of(seed, self.num_envs), mask_of(options, self.num_envs, self._begun)
+        for i in np.flatnonzero(mask).tolist():
+            if seeds[i] is not None:
+                self._generators[i] = seeding.np_random(seeds[i])[0]
+            self._renew(i, options)
+        self._begun = True
+        observations, infos = self._opened(mask)
+        return observations, masked(mask, infos)
+
+    def _renew(self, i: int, options: Mapping[str, Any] | None) -> None:
+        """Begin one environment's next episode."""
+        number = self._selection.number(options, lambda: self._generator(i))
+        self._begin(i, number)
+        self._numbers[i], self._steps[i], self._ended[i] = number, 0, False
+
+    def _renew_ended(self) -> Flags:
+        """Begin the next episodes where one has ended; return which environments (n,) step, the others."""
+        if not self._begun:
+            raise error.ResetNeeded("reset must come before anything else")
+        stepping = ~self._ended
+        for i in np.flatnonzero(self._ended).tolist():
+            self._renew(i, None)
+        self._steps += stepping
+        return stepping
+
+    def _generator(self, i: int) -> np.random.Generator:
+        mine = self._generators[i]
+        if mine is None:
+            mine = self._generators[i] = seeding.np_random(None)[0]
+        return mine
+
+    @abstractmethod
+    def _begin(self, i: int, number: int) -> None:
+        """Make environment i begin with an instance."""
+
+    @abstractmethod
+    def _opened(self, begun: Flags) -> tuple[Any, Infos]:
+        """Return observations (n, ...) after a reset of some environments, and what is said of those by name."""
+
+
+def masked(mask: Flags, values: Infos, others: Infos | None = None) -> Infos:
+    """Return infos as Gymnasium has them: `values` where the mask (n,) is true, zeros elsewhere, and the masks.
+
+    Where it is false there are `others`, of the same names or fewer. A name that nobody has is left out.
+    """
+    everyone, nobody = bool(mask.all()), not mask.any()
+    infos: Infos = {}
+    for name, value in values.items():
+        if others and name in others:
+            infos[name] = value if everyone else np.where(mask, value, others[name])
+            infos[f"_{name}"] = np.ones(len(mask), dtype=bool)
+        elif not nobody:
+            shape = (-1, *[1] * (value.ndim - 1))
+            infos[name] = value if everyone else np.where(mask.reshape(shape), value, np.zeros_like(value))
+            infos[f"_{name}"] = mask.copy()
+    return infos
+
+
+def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+    """Return a seed for each environment: s gives s, s + 1, ... Raises gymnasium.error.Error where they are too few."""
+    if seed is None:
+        return [None] * count
+    if isinstance(seed, int | np.integer):
+        return [int(seed) + i for i in range(count)]
+    if len(seed) != count:
+        raise error.Error(f"seed must be one number or {count}, got {len(seed)}")
+    return list(seed)
+
+
+def mask_of(options: Mapping[str, Any] | None, count: int, begun: bool) -> Flags:
+    """Return which environments (count,) a reset is for: all, or those of the option "reset_mask".
+
+    Raises gymnasium.error.Error where the mask does not fit, gymnasium.error.ResetNeeded where the others have not
+    `begun`.
+    """
+    if not options or options.get("reset_mask") is None:
+        return np.ones(count, dtype=bool)
+    mask = np.asarray(options["reset_mask"])
+    if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
+        raise error.Error(f"reset_mask must be {count} booleans, at least one of them true, got {mask!r}")
+    if not begun and not mask.all():
+        raise error.ResetNeeded("the first reset must be of all environments")
+    return mask

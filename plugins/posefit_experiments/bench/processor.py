@@ -1,0 +1,40 @@
+"""Which instructions the compiled loops use: those of this machine, or of the one that NUMBA_CPU_NAME names."""
+
+import platform
+from pathlib import Path
+
+# Sixteen numbers of 32 bits, each shifted by another: every set of instructions has its own way to do it.
+_PROBE = """
+define <16 x i32> @shifted(<16 x i32> %bits, <16 x i32> %by) {
+  %out = shl <16 x i32> %bits, %by
+  ret <16 x i32> %out
+}
+"""
+_SIGNS = (("zmm", "AVX-512"), ("vpsllvd", "AVX2"), ("vpmulld", "AVX"), ("pmulld", "SSE4"), ("pmuludq", "SSE2"))
+
+
+def processor() -> dict[str, str]:
+    """Return this machine's processor, the one that loops are compiled for as LLVM calls it, and its instructions."""
+    from numba.core.registry import cpu_target
+
+    _, name, features = cpu_target.target_context.codegen().magic_tuple()
+    return {"name": _own_name(), "compiled_for": name, "features": instructions(name, features)}
+
+
+def instructions(name: str, features: str = "") -> str:
+    """Return the widest instructions that LLVM uses for a processor: AVX-512, AVX2, AVX, SSE4, SSE2, or else its kind.
+
+    `features` are added to or taken from those that its name stands for, as in "+avx2,-avx512f".
+    """
+    from llvmlite import binding  # type: ignore[import-untyped]
+
+    target = binding.Target.from_default_triple().create_target_machine(cpu=name, features=features)
+    assembly = target.emit_assembly(binding.parse_assembly(_PROBE))
+    return next((kind for sign, kind in _SIGNS if sign in assembly), platform.machine())
+
+
+def _own_name() -> str:
+    listed = Path("/proc/cpuinfo")
+    lines = listed.read_text().splitlines() if listed.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()

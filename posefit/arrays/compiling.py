@@ -1,0 +1,89 @@
+"""Of several processes that need one compiled function, one compiles it; the others wait for it in numba's cache.
+
+numba's own cache lets them all compile at the same time, and loses a signature where two of them write its index. So
+each function has a lock beside its cache, a file that is locked (`flock`) while the function is looked for, compiled
+and written: who comes later finds it there. The operating system drops a lock when its process ends in any way.
+
+Locks cannot wait for each other in a circle: a process takes them one within the other only where one function calls
+another, and no two functions call each other. Where there is no lock to be had, on a disk without them or one that
+cannot be written to, everybody compiles, as without this module.
+"""
+
+import fcntl
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+PATIENCE = 120.0  # seconds that another process may take over a function, until this one compiles it itself
+LOOK = 0.02  # seconds between two looks whether it is done
+
+_held: set[Path] = set()  # of this process, which only the thread that holds numba's own lock may look at
+
+
+def compiled_once(dispatcher: Any) -> Any:
+    """Return a function of numba's, cached where there is a folder for it, that one process at a time compiles."""
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.types import unliteral
+
+    with suppress(RuntimeError):  # there is no folder for it
+        dispatcher.enable_caching()
+    folder, alone = dispatcher.stats.cache_path, dispatcher.compile
+    if folder is None:
+        return dispatcher
+    function = dispatcher.py_func
+    path = Path(folder) / f"{function.__module__}.{function.__qualname__}.lock"
+
+    def compile_in_turn(signature: Any) -> Any:
+        if isinstance(signature, tuple):  # a number written out in a call would be a type of its own
+            signature = tuple(unliteral(one) for one in signature)  # type: ignore[no-untyped-call]
+        # a thread of this process that waits for another process must not hold what a second thread needs to go on
+        with global_compiler_lock, in_turn(path):
+            return _compiled(alone, signature)
+
+    dispatcher.compile = compile_in_turn
+    return dispatcher
+
+
+def _compiled(alone: Callable[[Any], Any], signature: Any) -> Any:
+    try:
+        return alone(signature)
+    except OSError:  # it is compiled, and could not be written
+        return alone(signature)
+
+
+@contextmanager
+def in_turn(path: Path, patience: float = PATIENCE) -> Iterator[None]:
+    """Hold the lock of a path in the body; where that takes too long, or there is none, go on without it."""
+    if path in _held:  # a function that calls itself
+        yield
+        return
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:
+        yield
+        return
+    _held.add(path)
+    try:
+        _wait(file, time.monotonic() + patience)
+        yield
+    finally:
+        _held.discard(path)
+        with suppress(OSError):
+            fcntl.flock(file, fcntl.LOCK_UN)  # a process that was forked meanwhile may hold it open
+        os.close(file)
+
+
+def _wait(file: int, until: float) -> None:
+    while True:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            if time.monotonic() > until:
+                return
+            time.sleep(LOOK)
+        except OSError:  # a disk without locks
+            return

@@ -1,0 +1,210 @@
+"""One process compiles a function, others wait for it; none waits for ever, and none needs a cache."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+
+import pytest
+
+from posefit.arrays.compiling import in_turn
+
+# a loop that calls another, one that calls itself, one that calls another twice, and one that no type fits
+LOOPS = """
+from posefit.arrays import jit
+
+@jit
+def outer(values):
+    total = 0.0
+    for i in range(values.size):
+        total += inner(values, i)
+    return total
+
+@jit
+def inner(values, i):
+    return values[i] * values[i]
+
+@jit
+def halved(n):
+    return 0 if n < 2 else 1 + halved(n // 2)
+
+@jit
+def first(values):
+    one = 1
+    return picked(values, 0) + picked(values, values.size - 2 * one)
+
+@jit
+def picked(values, i):
+    return values[i]
+
+@jit
+def impossible(values):
+    return values + "words"
+"""
+# says what this process compiled, once a file tells it to begin
+RUN = """
+import os, time
+import numpy as np
+from numba.core import event
+
+class Listener(event.Listener):
+    def on_start(self, one):
+        name = one.data["dispatcher"].py_func
+        if name.__module__ == "loops":
+            print("compiled", name.__name__, one.data["args"][0], flush=True)
+    def on_end(self, one):
+        pass
+
+import loops
+event.register("numba:compile", Listener())
+print("ready", flush=True)
+while not os.path.exists("go"):
+    time.sleep(0.001)
+"""
+ALL = """
+assert loops.outer(np.arange(4.0)) == 14.0
+assert loops.outer(np.arange(4)) == 14.0
+assert loops.halved(9) == 3
+"""
+
+
+@pytest.fixture
+def start(tmp_path):
+    (tmp_path / "loops.py").write_text(LOOPS, encoding="utf-8")
+
+    def started(script, **variables):
+        told = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0", **variables}
+        path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+        return subprocess.Popen(
+            [sys.executable, "-c", RUN + script],
+            cwd=tmp_path,
+            env={**told, "PYTHONPATH": path},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    return started
+
+
+def compiled(process):
+    said, complaints = process.communicate(timeout=120)
+    assert process.returncode == 0, complaints
+    return [line.removeprefix("compiled ") for line in said.splitlines() if line.startswith("compiled")]
+
+
+ONCE = {
+    "outer array(float64, 1d, C)": 1,
+    "inner array(float64, 1d, C)": 1,
+    "outer array(int64, 1d, C)": 1,
+    "inner array(int64, 1d, C)": 1,
+    "halved int64": 1,
+}
+
+
+def test_two_processes_that_start_on_an_empty_cache_compile_each_function_once_in_all(start, tmp_path):
+    both = [start(ALL), start(ALL)]
+    for one in both:
+        assert one.stdout.readline() == "ready\n"
+    (tmp_path / "go").touch()
+    assert Counter(compiled(both[0]) + compiled(both[1])) == ONCE
+    # and nothing of it is lost: a third one finds both signatures of each
+    assert compiled(start(ALL)) == []
+
+
+def test_two_threads_that_need_functions_of_each_other_do_not_wait_for_each_other(start, tmp_path):
+    (tmp_path / "go").touch()
+    script = """
+from threading import Thread
+jobs = [Thread(target=loops.outer, args=(np.arange(4.0),)), Thread(target=loops.inner, args=(np.arange(4.0), 1))]
+for job in jobs: job.start()
+for job in jobs: job.join()
+"""
+    assert sorted(compiled(start(script))) == ["inner array(float64, 1d, C)", "outer array(float64, 1d, C)"]
+
+
+def test_a_function_that_cannot_be_compiled_leaves_no_lock_behind(start, tmp_path):
+    (tmp_path / "go").touch()
+    script = """
+from numba.core.errors import TypingError
+for _ in range(2):
+    try:
+        loops.impossible(np.arange(4.0))
+        raise AssertionError
+    except TypingError:
+        pass
+from posefit.arrays.compiling import _held
+assert not _held
+"""
+    assert compiled(start(script)) == ["impossible array(float64, 1d, C)"] * 2
+
+
+def test_without_a_folder_for_the_cache_every_process_compiles(start, tmp_path):
+    (tmp_path / "go").touch()
+    (tmp_path / "cache").write_text("a file where the folder should be", encoding="utf-8")
+    (tmp_path / "__pycache__").write_text("and here", encoding="utf-8")
+    nowhere = {"HOME": str(tmp_path / "cache"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    assert Counter(compiled(start(ALL, **nowhere))) == ONCE
+    assert Counter(compiled(start(ALL, **nowhere))) == ONCE
+
+
+def test_a_disk_without_room_for_the_cache_costs_nothing_but_time(start, tmp_path):
+    (tmp_path / "go").touch()
+    script = """
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+"""
+    assert Counter(compiled(start(script + ALL))) == ONCE
+
+
+def test_a_number_written_out_in_a_call_is_no_signature_of_its_own(start, tmp_path):
+    (tmp_path / "go").touch()
+    script = """
+assert loops.first(np.arange(3.0, 6.0)) == 7.0
+"""
+    assert Counter(compiled(start(script))) == {"first array(float64, 1d, C)": 1, "picked array(float64, 1d, C)": 1}
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from posefit.arrays.compiling import in_turn
+with in_turn(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.fixture
+def holder(tmp_path):
+    path = tmp_path / "one.lock"
+    process = subprocess.Popen([sys.executable, "-c", HOLD, str(path)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "held\n"
+    yield process, path
+    process.kill()
+    process.communicate()
+
+
+def waited(path, patience):
+    began = time.monotonic()
+    with in_turn(path, patience):
+        return time.monotonic() - began
+
+
+def test_who_waits_goes_on_when_the_process_dies_that_holds_the_lock(holder):
+    process, path = holder
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert waited(path, 60.0) < 30.0
+
+
+def test_who_waits_too_long_goes_on_alone(holder):
+    _, path = holder
+    assert 0.2 <= waited(path, 0.2) < 30.0
+
+
+def test_a_lock_that_one_holds_oneself_is_not_waited_for(tmp_path):
+    with in_turn(tmp_path / "one.lock"):
+        assert waited(tmp_path / "one.lock", 60.0) < 30.0

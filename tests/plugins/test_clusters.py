@@ -1,0 +1,45 @@
+"""K-means, against scikit-learn's: the same seed means the same clusters."""
+
+import numpy as np
+import pytest
+from sklearn.cluster import KMeans
+
+from posefit.arrays import Array
+from posefit.motion import library as motions
+from posefit_priors.clusters import clustered
+
+
+def agrees(points: Array, clusters: int, seed: int) -> None:
+    centres, labels = clustered(points, clusters, seed)
+    other = KMeans(clusters, n_init=10, random_state=seed).fit(points)
+    np.testing.assert_allclose(centres, other.cluster_centers_, atol=1e-11)
+    np.testing.assert_array_equal(labels, other.labels_)
+
+
+@pytest.mark.parametrize("clusters", [1, 2, 5, 12])
+@pytest.mark.parametrize("name", ["walk", "squat"])
+def test_poses_have_the_clusters_that_scikit_learn_finds(name: str, clusters: int) -> None:
+    for seed in range(3):
+        agrees(motions.built_in(name, frames=90).poses[:, 3:], clusters, seed)
+
+
+@pytest.mark.parametrize(("points", "dimensions", "clusters"), [(300, 3, 5), (12, 1, 5), (10, 2, 10)])
+def test_noise_has_the_clusters_that_scikit_learn_finds(points: int, dimensions: int, clusters: int) -> None:
+    for seed in range(5):
+        agrees(np.random.default_rng(seed).normal(size=(points, dimensions)), clusters, seed)
+
+
+@pytest.mark.filterwarnings("ignore:Number of distinct clusters")  # of scikit-learn's
+def test_fewer_different_points_than_clusters_are_centres_each() -> None:
+    points = np.repeat([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]], 4, axis=0)
+    agrees(points, 5, 0)
+    assert {tuple(one) for one in clustered(points, 5, 0)[0].round(12) + 0.0} == {(0.0, 0.0), (1.0, 0.0), (0.0, 2.0)}
+
+
+def test_two_heaps_have_their_means_as_centres() -> None:
+    # around 0 and around 10: means 1 and 11, whatever the seed
+    points = np.array([[0.0], [1.0], [2.0], [10.0], [11.0], [12.0]])
+    for seed in range(5):
+        centres, labels = clustered(points, 2, seed)
+        np.testing.assert_allclose(np.sort(centres.ravel()), [1.0, 11.0])
+        assert (centres[labels].ravel() == np.repeat(centres[labels[[0, 3]]].ravel(), 3)).all()

@@ -1,0 +1,302 @@
+"""One test for each equation of Hansen's tutorial, 2016: by hand, by law, or against the formula in matrices."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit.evolution.constants import Constants, usual_population
+from posefit.evolution.strategy import Strategy
+
+# Six proposals in two dimensions, worked by hand. mu = 3 and ln 3.5 - ln i is:
+RAW = np.array([1.252763, 0.559616, 0.154151, -0.133531, -0.356675, -0.538997])
+MU_EFF = 2.028615  # 1.966530^2 / (1.569415 + 0.313170 + 0.023763)
+MU_EFF_MINUS = 2.431917  # 1.029203^2 / (0.017831 + 0.127217 + 0.290518)
+SMALL = Constants.of(2, 6)
+EIGHT = Constants.of(3, 8)  # those of `learnt`
+
+
+class Rows(np.random.Generator):
+    """A generator whose standard normal draws are given."""
+
+    def __init__(self, rows: Array) -> None:
+        super().__init__(np.random.PCG64(0))
+        self.rows = rows
+
+    def standard_normal(self, size: Any = None, *_: Any, **__: Any) -> Any:
+        assert size == self.rows.shape
+        return self.rows.copy()
+
+
+@dataclass(frozen=True)
+class Generation:
+    """A strategy before and after it has learnt a generation, and what the tutorial's formulas are written in."""
+
+    before: dict[str, Any]
+    after: Strategy
+    y: Array  # (n, d) steps, best first
+
+    @property
+    def step(self) -> Array:
+        half = len(self.y) // 2
+        return np.asarray(EIGHT.weights[:half] @ self.y[:half])
+
+    @property
+    def root(self) -> Array:
+        """C^(-1/2) of the old covariance."""
+        values, vectors = np.linalg.eigh(self.before["covariance"])
+        return np.asarray(vectors @ np.diag(values**-0.5) @ vectors.T)
+
+
+def learnt(generations: int = 6, *, far: float = 0.0) -> Generation:
+    """Return the last of some generations on an ellipsoid; with `far`, its proposals lie so much to one side."""
+    strategy, rng = Strategy(np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.3, 0.2]), 8), np.random.default_rng(4)
+    for number in range(generations):
+        x = strategy.sample(rng, 8) + far * (number == generations - 1)
+        costs = x**2 @ np.array([1.0, 10.0, 3.0])
+        before = {
+            name: np.array(getattr(strategy, name)) for name in ("mean", "sigma", "covariance", "step_path", "path")
+        }
+        strategy.learn(x, costs)
+    return Generation(before, strategy, (x[costs.argsort()] - before["mean"]) / before["sigma"])
+
+
+def heeded(one: Generation) -> float:
+    """h_sigma, page 28: whether the path is not too long for the covariance to follow; the first generation is 1."""
+    rates, g = EIGHT.rates, one.after.generation
+    long = np.linalg.norm(one.after.step_path) / np.sqrt(1.0 - (1.0 - rates.c_sigma) ** (2 * (g + 1)))
+    return float(long < (1.4 + 2.0 / 4.0) * rates.chi)
+
+
+def test_eq_8_mu_eff_is_how_many_equal_weights_select_as_much() -> None:  # HANSEN2016 (8)
+    assert pytest.approx(MU_EFF, abs=1e-5) == SMALL.rates.mu_eff
+    # four proposals: (0.916291 + 0.223144)^2 / (0.839589 + 0.049793)
+    assert Constants.of(3, 4).rates.mu_eff == pytest.approx(1.459792, abs=1e-5)
+
+
+def test_eq_38_the_first_draws_are_normal_around_the_mean_with_its_spread() -> None:  # HANSEN2016 (38)
+    mean, spread = np.array([0.1, -0.2, 0.0, 0.3]), np.array([0.02, 0.05, 0.01, 0.03])
+    drawn = Strategy(mean, spread, 10).sample(np.random.default_rng(0), 20000)
+    np.testing.assert_allclose(drawn.mean(axis=0), mean, atol=1.5e-3)
+    np.testing.assert_allclose(np.cov(drawn.T), np.diag(spread**2), atol=1e-4)
+
+
+def test_eq_39_steps_are_normal_draws_along_the_axes_of_the_covariance() -> None:  # HANSEN2016 (39)
+    strategy = learnt().after
+    # what unit draws become are the columns of B D, and B D (B D)' = C
+    columns = (strategy.sample(Rows(np.eye(3)), 3) - strategy.mean) / strategy.sigma
+    np.testing.assert_allclose(columns.T @ columns, strategy.covariance, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(columns @ columns.T, np.diag(np.linalg.eigvalsh(strategy.covariance)), atol=1e-12)
+
+
+def test_eq_40_proposals_lie_a_step_size_times_a_step_from_the_mean() -> None:  # HANSEN2016 (40)
+    strategy = learnt().after
+    rows = np.random.default_rng(0).normal(size=(5, 3))
+    near = strategy.sample(Rows(rows), 5) - strategy.mean
+    strategy.sigma *= 3.0
+    strategy.mean += 7.0
+    np.testing.assert_allclose(strategy.sample(Rows(rows), 5) - strategy.mean, 3.0 * near, rtol=1e-9)
+
+
+def test_eq_41_the_step_of_the_mean_is_the_better_halfs_weighted_sum() -> None:  # HANSEN2016 (41)
+    # two dimensions, where sigma is 1 and the mean 0, so that the new mean is the step
+    strategy = Strategy(np.zeros(2), np.ones(2), 6)
+    strategy.learn(
+        np.array([[0.0, 9.0], [3.0, 0.0], [1.0, 0.0], [9.0, 9.0], [2.0, 0.0], [9.0, 0.0]]),
+        np.array([4.0, 3, 1, 6, 2, 5]),
+    )
+    # (1 x 1.252763 + 2 x 0.559616 + 3 x 0.154151) / 1.966530
+    np.testing.assert_allclose(strategy.mean, [1.441346, 0.0], atol=1e-5)
+
+
+def test_eq_42_the_mean_moves_by_a_step_size_times_the_step() -> None:  # HANSEN2016 (42)
+    one = learnt()
+    np.testing.assert_allclose(one.after.mean, one.before["mean"] + one.before["sigma"] * one.step, rtol=1e-12)
+
+
+def test_eq_43_the_step_sizes_path_adds_the_step_as_it_would_be_on_a_sphere() -> None:  # HANSEN2016 (43)
+    one = learnt()
+    rates = EIGHT.rates
+    fresh = np.sqrt(rates.c_sigma * (2.0 - rates.c_sigma) * rates.mu_eff) * one.root @ one.step
+    np.testing.assert_allclose(one.after.step_path, (1.0 - rates.c_sigma) * one.before["step_path"] + fresh, rtol=1e-10)
+
+
+def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> None:  # HANSEN2016 (44)
+    for far in (0.0, 2.0):
+        one = learnt(far=far)
+        rates = EIGHT.rates
+        share = np.linalg.norm(one.after.step_path) / rates.chi
+        grown = float(one.before["sigma"]) * np.exp(rates.c_sigma / rates.d_sigma * (share - 1.0))
+        assert one.after.sigma == pytest.approx(grown, rel=1e-12)
+        assert (one.after.sigma > one.before["sigma"]) == (share > 1.0)
+
+
+def test_h_sigma_stops_the_covariances_path_where_the_step_sizes_is_too_long() -> None:  # HANSEN2016 (h_sigma)
+    near, far = learnt(), learnt(far=5.0)
+    assert (heeded(near), heeded(far)) == (1.0, 0.0)
+    c_c = EIGHT.rates.c_c
+    np.testing.assert_allclose(far.after.path, (1.0 - c_c) * far.before["path"], rtol=1e-12)
+
+
+def test_eq_45_the_covariances_path_adds_the_step() -> None:  # HANSEN2016 (45)
+    one = learnt()
+    rates = EIGHT.rates
+    fresh = heeded(one) * np.sqrt(rates.c_c * (2.0 - rates.c_c) * rates.mu_eff) * one.step
+    np.testing.assert_allclose(one.after.path, (1.0 - rates.c_c) * one.before["path"] + fresh, rtol=1e-10)
+
+
+def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -> None:  # HANSEN2016 (46)
+    # far away proposals that are bad take away no more than ones nearby: sqrt(d) long they would weigh as they are
+    weights = SMALL.weights
+    good = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
+    taken = []
+    for long in (np.sqrt(2.0), 100.0):
+        strategy = Strategy(np.zeros(2), np.ones(2), 6)
+        bad = long * np.array([[0.6, 0.8], [0.6, 0.8], [0.6, 0.8]])
+        strategy.learn(np.concatenate([good, bad]), np.arange(6.0))
+        taken.append(strategy.covariance)
+    np.testing.assert_allclose(taken[0], taken[1], rtol=1e-7)
+    # three of them, each the outer product of sqrt(2) (0.6, 0.8): (0.72, 0.96; 0.96, 1.28)
+    path = SMALL.rates.c_1 * np.outer(strategy.path, strategy.path)
+    kept = 1.0 - SMALL.rates.c_1 - SMALL.rates.c_mu * weights.sum()
+    of_good = sum(w * np.outer(y, y) for w, y in zip(weights, good, strict=False))
+    of_bad = weights[3:].sum() * np.array([[0.72, 0.96], [0.96, 1.28]])
+    np.testing.assert_allclose(taken[0], kept * np.eye(2) + path + SMALL.rates.c_mu * (of_good + of_bad), rtol=1e-7)
+
+
+@pytest.mark.pure
+@pytest.mark.parametrize("far", [0.0, 5.0])
+def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step(far: float) -> None:  # HANSEN2016 (47)
+    one = learnt(far=far)
+    h, rates, w = heeded(one), EIGHT.rates, EIGHT.weights
+    lengths = np.linalg.norm(one.y @ one.root, axis=1)
+    rank_mu = sum(
+        wi * (1.0 if wi >= 0.0 else 3.0 / long**2) * np.outer(yi, yi)
+        for wi, yi, long in zip(w, one.y, lengths, strict=True)
+    )
+    kept = 1.0 + rates.c_1 * (1.0 - h) * rates.c_c * (2.0 - rates.c_c) - rates.c_1 - rates.c_mu * w.sum()
+    expected = (
+        kept * one.before["covariance"] + rates.c_1 * np.outer(one.after.path, one.after.path) + rates.c_mu * rank_mu
+    )
+    np.testing.assert_allclose(one.after.covariance, expected, rtol=1e-7, atol=1e-12)
+    assert (one.after.covariance == one.after.covariance.T).all()
+
+
+def test_eq_48_the_population_is_4_plus_3_ln_d() -> None:  # HANSEN2016 (48)
+    # 4 + floor(3 ln d): ln 4 = 1.386, ln 9 = 2.197, ln 66 = 4.190
+    assert [usual_population(d) for d in (1, 4, 9, 66)] == [4, 8, 10, 16]
+
+
+def test_eq_49_weights_fall_as_the_logarithm_of_the_rank() -> None:  # HANSEN2016 (49)
+    # whatever each half is divided by, its ratios are those of ln((lambda + 1) / 2) - ln i
+    weights = SMALL.weights
+    np.testing.assert_allclose(weights[:3] / weights[0], RAW[:3] / RAW[0], atol=1e-5)
+    np.testing.assert_allclose(weights[3:] / weights[3], RAW[3:] / RAW[3], atol=1e-4)
+    # of an odd number, the one in the middle counts for nothing
+    assert Constants.of(2, 7).weights[3] == 0.0
+
+
+def bounds(dimensions: int, population: int) -> tuple[float, float, float, float]:
+    """Return how much the negative weights sum to, and the three bounds (50), (51), (52) on that."""
+    constants = Constants.of(dimensions, population)
+    raw = np.log((population + 1) / 2) - np.log(np.arange(population // 2 + 1, population + 1))
+    worth = raw.sum() ** 2 / (raw**2).sum()
+    mu_eff, c_1, c_mu = constants.rates.mu_eff, constants.rates.c_1, constants.rates.c_mu
+    negative = -float(constants.weights[constants.weights < 0.0].sum())
+    return negative, 1 + c_1 / c_mu, 1 + 2 * worth / (mu_eff + 2), (1 - c_1 - c_mu) / (dimensions * c_mu)
+
+
+def test_eq_50_bounds_the_negative_weights_of_a_middling_population_in_many_dimensions() -> None:  # HANSEN2016 (50)
+    negative, *least = bounds(28, 40)
+    assert min(least) == least[0] == pytest.approx(negative)
+
+
+def test_eq_51_bounds_the_negative_weights_of_a_small_population() -> None:  # HANSEN2016 (51)
+    negative, *least = bounds(2, 6)
+    assert min(least) == least[1] == pytest.approx(negative)
+    # 1 + 2 x 2.431917 / 4.028615
+    assert negative == pytest.approx(2.207318, abs=1e-4)
+
+
+def test_eq_52_bounds_the_negative_weights_of_a_large_population() -> None:  # HANSEN2016 (52)
+    negative, *least = bounds(2, 100)
+    assert min(least) == least[2] == pytest.approx(negative)
+
+
+def test_eq_53_the_better_half_sums_to_1_and_each_weight_is_by_hand() -> None:  # HANSEN2016 (53)
+    # 1.252763 / 1.966530 and so on; -0.133531 / 1.029203 x 2.207318 and so on
+    expected = [0.637042, 0.284570, 0.078387, -0.286383, -0.764956, -1.155978]
+    np.testing.assert_allclose(SMALL.weights, expected, atol=1e-5)
+    assert SMALL.weights[:3].sum() == pytest.approx(1.0)
+
+
+def test_eq_55_the_step_sizes_rate_and_damping() -> None:  # HANSEN2016 (55)
+    # 4.028615 / 9.028615; and 1 more, as sqrt(1.028615 / 3) is below 1
+    np.testing.assert_allclose([SMALL.rates.c_sigma, SMALL.rates.d_sigma], [0.446205, 1.446205], atol=1e-5)
+    # where it is above: mu_eff of 100 is 26.97, sqrt(25.97 / 3) = 2.942 and 28.97 / 33.97 = 0.853
+    large = Constants.of(2, 100).rates
+    assert large.mu_eff == pytest.approx(26.97, abs=0.01)
+    assert large.d_sigma == pytest.approx(1.0 + 2.0 * 1.942 + 0.853, abs=5e-3)
+
+
+def test_eq_56_the_covariances_paths_rate() -> None:  # HANSEN2016 (56)
+    # (4 + 1.014308) / (6 + 2.028615)
+    assert pytest.approx(0.624555, abs=1e-5) == SMALL.rates.c_c
+
+
+def test_eq_57_how_fast_the_covariance_follows_its_path() -> None:  # HANSEN2016 (57)
+    # 2 / (3.3^2 + 2.028615)
+    assert pytest.approx(0.154815, abs=1e-5) == SMALL.rates.c_1
+
+
+def test_eq_58_how_fast_the_covariance_follows_the_population() -> None:  # HANSEN2016 (58)
+    # 2 (0.028615 + 0.492947) / (16 + 2.028615)
+    assert pytest.approx(0.057859, abs=1e-5) == SMALL.rates.c_mu
+    # of a huge population it takes all that the path leaves
+    huge = Constants.of(1, 10**5).rates
+    assert huge.c_mu == pytest.approx(1.0 - huge.c_1, abs=1e-6)
+
+
+def test_chi_is_how_long_a_standard_normal_vector_is() -> None:  # HANSEN2016 (chi)
+    # sqrt(2) Gamma((d + 1) / 2) / Gamma(d / 2): sqrt(2 / pi), sqrt(pi / 2), and in nine dimensions 2.918...; the
+    # tutorial's series is good to a few in ten thousand
+    exact = {1: 0.797885, 2: 1.253314, 3: 1.595769, 9: 2.9180}
+    for d, long in exact.items():
+        assert Constants.of(d, 10).rates.chi == pytest.approx(long, rel=8e-3 if d == 1 else 1e-3)
+
+
+def test_b_2_axes_are_decomposed_every_so_many_generations() -> None:  # HANSEN2016 (B.2)
+    # two dimensions, six proposals: 1 / (2 (0.154815 + 0.057859)) = 2.351
+    for lag, every in ((0.1, 1), (1.0, 2), (3.0, 7)):
+        strategy, rng = Strategy(np.zeros(2), np.ones(2), 6, lag=lag), np.random.default_rng(0)
+        changed = []
+        for _ in range(14):
+            axes = strategy._axes
+            x = strategy.sample(rng, 6)
+            strategy.learn(x, (x**2).sum(axis=1))
+            changed.append(strategy._axes is not axes)
+        assert np.flatnonzero(changed).tolist() == list(range(every - 1, 14, every))
+
+
+def test_b_3_a_search_ends_where_nothing_changes_any_more_or_it_diverges() -> None:  # HANSEN2016 (B.3)
+    def begun() -> Strategy:
+        strategy = Strategy(np.array([0.3, -0.2]), np.array([0.1, 0.1]), 6)
+        assert not strategy.ended()
+        return strategy
+
+    flat, still, far, fixed, thin = (begun() for _ in range(5))
+    for _ in range(2 * (10 + 10)):  # TolFun: 10 + 30 d / lambda generations cost the same
+        assert flat.generation <= 20 or flat.ended()
+        flat.learn(flat.sample(np.random.default_rng(flat.generation), 6), np.ones(6))
+    assert flat.ended()
+    still.mean[:] = 0.0  # TolX, where no step is too small for the mean
+    still.sigma *= 0.99e-12
+    assert still.ended()
+    far.sigma = 1.01e4  # TolXUp
+    assert far.ended()
+    fixed.mean[:] = 1e15  # NoEffectCoord
+    assert fixed.ended()
+    thin._lengths = np.array([1e-15, 1.0])  # ConditionCov
+    assert thin.ended()

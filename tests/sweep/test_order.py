@@ -1,0 +1,54 @@
+"""In which order a driver begins its cells: as the plan has them, but the first ones of different methods."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from posefit.sweep.cell import Cell
+from posefit.sweep.drive import NEAR, mingled
+
+METHODS = ("sapso@pca", "cma@pca", "vsmm")
+
+
+def cells(methods: str, seeds: int) -> list[Cell]:
+    """Return the cells of a product of methods, a letter each, and seeds."""
+    return [Cell(METHODS["abc".index(one)], "walk", ("walk-a",), seed=seed) for one in methods for seed in range(seeds)]
+
+
+def order(given: list[Cell], workers: int) -> list[int]:
+    return [given.index(cell) for cell in mingled(iter(given), lambda: workers)]
+
+
+@pytest.mark.parametrize(
+    ("workers", "expected"),
+    [
+        (1, [0, 1, 2, 3, 4, 5, 6, 7, 8]),
+        (2, [0, 3, 1, 2, 4, 5, 6, 7, 8]),
+        (3, [0, 3, 6, 1, 2, 4, 5, 7, 8]),
+        (9, [0, 3, 6, 1, 2, 4, 5, 7, 8]),
+    ],
+)
+def test_the_first_cell_of_each_worker_is_of_another_method(workers: int, expected: list[int]) -> None:
+    assert order(cells("abc", 3), workers) == expected
+
+
+def test_cells_of_one_method_keep_their_order() -> None:
+    assert order(cells("a", 4), 2) == [0, 1, 2, 3]
+
+
+def test_a_long_plan_is_not_gone_through_before_it_begins() -> None:
+    asked: list[int] = []
+
+    def coming() -> Iterator[Cell]:
+        for cell in cells("ab", 2 * NEAR):
+            asked.append(cell.seed)
+            yield cell
+
+    begun = next(mingled(coming(), lambda: 2))
+    assert begun == cells("a", 1)[0]
+    assert len(asked) == NEAR
+
+
+def test_no_cell_is_lost_or_run_twice() -> None:
+    given = cells("abc", 400)
+    assert sorted(order(given, 3)) == list(range(len(given)))
