@@ -12,13 +12,22 @@ ROUNDING = 1e-9  # radians by which a joint may pass its limit
 
 @jit
 def recover(latents, components, mean, angles):
-    """Write the joint angles (n, 63) of latents (n, m), from components (m, 63) and a mean (63,)."""
+    """Write the joint angles (n, 63) of latents (n, m or more), from components (m, 63) and a mean (63,).
+
+    A pass over the angles adds three components: it is loads and stores that cost, and not sums.
+    """
+    m = components.shape[0]
     for i in range(latents.shape[0]):
         for j in range(mean.size):
             angles[i, j] = mean[j]
-        for k in range(components.shape[0]):
+        for k in range(0, m - 2, 3):
+            a, b, c = latents[i, k], latents[i, k + 1], latents[i, k + 2]
             for j in range(mean.size):
-                angles[i, j] += latents[i, k] * components[k, j]  # SAPSO 2.1.3 recovery
+                # SAPSO 2.1.3 recovery
+                angles[i, j] = angles[i, j] + a * components[k, j] + b * components[k + 1, j] + c * components[k + 2, j]
+        for k in range(m - m % 3, m):
+            for j in range(mean.size):
+                angles[i, j] += latents[i, k] * components[k, j]
 
 
 @jit
@@ -55,15 +64,10 @@ def near(centres, latents, reach, allowed):
 @jit
 def recover_loose(latents, components, mean, loose, angles):
     """Write the joint angles (n, 63) of latents (n, m + k): m components, k loose angles."""
-    m = components.shape[0]
+    recover(latents, components, mean, angles)
     for i in range(latents.shape[0]):
-        for j in range(mean.size):
-            angles[i, j] = mean[j]
-        for k in range(m):
-            for j in range(mean.size):
-                angles[i, j] += latents[i, k] * components[k, j]
         for k in range(loose.size):
-            angles[i, loose[k]] += latents[i, m + k]
+            angles[i, loose[k]] += latents[i, components.shape[0] + k]
 
 
 @jit

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import final
+from functools import cached_property
+from typing import Any, TypeVar, final
 
 import numpy as np
 
@@ -12,12 +13,13 @@ from posefit.fitting.optimiser import Optimiser
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.silhouette.cost import BETA, Areas, areas, mismatch
+from posefit.silhouette.cost import BETA, Areas, areas, costs_in, drawing_of, mismatch
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.silhouette.sharing import parts_of, work_through
 
 FACTORS = (1, 2, 4)  # full, half and quarter size
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +54,16 @@ class PoseProblem:
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4)."""
-        if np.shape(proposals)[1:] != (self.space.dimensions,):
+        proposals = writeable(proposals)
+        if proposals.shape[1:] != (self.space.dimensions,):
             self.space.decode(proposals)  # says what is wrong
         parts = parts_of(len(proposals), self.threads)
         if len(parts) == 1:
-            return self.cost(*self.decode(proposals))  # SAPSO (5)
-        proposals, costs = writeable(proposals), np.empty(len(proposals))
+            return self._cost(*self.decode(proposals))  # SAPSO (5)
+        costs = np.empty(len(proposals))
 
         def count(part: slice, poses: Array, translations: Array) -> None:
-            costs[part] = self.combined(self._areas(poses, self._aligned(poses, translations), threads=1))
+            costs[part] = self._cost(poses, self._aligned(poses, translations))
 
         work_through(parts, self.threads, lambda part: self.space.decode(proposals[part]), count)
         return costs
@@ -104,13 +107,23 @@ class PoseProblem:
 
     def areas(self, poses: Array, translations: Array) -> list[Areas]:
         """Return R, B, Y (n, 3) of each view."""
-        return self._areas(poses, translations, self.threads)
-
-    def _areas(self, poses: Array, translations: Array, threads: int) -> list[Areas]:
         return [
-            areas(self.body, camera, silhouette, poses, translations, threads)
+            areas(self.body, camera, silhouette, poses, translations, self.threads)
             for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
         ]
+
+    @cached_property
+    def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:
+        """The views that have a say, as the kernel wants them."""
+        views = [
+            (drawing_of(self.body, camera, silhouette), silhouette)
+            for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
+        ]
+        return with_a_say(views, self.silhouettes)
+
+    def _cost(self, poses: Array, translations: Array) -> Array:
+        """Return the cost (n,) of decoded poses (n, 66) at translations (n, 3), on one thread."""
+        return mean_of([costs_in(*view, poses, translations, self.beta) for view in self._drawings])
 
     def _aligned(self, poses: Array, translations: Array) -> Array:
         """Return the translations (n, 3) of decoded poses (n, 66): other ones where the space has them aligned."""
@@ -121,12 +134,20 @@ class PoseProblem:
 
 def over_views(counts: Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:
     """Return the cost (n,) of areas R, B, Y (n, 3), one array a view; one of which nothing is known has no say."""
-    known = [view for view, silhouette in zip(counts, silhouettes, strict=True) if silhouette.known]
-    counts = known or counts
-    costs = mismatch(counts[0], beta)
-    for more in counts[1:]:
-        costs += mismatch(more, beta)
-    return costs if len(counts) == 1 else costs / len(counts)
+    return mean_of([mismatch(view, beta) for view in with_a_say(counts, silhouettes)])
+
+
+def mean_of(costs: Sequence[Array]) -> Array:
+    """Return the mean (n,) of costs (n,), one array a view. The first of them is overwritten."""
+    total = costs[0]
+    for more in costs[1:]:
+        total += more
+    return total if len(costs) == 1 else total / len(costs)
+
+
+def with_a_say(views: Sequence[T], silhouettes: Sequence[Silhouette]) -> Sequence[T]:
+    """Return those views of which something is known; all of them where nothing is."""
+    return [view for view, silhouette in zip(views, silhouettes, strict=True) if silhouette.known] or views
 
 
 @final
@@ -135,7 +156,7 @@ class CoarseFirst:
 
     `ask` proposes those alone, so what the driver counts, keeps and reports are costs at full size. `tell` tells the
     optimiser its whole population: theirs as they are, and of the others the small picture's, none below the worst of
-    those that were seen whole. The small picture's poses are drawn as well, and are counted by their share of the pixels.
+    those that were seen whole. The small picture's poses are drawn as well, and counted by their share of the pixels.
 
     Settings:
         factor: the picture has every so many pixels of every so many rows, see `PoseProblem.coarser`.

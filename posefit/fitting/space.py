@@ -89,11 +89,11 @@ class SearchSpace:
         Raises ValueError where the shape does not fit or a proposal is not finite.
         """
         proposals = writeable(proposals)
-        if proposals.ndim != 2 or proposals.shape[1] != self.dimensions:
-            raise ValueError(f"proposals must have shape (n, {self.dimensions}), got {proposals.shape}")
-        n, first = len(proposals), self.dimensions - len(self.prior.low)
-        poses, translations = np.empty((n, ANGLES)), np.empty((n, 3))
-        latents = np.empty((n, self.dimensions - first))
+        d, m = len(self.centre), len(self.prior.low)
+        if proposals.shape[1:] != (d,):
+            raise ValueError(f"proposals must have shape (n, {d}), got {proposals.shape}")
+        n, first = len(proposals), d - m
+        poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
         if not unpack_proposals(proposals, self.centre, self.half, self.anchor, first, poses, translations, latents):
             raise ValueError("proposals must be finite, got nan or infinity")
         poses[:, 3:] = self.prior.inverse_transform(latents)

@@ -26,6 +26,11 @@ def view_of(camera: Camera) -> View:
     return View(camera.rotation, camera.translation, camera.focal, camera.centre, camera.width, camera.height)
 
 
+def drawing_of(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
+    """Return what the kernel wants to know before the poses. Made once, it holds for any number of calls."""
+    return *body.skeleton.chain, body.radii, *view_of(camera), *silhouette.bits, silhouette.pixels
+
+
 def areas(
     body: Body, camera: Camera, silhouette: Silhouette, poses: Array, translations: Array, threads: int = 1
 ) -> Areas:
@@ -37,15 +42,14 @@ def areas(
     poses, translations = _checked(camera, [silhouette], poses, translations)
     drawn.count_poses(len(poses), silhouette)
     out = np.empty((len(poses), 3), dtype=np.int64)
-    chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
-    observed, valid = silhouette.bits
+    drawing = drawing_of(body, camera, silhouette)
     parts = parts_of(len(poses), threads)
     if len(parts) == 1:
-        kernels.count_areas(chain, radii, view, observed, valid, poses, translations, out)  # SAPSO (3)
+        kernels.count_areas(*drawing, poses, translations, out)  # SAPSO (3)
         return out
 
     def count(_part: slice, *rows: NDArray[Any]) -> None:
-        kernels.count_areas(chain, radii, view, observed, valid, *rows)
+        kernels.count_areas(*drawing, *rows)
 
     work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
     return out
@@ -97,6 +101,19 @@ def _checked(
         if silhouette.mask.shape != (camera.height, camera.width):
             raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
     return poses, translations
+
+
+def costs_in(
+    drawing: tuple[Any, ...], silhouette: Silhouette, poses: Array, translations: Array, beta: float = BETA
+) -> Array:
+    """Return the cost (n,) of poses (n, 66) at translations (n, 3), with what `drawing_of` says of the silhouette.
+
+    The arrays are as the kernel wants them: a search calls this for every population, and nothing is checked again.
+    """
+    drawn.count_poses(len(poses), silhouette)
+    counted = np.empty((len(poses), 3), dtype=np.int64)
+    kernels.count_areas(*drawing, poses, translations, counted)
+    return mismatch(counted, beta)
 
 
 def mismatch(areas: Areas, beta: float = BETA) -> Array:

@@ -46,13 +46,35 @@ def paint_bits(image, box, value, pixels):
 
 
 @jit
-def count_areas(chain, radii, view, observed, valid, poses, translations, areas):
-    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid."""
-    work = scratch(view, chain.parents.size, poses.shape[1])
-    silhouette = NONE
-    for w in range(observed.shape[0]):
-        for y in range(observed.shape[1]):
-            silhouette += np.uint64(popcount(observed[w, y]))
+def count_areas(
+    parents,
+    angles,
+    turns,
+    turned,
+    offsets,
+    radii,
+    rotation,
+    translation,
+    focal,
+    centre,
+    width,
+    height,
+    observed,
+    valid,
+    pixels,
+    poses,
+    translations,
+    areas,
+):
+    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid.
+
+    Of the observed silhouette's pixels there are so many. First come the fields of `Chain`, then radii, then those of
+    `View`: one by one, since to take a tuple apart costs a call twice as much as its arrays do.
+    """
+    chain = Chain(parents, angles, turns, turned, offsets)
+    view = View(rotation, translation, focal, centre, width, height)
+    work = scratch(view, parents.size, poses.shape[1])
+    silhouette = np.uint64(pixels)
     for i in range(poses.shape[0]):
         image, box = draw_pose(chain, radii, view, poses[i], translations[i], work)
         body, overlap = count(image, observed, valid, box)

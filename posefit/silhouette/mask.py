@@ -62,6 +62,11 @@ class Silhouette:
         return pack(self.mask), pack(self.valid)
 
     @cached_property
+    def pixels(self) -> int:
+        """How many pixels the person has."""
+        return int(np.count_nonzero(self.mask))
+
+    @cached_property
     def known(self) -> bool:
         """Whether anything is known at all."""
         return bool(self.valid.any())

@@ -14,14 +14,15 @@ SHARED_PART = 128  # where several threads take parts in turn: the last one to b
 LEAST_SHARE = 16  # poses; a smaller share of work is not worth handing to another thread
 
 
-def parts_of(n: int, threads: int) -> list[slice]:
+@lru_cache
+def parts_of(n: int, threads: int) -> tuple[slice, ...]:
     """Return slices that n rows are worked through in: about as long each, so many that each thread has a share."""
     shares = max(min(threads, n // LEAST_SHARE), 1)
     if shares == 1 and n <= PART:
-        return [slice(0, n)]
+        return (slice(0, n),)
     longest = PART if shares == 1 else SHARED_PART
     count = shares * max(-(-n // (shares * longest)), 1)
-    return [slice(a, b) for a, b in pairwise(n * part // count for part in range(count + 1))]
+    return tuple(slice(a, b) for a, b in pairwise(n * part // count for part in range(count + 1)))
 
 
 def work_through(

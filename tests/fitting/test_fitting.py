@@ -38,6 +38,24 @@ def test_a_cost_has_the_same_bits_whatever_stands_beside_it(problem: PoseProblem
     np.testing.assert_array_equal(problem.evaluate(proposals[::-1])[::-1], together)
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_search_is_told_the_costs_of_the_areas_and_a_view_that_knows_nothing_has_no_say(
+    problem: PoseProblem, threads: int
+) -> None:
+    seen = problem.silhouettes[0]
+    half = Silhouette.of(seen.mask, np.ones_like(seen.mask) & (np.arange(seen.size[0]) < 80))
+    blind = Silhouette.of(np.zeros_like(seen.mask), np.zeros_like(seen.mask))
+    cameras = [problem.cameras[0]] * 3
+    several = replace(problem, cameras=cameras, silhouettes=[blind, seen, half], beta=0.3, threads=threads)
+    proposals = several.space.draw(np.random.default_rng(1), 40)
+    counts = several.areas(*several.decode(proposals))
+    np.testing.assert_array_equal(several.evaluate(proposals), several.combined(counts))
+    shares = np.array([100.0 * (0.7 * b / (b + y) + 0.3 * r / (r + y)) for r, b, y in np.concatenate(counts[1:])])
+    np.testing.assert_allclose(several.evaluate(proposals), shares.reshape(2, -1).mean(axis=0))
+    nothing = replace(several, silhouettes=[blind] * 3, blank=True)
+    np.testing.assert_array_equal(nothing.evaluate(proposals), 100.0)  # Reading S2
+
+
 def test_proposals_and_coordinates_are_inverse(problem: PoseProblem) -> None:
     proposals = problem.space.draw(np.random.default_rng(0), 30)
     back = [problem.space.proposals(one) for one in problem.space.coordinates(proposals)]

@@ -28,6 +28,18 @@ def floor(prior: Any, poses: Array) -> float:
     return float(np.degrees(np.abs(prior.inverse_transform(prior.transform(poses)) - poses)).mean())
 
 
+# pca
+
+
+@pytest.mark.parametrize("m", range(1, 8))
+def test_poses_are_the_mean_and_so_much_of_each_component_however_many_there_are(m: int) -> None:
+    prior, rng = PCA(), np.random.default_rng(m)
+    prior.mean, prior.components = rng.normal(size=63), rng.normal(size=(m, 63))
+    latents = rng.normal(size=(5, m))
+    twin = prior.mean + (latents[:, :, None] * prior.components).sum(axis=1)
+    np.testing.assert_allclose(prior.inverse_transform(latents), twin, atol=1e-12)
+
+
 # full
 
 

@@ -40,6 +40,7 @@ def test_a_border_at_the_images_edge_is_unknown() -> None:
 def test_unknown_pixels_are_not_the_persons() -> None:
     silhouette = Silhouette.of(np.ones((2, 3)), np.array([[1, 0, 1], [1, 1, 1]]))
     assert silhouette.mask.sum() == 5
+    assert silhouette.pixels == 5
 
 
 def test_shapes_are_checked() -> None:
