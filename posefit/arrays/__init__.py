@@ -25,7 +25,9 @@ def jit(function: Callable[..., Any]) -> Any:
     """
     import numba
 
-    compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"})(function)
+    # nobody calls these functions from C; a door for it would take one part in twelve of the time to compile
+    told = numba.njit(nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, no_cfunc_wrapper=True)
+    compiled = told(function)
     return compiled if compiled is function else compiled_once(compiled)  # numba may be told to compile nothing
 
 
