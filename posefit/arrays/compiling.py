@@ -10,6 +10,7 @@ cannot be written to, everybody compiles, as without this module.
 """
 
 import fcntl
+import gc
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -42,7 +43,7 @@ def compiled_once(dispatcher: Any) -> Any:
         if isinstance(signature, tuple):  # a number written out in a call would be a type of its own
             signature = tuple(unliteral(one) for one in signature)  # type: ignore[no-untyped-call]
         # a thread of this process that waits for another process must not hold what a second thread needs to go on
-        with global_compiler_lock, in_turn(lock()):
+        with global_compiler_lock, uncollected(), in_turn(lock()):
             return _compiled(alone, signature)
 
     dispatcher.compile = compile_in_turn
@@ -54,6 +55,19 @@ def _compiled(alone: Callable[[Any], Any], signature: Any) -> Any:
         return alone(signature)
     except OSError:  # it is compiled, and could not be written
         return alone(signature)
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Have Python look for no garbage in the body: numba keeps so many objects that a fifth of compiling goes into it."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 @contextmanager

@@ -141,6 +141,30 @@ assert not _held
     assert compiled(start(script)) == ["impossible array(float64, 1d, C)"] * 2
 
 
+@pytest.mark.parametrize("on", [True, False])
+def test_garbage_is_collected_after_compiling_where_it_was_before(start, tmp_path, on):
+    (tmp_path / "go").touch()
+    script = f"""
+import gc
+if not {on}: gc.disable()
+within = []
+class Asking(Listener):
+    def on_start(self, one):
+        within.append(gc.isenabled())
+event.register("numba:compile", Asking())
+{ALL}
+from numba.core.errors import TypingError
+try:
+    loops.impossible(np.arange(4.0))
+    raise AssertionError
+except TypingError:
+    pass
+assert within and not any(within)
+assert gc.isenabled() is {on}
+"""
+    assert Counter(compiled(start(script))) == {**ONCE, "impossible array(float64, 1d, C)": 1}
+
+
 def test_without_a_folder_for_the_cache_every_process_compiles(start, tmp_path):
     (tmp_path / "go").touch()
     (tmp_path / "cache").write_text("a file where the folder should be", encoding="utf-8")
