@@ -59,7 +59,7 @@ def _compiled(alone: Callable[[Any], Any], signature: Any) -> Any:
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """Have Python look for no garbage in the body: numba keeps so many objects that a fifth of compiling goes into it."""
+    """Have Python look for no garbage in the body: numba has so many objects that a fifth of compiling goes into it."""
     if not gc.isenabled():
         yield
         return
