@@ -37,11 +37,10 @@ def inlined(function: Callable[..., Any]) -> Any:
 def _compiled(function: Callable[..., Any], inline: str) -> Any:
     import numba
 
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}, "inline": inline}
     # nobody calls these functions from C; a door for it would take one part in twelve of the time to compile
-    told = numba.njit(
-        nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, inline=inline, no_cfunc_wrapper=True
-    )
-    compiled = told(function)
+    options["no_cfunc_wrapper"] = True
+    compiled: Any = numba.njit(**options)(function)
     return compiled if compiled is function else compiled_once(compiled)  # numba may be told to compile nothing
 
 
