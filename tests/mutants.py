@@ -221,6 +221,12 @@ MUTANTS = (
         "tests/arrays/test_compiling.py::test_two_processes_that_start_on_an_empty_cache_compile_each_function_once_in_all",
     ),
     Mutant(
+        "the cache looks at a function's own code alone",
+        "posefit/arrays/cache.py",
+        (("                waiting.append(called)\n", ""),),
+        "tests/arrays/test_cache.py::test_a_change_in_a_function_that_is_called_compiles_both_anew",
+    ),
+    Mutant(
         "a bone's turn moves what hangs on its parent",
         "plugins/posefit_vsmm/kernels.py",
         (("0.5 if _HANGS[joint, j] else 0.0", "0.5 if _HANGS[pivot, j] else 0.0"),),

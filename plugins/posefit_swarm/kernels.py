@@ -154,8 +154,9 @@ def mend(broken, works, flown, moved, velocity, position):
         while first < many and not works[k * many + first]:
             first += 1
         if first < many:
-            velocity[broken[k]] = flown[k * many + first]
-            position[broken[k]] = moved[k * many + first]
+            for j in range(flown.shape[1]):  # numba would compile seven times as long for two rows at once
+                velocity[broken[k], j] = flown[k * many + first, j]
+                position[broken[k], j] = moved[k * many + first, j]
         else:
             broken[left] = broken[k]
             left += 1

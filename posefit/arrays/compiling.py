@@ -10,10 +10,12 @@ cannot be written to, everybody compiles, as without this module.
 """
 
 import fcntl
+import gc
 import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -28,19 +30,20 @@ def compiled_once(dispatcher: Any) -> Any:
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.types import unliteral
 
-    with suppress(RuntimeError):  # there is no folder for it
-        dispatcher.enable_caching()
-    folder, alone = dispatcher.stats.cache_path, dispatcher.compile
-    if folder is None:
-        return dispatcher
-    function = dispatcher.py_func
-    path = Path(folder) / f"{function.__module__}.{function.__qualname__}.lock"
+    from posefit.arrays.cache import cached
+
+    function, alone = dispatcher.py_func, dispatcher.compile
+
+    @cache
+    def lock() -> Path | None:
+        folder = cached(dispatcher)
+        return None if folder is None else folder / f"{function.__module__}.{function.__qualname__}.lock"
 
     def compile_in_turn(signature: Any) -> Any:
         if isinstance(signature, tuple):  # a number written out in a call would be a type of its own
             signature = tuple(unliteral(one) for one in signature)  # type: ignore[no-untyped-call]
         # a thread of this process that waits for another process must not hold what a second thread needs to go on
-        with global_compiler_lock, in_turn(path):
+        with global_compiler_lock, uncollected(), in_turn(lock()):
             return _compiled(alone, signature)
 
     dispatcher.compile = compile_in_turn
@@ -55,9 +58,22 @@ def _compiled(alone: Callable[[Any], Any], signature: Any) -> Any:
 
 
 @contextmanager
-def in_turn(path: Path, patience: float = PATIENCE) -> Iterator[None]:
+def uncollected() -> Iterator[None]:
+    """Have Python look for no garbage in the body: numba has so many objects that a fifth of compiling goes into it."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+@contextmanager
+def in_turn(path: Path | None, patience: float = PATIENCE) -> Iterator[None]:
     """Hold the lock of a path in the body; where that takes too long, or there is none, go on without it."""
-    if path in _held:  # a function that calls itself
+    if path is None or path in _held:  # a function that calls itself
         yield
         return
     try:

@@ -210,7 +210,7 @@ def _announced(say: Callable[[str], None]) -> Iterator[None]:
         def on_start(self, _event: event.Event) -> None:
             if not self.said:
                 self.said = True
-                say("compiling the kernels, once on this machine; this can take half a minute ...")
+                say("compiling the kernels, once on this machine; this takes ten seconds or more ...")
 
         def on_end(self, _event: event.Event) -> None:
             pass

@@ -11,9 +11,10 @@ import pytest
 
 from posefit.arrays.compiling import in_turn
 
-# a loop that calls another, one that calls itself, one that calls another twice, and one that no type fits
+# a loop that calls another, one that calls itself, one that calls another twice, one that no type fits, and one that
+# is to become part of others
 LOOPS = """
-from posefit.arrays import jit
+from posefit.arrays import inlined, jit
 
 @jit
 def outer(values):
@@ -42,6 +43,10 @@ def picked(values, i):
 @jit
 def impossible(values):
     return values + "words"
+
+@inlined
+def doubled(x):
+    return x + x
 """
 # says what this process compiled, once a file tells it to begin
 RUN = """
@@ -141,6 +146,30 @@ assert not _held
     assert compiled(start(script)) == ["impossible array(float64, 1d, C)"] * 2
 
 
+@pytest.mark.parametrize("on", [True, False])
+def test_garbage_is_collected_after_compiling_where_it_was_before(start, tmp_path, on):
+    (tmp_path / "go").touch()
+    script = f"""
+import gc
+if not {on}: gc.disable()
+within = []
+class Asking(Listener):
+    def on_start(self, one):
+        within.append(gc.isenabled())
+event.register("numba:compile", Asking())
+{ALL}
+from numba.core.errors import TypingError
+try:
+    loops.impossible(np.arange(4.0))
+    raise AssertionError
+except TypingError:
+    pass
+assert within and not any(within)
+assert gc.isenabled() is {on}
+"""
+    assert Counter(compiled(start(script))) == {**ONCE, "impossible array(float64, 1d, C)": 1}
+
+
 def test_without_a_folder_for_the_cache_every_process_compiles(start, tmp_path):
     (tmp_path / "go").touch()
     (tmp_path / "cache").write_text("a file where the folder should be", encoding="utf-8")
@@ -157,6 +186,13 @@ import resource
 resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 """
     assert Counter(compiled(start(script + ALL))) == ONCE
+
+
+def test_a_function_that_is_inlined_is_kept_as_well_where_python_calls_it(start, tmp_path):
+    (tmp_path / "go").touch()
+    script = "assert loops.doubled(2.0) == 4.0"
+    assert compiled(start(script)) == ["doubled float64"]
+    assert compiled(start(script)) == []
 
 
 def test_a_number_written_out_in_a_call_is_no_signature_of_its_own(start, tmp_path):

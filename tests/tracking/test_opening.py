@@ -18,7 +18,7 @@ from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
 from posefit.tracking.opening import begun
 
-COMPILING = "compiling the kernels, once on this machine; this can take half a minute ..."
+COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
 
 @pytest.mark.parametrize("method", [{}, {"optimiser": "annealed"}, {"tracker": "vsmm"}])
