@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array, inlined, jit
-from posefit.geometry.kernels import place_joints
-from posefit.silhouette.lanes import BLOCK, root, set_spans
+from posefit.geometry.kernels import empty_frames, place_frames
+from posefit.silhouette.lanes import BLOCK, LISTED, list_steps, root, set_spans
 
 STRIP_PIXELS = 32  # pixels
 NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
@@ -27,8 +27,8 @@ _HUGE, _NAN = np.float32(1e9), np.float32(np.nan)
 # Scratch rows, each LANES long and one lane a bone, in one flat array: offsets known to the compiler are what lets
 # it see that the loops over bones may run in vector registers.
 LANES = 32
-_U0, _V0, _R0, _U1, _V1, _R1, _SEEN = (row * LANES for row in range(7))
-_SCRATCH_ENDS = 7 * LANES
+_U, _V, _S, _U0, _V0, _R0, _R1, _SEEN = (row * LANES for row in range(8))
+_SCRATCH_ENDS = 8 * LANES
 _BLOCK, _BLOCKS, _FIRST, _LAST, _COUNT, _ROW = (row * LANES for row in range(6))
 _SCRATCH_BOUNDS = 6 * LANES
 _X0, _Y0, _S0, _X1, _Y1, _S1 = (row * LANES for row in range(6))
@@ -39,7 +39,6 @@ _SCRATCH_OUTLINE = 16 * LANES
 # A block to fill is one number: its first word as uint32 in the upper half; in the lower its first row, counted from
 # BLOCK rows above the cone's top so that none is negative, and in the lowest bits the cone.
 _NEXT = (BLOCK << 32) + BLOCK * LANES  # from a cone's block to the next
-_LISTED = 16  # blocks
 _NATURAL = 0x7FFFFFFF  # an index that is seen not to be negative needs no look at whether it counts from the end
 
 
@@ -70,7 +69,7 @@ def outline(ends, lines, bounds, strips, width, height):
     """
     for k in range(LANES):
         u0, v0, r0 = ends[_U0 + k], ends[_V0 + k], ends[_R0 + k]
-        u1, v1, r1 = ends[_U1 + k], ends[_V1 + k], ends[_R1 + k]
+        u1, v1, r1 = ends[_U + 1 + k], ends[_V + 1 + k], ends[_R1 + k]
         dx = u1 - u0
         dy = v1 - v0
         dr = r0 - r1
@@ -160,10 +159,8 @@ def list_blocks(bones, bounds, keys, blocks):
     end = 0
     for j in range(bones):
         count = int(bounds[_COUNT + j])
-        for i in range(0, count, _LISTED):
-            key, at = keys[j] + i * _NEXT, (end + i) & _NATURAL
-            for k in range(_LISTED):
-                blocks[at + k] = key + k * _NEXT
+        for i in range(0, count, LISTED):
+            list_steps(blocks, end + i, keys[j] + i * _NEXT, _NEXT)
         end += count
     return end
 
@@ -199,29 +196,27 @@ def columns(spans, lines, j, row):
 
 
 @inlined
-def rasterise(chain, radii, view, joints, ends, lines, bounds, spans, keys, blocks, box, pixels, image):
-    """Set the pixels of every cone of one body in a clear bit image, and its bounding box. Overwrites `joints`."""
+def rasterise(chain, radii, view, frames, ends, lines, bounds, spans, keys, blocks, box, pixels, image):
+    """Set the pixels of every cone of one body in a clear bit image, and its bounding box."""
     rotation, translation = view.rotation, view.translation
     scale = math.sqrt(view.focal[0] * view.focal[1])
-    for j in range(joints.shape[0]):
-        a, b, c = joints[j, 0], joints[j, 1], joints[j, 2]
+    for j in range(frames.shape[0]):
+        a, b, c = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
         x = rotation[0, 0] * a + rotation[0, 1] * b + rotation[0, 2] * c + translation[0]
         y = rotation[1, 0] * a + rotation[1, 1] * b + rotation[1, 2] * c + translation[1]
         z = rotation[2, 0] * a + rotation[2, 1] * b + rotation[2, 2] * c + translation[2]
         inside = (z >= NEAR) & (z <= FAR)  # false for nan as well
         depth = 1.0 / z if inside else 0.0
-        joints[j, 0] = view.centre[0] + view.focal[0] * x * depth - 0.5 if inside else 0.0
-        joints[j, 1] = view.centre[1] + view.focal[1] * y * depth - 0.5 if inside else 0.0
-        joints[j, 2] = scale * depth
+        ends[_U + j] = view.centre[0] + view.focal[0] * x * depth - 0.5 if inside else 0.0
+        ends[_V + j] = view.centre[1] + view.focal[1] * y * depth - 0.5 if inside else 0.0
+        ends[_S + j] = scale * depth
     for b in range(chain.parents.size):
-        p = chain.parents[b]
-        ends[_U0 + b] = joints[p, 0]
-        ends[_V0 + b] = joints[p, 1]
-        ends[_R0 + b] = joints[p, 2] * radii[b, 0]
-        ends[_U1 + b] = joints[b + 1, 0]
-        ends[_V1 + b] = joints[b + 1, 1]
-        ends[_R1 + b] = joints[b + 1, 2] * radii[b, 1]
-        ends[_SEEN + b] = min(joints[p, 2], joints[b + 1, 2])
+        p = chain.parents[b] & _NATURAL
+        ends[_U0 + b] = ends[_U + p]
+        ends[_V0 + b] = ends[_V + p]
+        ends[_R0 + b] = ends[_S + p] * radii[b, 0]
+        ends[_R1 + b] = ends[_S + 1 + b] * radii[b, 1]
+        ends[_SEEN + b] = min(ends[_S + p], ends[_S + 1 + b])
     strips, stride = image.shape[0], 2 * image.shape[1]
     outline(ends, lines, bounds, strips, float(view.width), float(view.height))
     bounding_box(bounds, box)
@@ -240,8 +235,8 @@ def scratch(view, bones, angles):
     """Return the work arrays of one thread: for the kinematics, for the outlines, and a clear bit image."""
     image = np.zeros(strips_and_words(view.width, view.height), np.uint64)
     pixels = image.reshape(-1).view(np.uint32)
-    listed = bones * (view.height // BLOCK + 1) + _LISTED
-    kinematics = (np.empty(angles), np.empty(angles), np.empty((bones + 1, 3, 3)), np.empty((bones + 1, 3)))
+    listed = bones * (view.height // BLOCK + 1) + LISTED
+    kinematics = (np.empty(angles), np.empty(angles), empty_frames(bones + 1))
     outlines = (
         np.zeros(_SCRATCH_ENDS),
         np.zeros(_SCRATCH_OUTLINE, np.float32),
@@ -258,7 +253,7 @@ def scratch(view, bones, angles):
 @jit
 def draw_pose(chain, radii, view, pose, translation, work):
     """Set the pixels of one body in the clear bit image of `work`, which `scratch` makes; return it and its box."""
-    (sines, cosines, frames, joints), (ends, lines, bounds, spans, keys, blocks, box, pixels), image = work
-    place_joints(chain, pose, translation, sines, cosines, frames, joints)
-    rasterise(chain, radii, view, joints, ends, lines, bounds, spans, keys, blocks, box, pixels, image)
+    (sines, cosines, frames), (ends, lines, bounds, spans, keys, blocks, box, pixels), image = work
+    place_frames(chain, pose, translation, sines, cosines, frames)
+    rasterise(chain, radii, view, frames, ends, lines, bounds, spans, keys, blocks, box, pixels, image)
     return image, box
