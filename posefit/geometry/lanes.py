@@ -11,13 +11,13 @@ from numba import types
 from numba.extending import intrinsic, overload
 
 _ROWS, _COLUMNS = 4, 4  # of a frame; the last row is padding, the last column the place of its origin
-_EXACT = ("contract", "nsz")  # what `jit` allows
+_FREEDOM = ("contract", "nsz")  # in rounding: what `jit` allows
 
 
 def place_bone(chain: Any, b: Any, sines: Any, cosines: Any, frames: Any) -> None:
     """Write the frame of the joint in which bone b ends, from that of the joint it starts from.
 
-    `frames` (27, 4, 4) are each three axes and an origin, in world coordinates and one number more.
+    Each of `frames` (27, 4, 4) is three axes and an origin: three world coordinates, and a fourth number to fill up.
     """
     a, turn, offset = chain.angles[b], chain.turns[b], chain.offsets[b]
     for i in range(_ROWS - 1):
@@ -35,11 +35,11 @@ def place_bone(chain: Any, b: Any, sines: Any, cosines: Any, frames: Any) -> Non
 @intrinsic  # type: ignore[untyped-decorator]
 def _place_bone(  # type: ignore[no-untyped-def]
     typing_context: Any,  # noqa: ARG001
-    parent,
-    own,
-    turned,
+    parent,  # noqa: ARG001
+    own,  # noqa: ARG001
+    turned,  # noqa: ARG001
     turn,
-    angle,
+    angle,  # noqa: ARG001
     sines,
     cosines,
     offset,
@@ -52,7 +52,7 @@ def _place_bone(  # type: ignore[no-untyped-def]
 @overload(place_bone, inline="always")  # type: ignore[untyped-decorator]
 def _place_bone_compiled(chain, b, sines, cosines, frames):  # type: ignore[no-untyped-def]  # noqa: ARG001
     def compiled(chain, b, sines, cosines, frames):  # type: ignore[no-untyped-def]
-        _place_bone(
+        _place_bone(  # type: ignore[call-arg]
             chain.parents[b],
             b + 1,
             chain.turned[b],
@@ -88,13 +88,13 @@ def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> A
         return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), _ROWS), [0] * _ROWS))
 
     def product(a: Any, b: Any) -> Any:
-        return builder.fmul(a, b, flags=_EXACT)
+        return builder.fmul(a, b, flags=_FREEDOM)
 
     def total(a: Any, b: Any) -> Any:
-        return builder.fadd(a, b, flags=_EXACT)
+        return builder.fadd(a, b, flags=_FREEDOM)
 
     def difference(a: Any, b: Any) -> Any:
-        return builder.fsub(a, b, flags=_EXACT)
+        return builder.fsub(a, b, flags=_FREEDOM)
 
     def changed_where(condition: Any, axes: Sequence[Any], change: Any) -> list[Any]:
         before = builder.block
