@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from posefit.cli import following, plugins, sweeping
+from posefit.cli.motions import motions
 from posefit.limits import exits_told
 from posefit.version import __version__
 
@@ -21,6 +22,7 @@ BUILT_IN = (
     following.extract,
     sweeping.sweep,
     sweeping.report,
+    motions,
     plugins.plugins,
     plugins.check,
 )

@@ -101,8 +101,20 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     options["extraction"] = Extraction(**given) if given else None
     options["source"] = options["source"] or ("walk",)
     options["view_degrees"] = options["view_degrees"] or None
+    options["train"] = _without(options["train"], options.pop("without_subject"))
     prior = options["prior"] or prior_of(options["source"][0])
     return options | parse_settings(options.pop("settings"), options["optimiser"], prior, options["tracker"])
+
+
+def _without(train: tuple[str, ...], subjects: tuple[str, ...]) -> tuple[str, ...]:
+    """Return what a method learns from, some people of the library left out."""
+    from posefit.motion import recorded
+
+    if not subjects:
+        return train
+    if not any(recorded.is_library(one) for one in train):
+        raise ValueError(f"without_subject must be given with --train library, got {', '.join(train) or 'no --train'}")
+    return tuple(recorded.leaving_out(one, subjects) if recorded.is_library(one) else one for one in train)
 
 
 def _degrees(pose: Any) -> list[float]:

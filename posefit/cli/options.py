@@ -53,7 +53,15 @@ TRACK = (
     click.option(
         "--set", "settings", multiple=True, metavar="NAME.SETTING=VALUE", help="Such as sapso.cooling=0.9; repeatable."
     ),
-    click.option("--train", multiple=True, metavar="SOURCE", help="Motion the prior learns from; may be repeated."),
+    click.option(
+        "--train",
+        multiple=True,
+        metavar="SOURCE",
+        help="What the method learns from: a motion, a folder, library, or library:16; may be repeated.",
+    ),
+    click.option(
+        "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
+    ),
     click.option(
         "--view-degrees",
         type=float,

@@ -135,7 +135,7 @@ class CoarseFirst:
 
     `ask` proposes those alone, so what the driver counts, keeps and reports are costs at full size. `tell` tells the
     optimiser its whole population: theirs as they are, and of the others the small picture's, none below the worst of
-    those that were seen whole. The small picture's poses are drawn as well, and whoever counts evaluations counts them.
+    those that were seen whole. The small picture's poses are drawn as well, and are counted by their share of the pixels.
 
     Settings:
         factor: the picture has every so many pixels of every so many rows, see `PoseProblem.coarser`.

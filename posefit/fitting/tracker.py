@@ -76,7 +76,10 @@ class Task:
 
 
 class Tracker(Protocol):
-    """Follows a person through a sequence; nothing to inherit."""
+    """Follows a person through a sequence; nothing to inherit.
+
+    One that looks ahead says how many observations it takes before it gives a frame: an attribute `lag`, else 1.
+    """
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, as it comes."""

@@ -19,7 +19,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
-from posefit.motion import library
+from posefit.motion import library, recorded
 from posefit.motion.motion import RATES, Motion
 from posefit.reading import quoted
 
@@ -116,7 +116,7 @@ def _known(sources: Sequence[Source], viewing: Viewing) -> Scene:
 
 
 def clip_of(source: Source, asf: str | Path | None = None) -> Callable[[float], Motion]:
-    """Return what gives the motion that a source names at any rate: a built-in motion, or an .amc or .bvh file.
+    """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
 
     A file is read once, now; the .asf of an .amc is `asf`, or the only one beside it. Raises ValueError where there is
     no such motion.
@@ -125,6 +125,8 @@ def clip_of(source: Source, asf: str | Path | None = None) -> Callable[[float], 
         return source.resampled
     if source in library.names():
         return partial(_built_in, str(source))
+    if recorded.is_recorded(source):
+        return recorded.clip(str(source)).motion().resampled
     path = Path(source)
     if path.suffix.lower() == ".amc":
         from posefit.motion.amc import read_clip
@@ -150,7 +152,7 @@ def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:
 
 def kind_of(source: Source) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video."""
-    if isinstance(source, Motion) or source in library.names():
+    if isinstance(source, Motion) or source in library.names() or recorded.is_recorded(source):
         return "motion"
     path = Path(source)
     if path.is_dir() or path.suffix.lower() == ".npz":

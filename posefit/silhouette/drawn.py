@@ -18,10 +18,10 @@ class PoseCount:
     """
 
     def __init__(self) -> None:
-        self.poses = 0
+        self.poses = 0.0
         self._lock = threading.Lock()
 
-    def add(self, poses: int) -> None:
+    def add(self, poses: float) -> None:
         """Count so many poses."""
         with self._lock:
             self.poses += poses
@@ -68,9 +68,9 @@ def uncounted() -> Iterator[None]:
 
 
 def count_poses(poses: int, silhouette: Silhouette | None = None) -> None:
-    """Count poses that are drawn now, for whoever counts them."""
+    """Count poses that are drawn now, for whoever counts them; in a smaller picture by its share of the pixels."""
     counted = _current.get()
     if counted is None and _owners and silhouette is not None:
         counted = _owners.get(silhouette)
     if counted is not None:
-        counted.add(poses)
+        counted.add(poses if silhouette is None else poses / silhouette.scale**2)

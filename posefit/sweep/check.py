@@ -13,7 +13,8 @@ from posefit.entries import PROJECT
 from posefit.fitting.space import TRANSLATIONS
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
-from posefit.motion import library
+from posefit.footage.training import training_clips
+from posefit.motion import library, recorded
 from posefit.motion.motion import RATES
 from posefit.reading import SHOWN, cut, quoted
 from posefit.registry import Kind, Offer, registry
@@ -128,8 +129,11 @@ def _other_styles(motion: str) -> tuple[str, ...]:
 @lru_cache(maxsize=1024)
 def _files(motion: str) -> tuple[tuple[str, str], ...]:
     """Return the files that a motion is read from, each with its digest; none for a built-in one."""
-    if motion in library.names():
+    if motion in library.names() or recorded.is_recorded(motion) or recorded.is_library(motion):
         return ()
+    if Path(motion).is_dir():
+        training_clips([motion])  # raises where one cannot be read
+        return tuple((str(one), digest_of(one)) for one in sorted(Path(motion).iterdir()) if one.is_file())
     motion_of(motion, None, FPS)  # raises where it cannot be read
     path = Path(motion)
     beside = sorted(path.parent.glob("*.asf")) if path.suffix.lower() == ".amc" else []
@@ -154,7 +158,7 @@ def _name(field: str, value: Any) -> str:
 
 def _motion(field: str, value: Any) -> str:
     name = _name(field, value)
-    if name not in library.names() and Path(name).suffix.lower() not in MOTIONS:
+    if name not in library.names() and not recorded.is_recorded(name) and Path(name).suffix.lower() not in MOTIONS:
         raise ValueError(
             f"{field} must be an .amc file, a .bvh file or one of {', '.join(library.names())}, "
             f"got {quoted(name)}{_nearest(name, library.names())}"
@@ -165,7 +169,15 @@ def _motion(field: str, value: Any) -> str:
 def _motions(field: str, value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise ValueError(f"{field} must be a list of motions, got {quoted(value)}")
-    return tuple(_motion(field, one) for one in value)
+    return tuple(_learned_from(field, one) for one in value)
+
+
+def _learned_from(field: str, value: Any) -> str:
+    """Return what a method learns from: a motion, people of the library, or a folder."""
+    if recorded.is_library(value):
+        recorded.named(value)  # raises where somebody is not there
+        return str(value)
+    return value if isinstance(value, str) and value and Path(value).is_dir() else _motion(field, value)
 
 
 def _views(field: str, value: Any) -> tuple[float, ...]:

@@ -17,7 +17,8 @@ from posefit.fitting.tracker import TrackerFactory
 from posefit.footage.masks import Range
 from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Extraction
-from posefit.footage.source import Source, Viewing, clip_of, kind_of, scene_of
+from posefit.footage.source import Source, Viewing, kind_of, scene_of
+from posefit.footage.training import training_clips
 from posefit.geometry.calibration import Up
 from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
@@ -151,7 +152,7 @@ def track(
     if kind == "motion":
         _check_known(asf, restarts, [*sources, *train])
     opening.check(kind == "motion")
-    clips = [clip_of(one, asf) for one in _training(sources, train)]  # before the work, as a name may be wrong
+    clips = training_clips(_training(sources, train), asf)  # before the work, as a name may be wrong
     if resume and out is None:
         raise ValueError("resume must be given with out, the folder of the track that goes on, got none")
     if rerun is not None:

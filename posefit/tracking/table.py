@@ -1,6 +1,6 @@
 """The table a track prints: the method beside what anybody can reach without it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from posefit.tracking.measures import BASELINES, MEASURES
@@ -8,13 +8,14 @@ from posefit.tracking.measures import BASELINES, MEASURES
 NOTABLE = 0.05  # a part of the build that is off the average by less is not worth a word
 
 WIDTH = 30  # of the names
+NAMED = 8  # motions that were learned from, and are named
 
 
 def table(summary: Mapping[str, Any]) -> str:
     """Return the lines that `posefit track` prints."""
     lines = [
         f"{summary['motion']}: {summary['frames']} frames, {summary['method']}, seed {summary['seed']}, "
-        f"translation {summary['translation']}, trained on {', '.join(summary['train'])}"
+        f"translation {summary['translation']}, trained on {_training(summary['train'])}"
     ]
     error = summary["error_degrees"]
     if error is not None:
@@ -60,3 +61,7 @@ def table(summary: Mapping[str, Any]) -> str:
 
 def _shown(summary: Mapping[str, Any], name: str) -> str:
     return MEASURES[name].shown(summary[name])
+
+
+def _training(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= NAMED else f"{len(names)} clips, {names[0]} to {names[-1]}"

@@ -23,7 +23,7 @@ def test_an_absent_library_is_named_with_the_extra_to_install(name: str) -> None
     plugin = found.plugins[0]
     absent = tuple(replace(offer, needs=(f"no_such_{offer.name}", f"posefit[{offer.name}]")) for offer in plugin.offers)
     with pytest.raises(ImportError, match=rf"optimiser {name} needs the library .* pip install 'posefit\[{name}\]'"):
-        Registry((replace(plugin, offers=absent),)).optimiser(name)
+        Registry((plugin._replace(offers=absent),)).optimiser(name)
     assert found.offers["optimiser"][name].needs == (EXTRAS[name], f"posefit[{name}]")
 
 

@@ -58,11 +58,13 @@ def test_the_borders_are_those_at_full_size() -> None:
     assert (left, top, bottom) == (3.25, 4.75, 15.25)
 
 
-def test_who_knows_a_silhouette_knows_its_smaller_one() -> None:
+def test_who_knows_a_silhouette_knows_its_smaller_one_and_counts_poses_by_its_pixels() -> None:
     count = PoseCount()
     (mine,) = count.own([Silhouette.of(np.ones((8, 8)))])
     count_poses(3, coarser_silhouette(mine, 2))
-    assert count.poses == 3
+    assert count.poses == 0.75  # a quarter of the pixels
+    count_poses(2, coarser_silhouette(coarser_silhouette(mine, 2), 2))
+    assert count.poses == 0.875
 
 
 @pytest.mark.parametrize("factor", [0, -1, 73, 2.0, True, None])

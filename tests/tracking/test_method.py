@@ -47,7 +47,7 @@ def test_a_budget_is_particles_times_iterations_and_one_where_nothing_else_is_sa
         ({"fps": float("inf")}, "fps must be a positive number, got inf"),
         ({"optimiser": "sapzo"}, "did you mean 'sapso'"),
         ({"prior": "pcb"}, "prior must be one of full, loose, pca, sklearn, union, got 'pcb'; did you mean 'pca'"),
-        ({"tracker": "vsmn"}, "tracker must be one of sapso.vsmm, vsmm, got 'vsmn'; did you mean 'vsmm'"),
+        ({"tracker": "vsmn"}, "tracker must be one of exemplars, sapso.vsmm, vsmm, got 'vsmn'; did you mean 'vsmm'"),
         ({"first_pose": "mine"}, "first_pose must be one of searched, given, got 'mine'"),
         ({"optimiser_settings": {"coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),
         ({"prior_settings": {"components": "six"}}, "pca.components must be float, got 'six'"),

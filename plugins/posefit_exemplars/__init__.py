@@ -1,0 +1,26 @@
+"""A tracker that follows clips instead of frames: `exemplars`.
+
+One silhouette cannot tell a stride from its mirrored half-cycle; a sequence of them nearly always can. So states are
+poses of recorded clips, each with a yaw; they go on as their clips do, at about their speed, or change to a clip that
+goes on alike, turn, or jump; and what is told is the likeliest way through all frames seen, some frames later. After
+Toyama and Blake, Probabilistic tracking in a metric space, 2001.
+
+`exemplars` are the poses and what came after each; `beam` the recursion over ways; `look` what a pose costs in a frame;
+`tracker` what is registered.
+
+>>> import posefit
+>>> track = posefit.track("walk-a", tracker="exemplars", train=["walk-b", "walk-c"], frames=(0, 10))
+>>> track.measures.lost_rate
+0.0
+"""
+
+from posefit import hookimpl
+from posefit.hooks import RegisterTracker
+
+
+@hookimpl
+def posefit_register_trackers(register: RegisterTracker) -> None:
+    """Offer `exemplars`."""
+    from posefit_exemplars.tracker import exemplars
+
+    register("exemplars", exemplars)

@@ -1,0 +1,114 @@
+"""The likeliest ways to where a person may be now: Viterbi's recursion over the states that are worth a look.
+
+A state is a pose of the exemplars and a yaw. Its total is what its best way has cost: silhouettes, steps and jumps.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
+
+BINS = 36  # of a full turn: two states of one pose in one bin are one
+SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
+TURN = np.radians(7.0)  # how far a candidate turns away from its clip, to either side, or not at all
+NEAR = 4  # groups of poses that a state goes on to
+HOPELESS = 8.0  # beyond the cost of a jump; what costs more is not looked at
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What a step costs."""
+
+    spread: float  # metres, root mean square over joints, that a pose may be off where its clip goes on
+    turning: float  # radians that it may turn away
+    jump: float  # the cost of a step to anywhere
+    straying: float  # metres that the root may be off where its clip goes on
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """States of one frame, where they come from, and what they cost."""
+
+    states: Rows  # (n,) poses of the exemplars
+    yaws: Array  # (n,) radians
+    parents: Rows  # (n,) row of the frame before, or -1
+    totals: Array  # (n,)
+    places: Array = field(repr=False)  # (n, 3) metres where the root is, or is expected
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def chosen(self, rows: Rows) -> "Beam":
+        """Return some of the states."""
+        return Beam(self.states[rows], self.yaws[rows], self.parents[rows], self.totals[rows], self.places[rows])
+
+    def best(self, count: int) -> "Beam":
+        """Return the states of least total, the best first."""
+        return self.chosen(np.argsort(self.totals, kind="stable")[:count])
+
+
+def joined_beams(*beams: Beam) -> Beam:
+    """Return the states of all beams; of several of one pose in one bin of yaw the one of least total."""
+    names = ("states", "yaws", "parents", "totals", "places")
+    states, yaws, parents, totals, places = (np.concatenate([getattr(one, name) for one in beams]) for name in names)
+    every = Beam(states, yaws, parents, totals, places)
+    code = states * BINS + bins_of(yaws)
+    order = np.lexsort((totals, code))
+    first = np.append(True, np.diff(code[order]) != 0)
+    return every.chosen(order[first])
+
+
+def bins_of(yaws: Array) -> Rows:
+    """Return the bin of each yaw."""
+    return np.round(yaws * (BINS / (2.0 * np.pi))).astype(np.int64) % BINS
+
+
+def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps) -> Beam:
+    """Return the states that those of a beam may be in so much later, each by its cheapest step.
+
+    A pose costs half the square of its distance, over the spread, from what its parent's clip did next at one of the
+    speeds; a yaw half the square of its turn away from the clip's own.
+    """
+    ahead = [exemplars.after(beam.states, seconds * speed) for speed in SPEEDS]
+    codes, turns, ways = ahead[SPEEDS.index(1.0)]
+    facing, places = beam.yaws + turns, beam.places + about_vertical(ways, beam.yaws)
+    bins = bins_of(facing)
+    centres = exemplars.codes[exemplars.centres]
+    near = min(NEAR, len(centres))
+    groups = np.argpartition(_squares(codes, centres), near - 1, axis=1)[:, :near]
+    limit = beam.totals.min() + steps.jump + HOPELESS
+    found: list[Beam] = []
+    for one in np.unique(bins):
+        rows = np.flatnonzero(bins == one)
+        states = exemplars.of_groups(np.unique(groups[rows]))
+        away = np.minimum.reduce([_squares(code[rows], exemplars.codes[states]) for code, *_ in ahead])
+        costs = beam.totals[rows, None] + away / (2.0 * steps.spread**2)
+        from_row = costs.argmin(axis=0)
+        least = costs[from_row, np.arange(len(states))]
+        kept = np.flatnonzero(least < limit)
+        parents = rows[from_row[kept]]
+        for turn in (0.0, -TURN, TURN):
+            totals = least[kept] + 0.5 * (turn / steps.turning) ** 2
+            found.append(Beam(states[kept], facing[parents] + turn, parents, totals, places[parents]))
+    return joined_beams(*found)
+
+
+def jumped(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:
+    """Return states as the best of a beam may jump to them."""
+    best = int(beam.totals.argmin())
+    many = len(states)
+    return Beam(
+        states,
+        yaws,
+        np.full(many, best),
+        np.full(many, beam.totals[best] + steps.jump),
+        np.repeat(beam.places[best : best + 1], many, axis=0),
+    )
+
+
+def _squares(some: Codes, others: Codes) -> Codes:
+    """Return the squared distances (n, m) of codes."""
+    squares = (some**2).sum(axis=1)[:, None] - 2.0 * (some @ others.T) + (others**2).sum(axis=1)
+    return np.asarray(np.maximum(squares, 0.0))

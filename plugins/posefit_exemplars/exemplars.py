@@ -1,0 +1,133 @@
+"""The states of the model: poses of clips, with what came after each of them, and groups of poses that are alike."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import JOINTS, Skeleton
+from posefit.motion.motion import Motion
+
+Codes = NDArray[np.float32]  # (n, D): two of them are as far apart as the joints of their poses, root mean square
+Rows = NDArray[np.int64]
+
+DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
+SAME = 0.01  # metres between the codes of poses that need not both be kept
+GROUPS = 1000  # of poses that are alike; fewer where there are fewer poses
+
+
+@dataclass(frozen=True, eq=False)
+class Exemplars:
+    """Poses (K, 66) in the order of their clips. A pose's yaw is free; its pitch and roll are the clip's."""
+
+    poses: Array = field(repr=False)
+    codes: Codes = field(repr=False)  # (K, D) metres
+    paths: Array = field(repr=False)  # (K, 3) metres: where the clip's root was
+    times: Array = field(repr=False)  # (K,) seconds since the clip's first frame
+    clips: Rows = field(repr=False)  # (K,) number of the clip
+    lasts: Rows = field(repr=False)  # (clips,) a clip's last pose
+    centres: Rows = field(repr=False)  # (G,) a pose of each group, so that the first few are as unlike as can be
+    members: Rows = field(repr=False)  # (K,) all poses, group by group
+    bounds: Rows = field(repr=False)  # (G + 1,) where each group begins in `members`
+
+    @classmethod
+    def of(cls, motions: Sequence[Motion], skeleton: Skeleton) -> Self:
+        """Return the states of motions, as the person with this skeleton would move.
+
+        A frame nearer than a centimetre to the last one kept is left out. Raises ValueError where a motion has a
+        single frame.
+        """
+        if not motions:
+            raise ValueError("exemplars must have motions to learn from, got none")
+        for motion in motions:
+            if len(motion) < 2:
+                raise ValueError(f"{motion.name} must have at least 2 frames to be followed, got 1")
+        poses = np.concatenate([motion.poses for motion in motions])
+        paths = np.concatenate([motion.translations for motion in motions])
+        times = np.concatenate([np.arange(len(motion)) / motion.fps for motion in motions])
+        clips = np.repeat(np.arange(len(motions)), [len(motion) for motion in motions])
+        codes = coded(skeleton, poses)
+        kept = thinned(codes, clips)
+        codes, clips = codes[kept], clips[kept]
+        centres, owners = groups(codes, GROUPS)
+        members = np.argsort(owners, kind="stable")
+        bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
+        lasts = np.searchsorted(clips, np.arange(len(motions)), "right") - 1
+        return cls(poses[kept], codes, paths[kept], times[kept], clips, lasts, centres, members, bounds)
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def after(self, states: Rows, seconds: float) -> tuple[Codes, Array, Array]:
+        """Return codes (n, D) of what came so long after some states, how far they turned (n,) and went (n, 3).
+
+        The way is that of a body whose yaw was 0. Between two poses all is interpolated; a clip that ends goes on with
+        its last pose.
+        """
+        last = self.lasts[self.clips[states]]
+        length = 1.0 + float(self.times.max())  # of the line on which all clips lie one after the other
+        line = self.clips * length + self.times
+        wanted = np.minimum(self.times[states] + seconds, self.times[last])
+        before = np.searchsorted(line, self.clips[states] * length + wanted, "right") - 1
+        following = np.minimum(before + 1, last)
+        gap = np.maximum(self.times[following] - self.times[before], 1e-9)
+        share = np.clip((wanted - self.times[before]) / gap, 0.0, 1.0)
+        codes = (1.0 - share)[:, None] * self.codes[before] + share[:, None] * self.codes[following]
+        yaws = (1.0 - share) * self.poses[before, 0] + share * self.poses[following, 0]
+        paths = (1.0 - share)[:, None] * self.paths[before] + share[:, None] * self.paths[following]
+        ways = about_vertical(paths - self.paths[states], -self.poses[states, 0])
+        return codes.astype(np.float32), yaws - self.poses[states, 0], ways
+
+    def of_groups(self, chosen: Rows) -> Rows:
+        """Return the poses of some groups."""
+        return np.concatenate([self.members[self.bounds[g] : self.bounds[g + 1]] for g in chosen])
+
+
+def about_vertical(vectors: Array, yaws: Array) -> Array:
+    """Return vectors (n, 3) turned about the vertical by yaws (n,)."""
+    sine, cosine = np.sin(yaws), np.cos(yaws)
+    x, y, z = vectors.T
+    return np.column_stack([cosine * x + sine * z, y, cosine * z - sine * x])
+
+
+def coded(skeleton: Skeleton, poses: Array) -> Codes:
+    """Return the codes (K, D) of poses (K, 66): principal components of the joints, the body turned to yaw 0."""
+    facing = poses.copy()
+    facing[:, 0] = 0.0
+    joints = skeleton.joints(facing).reshape(len(poses), -1)
+    joints -= joints.mean(axis=0)
+    _, axes = np.linalg.eigh(joints.T @ joints)
+    return np.asarray(joints @ axes[:, : -DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)), dtype=np.float32)
+
+
+def thinned(codes: Codes, clips: Rows) -> Rows:
+    """Return which frames to keep: each farther than a centimetre from the last one kept, and both ends of clips."""
+    kept, last = [], -1
+    ends = np.diff(clips, append=-1) != 0
+    for k in range(len(codes)):
+        new = last < 0 or clips[k] != clips[last]
+        if new or ends[k] or float(((codes[k] - codes[last]) ** 2).sum()) > SAME**2:
+            kept.append(k)
+            last = k
+    return np.array(kept)
+
+
+def groups(codes: Codes, most: int) -> tuple[Rows, Rows]:
+    """Return centres (G,), each as far from those before it as any pose, and the group (K,) of each pose's nearest.
+
+    Farthest-first traversal: Gonzalez, Clustering to minimize the maximum intercluster distance, 1985.
+    """
+    squares = (codes**2).sum(axis=1)
+    nearest = np.full(len(codes), np.inf, dtype=np.float32)
+    owners, centres = np.zeros(len(codes), dtype=np.int64), [0]
+    while True:
+        away = squares - 2.0 * (codes @ codes[centres[-1]]) + squares[centres[-1]]
+        closer = away < nearest
+        nearest[closer], owners[closer] = away[closer], len(centres) - 1
+        farthest = int(nearest.argmax())
+        if len(centres) == most or nearest[farthest] <= SAME**2:
+            return np.array(centres), owners
+        centres.append(farthest)

@@ -1,0 +1,68 @@
+"""What poses cost in one frame, at full size and in a small picture."""
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.alignment import align
+from posefit.fitting.problem import over_views
+from posefit.fitting.tracker import Observation, Task
+from posefit.geometry.camera import Camera
+from posefit.silhouette.cost import Areas, areas
+from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
+
+Views = list[tuple[Camera, Silhouette]]
+
+SMALL = 40  # pixels: no side of a small picture is shorter
+FACTORS = (4, 2, 1)
+
+
+class Look:
+    """One frame as cameras saw it. `small` costs are of a picture with every fourth pixel of every fourth row."""
+
+    def __init__(self, task: Task, observation: Observation) -> None:
+        self._task, self._observation = task, observation
+        sides = [side for camera in task.cameras for side in (camera.width, camera.height)]
+        self.factor = next((factor for factor in FACTORS if min(sides) >= factor * SMALL), 1)
+        self._small = [
+            (coarser_camera(camera, self.factor), coarser_silhouette(silhouette, self.factor))
+            for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True)
+        ]
+        self._full = list(zip(task.cameras, observation.silhouettes, strict=True))
+
+    @property
+    def share(self) -> float:
+        """What a look at the small picture counts, beside one at the full picture."""
+        return 1.0 / self.factor**2
+
+    def placed(self, poses: Array, places: Array) -> Array:
+        """Return where poses (n, 66) stand (n, 3): where the root is known to be, or aligned, from `places` (n, 3)."""
+        known = self._observation.translation
+        if self._task.translation == "known" and known is not None:
+            return np.repeat(np.asarray(known, dtype=np.float64)[None], len(poses), axis=0)
+        if self._task.translation == "known":
+            return places
+        cameras, silhouettes = zip(*self._full, strict=True)
+        return align(self._task.body, cameras, silhouettes, poses, places)
+
+    def small(self, poses: Array, places: Array) -> Array:
+        """Return the costs (n,) of poses in the small picture."""
+        return self._costs(self._small, poses, places)
+
+    def full(self, poses: Array, places: Array) -> Array:
+        """Return the costs (n,) of poses."""
+        return self._costs(self._full, poses, places)
+
+    def measured(self, pose: Array, place: Array) -> tuple[float, Areas]:
+        """Return the cost of one pose, and its areas (views, 3)."""
+        counts = [
+            areas(self._task.body, camera, silhouette, pose[None], place[None]) for camera, silhouette in self._full
+        ]
+        return float(over_views(counts, self._observation.silhouettes)[0]), np.concatenate(counts)
+
+    def _costs(self, views: Views, poses: Array, places: Array) -> Array:
+        counts = [
+            areas(self._task.body, camera, silhouette, poses, places, self._task.threads)
+            for camera, silhouette in views
+        ]
+        return over_views(counts, [silhouette for _, silhouette in views])

@@ -1,0 +1,182 @@
+"""The tracker by name: settings, checked; a frame's work; and the path that is told `lag` frames later."""
+
+import math
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit_exemplars.beam import BINS, Beam, Steps, joined_beams, jumped, stepped
+from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.look import Look
+
+WIDTH = 400  # states that a beam keeps
+FULL = 0.6  # share of the budget that is for full-size costs
+AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest looks everywhere
+GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are looked at; in the first frame more
+FIRST_GROUPS = 200
+OF_A_GROUP = 20  # poses, drawn at random, that stand for a group in a look everywhere
+FACING = np.radians(45.0)  # how far a yaw that was told may be off, to either side
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """A frame whose pose is not told yet."""
+
+    beam: Beam
+    look: Look
+    evaluations: float
+    seconds: float
+    cpu_seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class ExemplarTracker:
+    """Follows a person along recorded clips: what is likely is a way through them, not a pose."""
+
+    task: Task
+    exemplars: Exemplars = field(repr=False)
+    steps: Steps
+    temperature: float
+    lag: int  # frames that are seen before a pose is told
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a `Frame` for each observation, `lag` observations later."""
+        waiting: deque[_Seen] = deque()
+        latest: Beam | None = None
+        for observation in observations:
+            began, begun = time.perf_counter(), time.process_time()
+            look = Look(self.task, observation)
+            latest, used = self._seen(look, observation, latest, rng)
+            spent = time.perf_counter() - began, time.process_time() - begun
+            waiting.append(_Seen(latest, look, used, *spent))
+            if len(waiting) > self.lag:
+                yield self._told(waiting)
+        while waiting:
+            yield self._told(waiting)
+
+    def _seen(
+        self, look: Look, observation: Observation, before: Beam | None, rng: np.random.Generator
+    ) -> tuple[Beam, float]:
+        """Return the states of a frame, the best first and at 0, and how many evaluations they took."""
+        seconds = 1.0 / self.task.fps
+        if before is not None and not observation.usable:
+            beam = stepped(self.exemplars, before, seconds, self.steps).best(WIDTH)
+            places = look.placed(self._poses(beam), beam.places) if self.task.translation == "known" else beam.places
+            return replace(beam, totals=beam.totals - beam.totals[0], places=places), 0.0
+        full = int(FULL * self.task.evaluations)
+        small = int((self.task.evaluations - full - 2) / look.share)
+        around = int(AROUND * small) if before is not None else 0
+        elsewhere, looked = self._elsewhere(look, before, small - around, rng)
+        beams = [elsewhere]
+        if before is not None:
+            beams.append(stepped(self.exemplars, before, seconds, self.steps).best(around))
+        beam = self._at(look, joined_beams(*beams).best(around + len(elsewhere)), before is not None)
+        costs = look.small(self._poses(beam), beam.places)
+        used = (looked + len(beam)) * look.share
+        beam = beam.chosen(np.argsort(beam.totals + costs / self.temperature, kind="stable")[:full])
+        costs = look.full(self._poses(beam), beam.places)
+        used += len(beam)
+        beam = replace(beam, totals=beam.totals + costs / self.temperature).best(WIDTH)
+        return replace(beam, totals=beam.totals - beam.totals[0]), used
+
+    def _elsewhere(self, look: Look, before: Beam | None, most: int, rng: np.random.Generator) -> tuple[Beam, int]:
+        """Return states that fit, wherever they are; and how many small pictures were looked at."""
+        yaws = np.arange(BINS) * (2.0 * np.pi / BINS)
+        if before is None and self.task.yaw is not None:
+            off = (yaws - self.task.yaw + np.pi) % (2.0 * np.pi) - np.pi
+            yaws = self.task.yaw + off[np.abs(off) <= FACING]
+        taken = min(GROUPS_TAKEN if before is not None else FIRST_GROUPS, max(most // (4 * OF_A_GROUP), 1))
+        centres = self.exemplars.centres
+        count = int(np.clip((most - taken * OF_A_GROUP) // len(yaws), 1, len(centres)))
+        states, facing = np.repeat(centres[:count], len(yaws)), np.tile(yaws, count)
+        beam = self._at(look, self._begun(states, facing, before), False)
+        best = np.argsort(look.small(self._poses(beam), beam.places), kind="stable")[:taken]
+        found = [self._some(int(row) // len(yaws), rng) for row in best]
+        states = np.concatenate(found)
+        facing = np.repeat(facing[best], [len(some) for some in found])
+        return self._begun(states, facing, before), len(beam)
+
+    def _begun(self, states: Rows, yaws: Array, before: Beam | None) -> Beam:
+        """Return states that nothing led to but a jump, or the beginning."""
+        if before is not None:
+            return jumped(states, yaws, before, self.steps)
+        many = len(states)
+        return Beam(states, yaws, np.full(many, -1), np.zeros(many), np.repeat(self.task.anchor[None], many, axis=0))
+
+    def _some(self, group: int, rng: np.random.Generator) -> Rows:
+        members = self.exemplars.of_groups(np.array([group]))
+        return members if len(members) <= OF_A_GROUP else rng.choice(members, OF_A_GROUP, replace=False)
+
+    def _poses(self, beam: Beam) -> Array:
+        poses = self.exemplars.poses[beam.states]
+        poses[:, 0] = beam.yaws
+        return poses
+
+    def _at(self, look: Look, beam: Beam, begun: bool = True) -> Beam:
+        """Return states where they stand; how far that is from where they were expected costs them something."""
+        places = look.placed(self._poses(beam), beam.places)
+        if not begun or self.task.translation == "known":
+            return replace(beam, places=places)
+        off = ((places - beam.places) ** 2).sum(axis=1)
+        return replace(beam, places=places, totals=beam.totals + 0.5 * off / self.steps.straying**2)
+
+    def _told(self, waiting: "deque[_Seen]") -> Frame:
+        """Return the oldest frame that waits, on the best way to the newest."""
+        row = int(waiting[-1].beam.totals.argmin())
+        for seen in list(waiting)[:0:-1]:
+            row = int(seen.beam.parents[row])
+        oldest = waiting.popleft()
+        began = time.perf_counter()
+        pose, place = self._poses(oldest.beam.chosen(np.array([row])))[0], oldest.beam.places[row]
+        cost, areas = oldest.look.measured(pose, place)
+        return Frame(
+            pose,
+            place,
+            cost,
+            areas,
+            math.ceil(oldest.evaluations) + 1,
+            oldest.seconds + time.perf_counter() - began,
+            np.array([cost]),
+            cpu_seconds=oldest.cpu_seconds,
+        )
+
+
+def exemplars(
+    task: Task,
+    *,
+    spread: float = 0.03,
+    turning_degrees: float = 8.0,
+    jump: float = 12.0,
+    temperature: float = 2.0,
+    straying: float = 0.05,
+    lag: int = 15,
+) -> ExemplarTracker:
+    """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
+
+    Settings:
+        spread: metres that joints may be off where a clip goes on, root mean square; above 0.
+        turning_degrees: how far a body may turn away from its clip in a frame; above 0.
+        jump: what a step to any other pose costs, in units of cost over the temperature; 0 or more.
+        temperature: what silhouette costs are divided by; above 0. Costs of frames err together, so more than 1.
+        straying: metres that a root nobody knows may be off where its clip goes on; above 0.
+        lag: frames that are seen before a pose is told, 0 or more.
+    """
+    for name, value in (
+        ("spread", spread),
+        ("turning_degrees", turning_degrees),
+        ("temperature", temperature),
+        ("straying", straying),
+    ):
+        if not value > 0.0:
+            raise ValueError(f"{name} must be above 0, got {value}")
+    if not jump >= 0.0:
+        raise ValueError(f"jump must be 0 or more, got {jump}")
+    if lag < 0:
+        raise ValueError(f"lag must be 0 or more, got {lag}")
+    steps = Steps(spread, math.radians(turning_degrees), jump, straying)
+    return ExemplarTracker(task, Exemplars.of(task.training, task.body.skeleton), steps, temperature, lag)

@@ -1,0 +1,149 @@
+"""The library of recorded motions: clips of ten people, so that nobody has to bring motion capture of his own.
+
+They walk, run, jump, turn, dance, fight, sweep the floor, and play animals. `make_recorded.py` made the file from clips
+of the CMU database: a clip keeps the poses between which the others can be interpolated, no joint more than about a
+centimetre off. The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding
+from NSF EIA-0196217.
+
+    from posefit.motion import recorded
+
+    others = recorded.clips(without=("16",))     # of everybody but the person 16; also recorded.named("library:-16")
+    print(others[0].name, others[0].poses.shape, others[0].times[:4])
+    walk = recorded.clip("16_15").motion()       # as a motion of 30 frames a second
+"""
+
+import json
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.geometry.rotation import rotation_from_joint_angles
+from posefit.geometry.skeleton import ANGLES, Skeleton
+from posefit.motion.motion import Motion
+from posefit.reading import quoted
+
+FPS = 30.0  # frames a second that the times of clips count
+LIBRARY = "library"  # the name of all clips where motions are named
+STEP = 0.001  # radians and metres: what a stored number is a whole multiple of
+_NAME = re.compile(r"\d+_\d+")
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedClip:
+    """Poses of one clip, in order, as many as it takes. Arrays cannot be written to."""
+
+    name: str  # such as 16_15: the subject, and which of his clips
+    subject: str
+    skeleton: Skeleton = field(repr=False)
+    poses: Array = field(repr=False)  # (K, 66) radians
+    translations: Array = field(repr=False)  # (K, 3) metres
+    times: NDArray[np.int64] = field(repr=False)  # (K,) frames since the first pose, at 30 frames a second
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @property
+    def seconds(self) -> float:
+        """How long the clip is."""
+        return float(self.times[-1]) / FPS
+
+    def motion(self) -> Motion:
+        """Return the whole clip at 30 frames a second: angles and translations between the poses are interpolated."""
+        frames = np.arange(self.times[-1] + 1)
+        before = np.minimum(np.searchsorted(self.times, frames, "right") - 1, max(len(self) - 2, 0))
+        after = np.minimum(before + 1, len(self) - 1)
+        gap = np.maximum(self.times[after] - self.times[before], 1)
+        share = ((frames - self.times[before]) / gap)[:, None]
+        poses, translations = (
+            (1.0 - share) * series[before] + share * series[after] for series in (self.poses, self.translations)
+        )
+        return Motion(self.name, self.skeleton, poses, translations, FPS)
+
+
+@lru_cache(maxsize=1)
+def _stored() -> dict[str, RecordedClip]:
+    with (files("posefit.motion") / "recorded.npz").open("rb") as file, np.load(file) as stored:
+        told = json.loads(str(stored["skeletons"]))
+        names, owners = stored["names"].tolist(), stored["owners"].tolist()
+        ends = np.cumsum(stored["counts"], dtype=np.int64)
+        changes, gaps = stored["changes"].T.astype(np.int64), stored["gaps"].astype(np.int64)
+    skeletons = [
+        Skeleton(
+            one["name"],
+            np.array(one["offsets"]),
+            rotation_from_joint_angles(np.radians(one["axes_degrees"])),
+            tuple((bone, tuple(free)) for bone, free in one["channels"]),
+            None if one["limits_degrees"] is None else np.radians(one["limits_degrees"]),
+        )
+        for one in told
+    ]
+    clips = {}
+    for name, owner, start, stop in zip(names, owners, [0, *ends[:-1].tolist()], ends.tolist(), strict=True):
+        values = STEP * np.cumsum(changes[start:stop], axis=0)
+        times = np.cumsum(gaps[start:stop])
+        for array in (values, times):
+            array.setflags(write=False)
+        skeleton = skeletons[owner]
+        clips[name] = RecordedClip(name, skeleton.name, skeleton, values[:, :ANGLES], values[:, ANGLES:], times)
+    return clips
+
+
+def subjects() -> tuple[str, ...]:
+    """Return the people of the library, numbered as in the CMU database."""
+    return tuple(dict.fromkeys(clip.subject for clip in _stored().values()))
+
+
+def is_recorded(name: object) -> bool:
+    """Return whether a name is that of a recorded clip."""
+    return isinstance(name, str) and _NAME.fullmatch(name) is not None and name in _stored()
+
+
+def clip(name: str) -> RecordedClip:
+    """Return the clip of a name such as 16_15. Raises ValueError where there is none."""
+    if not is_recorded(name):
+        raise ValueError(f"a recorded motion must be one that posefit motions lists, got {quoted(name)}")
+    return _stored()[name]
+
+
+def clips(only: Iterable[str] = (), without: Iterable[str] = ()) -> Sequence[RecordedClip]:
+    """Return the clips of some people, or of all, but not of those `without`.
+
+    Raises ValueError where one of them is not in the library, or where nobody is left.
+    """
+    only, without = tuple(only), tuple(without)
+    for subject in (*only, *without):
+        if subject not in subjects():
+            raise ValueError(f"a subject of the library must be one of {', '.join(subjects())}, got {quoted(subject)}")
+    chosen = [one for one in _stored().values() if one.subject not in without and (not only or one.subject in only)]
+    if not chosen:
+        raise ValueError("the library must hold somebody else, got everybody left out")
+    return chosen
+
+
+def is_library(name: object) -> bool:
+    """Return whether a name is the library's, or that of some people of it."""
+    return isinstance(name, str) and name.partition(":")[0] == LIBRARY
+
+
+def named(name: str) -> Sequence[RecordedClip]:
+    """Return the clips of `library`, of some people as in `library:02,16`, or of all but some as in `library:-16`.
+
+    Raises ValueError where one of them is not in the library, or where nobody is left.
+    """
+    if not is_library(name):
+        raise ValueError(f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}")
+    people = [one.strip() for one in name.partition(":")[2].split(",") if one.strip()]
+    return clips([one for one in people if one[0] != "-"], [one[1:] for one in people if one[0] == "-"])
+
+
+def leaving_out(name: str, subjects: Iterable[str]) -> str:
+    """Return the name of the same library without some people."""
+    named(name)  # raises where it is none
+    people = [one for one in [name.partition(":")[2], *(f"-{subject}" for subject in subjects)] if one]
+    return f"{LIBRARY}:{','.join(people)}"

@@ -1,0 +1,100 @@
+"""The library of recorded motions: what is stored is what was recorded, to a centimetre."""
+
+import json
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from posefit.cli import main
+from posefit.motion import recorded
+from posefit.motion.library import average_skeleton
+from posefit.motion.make_recorded import LONGEST_GAP, TOLERANCE, kept_frames
+
+ROUNDED = 1e-3  # metres: what rounding 66 angles to a thousandth of a radian may move a hand by, and more
+
+
+@pytest.fixture(scope="module")
+def cmu30(cmu: Path) -> Path:
+    folder = cmu.parent / "cmu30"
+    if not folder.is_dir():
+        pytest.skip(f"no clips in {folder}")
+    return folder
+
+
+@pytest.mark.parametrize("subject", ["09", "135"])
+def test_a_clip_is_the_recorded_one_to_a_centimetre(cmu30: Path, subject: str) -> None:
+    with np.load(cmu30 / f"{subject}.npz") as stored:
+        start = 0
+        for name, length in zip(stored["names"].tolist(), stored["lengths"].tolist(), strict=True):
+            part = slice(start, start + length)
+            start += length
+            found = recorded.clip(name)
+            motion = found.motion()
+            assert (found.subject, len(motion), motion.fps) == (subject, length, 30.0)
+            true = found.skeleton.joints(
+                stored["poses"][part].astype(float), stored["translations"][part].astype(float)
+            )
+            away = np.linalg.norm(found.skeleton.joints(motion.poses, motion.translations) - true, axis=-1)
+            assert away.max() < TOLERANCE + ROUNDED
+
+
+def test_the_file_is_small_says_where_it_comes_from_and_opens_without_pickle() -> None:
+    path = files("posefit.motion") / "recorded.npz"
+    assert len(path.read_bytes()) < 3_000_000
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        assert "mocap.cs.cmu.edu" in str(stored["origin"])
+        assert "NSF EIA-0196217" in str(stored["origin"])
+
+
+def test_a_body_at_rest_leaves_few_frames_and_one_that_moves_all() -> None:
+    average = average_skeleton()
+    rest = np.zeros((50, 66))
+    assert kept_frames(average, rest, np.zeros((50, 3))).tolist() == [*range(0, 49, LONGEST_GAP), 49]
+    # the root is thrown to and fro by twice the tolerance: every frame is a corner
+    thrown = np.zeros((50, 3))
+    thrown[::2, 1] = 4.0 * TOLERANCE
+    assert kept_frames(average, rest, thrown).tolist() == list(range(50))
+    # at an even pace, everything lies on a line
+    assert len(kept_frames(average, rest, np.linspace(0.0, 5.0, 50)[:, None] * [1.0, 0.0, 0.0])) == 8
+
+
+def test_people_are_chosen_by_name() -> None:
+    everybody = {one.subject for one in recorded.named("library")}
+    assert everybody == set(recorded.subjects())
+    assert {one.subject for one in recorded.named("library:16, 02")} == {"02", "16"}
+    assert {one.subject for one in recorded.named("library:-16")} == everybody - {"16"}
+    assert recorded.leaving_out("library", ["16", "02"]) == "library:-16,-02"
+    assert recorded.leaving_out("library:02,16", ["16"]) == "library:02,16,-16"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("library:3", "a subject of the library must be one of 02, .*, got '3'"),
+        ("library:-x", "a subject of the library must be one of 02, .*, got 'x'"),
+        ("library:16,-16", "the library must hold somebody else, got everybody left out"),
+        ("walk", "a library must be library, library:02,16 or library:-16, got 'walk'"),
+    ],
+)
+def test_people_that_are_not_there_are_named(name: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        recorded.named(name)
+
+
+def test_a_clip_that_is_not_there_is_named() -> None:
+    with pytest.raises(ValueError, match="a recorded motion must be one that posefit motions lists, got '16_999'"):
+        recorded.clip("16_999")
+
+
+def test_the_command_lists_what_there_is() -> None:
+    listed = CliRunner().invoke(main, ["motions"]).stdout
+    assert "library:16 " in listed
+    assert "walk-a" in listed
+    found: dict[str, Any] = json.loads(CliRunner().invoke(main, ["motions", "--json"]).stdout)
+    assert found["recorded"][0] == {"name": "02_01", "subject": "02", "seconds": pytest.approx(85 / 30, abs=1e-3),
+                                    "poses": len(recorded.clip("02_01"))}  # fmt: skip
+    assert len(found["recorded"]) == 216
