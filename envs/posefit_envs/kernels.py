@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, Bits, jit
 from posefit.fitting.kernels import move_to_borders, unpack_proposals, within
-from posefit.geometry.kernels import Chain, place_joints
+from posefit.geometry.kernels import Chain, empty_frames, place_joints
 from posefit.silhouette.kernels import count, paint_bits
 from posefit.silhouette.rasteriser import View, draw_pose, scratch
 
@@ -53,7 +53,7 @@ def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations)
     """Move translations (n, k, 3) of some rows to where poses (n, k, 66) fill the borders (n, views, 4)."""
     bones, many = chain.parents.size, poses.shape[1]
     sines, cosines, origin = np.empty(poses.shape[2]), np.empty(poses.shape[2]), np.zeros(3)
-    frames, joints = np.empty((bones + 1, 3, 3)), np.empty((many, bones + 1, 3))
+    frames, joints = empty_frames(bones + 1), np.empty((many, bones + 1, 3))
     for i in rows:
         own = Chain(chain.parents, chain.angles, chain.turns, chain.turned, scenes.offsets[i])
         for k in range(many):

@@ -222,7 +222,7 @@ def points_and_jacobian(sines, cosines, frames, joints, points, jacobian, others
     for k in range(3 * _TURNING.size):
         joint, pivot, i = _TURNING[k // 3], _PIVOTS[k // 3], k % 3
         turned_about(
-            frames[joint, 0, i], frames[joint, 1, i], frames[joint, 2, i], pivot, joint, joints, jacobian, 3 + k
+            frames[joint, i, 0], frames[joint, i, 1], frames[joint, i, 2], pivot, joint, joints, jacobian, 3 + k
         )
     for k in range(others.shape[2]):
         joint, pivot, first = _OTHER_JOINTS[k // 3], _OTHER_PIVOTS[k // 3], OTHER_ANGLES[3 * (k // 3)]
@@ -233,9 +233,9 @@ def points_and_jacobian(sines, cosines, frames, joints, points, jacobian, others
         b = 0.0 if i == 0 else cx if i == 1 else sx * cy
         c = 0.0 if i == 0 else -sx if i == 1 else cx * cy
         turned_about(
-            a * frames[joint, 0, 0] + b * frames[joint, 0, 1] + c * frames[joint, 0, 2],
-            a * frames[joint, 1, 0] + b * frames[joint, 1, 1] + c * frames[joint, 1, 2],
-            a * frames[joint, 2, 0] + b * frames[joint, 2, 1] + c * frames[joint, 2, 2],
+            a * frames[joint, 0, 0] + b * frames[joint, 1, 0] + c * frames[joint, 2, 0],
+            a * frames[joint, 0, 1] + b * frames[joint, 1, 1] + c * frames[joint, 2, 1],
+            a * frames[joint, 0, 2] + b * frames[joint, 1, 2] + c * frames[joint, 2, 2],
             pivot,
             joint,
             joints,

@@ -13,7 +13,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import place_joints
+from posefit.geometry.kernels import empty_frames, place_joints
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit_imm import Measurement
 from posefit_vsmm.detection.joints import OWN, Errors, detected
@@ -49,7 +49,7 @@ class Figure:
         pose, chained = np.empty(ANGLES), np.empty(matrix.shape)
         bend(state, matrix, offset, np.empty(matrix.shape[1]), pose, chained)
         sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
-        frames, joints = np.empty((len(JOINTS), 3, 3)), np.empty((len(JOINTS), 3))
+        frames, joints = empty_frames(len(JOINTS)), np.empty((len(JOINTS), 3))
         place_joints(self.skeleton.chain, pose, state[:3], sines, cosines, frames, joints)
         count = len(POINTS)
         found, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))

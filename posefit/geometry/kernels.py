@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
+from posefit.geometry.lanes import place_bone
 
 # pi in two parts, so that angles of many turns keep their digits; then Taylor's coefficients on [-pi/2, pi/2],
 # where the first term left out is below 1e-10.
@@ -59,45 +60,47 @@ def sines_cosines(angles, sines, cosines):
 
 
 @inlined
-def place_joints(chain, pose, translation, sines, cosines, frames, joints):
-    """Write the joints (27, 3) of one pose (66,); `sines`, `cosines` (66,) and `frames` (27, 3, 3) are scratch."""
+def place_frames(chain, pose, translation, sines, cosines, frames):
+    """Write the frames (27, 4, 4) of the joints of one pose (66,): three axes and an origin, as `place_bone` has them.
+
+    `sines` and `cosines` (66,) are scratch.
+    """
     sines_cosines(pose, sines, cosines)
     sy, sp, sr = sines[0], sines[1], sines[2]
     cy, cp, cr = cosines[0], cosines[1], cosines[2]
     root = frames[0]
     root[0, 0] = cy * cr + sy * sp * sr
-    root[0, 1] = sy * sp * cr - cy * sr
-    root[0, 2] = sy * cp
-    root[1, 0] = cp * sr
+    root[1, 0] = sy * sp * cr - cy * sr
+    root[2, 0] = sy * cp
+    root[0, 1] = cp * sr
     root[1, 1] = cp * cr
-    root[1, 2] = -sp
-    root[2, 0] = cy * sp * sr - sy * cr
-    root[2, 1] = cy * sp * cr + sy * sr
+    root[2, 1] = -sp
+    root[0, 2] = cy * sp * sr - sy * cr
+    root[1, 2] = cy * sp * cr + sy * sr
     root[2, 2] = cy * cp
-    for k in range(3):
-        joints[0, k] = translation[k]
+    for i in range(3):
+        root[3, i] = translation[i]
     for b in range(chain.parents.size):
-        parent = frames[chain.parents[b]]
-        frame = frames[b + 1]
-        turn = chain.turns[b]
-        a = chain.angles[b]
+        place_bone(chain, b, sines, cosines, frames)
+
+
+@inlined
+def place_joints(chain, pose, translation, sines, cosines, frames, joints):
+    """Write the joints (27, 3) of one pose (66,), and what `place_frames` does."""
+    place_frames(chain, pose, translation, sines, cosines, frames)
+    for j in range(joints.shape[0]):
         for i in range(3):
-            # one row of parent @ turn, then of that times Rz @ Ry @ Rx
-            u, v, w = parent[i, 0], parent[i, 1], parent[i, 2]
-            if chain.turned[b]:
-                p, q, r = u, v, w
-                u = p * turn[0, 0] + q * turn[1, 0] + r * turn[2, 0]
-                v = p * turn[0, 1] + q * turn[1, 1] + r * turn[2, 1]
-                w = p * turn[0, 2] + q * turn[1, 2] + r * turn[2, 2]
-            if a >= 0:
-                u, v = u * cosines[a + 2] + v * sines[a + 2], v * cosines[a + 2] - u * sines[a + 2]
-                u, w = u * cosines[a + 1] - w * sines[a + 1], w * cosines[a + 1] + u * sines[a + 1]
-                v, w = v * cosines[a] + w * sines[a], w * cosines[a] - v * sines[a]
-            frame[i, 0] = u
-            frame[i, 1] = v
-            frame[i, 2] = w
-            own = chain.offsets[b]
-            joints[b + 1, i] = joints[chain.parents[b], i] + u * own[0] + v * own[1] + w * own[2]
+            joints[j, i] = frames[j, 3, i]
+
+
+@inlined
+def empty_frames(joints):
+    """Return room for the frames of so many joints, no number of it undefined."""
+    frames = np.empty((joints, 4, 4))
+    for j in range(joints):
+        for k in range(4):
+            frames[j, k, 3] = 0.0
+    return frames
 
 
 @jit
@@ -106,7 +109,7 @@ def joint_positions(chain, poses, translations):
     n, count = poses.shape[0], chain.parents.size + 1
     joints = np.empty((n, count, 3))
     sines, cosines = np.empty(poses.shape[1]), np.empty(poses.shape[1])
-    frames = np.empty((count, 3, 3))
+    frames = empty_frames(count)
     for i in range(n):
         place_joints(chain, poses[i], translations[i], sines, cosines, frames, joints[i])
     return joints

@@ -22,7 +22,8 @@ def count(image, observed, valid, box):
         for i in range(words.size):
             body += popcount(words[i] & known[i])
             overlap += popcount(words[i] & seen[i])
-        words[:] = NONE
+        for i in range(words.size):
+            words[i] = NONE
     return body, overlap
 
 

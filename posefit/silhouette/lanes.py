@@ -12,6 +12,7 @@ from numba import types
 from numba.extending import intrinsic, overload
 
 BLOCK = 8  # rows filled at a time
+LISTED = 16  # numbers of blocks that are written at a time
 _STRIP = 32  # bits of a lane
 
 
@@ -23,6 +24,39 @@ def root(x: Any) -> Any:
 @overload(root)  # type: ignore[untyped-decorator]
 def _root_compiled(x):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares the two signatures
     return lambda x: math.sqrt(x)
+
+
+def list_steps(blocks: Any, at: Any, first: Any, step: Any) -> None:
+    """Write LISTED whole numbers from place `at` on: `first`, and each next one a step larger."""
+    for k in range(LISTED):
+        blocks[at + k] = first + k * step
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _list_steps(typing_context: Any, blocks: Any, at: Any, first: Any, step: Any) -> Any:  # noqa: ARG001
+    return types.void(blocks, types.int64, types.int64, types.int64), _build_steps
+
+
+@overload(list_steps, inline="always")  # type: ignore[untyped-decorator]
+def _list_steps_compiled(blocks, at, first, step):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    return lambda blocks, at, first, step: _list_steps(blocks, at, first, step)  # type: ignore[call-arg]
+
+
+def _build_steps(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """Write `list_steps` as instructions for all its numbers at once: so many registers as they fill."""
+    number = ir.IntType(64)
+    vector = ir.VectorType(number, LISTED)
+    blocks, at, first, step = arguments
+
+    def splat(value: Any) -> Any:
+        lane = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.IntType(32)(0))
+        return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), LISTED), [0] * LISTED))
+
+    steps = builder.mul(splat(step), ir.Constant(vector, list(range(LISTED))))
+    data = context.make_array(signature.args[0])(context, builder, blocks).data
+    place = builder.bitcast(builder.gep(data, [at]), vector.as_pointer())
+    builder.store(builder.add(splat(first), steps), place, align=8)
+    return context.get_dummy_value()
 
 
 def set_spans(pixels: Any, place: Any, stride: Any, spans: Any) -> None:

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array, inlined, jit
-from posefit.geometry.kernels import place_joints
-from posefit.silhouette.lanes import BLOCK, root, set_spans
+from posefit.geometry.kernels import empty_frames, place_frames
+from posefit.silhouette.lanes import BLOCK, LISTED, list_steps, root, set_spans
 
 STRIP_PIXELS = 32  # pixels
 NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
@@ -26,9 +26,9 @@ _HUGE, _NAN = np.float32(1e9), np.float32(np.nan)
 
 # Scratch rows, each LANES long and one lane a bone, in one flat array: offsets known to the compiler are what lets
 # it see that the loops over bones may run in vector registers.
-LANES = 32
-_U0, _V0, _R0, _U1, _V1, _R1, _SEEN = (row * LANES for row in range(7))
-_SCRATCH_ENDS = 7 * LANES
+LANES, CONES = 32, 28  # of a row, and of those that may be in use: a body's bones, in whole registers
+_U, _V, _METRE, _U0, _V0, _R0, _R1, _SEEN = (row * LANES for row in range(8))
+_SCRATCH_ENDS = 8 * LANES  # U, V and METRE, the pixels of a metre there, are by joint; the others by bone
 _BLOCK, _BLOCKS, _FIRST, _LAST, _COUNT, _ROW = (row * LANES for row in range(6))
 _SCRATCH_BOUNDS = 6 * LANES
 _X0, _Y0, _S0, _X1, _Y1, _S1 = (row * LANES for row in range(6))
@@ -39,7 +39,6 @@ _SCRATCH_OUTLINE = 16 * LANES
 # A block to fill is one number: its first word as uint32 in the upper half; in the lower its first row, counted from
 # BLOCK rows above the cone's top so that none is negative, and in the lowest bits the cone.
 _NEXT = (BLOCK << 32) + BLOCK * LANES  # from a cone's block to the next
-_LISTED = 16  # blocks
 _NATURAL = 0x7FFFFFFF  # an index that is seen not to be negative needs no look at whether it counts from the end
 
 
@@ -68,9 +67,9 @@ def outline(ends, lines, bounds, strips, width, height):
     strip. Blocks begin at every eighth row of the image: two cones' blocks are then the same words or none in common,
     and a processor that has just written one can read it again at once.
     """
-    for k in range(LANES):
+    for k in range(CONES):
         u0, v0, r0 = ends[_U0 + k], ends[_V0 + k], ends[_R0 + k]
-        u1, v1, r1 = ends[_U1 + k], ends[_V1 + k], ends[_R1 + k]
+        u1, v1, r1 = ends[_U + 1 + k], ends[_V + 1 + k], ends[_R1 + k]
         dx = u1 - u0
         dy = v1 - v0
         dr = r0 - r1
@@ -122,7 +121,7 @@ def outline(ends, lines, bounds, strips, width, height):
 def bounding_box(bounds, box):
     """Write the pixels' bounding box in the bit image: its first and last + 1 word, its first and last strip."""
     top, bottom, left, right = np.int32(1 << 24), np.int32(0), np.int32(1 << 24), np.int32(-1)
-    for k in range(LANES):
+    for k in range(CONES):
         drawn = bounds[_BLOCKS + k] > 0
         top = min(top, bounds[_BLOCK + k] if drawn else top)
         bottom = max(bottom, bounds[_BLOCK + k] + bounds[_BLOCKS + k] if drawn else bottom)
@@ -138,7 +137,7 @@ def windows(step, bounds, lines, keys, strips, stride):
     Most cones are no wider than a window, so that their spans are computed once.
     """
     most = np.int32(0)
-    for k in range(LANES):
+    for k in range(CONES):
         wide = (bounds[_LAST + k] - bounds[_FIRST + k]) // 2 + 1 if bounds[_BLOCKS + k] > 0 else 0
         strip = min(bounds[_FIRST + k] + 2 * step, strips - 2)
         bounds[_COUNT + k] = bounds[_BLOCKS + k] if step < wide else 0
@@ -160,10 +159,8 @@ def list_blocks(bones, bounds, keys, blocks):
     end = 0
     for j in range(bones):
         count = int(bounds[_COUNT + j])
-        for i in range(0, count, _LISTED):
-            key, at = keys[j] + i * _NEXT, (end + i) & _NATURAL
-            for k in range(_LISTED):
-                blocks[at + k] = key + k * _NEXT
+        for i in range(0, count, LISTED):
+            list_steps(blocks, end + i, keys[j] + i * _NEXT, _NEXT)
         end += count
     return end
 
@@ -182,46 +179,51 @@ def columns(spans, lines, j, row):
     xq, mq, qa, qb = lines[_XQ + j], lines[_MQ + j], lines[_QA + j], lines[_QB + j]
     for k in range(BLOCK):
         y = row + np.float32(k - BLOCK)
-        h = root(s0 - (y - y0) * (y - y0))
-        low = min(_HUGE, x0 - h)
-        high = max(-_HUGE, x0 + h)
-        h = root(s1 - (y - y1) * (y - y1))
-        low = min(low, x1 - h)
-        high = max(high, x1 + h)
-        x = xp + mp * y if (y >= pa) & (y <= pb) else _NAN
-        low = min(low, x)
-        high = max(high, x)
+        x = xp + mp * y
+        crosses = (y >= pa) & (y <= pb)
+        low = x if crosses else _HUGE
+        high = x if crosses else -_HUGE
         x = xq + mq * y if (y >= qa) & (y <= qb) else _NAN
         low = min(low, x)
         high = max(high, x)
+        h = root(s0 - (y - y0) * (y - y0))
+        low = min(low, x0 - h)
+        high = max(high, x0 + h)
+        h = root(s1 - (y - y1) * (y - y1))
+        low = min(low, x1 - h)
+        high = max(high, x1 + h)
         spans[k] = np.int32(np.ceil(max(low - column, _ZERO)))
         spans[k + BLOCK] = np.int32(min(high - column + _ONE, stop))
 
 
 @inlined
-def rasterise(chain, radii, view, joints, ends, lines, bounds, spans, keys, blocks, box, pixels, image):
-    """Set the pixels of every cone of one body in a clear bit image, and its bounding box. Overwrites `joints`."""
-    rotation, translation = view.rotation, view.translation
+def rasterise(chain, radii, view, frames, ends, lines, bounds, spans, keys, blocks, box, pixels, image):
+    """Set the pixels of every cone of one body in a clear bit image, and its bounding box."""
+    rotation = view.rotation
+    # read once: what is read within a loop that also writes keeps it out of vector registers
+    xa, xb, xc = rotation[0, 0], rotation[0, 1], rotation[0, 2]
+    ya, yb, yc = rotation[1, 0], rotation[1, 1], rotation[1, 2]
+    za, zb, zc = rotation[2, 0], rotation[2, 1], rotation[2, 2]
+    x0, y0, z0 = view.translation[0], view.translation[1], view.translation[2]
+    fu, fv, cu, cv = view.focal[0], view.focal[1], view.centre[0], view.centre[1]
     scale = math.sqrt(view.focal[0] * view.focal[1])
-    for j in range(joints.shape[0]):
-        a, b, c = joints[j, 0], joints[j, 1], joints[j, 2]
-        x = rotation[0, 0] * a + rotation[0, 1] * b + rotation[0, 2] * c + translation[0]
-        y = rotation[1, 0] * a + rotation[1, 1] * b + rotation[1, 2] * c + translation[1]
-        z = rotation[2, 0] * a + rotation[2, 1] * b + rotation[2, 2] * c + translation[2]
+    for j in range(frames.shape[0]):
+        a, b, c = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
+        x = xa * a + xb * b + xc * c + x0
+        y = ya * a + yb * b + yc * c + y0
+        z = za * a + zb * b + zc * c + z0
         inside = (z >= NEAR) & (z <= FAR)  # false for nan as well
-        depth = 1.0 / z if inside else 0.0
-        joints[j, 0] = view.centre[0] + view.focal[0] * x * depth - 0.5 if inside else 0.0
-        joints[j, 1] = view.centre[1] + view.focal[1] * y * depth - 0.5 if inside else 0.0
-        joints[j, 2] = scale * depth
+        depth = 1.0 / (z if inside else 1.0)
+        ends[_U + j] = cu + fu * x * depth - 0.5 if inside else 0.0
+        ends[_V + j] = cv + fv * y * depth - 0.5 if inside else 0.0
+        ends[_METRE + j] = scale * depth if inside else 0.0
     for b in range(chain.parents.size):
-        p = chain.parents[b]
-        ends[_U0 + b] = joints[p, 0]
-        ends[_V0 + b] = joints[p, 1]
-        ends[_R0 + b] = joints[p, 2] * radii[b, 0]
-        ends[_U1 + b] = joints[b + 1, 0]
-        ends[_V1 + b] = joints[b + 1, 1]
-        ends[_R1 + b] = joints[b + 1, 2] * radii[b, 1]
-        ends[_SEEN + b] = min(joints[p, 2], joints[b + 1, 2])
+        p = chain.parents[b] & _NATURAL
+        ends[_U0 + b] = ends[_U + p]
+        ends[_V0 + b] = ends[_V + p]
+        ends[_R0 + b] = ends[_METRE + p] * radii[b, 0]
+        ends[_R1 + b] = ends[_METRE + 1 + b] * radii[b, 1]
+        ends[_SEEN + b] = min(ends[_METRE + p], ends[_METRE + 1 + b])
     strips, stride = image.shape[0], 2 * image.shape[1]
     outline(ends, lines, bounds, strips, float(view.width), float(view.height))
     bounding_box(bounds, box)
@@ -238,18 +240,24 @@ def rasterise(chain, radii, view, joints, ends, lines, bounds, spans, keys, bloc
 @jit
 def scratch(view, bones, angles):
     """Return the work arrays of one thread: for the kinematics, for the outlines, and a clear bit image."""
-    image = np.zeros(strips_and_words(view.width, view.height), np.uint64)
+    image = np.empty(strips_and_words(view.width, view.height), np.uint64)
+    for strip in range(image.shape[0]):
+        for i in range(image.shape[1]):
+            image[strip, i] = NONE
     pixels = image.reshape(-1).view(np.uint32)
-    listed = bones * (view.height // BLOCK + 1) + _LISTED
-    kinematics = (np.empty(angles), np.empty(angles), np.empty((bones + 1, 3, 3)), np.empty((bones + 1, 3)))
+    listed = bones * (view.height // BLOCK + 1) + LISTED
+    kinematics = (np.empty((angles,)), np.empty((angles,)), empty_frames(bones + 1))
+    ends = np.empty((_SCRATCH_ENDS,))
+    for k in range(_SCRATCH_ENDS):
+        ends[k] = 0.0  # what is no bone's is never seen
     outlines = (
-        np.zeros(_SCRATCH_ENDS),
-        np.zeros(_SCRATCH_OUTLINE, np.float32),
-        np.zeros(_SCRATCH_BOUNDS, np.int32),
-        np.empty(2 * BLOCK, np.int32),
-        np.zeros(LANES, np.int64),
-        np.zeros(listed, np.int64),
-        np.zeros(4, np.int64),
+        ends,
+        np.empty((_SCRATCH_OUTLINE,), np.float32),
+        np.empty((_SCRATCH_BOUNDS,), np.int32),
+        np.empty((2 * BLOCK,), np.int32),
+        np.empty((LANES,), np.int64),
+        np.empty((listed,), np.int64),
+        np.empty((4,), np.int64),
         pixels,
     )
     return kinematics, outlines, image
@@ -258,7 +266,7 @@ def scratch(view, bones, angles):
 @jit
 def draw_pose(chain, radii, view, pose, translation, work):
     """Set the pixels of one body in the clear bit image of `work`, which `scratch` makes; return it and its box."""
-    (sines, cosines, frames, joints), (ends, lines, bounds, spans, keys, blocks, box, pixels), image = work
-    place_joints(chain, pose, translation, sines, cosines, frames, joints)
-    rasterise(chain, radii, view, joints, ends, lines, bounds, spans, keys, blocks, box, pixels, image)
+    (sines, cosines, frames), (ends, lines, bounds, spans, keys, blocks, box, pixels), image = work
+    place_frames(chain, pose, translation, sines, cosines, frames)
+    rasterise(chain, radii, view, frames, ends, lines, bounds, spans, keys, blocks, box, pixels, image)
     return image, box

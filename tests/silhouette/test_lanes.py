@@ -1,15 +1,20 @@
-"""Eight rows at a time, as plain Python and as compiled, against sets of pixels."""
+"""What runs in vector registers, as plain Python and as compiled: eight rows at a time against sets of pixels."""
 
 import numpy as np
 import pytest
 
 from posefit.arrays import jit
-from posefit.silhouette.lanes import BLOCK, root, set_spans
+from posefit.silhouette.lanes import BLOCK, LISTED, list_steps, root, set_spans
 
 
 @jit
 def compiled_spans(pixels, place, stride, spans):  # type: ignore[no-untyped-def]
     set_spans(pixels, place, stride, spans)
+
+
+@jit
+def compiled_steps(blocks, at, first, step):  # type: ignore[no-untyped-def]
+    list_steps(blocks, at, first, step)
 
 
 @jit
@@ -46,3 +51,19 @@ def test_the_root_of_a_negative_number_is_nan(square_root) -> None:  # type: ign
     assert square_root(np.float32(0.0)) == 0.0
     assert np.isnan(square_root(np.float32(-1e-9)))
     assert np.isnan(square_root(np.float32(np.nan)))
+
+
+@pytest.mark.parametrize("listing", [list_steps, compiled_steps])
+@pytest.mark.parametrize("step", [0, 3, (8 << 32) + 256, -(1 << 40)])
+def test_steps_are_listed_from_a_place_on_and_nowhere_else(listing, step: int) -> None:  # type: ignore[no-untyped-def]
+    blocks = np.full(LISTED + 9, 7)
+    listing(blocks, 5, (1 << 45) + 1, step)
+    assert blocks.tolist() == [7] * 5 + range_of(step) + [7] * 4
+
+
+def range_of(step: int) -> list[int]:
+    """Return so many numbers as are listed, each the one before it and a step."""
+    numbers = [(1 << 45) + 1]
+    while len(numbers) < LISTED:
+        numbers.append(numbers[-1] + step)
+    return numbers

@@ -1,0 +1,144 @@
+"""One bone at a time, four numbers at a time: what numba's loops would not say in vector registers.
+
+The function stands here as plain Python, and below it as numba compiles it.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba import types
+from numba.extending import intrinsic, overload
+
+_ROWS, _COLUMNS = 4, 4  # of a frame; the last row is padding, the last column the place of its origin
+_FREEDOM = ("contract", "nsz")  # in rounding: what `jit` allows
+
+
+def place_bone(chain: Any, b: Any, sines: Any, cosines: Any, frames: Any) -> None:
+    """Write the frame of the joint in which bone b ends, from that of the joint it starts from.
+
+    Each of `frames` (27, 4, 4) is three axes and an origin: three world coordinates, and a fourth number to fill up.
+    """
+    a, turn, offset = chain.angles[b], chain.turns[b], chain.offsets[b]
+    for i in range(_ROWS - 1):
+        u, v, w, place = (frames[chain.parents[b], k, i] for k in range(_COLUMNS))
+        if chain.turned[b]:
+            u, v, w = (u * turn[0, k] + v * turn[1, k] + w * turn[2, k] for k in range(3))
+        if a >= 0:  # Rz @ Ry @ Rx
+            u, v = u * cosines[a + 2] + v * sines[a + 2], v * cosines[a + 2] - u * sines[a + 2]
+            u, w = u * cosines[a + 1] - w * sines[a + 1], w * cosines[a + 1] + u * sines[a + 1]
+            v, w = v * cosines[a] + w * sines[a], w * cosines[a] - v * sines[a]
+        frames[b + 1, 0, i], frames[b + 1, 1, i], frames[b + 1, 2, i] = u, v, w
+        frames[b + 1, 3, i] = place + u * offset[0] + v * offset[1] + w * offset[2]
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _place_bone(  # type: ignore[no-untyped-def]
+    typing_context: Any,  # noqa: ARG001
+    parent,  # noqa: ARG001
+    own,  # noqa: ARG001
+    turned,  # noqa: ARG001
+    turn,
+    angle,  # noqa: ARG001
+    sines,
+    cosines,
+    offset,
+    frames,
+) -> Any:
+    given = (types.int64, types.int64, types.boolean, turn, types.int64, sines, cosines, offset, frames)
+    return types.void(*given), _build_bone
+
+
+@overload(place_bone, inline="always")  # type: ignore[untyped-decorator]
+def _place_bone_compiled(chain, b, sines, cosines, frames):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    def compiled(chain, b, sines, cosines, frames):  # type: ignore[no-untyped-def]
+        _place_bone(  # type: ignore[call-arg]
+            chain.parents[b],
+            b + 1,
+            chain.turned[b],
+            chain.turns[b],
+            chain.angles[b],
+            sines,
+            cosines,
+            chain.offsets[b],
+            frames,
+        )
+
+    return compiled
+
+
+def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """Write `place_bone` as instructions for the four rows of a column."""
+    number, index = ir.DoubleType(), ir.IntType(64)
+    column = ir.VectorType(number, _ROWS)
+    parent, own, turned, turn, angle, sines, cosines, offset, frames = arguments
+    _, _, _, turn_type, _, sines_type, cosines_type, offset_type, frames_type = signature.args
+
+    def start(kind: Any, array: Any) -> Any:
+        return context.make_array(kind)(context, builder, array).data
+
+    def place_of(joint: Any, k: int) -> Any:
+        at = builder.add(builder.mul(joint, index(_ROWS * _COLUMNS)), index(_ROWS * k))
+        return builder.bitcast(builder.gep(start(frames_type, frames), [at]), column.as_pointer())
+
+    def in_all_rows(data: Any, at: Any) -> Any:
+        lane = builder.insert_element(
+            ir.Constant(column, ir.Undefined), builder.load(builder.gep(data, [at])), ir.IntType(32)(0)
+        )
+        return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), _ROWS), [0] * _ROWS))
+
+    def product(a: Any, b: Any) -> Any:
+        return builder.fmul(a, b, flags=_FREEDOM)
+
+    def total(a: Any, b: Any) -> Any:
+        return builder.fadd(a, b, flags=_FREEDOM)
+
+    def difference(a: Any, b: Any) -> Any:
+        return builder.fsub(a, b, flags=_FREEDOM)
+
+    def changed_where(condition: Any, axes: Sequence[Any], change: Any) -> list[Any]:
+        before = builder.block
+        with builder.if_then(condition):
+            others = change(*axes)
+            within = builder.block
+        chosen = []
+        for old, new in zip(axes, others, strict=True):
+            either = builder.phi(column)
+            either.add_incoming(old, before)
+            either.add_incoming(new, within)
+            chosen.append(either)
+        return chosen
+
+    def at_rest(u: Any, v: Any, w: Any) -> list[Any]:
+        data = start(turn_type, turn)
+        p, q, r = ([in_all_rows(data, index(3 * row + k)) for k in range(3)] for row in range(3))
+        return [total(total(product(u, p[k]), product(v, q[k])), product(w, r[k])) for k in range(3)]
+
+    def rotated(u: Any, v: Any, w: Any) -> tuple[Any, Any, Any]:
+        sine, cosine = (
+            [in_all_rows(start(kind, of), builder.add(angle, index(k))) for k in range(3)]
+            for kind, of in ((sines_type, sines), (cosines_type, cosines))
+        )
+        u, v = (
+            total(product(u, cosine[2]), product(v, sine[2])),
+            difference(product(v, cosine[2]), product(u, sine[2])),
+        )
+        u, w = (
+            difference(product(u, cosine[1]), product(w, sine[1])),
+            total(product(w, cosine[1]), product(u, sine[1])),
+        )
+        v, w = (
+            total(product(v, cosine[0]), product(w, sine[0])),
+            difference(product(w, cosine[0]), product(v, sine[0])),
+        )
+        return u, v, w
+
+    axes = [builder.load(place_of(parent, k), align=8) for k in range(3)]
+    axes = changed_where(builder.trunc(turned, ir.IntType(1)), axes, at_rest)
+    axes = changed_where(builder.icmp_signed(">=", angle, index(0)), axes, rotated)
+    origin = builder.load(place_of(parent, 3), align=8)
+    for k in range(3):
+        builder.store(axes[k], place_of(own, k), align=8)
+        origin = total(origin, product(axes[k], in_all_rows(start(offset_type, offset), index(k))))
+    builder.store(origin, place_of(own, 3), align=8)
+    return context.get_dummy_value()
