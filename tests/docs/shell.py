@@ -31,6 +31,8 @@ def commands(text: str) -> Iterator[list[str]]:
 
 def check(words: list[str]) -> None:
     """Raise AssertionError or click.UsageError where a command is not one."""
+    while re.fullmatch(r"[A-Z_]+=\S*", words[0]):  # what a variable of the environment is for this command
+        words = words[1:]
     name, *rest = words
     if name == "posefit":
         _check_posefit(main, rest)
