@@ -15,13 +15,15 @@ def test_a_real_walk_is_followed() -> None:
     video = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
     if not video.is_file():
         pytest.skip(f"no video at {video}")
-    found = filmed_figures(video, (0, 420, 1520, 532), (55, 166), 0)
-    assert found["usable"] >= 105
-    assert found["iou_masks"] >= 0.80
-    assert found["lowest_iou_masks"] > 0.6  # nowhere lost
-    assert found["travel_seen"] == found["travel_fitted"] == "left"
-    assert found["facing_its_way"] > 0.8
-    assert found["steps_a_second_fitted"] == pytest.approx(found["steps_a_second_seen"], rel=0.1)
+    tracks = [filmed_figures(video, (0, 420, 1520, 532), (55, 166), seed) for seed in range(5)]
+    # over seeds: one alone may begin with a pose that costs 2 % of the overlap
+    assert np.median([found["iou_masks"] for found in tracks]) >= 0.80
+    for found in tracks:
+        assert found["usable"] >= 105
+        assert found["lowest_iou_masks"] > 0.6  # nowhere lost
+        assert found["travel_seen"] == found["travel_fitted"] == "left"
+        assert found["facing_its_way"] > 0.8
+        assert found["steps_a_second_fitted"] == pytest.approx(found["steps_a_second_seen"], rel=0.1)
 
 
 def test_the_frequency_of_a_wave_is_found() -> None:
