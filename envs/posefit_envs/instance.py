@@ -217,10 +217,10 @@ def _body(motion: str) -> Body:
 
 @lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
-    from posefit.motion import library
+    from posefit.motion import built_in
 
     if not train:
-        train = library.other_styles(motion if motion in library.names() else "walk")
+        train = built_in.other_styles(motion if motion in built_in.names() else "walk")
     angles = np.concatenate([motion_of(one, None, FPS).poses[:, 3:] for one in train])
     fitted: Prior = registry().prior(prior)().fit(angles, _source(motion).skeleton)
     return fitted
@@ -282,9 +282,9 @@ def instance(setting: World, number: int, frames: int, evaluations: int) -> Inst
 
 
 def _truth(name: str, number: int, frames: int) -> Motion:
-    from posefit.motion import library
+    from posefit.motion import built_in
 
     try:
-        return motion_of_instance(name if name in library.names() else _source(name), number, frames=frames, fps=FPS)
+        return motion_of_instance(name if name in built_in.names() else _source(name), number, frames=frames, fps=FPS)
     except ValueError as mistake:  # a file that is too short
         raise error.Error(str(mistake)) from None

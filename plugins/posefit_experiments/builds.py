@@ -17,7 +17,7 @@ from posefit.fitting.space import Translation
 from posefit.footage.scene import Rendered, synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.tracking.method import Choice, prepare
 from posefit.tracking.opening import BODY_FRAMES, built, following
 from posefit_experiments.grid import Progress, each
@@ -56,7 +56,7 @@ PARTS = ("stature", *LIMBS)
 def subject(seed: int) -> Body:
     """Return a person of another build."""
     rng = np.random.default_rng([7, seed])
-    body = varied(Body.of(library.average_skeleton()), PERCENT, rng)
+    body = varied(Body.of(built_in.average_skeleton()), PERCENT, rng)
     scale = rng.uniform(0.9, 1.1)
     return body.scaled(scale, scale)
 
@@ -65,8 +65,8 @@ def builds(motion: str, subjects: int, workers: int | None, progress: Progress |
     """Return by how many percent stature and limbs are off, before and after the fit, for every setup."""
     if subjects < 1:
         raise ValueError(f"subjects must be at least 1, got {subjects}")
-    if motion not in library.names():
-        raise ValueError(f"motion must be one of {', '.join(library.names())}, got {motion}")
+    if motion not in built_in.names():
+        raise ValueError(f"motion must be one of {', '.join(built_in.names())}, got {motion}")
     keys = list(product(SETUPS, range(subjects)))
     found = each({(one.label, k): partial(_found, motion, one, k) for one, k in keys}, workers, progress)
     told: dict[str, Any] = {}
@@ -85,8 +85,8 @@ def _told(off: Array) -> dict[str, dict[str, float]]:
 
 def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[float]]:
     """Return by how many percent a subject's parts are off after the fit, and as they were taken to be before it."""
-    choice, average, true = Choice(prior="loose"), Body.of(library.average_skeleton()), subject(seed)
-    walk = replace(library.built_in(motion), skeleton=true.skeleton)
+    choice, average, true = Choice(prior="loose"), Body.of(built_in.average_skeleton()), subject(seed)
+    walk = replace(built_in.motion(motion), skeleton=true.skeleton)
     scene = synthetic(walk, setup.views_degrees, SIZE, [], (None, None))
     scene = replace(scene, body=true, observations=Rendered(walk, true, scene.cameras))
     height = true.stature if setup.stature else None

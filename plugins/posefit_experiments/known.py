@@ -9,7 +9,7 @@ from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.tracking.method import Choice, prepare
 
@@ -19,12 +19,12 @@ FRAMES = 60  # at 30 a second
 
 def known_scene(motion: str, views_degrees: Sequence[float]) -> Scene:
     """Return the scene of a built-in motion, seen by one camera a view."""
-    return synthetic(library.built_in(motion, frames=FRAMES), views_degrees, SIZE, [], (None, None))
+    return synthetic(built_in.motion(motion, frames=FRAMES), views_degrees, SIZE, [], (None, None))
 
 
 def known_task(scene: Scene, choice: Choice, body: Body, translation: Translation = "known") -> Task:
     """Return the task of following a scene with a body that need not be the true one."""
-    training = [library.built_in(style) for style in library.other_styles(scene.name)]
+    training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]
     return Task(body, scene.cameras, choice.budget(), scene.yaw, scene.anchor, translation, training=training)
 
 

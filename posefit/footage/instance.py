@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from posefit.footage.source import motion_of
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.motion import Motion
 
 SALT = 2013  # part of the seed of every instance
@@ -54,8 +54,8 @@ def motion_of_instance(source: str | Motion, number: int, *, frames: int, fps: f
     Raises ValueError where a file has fewer frames.
     """
     varied = variation(number)
-    if isinstance(source, str) and source in library.names():
-        return library.built_in(source, frames=frames, fps=fps, speed=varied.speed, phase=varied.phase)
+    if isinstance(source, str) and source in built_in.names():
+        return built_in.motion(source, frames=frames, fps=fps, speed=varied.speed, phase=varied.phase)
     motion = motion_of(source, None, fps)
     if frames > len(motion):
         name = source if isinstance(source, str) else source.name

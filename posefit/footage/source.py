@@ -19,7 +19,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
-from posefit.motion import library, recorded
+from posefit.motion import built_in, recorded
 from posefit.motion.motion import RATES, Motion
 from posefit.reading import quoted
 
@@ -123,7 +123,7 @@ def clip_of(source: Source, asf: str | Path | None = None) -> Callable[[float], 
     """
     if isinstance(source, Motion):
         return source.resampled
-    if source in library.names():
+    if source in built_in.names():
         return partial(_built_in, str(source))
     if recorded.is_recorded(source):
         return recorded.clip(str(source)).motion().resampled
@@ -141,7 +141,7 @@ def clip_of(source: Source, asf: str | Path | None = None) -> Callable[[float], 
         raise ValueError(
             f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}"
         )
-    library.built_in(str(source))  # raises: there is none of that name
+    built_in.motion(str(source))  # raises: there is none of that name
     return partial(_built_in, str(source))
 
 
@@ -152,7 +152,7 @@ def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:
 
 def kind_of(source: Source) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video."""
-    if isinstance(source, Motion) or source in library.names() or recorded.is_recorded(source):
+    if isinstance(source, Motion) or source in built_in.names() or recorded.is_recorded(source):
         return "motion"
     path = Path(source)
     if path.is_dir() or path.suffix.lower() == ".npz":
@@ -190,14 +190,14 @@ def _cameras(one: Camera | str | Path, viewing: Viewing) -> list[Camera]:
 def _body(viewing: Viewing) -> Body:
     from posefit.motion.asf import read_asf
 
-    skeleton = library.average_skeleton() if viewing.asf is None else read_asf(viewing.asf)
+    skeleton = built_in.average_skeleton() if viewing.asf is None else read_asf(viewing.asf)
     body = Body.of(skeleton)
     scale = 1.0 if viewing.height is None else viewing.height / body.stature
     return body.scaled(scale, scale)
 
 
 def _built_in(name: str, fps: float) -> Motion:
-    return library.built_in(name, fps=fps)
+    return built_in.motion(name, fps=fps)
 
 
 def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:

@@ -14,7 +14,7 @@ from posefit.fitting.space import TRANSLATIONS
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
 from posefit.footage.training import training_clips
-from posefit.motion import library, recorded
+from posefit.motion import built_in, recorded
 from posefit.motion.motion import RATES
 from posefit.reading import SHOWN, cut, quoted
 from posefit.registry import Kind, Offer, registry
@@ -123,13 +123,13 @@ def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
 
 @lru_cache(maxsize=1024)
 def _other_styles(motion: str) -> tuple[str, ...]:
-    return library.other_styles(motion if motion in library.names() else "walk")
+    return built_in.other_styles(motion if motion in built_in.names() else "walk")
 
 
 @lru_cache(maxsize=1024)
 def _files(motion: str) -> tuple[tuple[str, str], ...]:
     """Return the files that a motion is read from, each with its digest; none for a built-in one."""
-    if motion in library.names() or recorded.is_recorded(motion) or recorded.is_library(motion):
+    if motion in built_in.names() or recorded.is_recorded(motion) or recorded.is_library(motion):
         return ()
     if Path(motion).is_dir():
         training_clips([motion])  # raises where one cannot be read
@@ -158,10 +158,10 @@ def _name(field: str, value: Any) -> str:
 
 def _motion(field: str, value: Any) -> str:
     name = _name(field, value)
-    if name not in library.names() and not recorded.is_recorded(name) and Path(name).suffix.lower() not in MOTIONS:
+    if name not in built_in.names() and not recorded.is_recorded(name) and Path(name).suffix.lower() not in MOTIONS:
         raise ValueError(
-            f"{field} must be an .amc file, a .bvh file or one of {', '.join(library.names())}, "
-            f"got {quoted(name)}{_nearest(name, library.names())}"
+            f"{field} must be an .amc file, a .bvh file or one of {', '.join(built_in.names())}, "
+            f"got {quoted(name)}{_nearest(name, built_in.names())}"
         )
     return name
 

@@ -16,7 +16,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.settings import settings_of
 from posefit.testing.problem import walking_angles
 from posefit.testing.randomness import left_alone, watched
@@ -47,7 +47,7 @@ class PriorCase:
     def first(self) -> Fitting:
         """The prior after it has learned the built-in walks, which may take its time: once for all rules that can."""
         prior: Prior = self.factory(**self.settings)
-        angles, skeleton = walking_angles(), library.average_skeleton()
+        angles, skeleton = walking_angles(), built_in.average_skeleton()
         before = angles.copy()
         with watched() as random:
             given = prior.fit(angles, skeleton)
@@ -61,7 +61,7 @@ class PriorCase:
     def fitted_again(self) -> Prior:
         """Return another prior that has learned the same."""
         prior: Prior = self.factory(**self.settings)
-        return prior.fit(walking_angles(), library.average_skeleton())
+        return prior.fit(walking_angles(), built_in.average_skeleton())
 
     def latents(self, prior: Prior) -> Array:
         """Return some latents (ROWS, m) within the range."""
@@ -237,7 +237,7 @@ def bad_input(case: PriorCase) -> None:
     spoilt[3, 3] = np.nan
     for what, value in (("60 columns", angles[:, :60]), ("nan", spoilt), ("no frames", angles[:0])):
         with refusal(ValueError) as refused:
-            case.factory(**case.settings).fit(value, library.average_skeleton())
+            case.factory(**case.settings).fit(value, built_in.average_skeleton())
         expect(refused, f"fit must raise ValueError for {what}, got a prior")
 
 

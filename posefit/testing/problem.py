@@ -9,7 +9,7 @@ from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
@@ -19,13 +19,13 @@ SIZE = (160, 120)
 
 def walking_angles() -> Array:
     """Return the joint angles (T, 63) of the built-in walks but `walk` itself."""
-    return np.concatenate([library.built_in(style).poses[:, 3:] for style in library.other_styles("walk")])
+    return np.concatenate([built_in.motion(style).poses[:, 3:] for style in built_in.other_styles("walk")])
 
 
 @lru_cache(maxsize=1)
 def pose_problem() -> PoseProblem:
     """Return the problem: known translation, prior `pca`, seen from 45 degrees."""
-    motion = library.built_in("walk", frames=1)
+    motion = built_in.motion("walk", frames=1)
     body = Body.of(motion.skeleton)
     prior = registry().prior("pca")().fit(walking_angles())
     camera = Camera.around(motion.translations[0], 0.8, 3.5, SIZE)

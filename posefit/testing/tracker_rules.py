@@ -14,7 +14,7 @@ from posefit.fitting.guard import LEEWAY
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import areas, mismatch, project
 from posefit.silhouette.drawn import PoseCount
@@ -31,14 +31,14 @@ checklist = Checklist()
 @lru_cache(maxsize=1)
 def scene() -> tuple[Task, Motion, Sequence[Observation]]:
     """Return a task, the true motion, and what is seen of it: twelve frames of the built-in walk."""
-    motion = library.built_in("walk", frames=FRAMES)
+    motion = built_in.motion("walk", frames=FRAMES)
     body = Body.of(motion.skeleton)
     camera = Camera.around(motion.translations.mean(axis=0), 0.8, 3.5, SIZE)
     seen = [
         Observation([Silhouette.of(project(body, camera, pose, where))], where)
         for pose, where in zip(motion.poses, motion.translations, strict=True)
     ]
-    training = [library.built_in(style) for style in library.other_styles("walk")]
+    training = [built_in.motion(style) for style in built_in.other_styles("walk")]
     anchor = motion.translations[0]
     return Task(body, [camera], EVALUATIONS, 0.0, anchor, fps=motion.fps, training=training), motion, seen
 

@@ -6,12 +6,12 @@
 
     from pathlib import Path                                    # the same in pieces
     from posefit.footage.source import Viewing, scene_of
-    from posefit.motion import library
+    from posefit.motion import built_in
     from posefit.tracking.method import Choice
     from posefit.tracking.run import follow
 
     scene = scene_of(["walk"], Viewing(view_degrees=[90.0]), work=Path())
-    training = [library.built_in(style) for style in library.other_styles("walk")]
+    training = [built_in.motion(style) for style in built_in.other_styles("walk")]
     result = follow(scene, training, choice=Choice(optimiser="pso"), seed=1)
 
 | looking for | file |

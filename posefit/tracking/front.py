@@ -22,7 +22,7 @@ from posefit.footage.training import training_clips
 from posefit.geometry.calibration import Up
 from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.reading import quoted
 from posefit.tracking.identity import Told
@@ -238,8 +238,8 @@ def _training(sources: Sequence[Source], train: Sequence[Source]) -> Sequence[So
     """Return what a prior learns from: by default the other styles of a built-in motion, else the built-in walks."""
     source, chosen = sources[0], train
     if not chosen:
-        known = isinstance(source, str) and source in library.names()
-        chosen = library.other_styles(str(source) if known else "walk")
+        known = isinstance(source, str) and source in built_in.names()
+        chosen = built_in.other_styles(str(source) if known else "walk")
     for one in chosen:
         if one is source or (
             not isinstance(one, Motion) and not isinstance(source, Motion) and str(one) == str(source)
@@ -255,6 +255,6 @@ def _told(
     told: dict[str, Any] = {"source": sources, "train": train, "seed": seed, "version": __version__}
     for group in (viewing, choice, opening):
         told |= {one.name: getattr(group, one.name) for one in fields(group)}
-    if kind_of(sources[0]) == "motion" and sources[0] in library.names():
+    if kind_of(sources[0]) == "motion" and sources[0] in built_in.names():
         return {name: Told.of(value, files=name in _FILES and name != "source") for name, value in told.items()}
     return {name: Told.of(value, files=name in _FILES) for name, value in told.items()}

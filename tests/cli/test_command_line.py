@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 
 import posefit
 from posefit.cli import main
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
 from tests.files import arrays
@@ -70,14 +70,14 @@ def fails(*words: object) -> str:
 
 @pytest.fixture
 def clip(tmp_path: Path) -> tuple[Path, Path]:
-    motion = library.built_in("walk-b", frames=12, fps=120.0)
+    motion = built_in.motion("walk-b", frames=12, fps=120.0)
     write_asf(tmp_path / "one.asf", motion.skeleton)
     write_amc(tmp_path / "one.amc", motion)
     return tmp_path / "one.asf", tmp_path / "one.amc"
 
 
 def masks(folder: Path, count: int = 3) -> Path:
-    motion = library.built_in("walk", frames=count)
+    motion = built_in.motion("walk", frames=count)
     body = posefit.Body.of(motion.skeleton)
     camera = posefit.Camera.around(np.array([0.0, 0.9, 0.0]), 0.8, 4.0, (120, 90))
     folder.mkdir(parents=True, exist_ok=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefit.geometry.camera import Camera
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
 from posefit_envs.instance import RESERVED, instance, select
@@ -37,7 +37,7 @@ def test_a_built_in_motion_is_the_same_and_is_seen_from_the_same_side(number):
 
 def test_instance_0_is_the_motion_as_it_is():
     _, made = both("run", 0, 5)
-    assert made.truth.poses.tobytes() == library.built_in("run", frames=5).poses.tobytes()
+    assert made.truth.poses.tobytes() == built_in.motion("run", frames=5).poses.tobytes()
     assert azimuth(made.task.cameras[1]) - made.truth.poses[0, 0] == pytest.approx(np.pi / 2.0)
 
 

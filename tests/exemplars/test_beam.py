@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from posefit.motion.library import average_skeleton, built_in
+from posefit.motion import built_in
+from posefit.motion.built_in import average_skeleton
 from posefit_exemplars.beam import BINS, SPEEDS, TURN, Beam, Steps, bins_of, joined_beams, jumped, stepped
 from posefit_exemplars.exemplars import Exemplars
 
@@ -13,7 +14,7 @@ SECONDS = 1.0 / 30.0
 
 @pytest.fixture(scope="module")
 def small() -> Exemplars:
-    return Exemplars.of([built_in(name, frames=20) for name in ("walk-a", "walk-b")], average_skeleton())
+    return Exemplars.of([built_in.motion(name, frames=20) for name in ("walk-a", "walk-b")], average_skeleton())
 
 
 def beam(states: list[int], yaws: list[float], totals: list[float]) -> Beam:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from posefit.motion.library import average_skeleton, built_in
+from posefit.motion import built_in
+from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
 from posefit_exemplars.exemplars import DIMENSIONS, SAME, Exemplars, coded, groups, thinned
 
@@ -12,11 +13,11 @@ SKELETON = average_skeleton()
 
 @pytest.fixture(scope="module")
 def two() -> Exemplars:
-    return Exemplars.of([built_in("walk-a", frames=40), built_in("run-a", frames=25)], SKELETON)
+    return Exemplars.of([built_in.motion("walk-a", frames=40), built_in.motion("run-a", frames=25)], SKELETON)
 
 
 def test_codes_are_as_far_apart_as_joints_are() -> None:
-    poses = built_in("walk-a", frames=30).poses
+    poses = built_in.motion("walk-a", frames=30).poses
     codes = coded(SKELETON, poses)
     assert codes.shape == (30, DIMENSIONS)
     facing = poses.copy()
@@ -33,7 +34,7 @@ def test_frames_that_are_alike_are_kept_once_but_ends_of_clips_always() -> None:
 
 
 def test_what_comes_after_a_pose_lies_on_its_clip_and_stops_at_its_end(two: Exemplars) -> None:
-    walk = built_in("walk-a", frames=40)
+    walk = built_in.motion("walk-a", frames=40)
     first = int(np.flatnonzero(two.clips == 0)[0])
     # two clips of one skeleton: codes of interpolated poses are what the clip's own frames have
     for seconds in (1.0 / 30.0, 0.5, 1.0):
@@ -59,7 +60,7 @@ def test_every_pose_is_in_one_group(two: Exemplars) -> None:
 
 
 def test_a_motion_of_one_frame_or_none_is_refused() -> None:
-    walk = built_in("walk-a", frames=1)
+    walk = built_in.motion("walk-a", frames=1)
     with pytest.raises(ValueError, match="walk-a must have at least 2 frames to be followed, got 1"):
         Exemplars.of([walk], SKELETON)
     with pytest.raises(ValueError, match="exemplars must have motions to learn from, got none"):
@@ -67,7 +68,7 @@ def test_a_motion_of_one_frame_or_none_is_refused() -> None:
 
 
 def test_a_turn_of_the_whole_body_makes_no_other_code() -> None:
-    walk = built_in("walk-a", frames=20)
+    walk = built_in.motion("walk-a", frames=20)
     turned = walk.poses.copy()
     turned[:, 0] += 1.2
     both = coded(

@@ -13,17 +13,20 @@ from posefit.cli import main
 from posefit.fitting.tracker import Observation, Task
 from posefit.footage.scene import synthetic
 from posefit.geometry.body import Body
-from posefit.motion import recorded
-from posefit.motion.library import built_in
+from posefit.motion import built_in, recorded
 from posefit_exemplars.tracker import exemplars
 
 
 @pytest.fixture(scope="module")
 def walker() -> tuple[Task, list[Observation], np.ndarray]:
     """Return a task, what is seen of the built-in walk, and its joints (T, 27, 3)."""
-    motion = built_in("walk-a", frames=30)
+    motion = built_in.motion("walk-a", frames=30)
     scene = synthetic(motion, [45.0], (160, 120), [], (None, None))
-    training = [built_in("walk-b", frames=60), built_in("walk-c", frames=60), built_in("run-b", frames=40)]
+    training = [
+        built_in.motion("walk-b", frames=60),
+        built_in.motion("walk-c", frames=60),
+        built_in.motion("run-b", frames=40),
+    ]
     yaw = float(motion.poses[0, 0])
     task = Task(Body.of(motion.skeleton), scene.cameras, 2440, yaw, motion.translations[0], training=training)
     return task, list(scene.observations), motion.skeleton.joints(motion.poses, motion.translations)

@@ -46,10 +46,10 @@ def test_a_cell_that_fails_is_told_in_a_line(tmp_path: Path) -> None:
     # two of 40 particles in a budget of 80; the file is gone when the cell comes to be run
     clip = tmp_path / "clip.bvh"
     pytest.importorskip("pybvh")
-    from posefit.motion import library
+    from posefit.motion import built_in
     from posefit.motion.bvh import write_bvh
 
-    write_bvh(clip, library.built_in("walk", frames=4))
+    write_bvh(clip, built_in.motion("walk", frames=4))
     plan = Plan.of({"cells": [{"method": "random@pca", "motion": str(clip), "frames": 2, "evaluations": 80}]})
     clip.unlink()
     with pytest.raises(ValueError, match=r"random@pca on .*clip.bvh, instance 0, seed 0: .*clip.bvh"):

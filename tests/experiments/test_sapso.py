@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from posefit.cli import main
 from posefit.geometry.rotation import wrapped
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.tracking.front import track
 from posefit.tracking.measures import BASELINES
 from posefit_experiments.sapso.design import COMPARED, METHODS, Scale
@@ -179,7 +179,7 @@ def test_built_in_training_is_as_long_as_the_papers() -> None:
 
 
 def test_a_turned_motion_keeps_its_steps_and_ends_to_the_left() -> None:
-    straight = library.built_in("walk", frames=50)
+    straight = built_in.motion("walk", frames=50)
     bent = turned(straight, 90.0)
     steps, old = np.diff(bent.translations, axis=0), np.diff(straight.translations, axis=0)
     np.testing.assert_allclose(np.linalg.norm(steps, axis=1), np.linalg.norm(old, axis=1))

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from posefit.cli import main
 from posefit.fitting.tracker import Frame
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit_experiments.vsmm import activities
 from posefit_experiments.vsmm.activities import film_of
 from posefit_experiments.vsmm.experiment import METHODS, PatentTrack, follow_film
@@ -37,7 +37,7 @@ def test_no_motion_of_the_experiment_was_learned_from() -> None:
     from posefit_vsmm.fit.motion import TEACHINGS
 
     tested = {one.motion for one in activities.ACTIVITIES}
-    stored = json.loads((Path(library.__file__).parent / "library.json").read_text(encoding="utf-8"))["motions"]
+    stored = json.loads((Path(built_in.__file__).parent / "built_in.json").read_text(encoding="utf-8"))["motions"]
     sources = {stored[name]["source"] for name in tested}
     parts = {(clip.path.split("/")[1], clip.start) for teaching in TEACHINGS.values() for clip in teaching.fitted}
     assert not sources & {name for name, _ in parts}

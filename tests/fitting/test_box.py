@@ -9,7 +9,7 @@ from scipy.stats import kstest, truncnorm
 from posefit import SearchSpace, Start
 from posefit.arrays import Array
 from posefit.fitting import box
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.testing.toy import Toy, anywhere, ball, shell
 from posefit_priors.pca import PCA
 
@@ -113,7 +113,7 @@ def test_a_draw_where_nothing_is_feasible_says_so() -> None:
 
 
 def test_moving_to_another_box_keeps_the_pose() -> None:
-    motion = library.built_in("walk-a")
+    motion = built_in.motion("walk-a")
     prior = PCA().fit(motion.poses[:, 3:])
     old = SearchSpace(prior, np.zeros(3), np.radians([180.0, 15.0, 15.0]), np.array([0.0, 1.0, 0.0]), "searched")
     new = SearchSpace(

@@ -10,7 +10,7 @@ from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
 from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.optimiser import BudgetError, populations
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit_priors.pca import PCA
 from posefit_swarm.random import Random
@@ -19,8 +19,8 @@ from posefit_swarm.sapso import SAPSO
 
 @pytest.fixture(scope="module")
 def problem() -> PoseProblem:
-    motion = library.built_in("walk", frames=2)
-    angles = np.concatenate([library.built_in(style).poses[:, 3:] for style in ("walk-a", "walk-b")])
+    motion = built_in.motion("walk", frames=2)
+    angles = np.concatenate([built_in.motion(style).poses[:, 3:] for style in ("walk-a", "walk-b")])
     body = Body.of(motion.skeleton)
     camera = Camera.around(motion.translations[0], 0.8, 3.5, (160, 120))
     silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
@@ -72,7 +72,7 @@ def test_a_searched_translation_has_three_more_dimensions(problem: PoseProblem) 
 
 def test_several_views_are_averaged(problem: PoseProblem) -> None:
     other = Camera.around(problem.space.anchor, 2.1, 3.5, (100, 90))
-    motion = library.built_in("walk", frames=2)
+    motion = built_in.motion("walk", frames=2)
     seen = Silhouette.of(project(problem.body, other, motion.poses[0], motion.translations[0]))
     second = replace(problem, cameras=[other], silhouettes=[seen])
     both = replace(problem, cameras=[problem.cameras[0], other], silhouettes=[problem.silhouettes[0], seen])
@@ -92,7 +92,7 @@ def test_unknown_pixels_count_for_nothing(problem: PoseProblem) -> None:
 
 
 def test_aligning_finds_the_true_translation(problem: PoseProblem) -> None:
-    motion = library.built_in("walk", frames=8)
+    motion = built_in.motion("walk", frames=8)
     camera = problem.cameras[0]
     for pose, translation in zip(motion.poses, motion.translations, strict=True):
         where = translation + [0.2, -0.1, 0.3]

@@ -8,7 +8,7 @@ import pytest
 from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
 from posefit.arrays import Array
 from posefit.fitting.problem import CoarseFirst
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.drawn import PoseCount
 from posefit_priors.pca import PCA
@@ -17,8 +17,8 @@ from posefit_swarm.sapso import SAPSO
 
 @pytest.fixture(scope="module")
 def problem() -> PoseProblem:
-    motion = library.built_in("walk", frames=2)
-    angles = np.concatenate([library.built_in(style).poses[:, 3:] for style in ("walk-a", "walk-b")])
+    motion = built_in.motion("walk", frames=2)
+    angles = np.concatenate([built_in.motion(style).poses[:, 3:] for style in ("walk-a", "walk-b")])
     body = Body.of(motion.skeleton)
     cameras = [Camera.around(motion.translations[0], azimuth, 3.5, (160, 120)) for azimuth in (0.8, 2.1)]
     seen = [Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0])) for camera in cameras]
@@ -81,7 +81,7 @@ def test_a_proposal_means_the_same_pose_at_every_size(problem: PoseProblem, tran
 
 
 def test_a_pose_that_fits_perfectly_costs_nothing_at_any_size(problem: PoseProblem) -> None:
-    motion = library.built_in("walk", frames=2)
+    motion = built_in.motion("walk", frames=2)
     for factor in (1, 2, 4):
         assert problem.coarser(factor).cost(motion.poses[:1], motion.translations[:1]).tolist() == [0.0]
 

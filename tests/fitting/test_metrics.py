@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import JOINTS, MIRROR, angle_index
-from posefit.motion import library
+from posefit.motion import built_in
 
 seeds = st.integers(0, 2**32 - 1)
 rotations = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(lambda angles: rotation_from_joint_angles(np.array(angles)))
@@ -20,7 +20,7 @@ rotations = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(lambda angles: rotation_f
 
 @pytest.fixture(scope="module")
 def joints() -> Array:
-    motion = library.built_in("walk", frames=20)
+    motion = built_in.motion("walk", frames=20)
     return motion.skeleton.joints(motion.poses, motion.translations)
 
 

@@ -9,12 +9,12 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body, varied
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 
-AVERAGE = Body.of(library.average_skeleton())
-WALK = library.built_in("walk", frames=40).frames(0, 40)
+AVERAGE = Body.of(built_in.average_skeleton())
+WALK = built_in.motion("walk", frames=40).frames(0, 40)
 
 
 def frame(pose: np.ndarray, translation: np.ndarray) -> Frame:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import project
 
 SIZE = (160, 120)
@@ -19,7 +19,7 @@ EMPTY, FRAMES = 12, 48  # frames without anybody, then frames of a walk across
 
 def walk() -> posefit.Motion:
     """Return a walk of 2.2 m along +z."""
-    motion = library.built_in("walk", frames=FRAMES)
+    motion = built_in.motion("walk", frames=FRAMES)
     places = motion.translations.copy()
     places[:, 2] = np.linspace(-1.1, 1.1, FRAMES)
     return replace(motion, translations=places)

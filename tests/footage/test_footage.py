@@ -23,7 +23,7 @@ from posefit.footage.masks import Straight, Views
 from posefit.footage.segmentation import Extraction
 from posefit.footage.stacks import StackMasks
 from posefit.geometry.rotation import wrapped
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.amc import read_clip
 from posefit.motion.bvh import read_bvh
 from posefit.registry import registry
@@ -114,7 +114,7 @@ def test_two_calibrated_cameras_find_the_person_where_he_is(filmed: tuple[Path, 
     assert filmed_twice.summary["iou"] > 0.4
 
 
-AVERAGE = posefit.Body.of(library.average_skeleton())
+AVERAGE = posefit.Body.of(built_in.average_skeleton())
 
 
 def line(body: posefit.Body) -> SearchSpace:

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from posefit.footage.instance import SPEED, VIEW_DEGREES, motion_of_instance, variation
-from posefit.motion import library
+from posefit.motion import built_in
 
 
 def test_instance_0_is_the_motion_as_it_is():
     assert variation(0).views([45.0, -0.0]) == [45.0, 0.0]
     found = motion_of_instance("walk", 0, frames=7, fps=25.0)
-    assert found.poses.tobytes() == library.built_in("walk", frames=7, fps=25.0).poses.tobytes()
-    whole = library.built_in("run", frames=20)
+    assert found.poses.tobytes() == built_in.motion("walk", frames=7, fps=25.0).poses.tobytes()
+    whole = built_in.motion("run", frames=20)
     assert motion_of_instance(whole, 0, frames=5, fps=30.0).poses.tobytes() == whole.poses[:5].tobytes()
 
 
@@ -40,13 +40,13 @@ def test_instances_differ_by_no_more_than_is_said_and_use_all_of_it():
 def test_a_built_in_motion_has_the_speed_and_phase_of_its_instance():
     varied = variation(17)
     found = motion_of_instance("walk", 17, frames=9, fps=30.0)
-    told = library.built_in("walk", frames=9, speed=varied.speed, phase=varied.phase)
+    told = built_in.motion("walk", frames=9, speed=varied.speed, phase=varied.phase)
     assert found.poses.tobytes() == told.poses.tobytes()
     assert varied.views([0.0, 90.0]) == [varied.turn_degrees, 90.0 + varied.turn_degrees]
 
 
 def test_the_frames_of_an_instance_of_a_file_begin_anywhere_but_never_end_beyond_it():
-    whole = library.built_in("run", frames=12)
+    whole = built_in.motion("run", frames=12)
     begins = set()
     for number in range(200):
         found = motion_of_instance(whole, number, frames=10, fps=30.0)

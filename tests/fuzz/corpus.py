@@ -10,7 +10,7 @@ import numpy as np
 
 from posefit import Camera
 from posefit.geometry.body import Body
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
@@ -67,7 +67,7 @@ class Seed:
 
 def corpus(folder: Path) -> list[Seed]:
     """Return valid files of every kind; `folder` is for what is written meanwhile."""
-    motion = library.built_in("walk", frames=3)
+    motion = built_in.motion("walk", frames=3)
     write_asf(folder / "a.asf", motion.skeleton)
     write_amc(folder / "a.amc", motion)
     write_bvh(folder / "a.bvh", motion)
@@ -79,7 +79,7 @@ def corpus(folder: Path) -> list[Seed]:
         for stack in (masks, masks.astype(np.uint8) * 255, np.asfortranarray(masks.astype(np.float32))):
             seeds.append(_npz("masks", save, masks=stack, valid=~masks, usable=usable, fps=np.array(30.0)))
     seeds += [Seed("images", suffix, _image(masks[0], suffix)) for suffix in (".png", ".jpg", ".bmp", ".tif", ".pgm")]
-    angles = np.concatenate([library.built_in(name).poses[:, 3:] for name in library.other_styles("walk")])
+    angles = np.concatenate([built_in.motion(name).poses[:, 3:] for name in built_in.other_styles("walk")])
     for prior in (PCA, Full, Loose, Union):
         path = folder / "prior.npz"
         prior().fit(angles, motion.skeleton).save(path)

@@ -5,7 +5,7 @@ import pytest
 
 from posefit.geometry.body import PROPORTIONS, Body
 from posefit.geometry.skeleton import BONES, JOINTS, MIRROR, PARENTS
-from posefit.motion.library import average_skeleton
+from posefit.motion.built_in import average_skeleton
 
 
 def test_radii_are_shares_of_the_bones_length() -> None:

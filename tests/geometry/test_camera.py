@@ -13,7 +13,7 @@ from posefit.arrays import Array
 from posefit.geometry.body import PROPORTIONS, Body
 from posefit.geometry.camera import MARGIN, Camera
 from posefit.geometry.skeleton import BONES, JOINTS
-from posefit.motion.library import average_skeleton
+from posefit.motion.built_in import average_skeleton
 
 
 def test_a_point_is_projected_by_hand() -> None:

@@ -8,7 +8,7 @@ from posefit.geometry.kernels import empty_frames
 from posefit.geometry.lanes import place_bone
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES
-from posefit.motion.library import average_skeleton
+from posefit.motion.built_in import average_skeleton
 
 
 @jit

@@ -8,7 +8,7 @@ import pytest
 from posefit.geometry.body import Body
 from posefit.geometry.limbs import LIMBS, check_limbs, rows_of, turns_of
 from posefit.geometry.skeleton import BONES, JOINTS, PARENTS
-from posefit.motion.library import average_skeleton
+from posefit.motion.built_in import average_skeleton
 
 
 def test_the_limbs_and_the_torso_are_all_bones_once() -> None:

@@ -30,7 +30,7 @@ from posefit.geometry.skeleton import (
     kind,
     side,
 )
-from posefit.motion.library import average_skeleton
+from posefit.motion.built_in import average_skeleton
 
 angles = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
 

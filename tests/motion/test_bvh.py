@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.motion import bvh, library
+from posefit.motion import built_in, bvh
 from posefit.motion.bvh import read_bvh, write_bvh
 
 pytest.importorskip("pybvh")
@@ -248,7 +248,7 @@ def test_without_the_library_the_way_out_is_named(monkeypatch: pytest.MonkeyPatc
 
 def test_what_comes_out_of_a_file_has_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.bvh"
-    write_bvh(path, library.built_in("walk", frames=6))
+    write_bvh(path, built_in.motion("walk", frames=6))
     text = path.read_text()
     # 30 frames of 70,000,000 s were 2.1e9 at 30 a second
     path.write_text(re.sub("Frame Time: .*", "Frame Time: 70000000", text))

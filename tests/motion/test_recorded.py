@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from posefit.cli import main
 from posefit.motion import recorded
-from posefit.motion.library import average_skeleton
+from posefit.motion.built_in import average_skeleton
 from posefit.motion.make_recorded import LONGEST_GAP, TOLERANCE, kept_frames
 
 ROUNDED = 1e-3  # metres: what rounding 66 angles to a thousandth of a radian may move a hand by, and more

@@ -5,7 +5,7 @@ import pytest
 from sklearn.cluster import KMeans
 
 from posefit.arrays import Array
-from posefit.motion import library as motions
+from posefit.motion import built_in
 from posefit_priors.clusters import clustered
 
 
@@ -20,7 +20,7 @@ def agrees(points: Array, clusters: int, seed: int) -> None:
 @pytest.mark.parametrize("name", ["walk", "squat"])
 def test_poses_have_the_clusters_that_scikit_learn_finds(name: str, clusters: int) -> None:
     for seed in range(3):
-        agrees(motions.built_in(name, frames=90).poses[:, 3:], clusters, seed)
+        agrees(built_in.motion(name, frames=90).poses[:, 3:], clusters, seed)
 
 
 @pytest.mark.parametrize(("points", "dimensions", "clusters"), [(300, 3, 5), (12, 1, 5), (10, 2, 10)])

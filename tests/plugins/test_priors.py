@@ -11,7 +11,7 @@ import posefit
 from posefit.arrays import Array
 from posefit.cli import main
 from posefit.geometry.skeleton import Skeleton
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit_priors.full import Full
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
@@ -21,7 +21,7 @@ from tests.files import arrays
 
 
 def angles(*names: str) -> Array:
-    return np.concatenate([library.built_in(name).poses[:, 3:] for name in names])
+    return np.concatenate([built_in.motion(name).poses[:, 3:] for name in names])
 
 
 def floor(prior: Any, poses: Array) -> float:
@@ -44,7 +44,7 @@ def test_poses_are_the_mean_and_so_much_of_each_component_however_many_there_are
 
 
 def test_the_full_space_has_the_limits_that_the_skeleton_states() -> None:
-    skeleton = library.average_skeleton()
+    skeleton = built_in.average_skeleton()
     prior = Full().fit(angles("walk-a"), skeleton)
     assert skeleton.limits is not None
     # .asf of CMU: the thigh's rx lies in -160 to 20 degrees, and lfemur is the third inner joint
@@ -54,7 +54,7 @@ def test_the_full_space_has_the_limits_that_the_skeleton_states() -> None:
 
 
 def test_limits_widen_where_a_training_pose_passes_them() -> None:
-    skeleton, poses = library.average_skeleton(), angles("run-a")
+    skeleton, poses = built_in.average_skeleton(), angles("run-a")
     prior = Full().fit(poses, skeleton)
     latents = prior.transform(poses)
     assert ((latents >= prior.low) & (latents <= prior.high)).all()
@@ -71,7 +71,7 @@ def test_the_training_range_can_be_taken_instead_with_a_margin() -> None:
 
 
 def test_a_skeleton_without_limits_is_named() -> None:
-    average = library.average_skeleton()
+    average = built_in.average_skeleton()
     bare = Skeleton("bare", average.offsets, average.axes, average.channels)
     with pytest.raises(
         ValueError, match="limits must be training where the skeleton states no joint limits, got asf and bare"
@@ -172,7 +172,7 @@ def test_a_file_that_is_no_prior_is_refused(kind: Any, tmp_path: Path) -> None:
     for name in "ab":
         with pytest.raises(ValueError, match=r"\.npz: expected an \.npz file with"):
             kind.load(tmp_path / f"{name}.npz")
-    prior = kind().fit(angles("walk-a", "walk-b"), library.average_skeleton())
+    prior = kind().fit(angles("walk-a", "walk-b"), built_in.average_skeleton())
     prior.save(tmp_path / "good.npz")
     stored = arrays(tmp_path / "good.npz")
     name = "words" if kind is Transformed else "low"
@@ -185,7 +185,7 @@ def test_a_file_that_is_no_prior_is_refused(kind: Any, tmp_path: Path) -> None:
 
 
 def test_a_loose_prior_reaches_what_its_components_do_not() -> None:
-    prior, pca = Loose().fit(angles("walk-a", "walk-b", "walk-c"), library.average_skeleton()), PCA(components=12)
+    prior, pca = Loose().fit(angles("walk-a", "walk-b", "walk-c"), built_in.average_skeleton()), PCA(components=12)
     pca.fit(angles("walk-a", "walk-b", "walk-c"))
     run = angles("run-a")
     arms = [i for i in prior.loose if i >= 30]
@@ -195,7 +195,7 @@ def test_a_loose_prior_reaches_what_its_components_do_not() -> None:
 
 def test_loose_angles_are_those_of_limbs_that_move_in_training() -> None:
     poses = angles("walk-a", "walk-b")
-    prior = Loose().fit(poses, library.average_skeleton())
+    prior = Loose().fit(poses, built_in.average_skeleton())
     # both shoulders and hips turn about three axes in CMU's skeletons, elbows and knees about one
     assert len(prior.loose) == 2 * (3 + 1 + 3 + 1)
     assert len(prior.low) == 12 + 16
@@ -207,13 +207,13 @@ def test_a_loose_angle_reaches_as_far_as_every_training_pose_may_still_go() -> N
     # may go down by 140 at least, so the setting's 15 degrees bound that side, and up by no more than 20 - 10 = 10.
     poses, thigh = np.zeros((200, 63)), 3
     poses[:, thigh] = np.radians(np.linspace(-20.0, 10.0, 200))
-    prior = Loose(components=1, clusters=1, legs_degrees=15.0).fit(poses, library.average_skeleton())
+    prior = Loose(components=1, clusters=1, legs_degrees=15.0).fit(poses, built_in.average_skeleton())
     assert prior.loose.tolist() == [thigh]
     assert np.degrees([prior.low[1], prior.high[1]]) == pytest.approx([-15.0, 10.0])
 
 
 def test_what_bends_past_a_joint_limit_is_not_feasible() -> None:
-    prior = Loose().fit(angles("walk-a", "walk-b"), library.average_skeleton())
+    prior = Loose().fit(angles("walk-a", "walk-b"), built_in.average_skeleton())
     latents = prior.transform(angles("walk-a")[:1])
     assert prior.feasible(latents).all()
     latents[0, 12:] -= 3.0
@@ -222,7 +222,7 @@ def test_what_bends_past_a_joint_limit_is_not_feasible() -> None:
 
 def test_no_freedom_at_all_is_the_space_of_pca() -> None:
     poses = angles("walk-a", "walk-b", "walk-c")
-    prior = Loose(arms_degrees=0.0, legs_degrees=0.0, slack=1.0).fit(poses, library.average_skeleton())
+    prior = Loose(arms_degrees=0.0, legs_degrees=0.0, slack=1.0).fit(poses, built_in.average_skeleton())
     latents = prior.transform(poses)
     latents[:, 12:] = 0.0
     pca = PCA(components=12).fit(poses)
@@ -240,7 +240,7 @@ def test_a_setting_that_makes_no_sense_is_one_line_of_check_and_not_one_a_rule()
 @pytest.mark.parametrize(("kind", "name"), [(Loose, "loose"), (Full, "angles")])
 def test_places_in_a_file_are_those_of_joint_angles(kind: Any, name: str, tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
-    kind().fit(angles("walk-a"), library.average_skeleton()).save(path)
+    kind().fit(angles("walk-a"), built_in.average_skeleton()).save(path)
     stored = arrays(path)
     for wrong in (63, -1, 10**9):  # a compiled loop would have written there
         stored[name] = np.array([wrong, *stored[name][1:]])
@@ -252,7 +252,7 @@ def test_places_in_a_file_are_those_of_joint_angles(kind: Any, name: str, tmp_pa
 @pytest.mark.parametrize("kind", [PCA, Full, Loose, Union])
 def test_a_damaged_prior_is_one_line(kind: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
-    kind().fit(angles("walk-a", "walk-b"), library.average_skeleton()).save(path)
+    kind().fit(angles("walk-a", "walk-b"), built_in.average_skeleton()).save(path)
     content = path.read_bytes()
     for damaged in (content[: len(content) // 2], content.replace(b"NUMPY", b"NUMPI"), content[:-3]):
         path.write_bytes(damaged)

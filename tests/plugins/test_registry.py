@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from posefit import entries, hookimpl
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.registry import registry, registry_of
 from posefit_priors.pca import PCA
 
@@ -225,7 +225,7 @@ def test_a_plugin_that_takes_one_name_that_is_taken_is_left_out_whole() -> None:
 
 
 def test_a_prior_survives_its_file(tmp_path: Path) -> None:
-    prior = PCA().fit(library.built_in("walk-a").poses[:, 3:])
+    prior = PCA().fit(built_in.motion("walk-a").poses[:, 3:])
     prior.save(tmp_path / "prior.npz")
     again = PCA.load(tmp_path / "prior.npz")
     latents = np.random.default_rng(0).uniform(prior.low, prior.high, (50, 6))

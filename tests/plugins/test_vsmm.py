@@ -15,7 +15,7 @@ from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
@@ -34,7 +34,7 @@ NAMES = ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
 
 def seen(name: str = "jacks-b", frames: int = 40, azimuth: float = 0.1) -> tuple[Task, list[Observation]]:
     """Return a task and what is seen of a built-in motion, from the front."""
-    motion = library.built_in(name, frames=frames)
+    motion = built_in.motion(name, frames=frames)
     body = Body.of(motion.skeleton)
     camera = Camera.around(np.array([0.0, 1.05, 0.0]), azimuth, 4.4, SIZE)
     found = [
@@ -260,7 +260,7 @@ def test_the_patents_own_form_runs(settings: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 def test_two_cameras_are_better_than_one() -> None:
-    motion = library.built_in("squat-b", frames=40)
+    motion = built_in.motion("squat-b", frames=40)
     body = Body.of(motion.skeleton)
     cameras = [Camera.around(np.array([0.0, 1.0, 0.0]), azimuth, 4.4, SIZE) for azimuth in (0.2, 1.5)]
     errors = []

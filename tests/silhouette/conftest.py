@@ -3,7 +3,7 @@ import pytest
 
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.motion.library import average_skeleton
+from posefit.motion.built_in import average_skeleton
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
-from posefit.motion.library import average_skeleton
+from posefit.motion.built_in import average_skeleton
 from posefit.silhouette.cost import areas, mismatch, project, view_of
 from posefit.silhouette.kernels import add_mismatch, paint_bits
 from posefit.silhouette.mask import Silhouette

@@ -16,7 +16,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import areas, mismatch, project
 from posefit_priors.pca import PCA
 from posefit_swarm import flock, kernels, sapso, swarm
@@ -73,7 +73,7 @@ class Fixed(np.random.Generator):
 
 @pytest.fixture(scope="module")
 def walk() -> Array:
-    return np.concatenate([library.built_in(style).poses[:, 3:] for style in ("walk-a", "walk-b", "walk-c")])
+    return np.concatenate([built_in.motion(style).poses[:, 3:] for style in ("walk-a", "walk-b", "walk-c")])
 
 
 @pytest.mark.parametrize("tag", TAGS)
@@ -249,7 +249,7 @@ def test_inertia_falls_from_a_to_a_tenth() -> None:
 
 
 def test_eq_3_by_counting_pixels() -> None:
-    body = Body.of(library.average_skeleton())
+    body = Body.of(built_in.average_skeleton())
     camera = Camera.around(np.zeros(3), 0.3, 4.0, (100, 80))
     rng = np.random.default_rng(0)
     poses, translations = rng.normal(0.0, 0.3, (5, ANGLES)), rng.uniform(-0.2, 0.2, (5, 3))
@@ -404,14 +404,14 @@ def test_eq_7_velocities_of_the_first_population_keep_within_the_limits() -> Non
 
 @pytest.fixture(scope="module")
 def scene(walk: Array) -> tuple[Body, Camera, PCA]:
-    body = Body.of(library.average_skeleton())
+    body = Body.of(built_in.average_skeleton())
     camera = Camera.around(np.array([0.0, 0.9, 0.0]), 0.8, 3.5, (160, 120))
     return body, camera, PCA().fit(walk)
 
 
 def test_eq_5_the_search_returns_the_least_cost_it_saw(scene: tuple[Body, Camera, PCA]) -> None:
     body, camera, prior = scene
-    motion = library.built_in("walk", frames=1)
+    motion = built_in.motion("walk", frames=1)
     silhouette = Silhouette.of(project(body, camera, motion.poses[0], motion.translations[0]))
     space = SearchSpace(prior, np.zeros(3), np.radians([45.0, 15.0, 15.0]), motion.translations[0])
     problem = PoseProblem(body, [camera], [silhouette], space)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.motion import library as motions
+from posefit.motion import built_in
 from posefit_imm import Belief, Measurement, start
 from posefit_imm.kernels import minus, plus
 from posefit_vsmm.detection.joints import detected
@@ -188,7 +188,7 @@ def test_a_hidden_joint_goes_on_as_it_went() -> None:  # VSMM 2.7
 
 
 def test_states_and_poses_lead_back_to_each_other() -> None:
-    walk, reliance = motions.built_in("walk"), library().reliance
+    walk, reliance = built_in.motion("walk"), library().reliance
     states = encode(walk.poses, walk.translations)
     poses, places = decode(states, reliance)
     assert np.allclose(places, walk.translations)
@@ -198,7 +198,7 @@ def test_states_and_poses_lead_back_to_each_other() -> None:
 
 def test_plus_and_minus_undo_each_other() -> None:
     rng = np.random.default_rng(0)
-    state = encode(motions.built_in("jacks").poses[:1], np.zeros((1, 3)))[0]
+    state = encode(built_in.motion("jacks").poses[:1], np.zeros((1, 3)))[0]
     error = rng.normal(0.0, 0.5, ERROR)
     assert np.allclose(minus(plus(state, error), state), error, atol=1e-12)
     turned = Rotation.from_quat(state[3:7], scalar_first=True) * Rotation.from_rotvec(error[3:6])
@@ -224,7 +224,7 @@ def test_ridge_regression_is_least_squares_with_more_rows() -> None:  # VSMM 3
 
 @pytest.mark.parametrize("name", ["walk", "jacks", "squat"])
 def test_a_models_jacobian_is_that_of_its_step(name: str) -> None:
-    walk = motions.built_in("march")
+    walk = built_in.motion("march")
     model = library().models[name].fitted_to(walk.skeleton, 25.0)
     state = encode(walk.poses[7:8], walk.translations[7:8])[0]
     moved, jacobian = model.step(state)
@@ -233,7 +233,7 @@ def test_a_models_jacobian_is_that_of_its_step(name: str) -> None:
 
 
 def test_a_model_does_not_care_where_somebody_stands_and_which_way_he_looks() -> None:
-    jump = motions.built_in("jump")
+    jump = built_in.motion("jump")
     model = library().models["jump"].fitted_to(jump.skeleton, 30.0)
     state = encode(jump.poses[3:4], jump.translations[3:4])[0]
     turn = Rotation.from_euler("y", 1.1)
@@ -272,7 +272,7 @@ def models(**changes: object) -> Models:
     carried = library()
     given = {"structure": "variable", "rules": Rules(), "new": "rerun", "test": SequentialTest()} | changes
     switching = Switching(library=carried, topology=read_topology(None, carried.names), **given)  # type: ignore[arg-type]
-    return Models(switching, motions.average_skeleton(), 30.0)
+    return Models(switching, built_in.average_skeleton(), 30.0)
 
 
 def telling(name: str, running: Models) -> Callable[[Array], Measurement]:
@@ -287,7 +287,7 @@ def telling(name: str, running: Models) -> Callable[[Array], Measurement]:
 
 
 def begun(running: Models) -> Belief:
-    pose = motions.built_in("walk")
+    pose = built_in.motion("walk")
     state = encode(pose.poses[:1], pose.translations[:1])[0]
     return start(state, 0.01 * np.eye(ERROR), len(running.active))
 
@@ -309,7 +309,7 @@ def test_after_ten_cycles_over_all_models_the_most_probable_group_stays(model: s
 
 
 def test_the_points_are_projected_and_their_jacobian_is_right() -> None:  # VSMM 6.1
-    jacks = motions.built_in("jacks-a")
+    jacks = built_in.motion("jacks-a")
     shown = Figure(jacks.skeleton, library().reliance)
     camera = Camera.around(np.array([0.0, 1.0, 0.0]), 0.4, 4.0, (320, 240))
     for k in (0, 9, 21):
@@ -387,7 +387,7 @@ OLD, UNION = ("walk", "arms-out"), ("walk", "arms-out", "jacks")
 
 
 def believing() -> Belief:
-    states = encode(motions.built_in("walk").poses[:2], np.zeros((2, 3)))
+    states = encode(built_in.motion("walk").poses[:2], np.zeros((2, 3)))
     return Belief(states, np.tile(0.01 * np.eye(ERROR), (2, 1, 1)), np.log([0.8, 0.2]), np.array([-1.0, -2.0]))
 
 
@@ -406,7 +406,7 @@ def test_a_new_models_covariance_is_its_noise() -> None:  # VSMM 8.2
 
 
 def test_a_new_model_starts_from_its_typical_pose() -> None:  # VSMM 8.3
-    walk = motions.built_in("walk")
+    walk = built_in.motion("walk")
     state = encode(walk.poses[:1], walk.translations[:1])[0]
     model = library().models["walk"]
     found = model.nearest(state)
@@ -489,10 +489,10 @@ def test_a_rivalry_that_is_never_decided_ends() -> None:
 
 
 def test_the_body_and_its_models_fit_any_frame_rate() -> None:
-    body = Body.of(motions.average_skeleton())
+    body = Body.of(built_in.average_skeleton())
     model = library().models["squat"]
     slow, fast = (model.fitted_to(body.skeleton, fps) for fps in (30.0, 60.0))
-    state = encode(motions.built_in("squat").poses[5:6], np.zeros((1, 3)))[0]
+    state = encode(built_in.motion("squat").poses[5:6], np.zeros((1, 3)))[0]
     whole, half = (minus(one.step(state)[0], state) for one in (slow, fast))
     assert np.allclose(whole, 2.0 * half, atol=2e-3)
     assert np.allclose(slow.noise, 2.0 * fast.noise)

@@ -11,7 +11,7 @@ import pytest
 
 import posefit
 from posefit.entries import Plugin
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.registry import Offer, Registry
@@ -51,7 +51,7 @@ def test_a_product_holds_every_combination_and_cells_come_beside_it() -> None:
     assert {cell.frames for cell in plan if cell.motion != "run"} == {7}
     assert {cell.view_degrees for cell in plan} == {(45.0,), (0.0, 90.0)}
     assert {cell.seed for cell in plan} == {0, 1, 2}
-    assert plan.cells[-1].train == library.other_styles("jump")
+    assert plan.cells[-1].train == built_in.other_styles("jump")
 
 
 def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
@@ -173,7 +173,7 @@ def test_instances_differ_and_a_number_is_the_same_for_every_method_and_seed() -
         assert scene.truth is not None
         return scene.truth.poses.tobytes(), scene.observations[2].silhouettes[0].mask.tobytes()
 
-    assert seen(instance=0)[0] == library.built_in("walk", frames=4).poses.tobytes()
+    assert seen(instance=0)[0] == built_in.motion("walk", frames=4).poses.tobytes()
     assert seen(instance=1) == seen(instance=1, method="cma@full", seed=5)
     assert seen(instance=1)[0] != seen(instance=2)[0] != seen(instance=0)[0]
     spoilt = {"holes": 0.5}
@@ -191,7 +191,7 @@ def test_a_share_of_the_frames_is_dropped() -> None:
 
 
 def test_a_file_that_changed_after_it_was_planned_is_not_followed(tmp_path: Path) -> None:
-    motion = library.built_in("walk-b", frames=12)
+    motion = built_in.motion("walk-b", frames=12)
     write_asf(tmp_path / "one.asf", motion.skeleton)
     write_amc(tmp_path / "one.amc", motion)
     source = str(tmp_path / "one.amc")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.tracking.identity import Told, difference
 
 QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200}
@@ -26,7 +26,7 @@ def stopping(frames: Any, count: int) -> Any:
 
 
 def camera(azimuth: float) -> posefit.Camera:
-    return posefit.Camera.around(library.built_in("walk").translations[0], azimuth, 4.0, (120, 90))
+    return posefit.Camera.around(built_in.motion("walk").translations[0], azimuth, 4.0, (120, 90))
 
 
 def test_cameras_at_two_azimuths_are_not_the_same_track(tmp_path: Path) -> None:
@@ -44,7 +44,7 @@ def test_cameras_at_two_azimuths_are_not_the_same_track(tmp_path: Path) -> None:
 
 
 def test_two_motions_of_one_name_are_not_the_same_track(tmp_path: Path) -> None:
-    motion, out = library.built_in("walk", frames=8), tmp_path / "out"
+    motion, out = built_in.motion("walk", frames=8), tmp_path / "out"
     other = replace(motion, poses=motion.poses + 0.01)
     with pytest.raises(StopError):
         posefit.track(motion, out=out, progress=stopping, **QUICK)
@@ -78,7 +78,7 @@ def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
         (np.zeros(3), np.zeros(4)),
         (np.zeros(2, np.float32), np.zeros(2)),
         (np.sin, np.cos),
-        (library.built_in, library.names),
+        (built_in.motion, built_in.names),
     ],
 )
 def test_what_differs_has_another_digest(one: Any, other: Any) -> None:

@@ -247,12 +247,12 @@ def test_every_prior_can_be_searched(prior: str) -> None:
 
 def test_a_scene_is_followed_as_it_is() -> None:
 
-    from posefit.motion import library
+    from posefit.motion import built_in
 
-    motion = library.built_in("walk", frames=3)
+    motion = built_in.motion("walk", frames=3)
     seen = synthetic(motion, [45.0], (120, 90), [], (None, None))
-    result = posefit.track(seen, train=library.other_styles("walk"), evaluations=200)
-    by_name = posefit.track(motion, train=library.other_styles("walk"), evaluations=200, size=(120, 90))
+    result = posefit.track(seen, train=built_in.other_styles("walk"), evaluations=200)
+    by_name = posefit.track(motion, train=built_in.other_styles("walk"), evaluations=200, size=(120, 90))
     np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
     assert [frame.cost for frame in result.found] == [row["cost"] for row in result.frames]
     with pytest.raises(ValueError, match="a scene must be followed as it is, got Viewing"):

@@ -11,7 +11,7 @@ from posefit import Camera, PoseProblem, SearchSpace, Silhouette, minimise
 from posefit.fitting.tracker import Prediction
 from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.registry import registry
 
 MISUSES: list[tuple[dict[str, Any], str]] = [
@@ -61,9 +61,9 @@ def test_a_camera_stands_at_a_distance_that_is_not_negative() -> None:
 
 @pytest.fixture(scope="module")
 def problem() -> PoseProblem:
-    motion = library.built_in("walk", frames=1)
+    motion = built_in.motion("walk", frames=1)
     body = Body.of(motion.skeleton)
-    angles = np.concatenate([library.built_in(name).poses[:, 3:] for name in library.other_styles("walk")])
+    angles = np.concatenate([built_in.motion(name).poses[:, 3:] for name in built_in.other_styles("walk")])
     prior = registry().prior("pca")().fit(angles, motion.skeleton)
     camera = Camera.around(motion.translations[0], 0.8, 3.5, (64, 48))
     mask = posefit.silhouette.cost.project(body, camera, motion.poses[0], motion.translations[0])

@@ -13,7 +13,7 @@ import pytest
 import posefit
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import synthetic
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
 from posefit.tracking.opening import begun
@@ -27,7 +27,7 @@ def test_a_search_is_made_once(method: dict[str, Any]) -> None:
     with drawn.counting():
         used = posefit.fit("walk", size=(120, 90), **method).summary["evaluations"]
     # the warm-up may have 8 x 40 evaluations; the baselines draw every training pose once, and the scene one
-    training = sum(len(posefit.motion.library.built_in(style).poses) for style in ("walk-a", "walk-b", "walk-c"))
+    training = sum(len(posefit.motion.built_in.motion(style).poses) for style in ("walk-a", "walk-b", "walk-c"))
     assert used <= drawn.poses - training <= used + 400
 
 
@@ -59,7 +59,7 @@ def test_a_tracker_that_needs_its_whole_budget_works_all_the_same() -> None:
 def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole_one(
     size: tuple[int, int], rows: int
 ) -> None:
-    motion = library.built_in("walk", frames=5)
+    motion = built_in.motion("walk", frames=5)
     scene = synthetic(motion, [90.0], size, [], (None, None))
     task = Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
     looked: list[int] = []

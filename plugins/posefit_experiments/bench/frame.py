@@ -14,7 +14,7 @@ from posefit.fitting.prior import Prior
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Observation, SynthesisTracker, Task
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit_experiments.bench.timing import fastest
@@ -78,8 +78,8 @@ class Walk:
     def __init__(
         self, problem: PoseProblem, make: Callable[..., Optimiser], next_frame: NextFrame, prior: Callable[[], Prior]
     ) -> None:
-        motion = library.built_in("walk", frames=FRAMES, fps=30.0)
-        styles = [library.built_in(name, frames=60, fps=30.0) for name in library.other_styles("walk")]
+        motion = built_in.motion("walk", frames=FRAMES, fps=30.0)
+        styles = [built_in.motion(name, frames=60, fps=30.0) for name in built_in.other_styles("walk")]
         learned = prior().fit(np.concatenate([style.poses[:, 3:] for style in styles]), motion.skeleton)
         body, cameras = problem.body, problem.cameras
         self._seen = [

@@ -9,7 +9,7 @@ import numpy as np
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace, Translation
 from posefit.geometry.camera import Camera
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
@@ -117,7 +117,7 @@ def _seen_from(problem: PoseProblem, count: int) -> PoseProblem:
 
 def _searched_in(problem: PoseProblem, name: str, settings: dict[str, int], translation: Translation) -> PoseProblem:
     """Return the problem with another prior."""
-    styles = [library.built_in(style, frames=60, fps=30.0) for style in library.other_styles("walk")]
+    styles = [built_in.motion(style, frames=60, fps=30.0) for style in built_in.other_styles("walk")]
     angles = np.concatenate([style.poses[:, 3:] for style in styles])
     prior = registry().prior(name)(**settings).fit(angles, problem.body.skeleton)
     usual = problem.space

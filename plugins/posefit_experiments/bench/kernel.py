@@ -9,7 +9,7 @@ from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import PARENTS
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import mismatch, project
 from posefit.silhouette.mask import Silhouette
 from posefit_priors.pca import PCA
@@ -19,9 +19,9 @@ SIZE = (320, 240)
 
 def bench_problem(threads: int = 1) -> PoseProblem:
     """Return the benchmark's problem: one frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
-    motion = library.built_in("walk", frames=1, fps=30.0)
+    motion = built_in.motion("walk", frames=1, fps=30.0)
     body = Body.of(motion.skeleton)
-    styles = [library.built_in(name, frames=60, fps=30.0) for name in library.other_styles("walk")]
+    styles = [built_in.motion(name, frames=60, fps=30.0) for name in built_in.other_styles("walk")]
     prior = PCA().fit(np.concatenate([style.poses[:, 3:] for style in styles]))
     joints = motion.skeleton.joints(motion.poses, motion.translations)[0]
     camera = Camera.framing(joints, body.joint_radii(), motion.poses[0, 0] + np.radians(45.0), SIZE)

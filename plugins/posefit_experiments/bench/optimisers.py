@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from posefit.arrays import Array
 from posefit.fitting.optimiser import Filter, Optimiser, minimise
 from posefit.fitting.space import SearchSpace
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.registry import Offer, registry
 from posefit.settings import planned
 from posefit_priors.loose import Loose
@@ -26,7 +26,7 @@ COMPONENTS = 9  # of the prior `loose`, which makes 28 dimensions with the root'
 
 def wide_space(space: SearchSpace) -> SearchSpace:
     """Return a space with the prior `loose` instead of its own, of 28 dimensions."""
-    styles = [library.built_in(name, frames=60, fps=30.0) for name in library.other_styles("walk")]
+    styles = [built_in.motion(name, frames=60, fps=30.0) for name in built_in.other_styles("walk")]
     return replace(space, prior=Loose(components=COMPONENTS).fit(np.concatenate([one.poses[:, 3:] for one in styles])))
 
 

@@ -16,7 +16,7 @@ from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Box, Extraction, Segmentation
 from posefit.footage.source import Viewing, scene_of
 from posefit.footage.video import Video
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.tracking.method import Choice, prepare
 
 POPULATION = 40
@@ -47,7 +47,7 @@ def loop_speed(source: str | Path, roi: Box, frames: Range) -> dict[str, float]:
 
 def _times(seen: Scene, choice: Choice) -> tuple[float, float]:
     """Return the median milliseconds of a frame, and of the same number of evaluations alone."""
-    training = [library.built_in(style) for style in library.other_styles("walk")]
+    training = [built_in.motion(style) for style in built_in.other_styles("walk")]
     task = Task(seen.body, seen.cameras, choice.budget(), None, seen.anchor, "aligned", training=training)
     method = prepare(choice, task)
     assert method.prior is not None

@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.footage.masks import Range
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.source import motion_of
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit_experiments.clips import clip_path
 from posefit_experiments.known import SIZE
@@ -60,12 +60,12 @@ def _from_clips(folder: str | Path, name: str) -> PaperMotion:
 
 def _built_in(name: str, frames: int) -> PaperMotion:
     kind = "run" if name == "run" else "walk"
-    styles = library.other_styles(kind)
-    test = library.built_in(kind, frames=frames, fps=FPS)
+    styles = built_in.other_styles(kind)
+    test = built_in.motion(kind, frames=frames, fps=FPS)
     if name == "turn":
-        test = turned(library.built_in(kind, frames=frames, fps=FPS, speed=0.9, phase=0.3), TURN)
+        test = turned(built_in.motion(kind, frames=frames, fps=FPS, speed=0.9, phase=0.3), TURN)
     count = round(TRAINING_FRAMES[name] / len(styles))
-    return PaperMotion(name, test, [library.built_in(style, frames=count, fps=FPS) for style in styles])
+    return PaperMotion(name, test, [built_in.motion(style, frames=count, fps=FPS) for style in styles])
 
 
 def paper_scene(motion: PaperMotion, view: float, frames: Range = (None, None)) -> Scene:

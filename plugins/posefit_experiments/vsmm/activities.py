@@ -15,7 +15,7 @@ from posefit.fitting.tracker import Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, mean_background, person
@@ -72,7 +72,7 @@ def film_of(seed: int) -> Film:
     """Return the film of a seed: masks taken from a film of it, by the mean background of the empty scene."""
     rng = np.random.default_rng(seed)
     parts = [
-        library.built_in(one.motion, frames=one.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random())
+        built_in.motion(one.motion, frames=one.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random())
         for one in ACTIVITIES
     ]
     poses = np.concatenate([part.poses for part in parts])
@@ -83,7 +83,7 @@ def film_of(seed: int) -> Film:
         share = (np.arange(1, BLEND + 1) / (BLEND + 1))[:, None]
         poses[first : first + BLEND] = poses[first - 1] + share * away
         places[first : first + BLEND] = places[first - 1] + share * (moved - places[first - 1])
-    truth = Motion("patent", library.average_skeleton(), poses, places, FPS)
+    truth = Motion("patent", built_in.average_skeleton(), poses, places, FPS)
     body = Body.of(truth.skeleton)
     camera = Camera.around(np.array([0.0, 1.05, 0.0]), rng.uniform(-SIDEWAYS, SIDEWAYS), DISTANCE, SIZE)
     empty, film = _images(truth, body, camera, rng)

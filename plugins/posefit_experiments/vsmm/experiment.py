@@ -16,7 +16,7 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.skeleton import JOINTS
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.tracking.method import Choice, prepare
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.vsmm.activities import TRAINING, Film, film_of
@@ -57,7 +57,7 @@ def follow_film(choice: Choice, seed: int) -> PatentTrack:
         seen.truth.translations[0],
         "aligned",
         seen.truth.fps,
-        [library.built_in(one) for one in TRAINING],
+        [built_in.motion(one) for one in TRAINING],
     )
     with threadpool_limits(1):
         frames = list(prepare(choice, task).tracker(task).track(seen.observations, np.random.default_rng(seed)))

@@ -15,7 +15,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit_vsmm.detection import joints
 from posefit_vsmm.detection.joints import BODY, detected
@@ -37,7 +37,7 @@ def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
     """Return the errors (2,) in legs of each point where it was detected."""
     found: dict[str, list[Array]] = {name: [] for name in POINTS}
     for name, azimuth in product(MOTIONS, AZIMUTHS):
-        motion = library.built_in(name)
+        motion = built_in.motion(name)
         body = Body.of(motion.skeleton)
         leg = leg_of(motion.skeleton)
         camera = Camera.around(np.array([0.0, 0.95, 0.0]), motion.poses[0, 0] + azimuth, DISTANCE, SIZE)

@@ -19,7 +19,7 @@ from sklearn.covariance import LedoitWolf
 from posefit.arrays import Array
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, INNER, MIRROR, angle_index
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.amc import FPS as AMC_FPS
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
@@ -210,7 +210,7 @@ def main(root: Path) -> None:
             raise ValueError(f"CMU_DIR must hold {clip.path}.amc, got {root} without it")
     for name, teaching in TEACHINGS.items():
         clips = [recorded(root, clip) for clip in teaching.fitted]
-        clips += [moving(library.built_in(one, frames=DRAWN, fps=AMC_FPS)) for one in teaching.drawn]
+        clips += [moving(built_in.motion(one, frames=DRAWN, fps=AMC_FPS)) for one in teaching.drawn]
         kept = recorded(root, teaching.kept)
         every += clips
         sides = [pairs(one._replace(states=s)) for one in clips for s in (one.states, mirrored_states(one.states))]

@@ -11,7 +11,7 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, angle_index
-from posefit.motion import library
+from posefit.motion import built_in
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 
@@ -45,26 +45,26 @@ GAITS = ("walk", "run", "arms-out", "wave")
 DRAWN = {"arms-out": "lr", "wave": "r"}  # whose arms are not the clip's
 CYCLE = 240  # frames
 
-each = pytest.mark.parametrize("name", library.names())
-each_gait = pytest.mark.parametrize("name", [name for name in library.names() if name.startswith(GAITS)])
-each_exercise = pytest.mark.parametrize("name", [name for name in library.names() if not name.startswith(GAITS)])
+each = pytest.mark.parametrize("name", built_in.names())
+each_gait = pytest.mark.parametrize("name", [name for name in built_in.names() if name.startswith(GAITS)])
+each_exercise = pytest.mark.parametrize("name", [name for name in built_in.names() if not name.startswith(GAITS)])
 
 
 def stored() -> dict[str, Any]:
-    text = (files("posefit.motion") / "library.json").read_text(encoding="utf-8")
+    text = (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")
     models: dict[str, Any] = json.loads(text)["motions"]
     return models
 
 
 def means(name: str, key: str) -> float:
     """Return a style's number, or the mean over a kind's styles."""
-    styles = [name] if name in stored() else library.other_styles(name)
+    styles = [name] if name in stored() else built_in.other_styles(name)
     return float(np.mean([stored()[style][key] for style in styles]))
 
 
 def cycle(name: str, cycles: int = 1, **settings: Any) -> Motion:
     """Return whole cycles of a motion, CYCLE frames each."""
-    return library.built_in(name, frames=cycles * CYCLE, fps=CYCLE / means(name, "period"), **settings)
+    return built_in.motion(name, frames=cycles * CYCLE, fps=CYCLE / means(name, "period"), **settings)
 
 
 def joints(motion: Motion) -> Array:
@@ -72,17 +72,17 @@ def joints(motion: Motion) -> Array:
 
 
 def test_names_are_the_kinds_and_their_styles() -> None:
-    assert library.names() == KINDS + tuple(CLIPS)
+    assert built_in.names() == KINDS + tuple(CLIPS)
 
 
 def test_the_other_styles_of_a_motion_never_contain_it() -> None:
-    assert library.other_styles("walk-b") == ("walk-a", "walk-c")
-    assert library.other_styles("run") == ("run-a", "run-b")
-    for name in library.names():
-        others = library.other_styles(name)
+    assert built_in.other_styles("walk-b") == ("walk-a", "walk-c")
+    assert built_in.other_styles("run") == ("run-a", "run-b")
+    for name in built_in.names():
+        others = built_in.other_styles(name)
         assert others
         assert name not in others
-        assert {library.activity_of(other) for other in others} == {library.activity_of(name)}
+        assert {built_in.activity_of(other) for other in others} == {built_in.activity_of(name)}
 
 
 @each
@@ -140,7 +140,7 @@ def test_an_arm_swings_with_the_leg_of_the_other_side(name: str) -> None:
     motion = cycle(name)
     ahead = joints(motion)[..., 2] - motion.translations[:, None, 2]
     for arm, leg in (("lwrist", "rfoot"), ("rwrist", "lfoot")):
-        if arm[0] in DRAWN.get(library.activity_of(name), ""):
+        if arm[0] in DRAWN.get(built_in.activity_of(name), ""):
             continue
         assert np.corrcoef(ahead[:, JOINTS.index(arm)], ahead[:, JOINTS.index(leg)])[0, 1] > 0.5
 
@@ -157,7 +157,7 @@ def test_at_phase_0_the_left_thigh_is_ahead(name: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_styles_of_a_kind_differ_by_some_degrees(kind: str) -> None:
-    poses = {name: cycle(name).poses for name in (kind, *library.other_styles(kind))}
+    poses = {name: cycle(name).poses for name in (kind, *built_in.other_styles(kind))}
     for first, second in combinations(poses, 2):
         assert 1.0 < np.degrees(np.abs(poses[first] - poses[second]).mean()) < 25.0, (first, second)
 
@@ -194,7 +194,7 @@ def test_each_exercise_is_what_it_is_called() -> None:
 
 @pytest.mark.parametrize("kind", ["squat", "jump"])
 def test_at_phase_0_somebody_who_squats_or_jumps_is_down(kind: str) -> None:
-    for name in (kind, *library.other_styles(kind)):
+    for name in (kind, *built_in.other_styles(kind)):
         height = cycle(name).translations[:, 1]
         turns = 2.0 * np.pi * np.arange(CYCLE) / CYCLE
         assert height @ np.cos(turns) < 0.0
@@ -203,13 +203,13 @@ def test_at_phase_0_somebody_who_squats_or_jumps_is_down(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_kind_without_a_letter_is_the_mean_of_its_styles(kind: str) -> None:
-    styles = [cycle(style).poses for style in library.other_styles(kind)]
+    styles = [cycle(style).poses for style in built_in.other_styles(kind)]
     np.testing.assert_allclose(cycle(kind).poses, np.mean(styles, axis=0), atol=1e-9)
 
 
 @each
 def test_twice_the_speed_is_every_second_frame(name: str) -> None:
-    slow, fast = library.built_in(name, frames=39), library.built_in(name, frames=20, speed=2.0)
+    slow, fast = built_in.motion(name, frames=39), built_in.motion(name, frames=20, speed=2.0)
     np.testing.assert_allclose(fast.poses, slow.poses[::2], atol=1e-12)
     np.testing.assert_allclose(fast.translations, slow.translations[::2], atol=1e-12)
 
@@ -222,16 +222,16 @@ def test_a_phase_starts_later_in_the_cycle(name: str) -> None:
 
 
 def test_frames_and_rate_are_as_asked() -> None:
-    motion = library.built_in("walk")
+    motion = built_in.motion("walk")
     assert (len(motion), motion.fps, motion.name) == (60, 30.0, "walk")
-    motion = library.built_in("run-b", frames=7, fps=120)
+    motion = built_in.motion("run-b", frames=7, fps=120)
     assert (len(motion), motion.fps, motion.name) == (7, 120.0, "run-b")
-    twice = library.built_in("walk", frames=21, fps=60.0)
-    np.testing.assert_allclose(twice.poses[::2], library.built_in("walk", frames=11).poses, atol=1e-12)
+    twice = built_in.motion("walk", frames=21, fps=60.0)
+    np.testing.assert_allclose(twice.poses[::2], built_in.motion("walk", frames=11).poses, atol=1e-12)
 
 
 def test_the_skeleton_is_its_own_mirror_image() -> None:
-    skeleton = library.average_skeleton()
+    skeleton = built_in.average_skeleton()
     flip, other = np.diag([-1.0, 1.0, 1.0]), np.array(MIRROR)[1:] - 1
     np.testing.assert_allclose(skeleton.offsets, skeleton.offsets[other] @ flip, atol=1e-12)
     np.testing.assert_allclose(skeleton.axes, flip @ skeleton.axes[other] @ flip, atol=1e-12)
@@ -241,7 +241,7 @@ def test_the_skeleton_is_its_own_mirror_image() -> None:
 
 
 def test_the_skeleton_has_a_grown_up_s_size_and_only_inner_joints_turn() -> None:
-    skeleton = library.average_skeleton()
+    skeleton = built_in.average_skeleton()
     assert 1.4 < np.ptp(skeleton.joints(np.zeros(66))[:, 1]) < 1.8  # from the sole to the head's joint
     assert {bone for bone, _ in skeleton.channels} <= {JOINTS[joint] for joint in INNER}
     assert len(skeleton.lengths) == len(BONES)
@@ -250,7 +250,7 @@ def test_the_skeleton_has_a_grown_up_s_size_and_only_inner_joints_turn() -> None
 @each
 def test_only_free_angles_move(name: str) -> None:
     motion = cycle(name)
-    assert motion.skeleton is library.average_skeleton()
+    assert motion.skeleton is built_in.average_skeleton()
     assert not motion.poses[:, ~motion.skeleton.free].any()
 
 
@@ -274,23 +274,23 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
         poses[:, 0] -= np.angle(np.exp(1j * poses[:, 0]).mean())
 
     same = np.ones(66, dtype=bool)
-    for side in DRAWN.get(library.activity_of(name), ""):
+    for side in DRAWN.get(built_in.activity_of(name), ""):
         shoulder, elbow = (angle_index(JOINTS.index(side + bone)) for bone in ("humerus", "radius"))
         same[[shoulder, shoulder + 1, shoulder + 2, elbow]] = False
 
     def error(phase: float) -> float:
-        made = library.built_in(name, frames=len(recorded), fps=recorded.fps, phase=phase)
+        made = built_in.motion(name, frames=len(recorded), fps=recorded.fps, phase=phase)
         # a clip may have whole turns more
         off = np.abs((made.poses - poses + np.pi) % (2.0 * np.pi) - np.pi)
         return float(np.degrees(off[:, same].mean()))
 
     least = min(error(phase) for phase in np.arange(400) / 400)
-    assert least < RESIDUAL_DEGREES[library.activity_of(name)]
+    assert least < RESIDUAL_DEGREES[built_in.activity_of(name)]
     assert least == pytest.approx(model["residual_degrees"], abs=0.05 if same.all() else 0.3)
 
 
 def test_arms_that_are_held_out_are_level_and_one_that_waves_points_up() -> None:
-    out, wave = (joints(library.built_in(name, frames=40)) for name in ("arms-out", "wave"))
+    out, wave = (joints(built_in.motion(name, frames=40)) for name in ("arms-out", "wave"))
     for side, sign in (("l", 1.0), ("r", -1.0)):
         reach = out[:, JOINTS.index(f"{side}wrist")] - out[:, JOINTS.index(f"{side}clavicle")]
         assert (sign * reach[:, 0] > 0.45).all()
@@ -303,14 +303,14 @@ def test_arms_that_are_held_out_are_level_and_one_that_waves_points_up() -> None
 
 
 def test_the_library_is_small_and_states_its_origin() -> None:
-    text = (files("posefit.motion") / "library.json").read_text(encoding="utf-8")
+    text = (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")
     assert len(text.encode()) < 100_000
     origin = json.loads(text)["origin"]
     assert "The data used in this project was obtained from mocap.cs.cmu.edu." in origin
     assert "The database was created with funding from NSF EIA-0196217." in origin
 
 
-@pytest.mark.parametrize("ask", [library.built_in, library.other_styles])
+@pytest.mark.parametrize("ask", [built_in.motion, built_in.other_styles])
 def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
     with pytest.raises(ValueError, match=r"one of walk, run, march, .* got 'wlak'; did you mean 'walk'\?"):
         ask("wlak")
@@ -332,4 +332,4 @@ def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
 )
 def test_mistakes_are_named(settings: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        library.built_in("walk", **settings)
+        built_in.motion("walk", **settings)

@@ -5,7 +5,7 @@ knees on the spot), `jacks` (jumping jacks), `squat`, `jump`, `step` (walking on
 (walking with both arms held out, or with one waving). Without a letter it is somebody in between: the mean of the
 styles, in step. So `walk` is none of the motions that its prior is trained on, but within their reach; a prior trained
 on other people only, as for `walk-a`, is the harder case.
-They were fitted to CMU clips by `fit_library.py`; the arms that are held out or wave are drawn by hand. The data used
+They were fitted to CMU clips by `fit_built_in.py`; the arms that are held out or wave are drawn by hand. The data used
 in this project was obtained from mocap.cs.cmu.edu. The database was created with funding from NSF EIA-0196217.
 """
 
@@ -26,15 +26,15 @@ from posefit.reading import SHOWN, quoted
 
 
 @lru_cache(maxsize=1)
-def _library() -> dict[str, Any]:
-    stored: dict[str, Any] = json.loads((files("posefit.motion") / "library.json").read_text(encoding="utf-8"))
+def _stored() -> dict[str, Any]:
+    stored: dict[str, Any] = json.loads((files("posefit.motion") / "built_in.json").read_text(encoding="utf-8"))
     return stored
 
 
 @lru_cache(maxsize=1)
 def names() -> tuple[str, ...]:
-    """Return the names that `built_in` takes."""
-    styles = tuple(_library()["motions"])
+    """Return the names that `motion` takes."""
+    styles = tuple(_stored()["motions"])
     return tuple(dict.fromkeys(activity_of(name) for name in styles)) + styles
 
 
@@ -46,13 +46,13 @@ def activity_of(name: str) -> str:
 def other_styles(name: str) -> tuple[str, ...]:
     """Return the other styles of a motion's kind, what its prior is trained on by default."""
     _check(name)
-    return tuple(style for style in _library()["motions"] if activity_of(style) == activity_of(name) and style != name)
+    return tuple(style for style in _stored()["motions"] if activity_of(style) == activity_of(name) and style != name)
 
 
 @lru_cache(maxsize=1)
 def average_skeleton() -> Skeleton:
     """Return the skeleton of the built-in motions: the mean of nine people, left and right alike."""
-    stored = _library()["skeleton"]
+    stored = _stored()["skeleton"]
     return Skeleton(
         "average",
         np.array(stored["offsets"]),
@@ -62,7 +62,7 @@ def average_skeleton() -> Skeleton:
     )
 
 
-def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0, phase: float = 0.0) -> Motion:
+def motion(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0, phase: float = 0.0) -> Motion:
     """Return a built-in motion of so many frames. It goes along +z, and half its way is behind the origin.
 
     `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
@@ -92,8 +92,8 @@ def built_in(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1
 def _model(name: str) -> tuple[list[int], Array, float, float]:
     """Return the free angles, the series of path and angles, the period in seconds and the pace in m/s."""
     _check(name)
-    styles = [name] if name in _library()["motions"] else other_styles(name)
-    models = [_library()["motions"][style] for style in styles]
+    styles = [name] if name in _stored()["motions"] else other_styles(name)
+    models = [_stored()["motions"][style] for style in styles]
     means = (np.mean([model[key] for model in models], axis=0) for key in ("series", "period", "speed"))
     series, period, pace = means
     return models[0]["angles"], series, float(period), float(pace)

@@ -1,7 +1,7 @@
-"""Fits the built-in motions and the average skeleton to CMU clips: `python -m posefit.motion.fit_library CMU_DIR`.
+"""Fits the built-in motions and the average skeleton to CMU clips: `python -m posefit.motion.fit_built_in CMU_DIR`.
 
 A motion is a period and, for each free angle and the root's path, a Fourier series over that period. What is stored
-are these few numbers, no recorded frame. It is run by hand when a motion is added; its result, library.json, is
+are these few numbers, no recorded frame. It is run by hand when a motion is added; its result, built_in.json, is
 what the package carries. Without an argument, CMU_DIR is the environment variable POSEFIT_CMU.
 """
 
@@ -20,8 +20,8 @@ from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_
 from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.motion.amc import read_clip
 from posefit.motion.asf import read_asf
+from posefit.motion.built_in import activity_of
 from posefit.motion.fit_arms import PHASES, drawn, held_out, waving
-from posefit.motion.library import activity_of
 
 ORIGIN = (
     "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
@@ -196,7 +196,7 @@ def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
 
 
 def main(root: Path) -> None:
-    """Write library.json beside this file. Raises ValueError where a file it needs is missing."""
+    """Write built_in.json beside this file. Raises ValueError where a file it needs is missing."""
     needed = [f"{subject}/{subject}.asf" for subject in SUBJECTS] + [f"{clip.path}.amc" for clip in CLIPS.values()]
     for name in needed:
         if not (root / name).is_file():
@@ -214,7 +214,7 @@ def main(root: Path) -> None:
         armed(model, skeleton, activity_of(name))
         grounded(model, skeleton)
         print(f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees")
-    target = Path(__file__).with_name("library.json")
+    target = Path(__file__).with_name("built_in.json")
     text = json.dumps({"origin": ORIGIN, "skeleton": bones, "motions": motions}, separators=(",", ":"))
     target.write_text(text + "\n", encoding="utf-8")
     print(f"{target.name}: {len(text)} bytes")
@@ -223,7 +223,7 @@ def main(root: Path) -> None:
 if __name__ == "__main__":
     folders = sys.argv[1:] or [folder for folder in [os.environ.get("POSEFIT_CMU")] if folder]
     if len(folders) != 1:
-        sys.exit("usage: python -m posefit.motion.fit_library CMU_DIR")
+        sys.exit("usage: python -m posefit.motion.fit_built_in CMU_DIR")
     try:
         main(Path(folders[0]))
     except ValueError as error:
