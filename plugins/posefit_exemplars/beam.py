@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.geometry.rotation import wrapped
 from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 
 BINS = 36  # of a full turn: two states of one pose in one bin are one
@@ -24,7 +25,8 @@ class Steps:
     spread: float  # metres, root mean square over joints, that a pose may be off where its clip goes on
     turning: float  # radians that it may turn away
     jump: float  # the cost of a step to anywhere
-    straying: float  # metres that the root may be off where its clip goes on
+    straying: float  # metres that an aligned root may be off where its clip goes on
+    pace: float  # metres that a known root may be off where its clip goes on
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ def joined_beams(*beams: Beam) -> Beam:
     every = Beam(states, yaws, parents, totals, places)
     code = states * BINS + bins_of(yaws)
     order = np.lexsort((totals, code))
-    first = np.append(True, np.diff(code[order]) != 0)
+    first = np.diff(code[order], prepend=-1) != 0
     return every.chosen(order[first])
 
 
@@ -65,26 +67,53 @@ def bins_of(yaws: Array) -> Rows:
     return np.round(yaws * (BINS / (2.0 * np.pi))).astype(np.int64) % BINS
 
 
-def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps) -> Beam:
+@dataclass(frozen=True, eq=False)
+class Ahead:
+    """Where the clips of a beam's states go on, at each of the speeds."""
+
+    codes: list[Codes]  # (n, D) at a speed
+    ways: list[Array]  # (n,) what the root's way costs at a speed
+    yaws: Array  # (n,) at the clip's own speed
+    places: Array  # (n, 3) at the clip's own speed
+
+    @classmethod
+    def of(cls, exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, root: Array | None) -> "Ahead":
+        """Return where clips are so much later, and how far from `root` (3,), where it is known, they put the body."""
+        ahead = [exemplars.after(beam.states, seconds * speed) for speed in SPEEDS]
+        places = [beam.places + about_vertical(way, beam.yaws) for _, _, way in ahead]
+        ways = [np.zeros(len(beam)) for _ in SPEEDS]
+        if root is not None:
+            ways = [np.log1p(((place - root) ** 2).sum(axis=1) / (2.0 * steps.pace**2)) for place in places]
+        own = SPEEDS.index(1.0)
+        return cls([codes for codes, _, _ in ahead], ways, beam.yaws + ahead[own][1], places[own])
+
+    def costs(self, rows: Rows, codes: Codes, steps: Steps) -> Array:
+        """Return what steps from some states to poses of these codes (m, D) cost (rows, m), at the best speed."""
+        double = 2.0 * steps.spread**2
+        each = zip(self.codes, self.ways, strict=True)
+        return np.minimum.reduce([squares(code[rows], codes) / double + way[rows, None] for code, way in each])
+
+
+def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, root: Array | None = None) -> Beam:
     """Return the states that those of a beam may be in so much later, each by its cheapest step.
 
     A pose costs half the square of its distance, over the spread, from what its parent's clip did next at one of the
-    speeds; a yaw half the square of its turn away from the clip's own.
+    speeds; a yaw half the square of its turn away from the clip's own. Where the root is known to be at `root` (3,),
+    its distance d from where the clip's own way leads costs log(1 + d^2 / 2 / pace^2), which bears that somebody is
+    faster or slower than all clips: who walks goes where he faces, and sways to the side of the foot he stands on.
     """
-    ahead = [exemplars.after(beam.states, seconds * speed) for speed in SPEEDS]
-    codes, turns, ways = ahead[SPEEDS.index(1.0)]
-    facing, places = beam.yaws + turns, beam.places + about_vertical(ways, beam.yaws)
+    ahead = Ahead.of(exemplars, beam, seconds, steps, root)
+    codes, facing, places = ahead.codes[SPEEDS.index(1.0)], ahead.yaws, ahead.places
     bins = bins_of(facing)
     centres = exemplars.codes[exemplars.centres]
     near = min(NEAR, len(centres))
-    groups = np.argpartition(_squares(codes, centres), near - 1, axis=1)[:, :near]
+    groups = np.argpartition(squares(codes, centres), near - 1, axis=1)[:, :near]
     limit = beam.totals.min() + steps.jump + HOPELESS
     found: list[Beam] = []
     for one in np.unique(bins):
         rows = np.flatnonzero(bins == one)
         states = exemplars.of_groups(np.unique(groups[rows]))
-        away = np.minimum.reduce([_squares(code[rows], exemplars.codes[states]) for code, *_ in ahead])
-        costs = beam.totals[rows, None] + away / (2.0 * steps.spread**2)
+        costs = beam.totals[rows, None] + ahead.costs(rows, exemplars.codes[states], steps)
         from_row = costs.argmin(axis=0)
         least = costs[from_row, np.arange(len(states))]
         kept = np.flatnonzero(least < limit)
@@ -108,7 +137,17 @@ def jumped(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:
     )
 
 
-def _squares(some: Codes, others: Codes) -> Codes:
+def squares(some: Codes, others: Codes) -> Codes:
     """Return the squared distances (n, m) of codes."""
     squares = (some**2).sum(axis=1)[:, None] - 2.0 * (some @ others.T) + (others**2).sum(axis=1)
     return np.asarray(np.maximum(squares, 0.0))
+
+
+def between(exemplars: Exemplars, before: Beam, beam: Beam, seconds: float, steps: Steps, root: Array | None) -> Array:
+    """Return what each step from a state of one beam to one of the next costs (n, m); none costs more than a jump."""
+    ahead = Ahead.of(exemplars, before, seconds, steps, root)
+    costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)
+    costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
+    if root is None:
+        costs += squares(ahead.places, beam.places) / (2.0 * steps.straying**2)
+    return np.asarray(np.minimum(costs, steps.jump))

@@ -31,15 +31,22 @@ class Look:
         self._full = list(zip(task.cameras, observation.silhouettes, strict=True))
 
     @property
+    def root(self) -> Array | None:
+        """Where the root is known to be (3,), metres; None where nobody knows."""
+        known = self._observation.translation
+        if self._task.translation != "known" or known is None:
+            return None
+        return np.asarray(known, dtype=np.float64)
+
+    @property
     def share(self) -> float:
         """What a look at the small picture counts, beside one at the full picture."""
         return 1.0 / self.factor**2
 
     def placed(self, poses: Array, places: Array) -> Array:
         """Return where poses (n, 66) stand (n, 3): where the root is known to be, or aligned, from `places` (n, 3)."""
-        known = self._observation.translation
-        if self._task.translation == "known" and known is not None:
-            return np.repeat(np.asarray(known, dtype=np.float64)[None], len(poses), axis=0)
+        if self.root is not None:
+            return np.repeat(self.root[None], len(poses), axis=0)
         if self._task.translation == "known":
             return places
         cameras, silhouettes = zip(*self._full, strict=True)

@@ -10,9 +10,10 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit_exemplars.beam import BINS, Beam, Steps, joined_beams, jumped, stepped
+from posefit_exemplars.beam import BINS, Beam, Steps, between, joined_beams, jumped, stepped
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.look import Look
+from posefit_exemplars.window import Seen, likeliest, mean_around, seen, weights
 
 WIDTH = 400  # states that a beam keeps
 FULL = 0.6  # share of the budget that is for full-size costs
@@ -24,10 +25,10 @@ FACING = np.radians(45.0)  # how far a yaw that was told may be off, to either s
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _Waiting:
     """A frame whose pose is not told yet."""
 
-    beam: Beam
+    seen: Seen
     look: Look
     evaluations: float
     seconds: float
@@ -46,43 +47,51 @@ class ExemplarTracker:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
-        waiting: deque[_Seen] = deque()
-        latest: Beam | None = None
+        waiting: deque[_Waiting] = deque()
+        latest: Seen | None = None
         for observation in observations:
             began, begun = time.perf_counter(), time.process_time()
             look = Look(self.task, observation)
             latest, used = self._seen(look, observation, latest, rng)
             spent = time.perf_counter() - began, time.process_time() - begun
-            waiting.append(_Seen(latest, look, used, *spent))
+            waiting.append(_Waiting(latest, look, used, *spent))
             if len(waiting) > self.lag:
                 yield self._told(waiting)
         while waiting:
             yield self._told(waiting)
 
     def _seen(
-        self, look: Look, observation: Observation, before: Beam | None, rng: np.random.Generator
-    ) -> tuple[Beam, float]:
-        """Return the states of a frame, the best first and at 0, and how many evaluations they took."""
-        seconds = 1.0 / self.task.fps
-        if before is not None and not observation.usable:
-            beam = stepped(self.exemplars, before, seconds, self.steps).best(WIDTH)
-            places = look.placed(self._poses(beam), beam.places) if self.task.translation == "known" else beam.places
-            return replace(beam, totals=beam.totals - beam.totals[0], places=places), 0.0
+        self, look: Look, observation: Observation, before: Seen | None, rng: np.random.Generator
+    ) -> tuple[Seen, float]:
+        """Return what is known of a frame, and how many evaluations it took."""
+        latest, seconds, root = None if before is None else before.beam, 1.0 / self.task.fps, look.root
+        if latest is not None and not observation.usable:
+            beam = stepped(self.exemplars, latest, seconds, self.steps, root).best(WIDTH)
+            if root is not None:
+                beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
+            return self._joined(beam, np.zeros(len(beam)), before, root), 0.0
         full = int(FULL * self.task.evaluations)
         small = int((self.task.evaluations - full - 2) / look.share)
-        around = int(AROUND * small) if before is not None else 0
-        elsewhere, looked = self._elsewhere(look, before, small - around, rng)
+        around = int(AROUND * small) if latest is not None else 0
+        elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
-        if before is not None:
-            beams.append(stepped(self.exemplars, before, seconds, self.steps).best(around))
-        beam = self._at(look, joined_beams(*beams).best(around + len(elsewhere)), before is not None)
+        if latest is not None:
+            beams.append(stepped(self.exemplars, latest, seconds, self.steps, root).best(around))
+        beam = self._at(look, joined_beams(*beams).best(around + len(elsewhere)), latest is not None)
         costs = look.small(self._poses(beam), beam.places)
         used = (looked + len(beam)) * look.share
         beam = beam.chosen(np.argsort(beam.totals + costs / self.temperature, kind="stable")[:full])
-        costs = look.full(self._poses(beam), beam.places)
+        fits = look.full(self._poses(beam), beam.places) / self.temperature
         used += len(beam)
-        beam = replace(beam, totals=beam.totals + costs / self.temperature).best(WIDTH)
-        return replace(beam, totals=beam.totals - beam.totals[0]), used
+        best = np.argsort(beam.totals + fits, kind="stable")[:WIDTH]
+        return self._joined(beam.chosen(best), fits[best], before, root), used
+
+    def _joined(self, beam: Beam, fits: Array, before: Seen | None, root: Array | None) -> Seen:
+        """Return a frame, joined to the one before."""
+        if before is None:
+            return seen(beam, fits, None, None)
+        costs = between(self.exemplars, before.beam, beam, 1.0 / self.task.fps, self.steps, root)
+        return seen(beam, fits, before, costs)
 
     def _elsewhere(self, look: Look, before: Beam | None, most: int, rng: np.random.Generator) -> tuple[Beam, int]:
         """Return states that fit, wherever they are; and how many small pictures were looked at."""
@@ -125,14 +134,13 @@ class ExemplarTracker:
         off = ((places - beam.places) ** 2).sum(axis=1)
         return replace(beam, places=places, totals=beam.totals + 0.5 * off / self.steps.straying**2)
 
-    def _told(self, waiting: "deque[_Seen]") -> Frame:
-        """Return the oldest frame that waits, on the best way to the newest."""
-        row = int(waiting[-1].beam.totals.argmin())
-        for seen in list(waiting)[:0:-1]:
-            row = int(seen.beam.parents[row])
-        oldest = waiting.popleft()
+    def _told(self, waiting: deque[_Waiting]) -> Frame:
+        """Return the oldest frame that waits: the mean of what is likely about the best way to the newest."""
         began = time.perf_counter()
-        pose, place = self._poses(oldest.beam.chosen(np.array([row])))[0], oldest.beam.places[row]
+        window = [one.seen for one in waiting]
+        row, found, oldest = likeliest(window), weights(window), waiting.popleft()
+        beam = oldest.seen.beam
+        pose, place = mean_around(row, found, self.exemplars.codes[beam.states], self._poses(beam), beam.places)
         cost, areas = oldest.look.measured(pose, place)
         return Frame(
             pose,
@@ -150,10 +158,11 @@ def exemplars(
     task: Task,
     *,
     spread: float = 0.03,
-    turning_degrees: float = 8.0,
+    turning_degrees: float = 4.0,
     jump: float = 12.0,
     temperature: float = 2.0,
     straying: float = 0.05,
+    pace: float = 0.008,
     lag: int = 15,
 ) -> ExemplarTracker:
     """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
@@ -163,7 +172,8 @@ def exemplars(
         turning_degrees: how far a body may turn away from its clip in a frame; above 0.
         jump: what a step to any other pose costs, in units of cost over the temperature; 0 or more.
         temperature: what silhouette costs are divided by; above 0. Costs of frames err together, so more than 1.
-        straying: metres that a root nobody knows may be off where its clip goes on; above 0.
+        straying: metres that a root that is aligned may be off where its clip goes on; above 0.
+        pace: metres that a root that is known may be off where its clip goes on; above 0.
         lag: frames that are seen before a pose is told, 0 or more.
     """
     for name, value in (
@@ -171,6 +181,7 @@ def exemplars(
         ("turning_degrees", turning_degrees),
         ("temperature", temperature),
         ("straying", straying),
+        ("pace", pace),
     ):
         if not value > 0.0:
             raise ValueError(f"{name} must be above 0, got {value}")
@@ -178,5 +189,8 @@ def exemplars(
         raise ValueError(f"jump must be 0 or more, got {jump}")
     if lag < 0:
         raise ValueError(f"lag must be 0 or more, got {lag}")
-    steps = Steps(spread, math.radians(turning_degrees), jump, straying)
+    intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
+    temperature /= intervals
+    slack = math.sqrt(intervals)
+    steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, pace * intervals)
     return ExemplarTracker(task, Exemplars.of(task.training, task.body.skeleton), steps, temperature, lag)
