@@ -123,7 +123,7 @@ def cell_scene(cell: Cell) -> "Scene":
     """Return what is seen in a cell; the same for all methods and seeds."""
     from posefit.footage.instance import motion_of_instance, variation
     from posefit.footage.scene import synthetic
-    from posefit.tracking.synthetic import Spoilt
+    from posefit.footage.spoilt import Spoilt
 
     motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
     scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
