@@ -2,8 +2,8 @@
 
 A silhouette shows neither which leg is in front nor how deep anything is. A search that has settled on the wrong one of
 two such poses stays there, as each next frame continues the last; so whatever follows a person may want to try the
-other one, too. These are plain functions of poses (n, 66), whose roots stay where they are; each undoes itself. Bones of
-the two sides are seldom equally long, and silhouettes are as much alike as the sides are.
+other one, too. These are plain functions of poses (n, 66), whose roots stay where they are; each undoes itself. Bones
+of the two sides are seldom equally long, and silhouettes are as much alike as the sides are.
 """
 
 from collections.abc import Sequence
