@@ -232,6 +232,36 @@ MUTANTS = (
         (("0.5 if _HANGS[joint, j] else 0.0", "0.5 if _HANGS[pivot, j] else 0.0"),),
         "tests/sources/test_vsmm_steps.py::test_the_points_are_projected_and_their_jacobian_is_right",
     ),
+    Mutant(
+        "of several tracks the one is kept that costs most",
+        "posefit/tracking/run.py",
+        (("kept = min(range(len(costs))", "kept = max(range(len(costs))"),),
+        "tests/tracking/test_tracks.py::test_the_evaluations_of_all_tracks_are_counted[method0]",
+    ),
+    Mutant(
+        "evaluations of tracks that are not kept are not counted",
+        "posefit/tracking/tracks.py",
+        (("sum(one.evaluations for one in together)", "frame.evaluations"),),
+        "tests/tracking/test_tracks.py::test_the_evaluations_of_all_tracks_are_counted[method0]",
+    ),
+    Mutant(
+        "a whole cost has the motion of frames that were held",
+        "posefit/tracking/tracks.py",
+        (("changes[followed]", "changes"),),
+        "tests/tracking/test_tracks.py::test_frames_that_were_held_count_for_nothing",
+    ),
+    Mutant(
+        "a beginning contradicts where somebody is known to face",
+        "posefit/tracking/tracks.py",
+        (("name == ANEW or not _contradicts(poses[name], known)", "True"),),
+        "tests/tracking/test_tracks.py::test_what_is_known_is_not_contradicted",
+    ),
+    Mutant(
+        "a mirrored body leans the way it leaned",
+        "posefit/geometry/alike.py",
+        (("exchanged[:, 2] *= -1.0", "exchanged[:, 2] *= 1.0"),),
+        "tests/geometry/test_alike.py::test_mirrored_joints_are_those_of_the_other_side_across_the_plane_that_is_faced_along",
+    ),
 )
 
 

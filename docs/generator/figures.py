@@ -16,7 +16,12 @@ ASKED = {
     "method": ("", "the optimiser and the prior, or the tracker"),
     "seed": ("", "the seed that everything random follows from"),
     "frames": ("frames", "how many frames were followed"),
-    "evaluations_per_frame": ("", "budget of a frame"),
+    "evaluations_per_frame": ("", "budget of a frame, in each track"),
+    "tracks": (
+        "",
+        "of each of several [tracks](../howto/tracks.md): its `beginning`, silhouette `cost` and pull of `motion`, and "
+        "whether it was `kept`; empty where there was one",
+    ),
     "version": ("", "the version of posefit"),
     "train": ("", "names of the motions that the prior learned from"),
     "view_degrees": ("degrees", "where the cameras were told to stand; null where nobody said"),
@@ -56,9 +61,10 @@ CELL = {
     "frames": ("frames", "length of the sequence"),
     "fps": ("1/s", "frames a second"),
     "size": ("pixels", "width and height of the masks"),
-    "evaluations": ("", "budget of a frame"),
+    "evaluations": ("", "budget of a frame, in each track"),
     "translation": ("", "how the root's place is found: known, searched or aligned"),
     "first_pose": ("", "how the first pose is found: searched, or given"),
+    "tracks": ("", "how many tracks from different beginnings one was chosen of"),
     "seed": ("", "the seed of the method"),
 }
 HEAD = "| {0} | unit | meaning |\n|---|---|---|"

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from posefit.footage.spoilt import Spoilt
 from posefit.geometry.body import varied
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit.tracking.method import Choice, prepare
-from posefit.tracking.synthetic import Spoilt
 from posefit_experiments.columns import head_of, labelled, number
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.known import follow_known, known_errors, known_scene, known_task, mean_pose_degrees

@@ -81,6 +81,7 @@ TRACK = (
     click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
     click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks."),
     *EXTRACTION,
+    click.option("--tracks", type=int, default=1, show_default=True, help="Tracks of other beginnings; one is kept."),
     click.option("--seed", type=int, default=0, show_default=True),
     click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),
     click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),

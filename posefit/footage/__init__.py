@@ -10,6 +10,7 @@
 |---|---|
 | what a user names becomes a scene: motions, masks, videos; how it is looked at | source.py |
 | what a scene is; a known motion rendered; masks whose truth nobody knows | scene.py |
+| observations that are spoilt on purpose | spoilt.py |
 | several cameras: calibrations, lens distortion, which camera saw what | cameras.py |
 | masks read when their turn comes; those of an .npz file; pictures of strangers | masks.py, stacks.py, images.py |
 | video, read and written frame by frame | video.py |

@@ -12,22 +12,22 @@ from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import COLUMNS, FIGURES
 from posefit.report.repeat import LAST, command_head
-from posefit.sweep.cell import settings_text
+from posefit.sweep.cell import LATER, settings_text
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
-_VARIANT = ("method", "settings", "evaluations", "version")  # what a method is
+_VARIANT = ("method", "settings", "evaluations", "tracks", "version")  # what a method is
 _PLACE = ("motion", "view_degrees", "corruption", "instance")  # what is always said of an instance
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """All rows. Methods are told apart by settings, budget and version, instances by everything else but the seed."""
+    """All rows. Methods are told apart by settings, budget, tracks and version, instances by all else but the seed."""
 
     version: str
     methods: tuple[str, ...]  # named so that no two are alike, the lowest mean error first
-    variants: tuple[dict[str, Any], ...]  # of each method: method, settings, evaluations, version
+    variants: tuple[dict[str, Any], ...]  # of each method: method, settings, evaluations, tracks, version
     instances: tuple[str, ...]  # so named too
     places: tuple[dict[str, Any], ...]  # of each instance: the fields of a spec that make it
     heads: tuple[str, ...]  # what commands that run rows again begin with
@@ -151,7 +151,7 @@ def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _variant(spec: Mapping[str, Any]) -> str:
-    return _text({name: spec[name] for name in _VARIANT})
+    return _text({name: value for name, value in {**LATER, **spec}.items() if name in _VARIANT})
 
 
 def _variation(variant: Mapping[str, Any]) -> list[str]:
@@ -159,6 +159,7 @@ def _variation(variant: Mapping[str, Any]) -> list[str]:
     return [
         *settings_text(variant["settings"]),
         f"{variant['evaluations']} evaluations",
+        f"{variant['tracks']} {'track' if variant['tracks'] == 1 else 'tracks'}",
         *([foreign] if foreign else []),
     ]
 

@@ -132,7 +132,7 @@ def _write_iohprofiler(ledger: Ledger, path: str) -> None:
             damage = "".join(f" {kind} {share:g}" for kind, share in sorted(spec["corruption"].items()))
             yield LoggedRun(
                 spec["method"],
-                {**spec["settings"], "evaluations": spec["evaluations"], "version": spec["version"]},
+                {**spec["settings"], **{one: spec[one] for one in ("evaluations", "tracks", "version") if one in spec}},
                 f"{spec['motion']} view {views}{damage} frames {spec['frames']} {spec['translation']}",
                 ANGLES if spec["translation"] == "known" else ANGLES + 3,  # of the pose, whatever a method searches
                 spec["instance"],

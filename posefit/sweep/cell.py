@@ -33,8 +33,8 @@ class Cell:
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
     numbers what is seen of the motion, see `posefit.footage.instance`. `corruption` gives kinds of
     `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames that are not seen; what is
-    spoilt follows from the instance, so that every method and seed sees the same. `files` holds the SHA-256 of every
-    capture file that is read.
+    spoilt follows from the instance, so that every method and seed sees the same. `tracks` is how many times the motion
+    is followed, see `posefit.tracking.tracks`. `files` holds the SHA-256 of every capture file that is read.
     """
 
     method: str
@@ -50,20 +50,22 @@ class Cell:
     evaluations: int = 2440
     translation: str = "known"
     first_pose: str = "searched"
+    tracks: int = 1
     seed: int = 0
     files: Mapping[str, str] = field(default_factory=dict)
     version: str = __version__  # of posefit, and of plugins that are not its own
 
     @cached_property
     def spec(self) -> dict[str, Any]:
-        """The cell as JSON holds it."""
-        spec: dict[str, Any] = json.loads(json.dumps({name: getattr(self, name) for name in FIELDS}))
+        """The cell as JSON holds it, without fields of `LATER` that say nothing new."""
+        told = {name: value for name in FIELDS if says(name, value := getattr(self, name))}
+        spec: dict[str, Any] = json.loads(json.dumps(told))
         return spec
 
     @cached_property
     def key(self) -> str:
         """The cell's name: the SHA-256 of its spec, version included, as 64 hexadecimal digits."""
-        return hashlib.sha256(json_of({name: getattr(self, name) for name in NAMES}).encode()).hexdigest()
+        return hashlib.sha256(json_of(self.spec).encode()).hexdigest()
 
     def __str__(self) -> str:
         return f"{self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
@@ -71,6 +73,13 @@ class Cell:
 
 FIELDS = tuple(one.name for one in fields(Cell))
 NAMES = tuple(sorted(FIELDS))  # in which order a key is of them
+# Fields that came after ledgers had been kept, and what a spec means that does not say them: keys stay as they were.
+LATER = {"tracks": 1}
+
+
+def says(name: str, value: Any) -> bool:
+    """Return whether a field has to be told, in a spec and for its key."""
+    return name not in LATER or value != LATER[name]
 
 
 @dataclass(frozen=True)
@@ -98,7 +107,7 @@ def run_cell(cell: Cell) -> CellResult:
             raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
     scene = cell_scene(cell)
     training = [clip(scene.fps) for clip in training_clips(cell.train)]
-    result = follow(scene, training, choice=_choice(cell), opening=_opening(cell), seed=cell.seed)
+    result = follow(scene, training, choice=_choice(cell), opening=_opening(cell), seed=cell.seed, tracks=cell.tracks)
     truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
     errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
     row = {
@@ -123,7 +132,7 @@ def cell_scene(cell: Cell) -> "Scene":
     """Return what is seen in a cell; the same for all methods and seeds."""
     from posefit.footage.instance import motion_of_instance, variation
     from posefit.footage.scene import synthetic
-    from posefit.tracking.synthetic import Spoilt
+    from posefit.footage.spoilt import Spoilt
 
     motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
     scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))

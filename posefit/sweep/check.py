@@ -267,5 +267,6 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "evaluations": _whole(1),
     "translation": _one_of(*TRANSLATIONS),
     "first_pose": _one_of("searched", "given"),
+    "tracks": _whole(1),
     "seed": _whole(0),
 }

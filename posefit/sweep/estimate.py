@@ -68,7 +68,7 @@ def estimate_of(amounts: Amounts, engine: Engine, workers: int) -> Estimate:
 
 def _kind(cell: Cell) -> Kind:
     """Return what the time of a frame depends on."""
-    return cell.method, str(cell.settings), cell.size, len(cell.view_degrees), bool(cell.corruption)
+    return cell.method, str(cell.settings), cell.tracks, cell.size, len(cell.view_degrees), bool(cell.corruption)
 
 
 def _tried(cell: Cell) -> list[Cell]:

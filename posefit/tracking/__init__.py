@@ -19,6 +19,7 @@
 | `posefit.track` and `posefit.fit`, every option a keyword | front.py |
 | a scene is followed: the order of what happens | run.py |
 | names become an optimiser, a prior or a tracker, with settings checked and a budget | method.py |
+| several tracks from different beginnings, and which one to keep | tracks.py |
 | the first pose, searched from several starts; the person's build | opening.py |
 | errors and baselines of a track, frame by frame | evaluation.py |
 | what every figure is called, its unit and meaning | measures.py |

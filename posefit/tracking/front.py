@@ -69,6 +69,7 @@ def track(
     height: float | None = None,
     extraction: Extraction | None = None,
     up: Up | None = None,
+    tracks: int = 1,
     seed: int = 0,
     threads: int = 1,
     ask_seconds: float | None = None,
@@ -94,8 +95,10 @@ def track(
 
     Where the truth is known the prior is `pca`. Where it is not it is `loose`, the first frame is searched `restarts`
     times (8), and the person's build is fitted to `body_frames` (30; none where an .asf is given), as tall as `height`
-    says. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
-    calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video.
+    says. With several `tracks` the person is followed so many times from different beginnings, each at the full budget,
+    and the track is kept whose whole cost is least. `view_degrees` gives where the camera stands, several of them
+    several cameras; `camera` is a camera or a calibration, one a view, in whose world `up` points up; `extraction` is
+    how masks are taken from video.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at
     all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
@@ -108,6 +111,7 @@ def track(
         evaluations=evaluations,
         restarts=restarts,
         body_frames=body_frames,
+        tracks=tracks,
         seed=seed,
         threads=threads,
         ask_seconds=ask_seconds,
@@ -162,7 +166,9 @@ def track(
     listener = Listener(say or QUIET.say, progress or QUIET.progress)
     folder: AbstractContextManager[Nowhere | OutputFolder] = Nowhere()
     if out is not None:
-        folder = OutputFolder(out, force, resume, _told(sources, train, viewing, choice, opening, seed), listener.say)
+        folder = OutputFolder(
+            out, force, resume, _told(sources, train, viewing, choice, opening, tracks, seed), listener.say
+        )
     with folder as output:
         scene = source if isinstance(source, Scene) else scene_of(sources, viewing, output.work, listener)
         result = follow(
@@ -179,6 +185,7 @@ def track(
                 "frames_chosen": list(frames),
                 "view_degrees": view_degrees,
             },
+            tracks=tracks,
         )
         if rerun is not None:
             from posefit.tracking.recording import record
@@ -249,10 +256,16 @@ def _training(sources: Sequence[Source], train: Sequence[Source]) -> Sequence[So
 
 
 def _told(
-    sources: Sequence[Source], train: Sequence[Source], viewing: Viewing, choice: Choice, opening: Opening, seed: int
+    sources: Sequence[Source],
+    train: Sequence[Source],
+    viewing: Viewing,
+    choice: Choice,
+    opening: Opening,
+    tracks: int,
+    seed: int,
 ) -> dict[str, Told]:
     """Return what a track has to have in common with one that it goes on with."""
-    told: dict[str, Any] = {"source": sources, "train": train, "seed": seed, "version": __version__}
+    told: dict[str, Any] = {"source": sources, "train": train, "tracks": tracks, "seed": seed, "version": __version__}
     for group in (viewing, choice, opening):
         told |= {one.name: getattr(group, one.name) for one in fields(group)}
     if kind_of(sources[0]) == "motion" and sources[0] in built_in.names():

@@ -17,6 +17,16 @@ from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, opened, task_of
 from posefit.tracking.outputs import Nowhere, Output
+from posefit.tracking.tracks import (
+    SEARCHED,
+    Known,
+    beginning,
+    first_seen,
+    generator,
+    spent_by_all,
+    usual_speed,
+    whole_cost,
+)
 from posefit.version import __version__
 
 
@@ -43,15 +53,19 @@ def follow(
     output: Output | None = None,
     listener: Listener = QUIET,
     source: Mapping[str, Any] | None = None,
+    tracks: int = 1,
 ) -> Track:
     """Return a scene's motion followed by a method that learns from `training`, with what it is worth.
 
-    `output` gets every frame as it comes and everything at the end; `source` is what the summary says of where the
-    scene is from. Raises ValueError where something does not fit.
+    With several `tracks`, each from another beginning and at the full budget, the one is kept whose whole cost is
+    least; evaluations and times are those of all. `output` gets every frame as it comes and everything at the end;
+    `source` is what the summary says of where the scene is from. Raises ValueError where something does not fit.
     """
     choice, opening = choice or Choice(), opening or Opening()
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
+    if tracks < 1:
+        raise ValueError(f"tracks must be at least 1, got {tracks}")
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         for warning in scene.warnings:
             listener.say(f"warning: {warning}")
@@ -61,7 +75,10 @@ def follow(
         scene = replace(scene, body=task.body)
         method.audit.forget()  # what was tried before the first frame is in no row
         output = output or Nowhere()
-        found = _found(scene, method, task, output, seed, listener)
+        known = Known(scene.yaw, opening.first_pose == "given")
+        usable = [observation.usable for observation in scene.observations] if tracks > 1 else []
+        each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
+        found, told = _kept(scene, each, usable, training)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
         for warning in method.audit.warnings:
             listener.say(f"warning: {warning}")
@@ -84,6 +101,7 @@ def follow(
             **measures.as_dict(),
             **({"history": found[0].history.tolist()} if len(found) == 1 else {}),
             "evaluations_per_frame": task.evaluations,
+            "tracks": told,
             "version": __version__,
             "train": [motion.name for motion in training],
             "translation": task.translation,
@@ -100,21 +118,60 @@ def follow(
     return Track(estimate, scene.truth, measures, rows, summary, found)
 
 
-def _found(scene: Scene, method: Method, task: Task, output: Output, seed: int, listener: Listener) -> list[Frame]:
-    """Return what is found in all frames, each recorded as it comes; those that were found before stay as they are."""
-    found, state = output.earlier()
-    rng = np.random.default_rng(seed)
-    if state is not None:
-        rng.bit_generator.state = state
-        listener.say(f"going on from frame {len(found)} of {scene.count}")
-        last = found[-1]
-        task = replace(task, yaw=float(last.pose[0]), first_pose=last.pose[3:], before=tuple(found))
-    rest = (scene.observations[k] for k in range(len(found), scene.count))
-    results = method.tracker(task).track(rest, rng) if len(found) < scene.count else iter(())
-    for frame in listener.progress(results, scene.count - len(found)):
-        output.record(frame, dict(rng.bit_generator.state))
-        found.append(frame)
+def _found(
+    scene: Scene,
+    method: Method,
+    task: Task,
+    known: Known,
+    output: Output,
+    seed: int,
+    tracks: int,
+    usable: Sequence[bool],
+    listener: Listener,
+) -> list[tuple[str, list[Frame]]]:
+    """Return how each track was begun, and what it found in all frames.
+
+    Every frame is recorded as it comes, track after track; those that were found before stay as they are.
+    """
+    earlier, state = output.earlier()
+    found: list[tuple[str, list[Frame]]] = []
+    for number in range(tracks):
+        begun, mine = SEARCHED, task
+        if number:
+            begun, mine = beginning(number, task, known, first_seen(found[0][1], usable))
+        frames = list(earlier[number * scene.count : (number + 1) * scene.count])
+        rng = generator(seed, number)
+        which = f" of track {number + 1} of {tracks}, {begun}" if tracks > 1 else ""
+        if state is not None and 0 < len(frames) < scene.count:
+            rng.bit_generator.state = state
+            listener.say(f"going on from frame {len(frames)} of {scene.count}{which}")
+            last = frames[-1]
+            mine = replace(mine, yaw=float(last.pose[0]), first_pose=last.pose[3:], before=tuple(frames))
+        elif which and not frames:
+            listener.say(f"track {number + 1} of {tracks}: {begun}")
+        found.append((begun, frames))
+        if len(frames) < scene.count:
+            rest = (scene.observations[k] for k in range(len(frames), scene.count))
+            for frame in listener.progress(method.tracker(mine).track(rest, rng), scene.count - len(frames)):
+                output.record(frame, dict(rng.bit_generator.state))
+                frames.append(frame)
     return found
+
+
+def _kept(
+    scene: Scene, found: Sequence[tuple[str, list[Frame]]], usable: Sequence[bool], training: Sequence[Motion]
+) -> tuple[list[Frame], list[dict[str, Any]]]:
+    """Return the frames of the track whose whole cost is least, and of several tracks what the summary says of each."""
+    if len(found) == 1:
+        return found[0][1], []
+    usual = usual_speed(training)
+    costs = [whole_cost(frames, usable, scene.body.skeleton, scene.fps, usual) for _, frames in found]
+    kept = min(range(len(costs)), key=lambda k: costs[k].total)
+    told = [
+        {"beginning": begun, "cost": whole.cost, "motion": whole.motion, "kept": k == kept}
+        for k, ((begun, _), whole) in enumerate(zip(found, costs, strict=True))
+    ]
+    return spent_by_all([frames for _, frames in found], kept), told
 
 
 def _described(shape: Shape) -> dict[str, Any]:

@@ -50,9 +50,11 @@ def table(summary: Mapping[str, Any]) -> str:
         lines.append(
             "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
         )
-    used = summary["evaluations"] / summary["frames"]
+    used, tracks = summary["evaluations"] / summary["frames"], summary["tracks"]
+    lines += [_chosen(tracks)] if tracks else []
+    budget = summary["evaluations_per_frame"] * max(len(tracks), 1)
     lines.append(
-        f"{_shown(summary, 'iou')}, {used:,.0f} of {summary['evaluations_per_frame']:,} evaluations and "
+        f"{_shown(summary, 'iou')}, {used:,.0f} of {budget:,} evaluations and "
         f"{MEASURES['seconds_per_frame'].number(summary['seconds_per_frame'])} ms a frame, "
         f"{MEASURES['evaluations_per_second'].number(summary['evaluations_per_second'])} poses a second"
     )
@@ -61,6 +63,13 @@ def table(summary: Mapping[str, Any]) -> str:
 
 def _shown(summary: Mapping[str, Any], name: str) -> str:
     return MEASURES[name].shown(summary[name])
+
+
+def _chosen(tracks: Sequence[Mapping[str, Any]]) -> str:
+    """Return which of several tracks was kept, and what each costs as a whole."""
+    kept = next(k for k, one in enumerate(tracks) if one["kept"])
+    costs = [f"{one['beginning']} {one['cost'] + one['motion']:.2f}" for one in tracks]
+    return f"kept track {kept + 1} of {len(tracks)}; whole cost by beginning: {', '.join(costs)}"
 
 
 def _training(names: Sequence[str]) -> str:

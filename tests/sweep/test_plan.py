@@ -1,5 +1,6 @@
 """A plan is checked as a whole, before anything runs; a mistake in it is one line."""
 
+import hashlib
 import json
 import tracemalloc
 from dataclasses import replace
@@ -16,9 +17,10 @@ from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.registry import Offer, Registry
 from posefit.sweep import check
-from posefit.sweep.cell import Cell, anytime_trace, cell_scene, digest_of, run_cell
+from posefit.sweep.cell import Cell, anytime_trace, cell_scene, digest_of, json_of, run_cell
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
+from posefit.sweep.table import flat
 from posefit.tracking import method
 from tests.effort import effort
 from tests.testing.planted import Holds
@@ -157,6 +159,25 @@ def test_a_key_follows_from_the_spec_and_the_version_alone() -> None:
     assert Cell("sapso@pca", "walk", ("walk-a",), seed=1, version="0.0.9").key != one.key
 
 
+def test_one_track_is_not_told_so_that_keys_of_earlier_ledgers_are_found_again() -> None:
+    cell = cell_of({"method": "random@pca", "motion": "walk"})
+    before = {name: value for name, value in vars(replace(cell)).items() if name != "tracks"}
+    assert cell.key == hashlib.sha256(json_of(before).encode()).hexdigest()
+    assert "tracks" not in cell.spec
+    assert flat({"key": cell.key, "spec": cell.spec, "status": "done"})["tracks"] == 1
+    several = cell_of({"method": "random@pca", "motion": "walk", "tracks": 2})
+    assert several.key != cell.key
+    assert several.spec == {**cell.spec, "tracks": 2}
+
+
+def test_a_cell_follows_so_many_tracks() -> None:
+    spec = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
+    one, three = (run_cell(cell_of({**spec, "tracks": tracks})).row for tracks in (1, 3))
+    assert three["evaluations_used"] == 3 * one["evaluations_used"] == 3 * 2 * 80
+    assert three["trace"]["evaluations"][-1] == 3 * one["trace"]["evaluations"][-1]
+    assert three["spec"]["tracks"] == 3
+
+
 def test_a_cell_is_restored_from_its_rows_spec() -> None:
     spec = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
     (cell,) = Plan.of({"cells": [{**spec, "corruption": {"holes": 0.5}, "settings": {"pca.components": 4}}]})
@@ -272,17 +293,17 @@ def test_a_product_gives_the_cells_and_keys_that_its_specs_give_one_by_one() -> 
         ],
         "corruptions": [{}, {"dropped": 0.5, "holes": 0.25}],
         "motions": ["walk", {"motion": "run", "train": ["walk-a"], "size": [80, 60]}],
-        "views": [45, [0, 90.5]],
+        "views": [45, [0, 90.5], {"view_degrees": 90, "tracks": 3}, {"view_degrees": 91, "tracks": 1}],
         "instances": 2,
     }
-    defaults = {"frames": 5, "translation": "searched", "settings": {"sapso.cooling": 0.9}}
+    defaults = {"frames": 5, "tracks": 2, "translation": "searched", "settings": {"sapso.cooling": 0.9}}
     plan = Plan.of({"defaults": defaults, "product": lists})
     expected = []
     for seed, chosen, damage, motion, view, instance in product(
         lists["seeds"], lists["methods"], lists["corruptions"], lists["motions"], lists["views"], range(2)
     ):
-        spec: dict[str, Any] = {"frames": 5, "translation": "searched", "seed": seed, "instance": instance}
-        spec |= {"corruption": damage, "view_degrees": view}
+        spec: dict[str, Any] = {"frames": 5, "tracks": 2, "translation": "searched", "seed": seed, "instance": instance}
+        spec |= {"corruption": damage, **(view if isinstance(view, dict) else {"view_degrees": view})}
         spec |= chosen if isinstance(chosen, dict) else {"method": chosen, "settings": {"sapso.cooling": 0.9}}
         spec |= motion if isinstance(motion, dict) else {"motion": motion}
         expected.append(cell_of(spec))

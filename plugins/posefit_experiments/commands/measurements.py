@@ -16,6 +16,7 @@ bar = partial(progress, unit="run")
 @click.command("accuracy")
 @CLIPS
 @click.option("--optimiser", default="sapso", show_default=True, help="See `posefit plugins`.")
+@click.option("--tracks", type=int, default=1, show_default=True, help="Beginnings of each track; one is kept.")
 @seeds(5)
 @workers(None)
 @LEDGER

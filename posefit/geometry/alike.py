@@ -1,0 +1,94 @@
+"""Poses that a silhouette hardly tells from a given one: left and right exchanged, turned, reflected.
+
+A silhouette shows neither which leg is in front nor how deep anything is. A search that has settled on the wrong one of
+two such poses stays there, as each next frame continues the last; so whatever follows a person may want to try the
+other one, too. These are plain functions of poses (n, 66), whose roots stay where they are; each undoes itself. Bones
+of the two sides are seldom equally long, and silhouettes are as much alike as the sides are.
+"""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.camera import Camera
+from posefit.geometry.limbs import LIMBS
+from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles, wrapped
+from posefit.geometry.skeleton import INNER, JOINTS, MIRROR, Skeleton, angle_index
+
+Limbs = Literal["legs", "arms"]
+
+_LEFT_RIGHT = np.diag([-1.0, 1.0, 1.0])  # of a body at rest, whose left is at +x
+_BONES: dict[Limbs, tuple[str, ...]] = {
+    "legs": (*LIMBS["left leg"], *LIMBS["right leg"]),
+    "arms": (*LIMBS["left arm"], *LIMBS["right arm"]),
+}
+
+
+def mirrored(skeleton: Skeleton, poses: Array) -> Array:
+    """Return poses (n, 66) whose left and right are exchanged: a stride becomes the one half a cycle later.
+
+    The body is reflected in the upright plane that it faces along, and each side takes the name of the other. Seen
+    exactly from its side that leaves the silhouette as it is, as the camera looks across that plane and depth does not
+    show; the farther the camera stands from the side, the more it shows.
+    """
+    exchanged = _exchanged(skeleton, poses, JOINTS)
+    exchanged[:, 2] *= -1.0  # a lean to the left is one to the right
+    return exchanged
+
+
+def turned(poses: Array) -> Array:
+    """Return poses (n, 66) that face the other way, their joints as they are.
+
+    From in front, and from behind, an upright body that stands still shows the same outline; one that walks, only
+    about the same, with left and right on the other side. From its side knees and feet point the wrong way.
+    """
+    poses = np.array(poses, dtype=np.float64)
+    poses[:, 0] = wrapped(poses[:, 0] + np.pi)
+    return poses
+
+
+def reflected(skeleton: Skeleton, poses: Array, towards: float) -> Array:
+    """Return poses (n, 66) reflected along the line of sight: who comes goes, who faces across stays as he faces.
+
+    `towards` is the yaw in radians of somebody who faces the camera, see `facing`. What is near and what is far trade
+    places, and so left and right do: a turn of 30 degrees out of the picture becomes one into it. Whatever the pose,
+    and from whatever side, a level camera far away sees the same silhouette. From the side it is `mirrored`, and from
+    in front it is `turned` with left and right exchanged.
+    """
+    reflected = mirrored(skeleton, poses)
+    reflected[:, 0] = wrapped(2.0 * towards + np.pi - reflected[:, 0])
+    return reflected
+
+
+def exchanged(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
+    """Return poses (n, 66) whose two `legs`, or two `arms`, have each the other's angles, mirrored.
+
+    The trunk and the other limbs stay. Seen from the side, the near and the far limb of a pair lie on each other or
+    cross, and the silhouette is nearly the same whichever of them is in front.
+    """
+    if limbs not in _BONES:
+        raise ValueError(f"limbs must be one of {', '.join(_BONES)}, got {limbs!r}")
+    return _exchanged(skeleton, poses, _BONES[limbs])
+
+
+def facing(camera: Camera, place: Array) -> float:
+    """Return the yaw in radians of somebody who stands at a place (3,) and faces a camera."""
+    way = camera.position - np.asarray(place)
+    return float(np.arctan2(way[0], way[2]))
+
+
+def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
+    """Return poses (n, 66) in which the joints of some names have the angles of their counterparts, mirrored."""
+    poses = np.asarray(poses, dtype=np.float64)
+    found = poses.copy()
+    for j in (j for j in INNER if JOINTS[j] in names):
+        mine, theirs = (slice(k, k + 3) for k in (angle_index(j), angle_index(MIRROR[j])))
+        # this bone's rest frame from the reflected one of its counterpart
+        frame = skeleton.axes[j - 1].T @ _LEFT_RIGHT @ skeleton.axes[MIRROR[j] - 1]
+        if np.allclose(frame, _LEFT_RIGHT):  # which keeps angles of more than half a turn as they are
+            found[:, mine] = poses[:, theirs] * [1.0, -1.0, -1.0]
+        else:
+            found[:, mine] = joint_angles_from_rotation(frame @ rotation_from_joint_angles(poses[:, theirs]) @ frame.T)
+    return found

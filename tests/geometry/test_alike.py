@@ -1,0 +1,146 @@
+"""Poses that look alike in a silhouette: what each operator does to joints, and how much of the outline it keeps."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit.geometry.alike import exchanged, facing, mirrored, reflected, turned
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.limbs import LIMBS
+from posefit.geometry.rotation import rotation_from_root_angles
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, MIRROR, Skeleton, angle_index
+from posefit.motion import built_in
+from posefit.silhouette.cost import project
+
+WALK = built_in.motion("walk", frames=30)
+SKELETON = WALK.skeleton  # symmetric
+TOWARDS = 0.4  # radians
+
+Operator = Callable[[Skeleton, Array], Array]
+OPERATORS: dict[str, Operator] = {
+    "mirrored": mirrored,
+    "turned": lambda _, poses: turned(poses),
+    "reflected": lambda skeleton, poses: reflected(skeleton, poses, TOWARDS),
+    "legs": lambda skeleton, poses: exchanged(skeleton, poses, "legs"),
+    "arms": lambda skeleton, poses: exchanged(skeleton, poses, "arms"),
+}
+
+
+def drawn(count: int = 20) -> Array:
+    """Return poses of a body that leans and turns every way, free of what the motions of a walk have in common."""
+    rng = np.random.default_rng(3)
+    poses = np.zeros((count, ANGLES))
+    poses[:, :3] = rng.uniform(-1.2, 1.2, (count, 3)) * [2.5, 1.0, 1.0]
+    for j in INNER:
+        if JOINTS[j] not in ("lhipjoint", "rhipjoint"):
+            poses[:, angle_index(j) : angle_index(j) + 3] = rng.uniform(-1.2, 1.2, (count, 3))
+    return poses
+
+
+def lopsided() -> Skeleton:
+    """Return a skeleton whose rest frames are no mirror images, as nothing makes a .bvh or .asf file have them."""
+    turn = rotation_from_root_angles(np.random.default_rng(1).uniform(-1.0, 1.0, (26, 3)))
+    return Skeleton("lopsided", SKELETON.offsets, turn @ SKELETON.axes, SKELETON.channels)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+@pytest.mark.parametrize("skeleton", [SKELETON, lopsided()], ids=["symmetric", "lopsided"])
+def test_twice_is_as_before(name: str, skeleton: Skeleton) -> None:
+    poses = drawn()
+    twice = OPERATORS[name](skeleton, OPERATORS[name](skeleton, poses))
+    np.testing.assert_allclose(skeleton.joints(twice), skeleton.joints(poses), atol=1e-9)
+    assert not np.allclose(skeleton.joints(OPERATORS[name](skeleton, poses)), skeleton.joints(poses), atol=0.05)
+
+
+def test_what_is_given_stays_as_it_is() -> None:
+    poses = drawn()
+    poses.setflags(write=False)
+    for operator in OPERATORS.values():
+        operator(SKELETON, poses)
+
+
+@pytest.mark.parametrize("skeleton", [SKELETON, lopsided()], ids=["symmetric", "lopsided"])
+def test_mirrored_joints_are_those_of_the_other_side_across_the_plane_that_is_faced_along(skeleton: Skeleton) -> None:
+    poses = drawn()
+    across = np.stack([np.cos(poses[:, 0]), np.zeros(len(poses)), -np.sin(poses[:, 0])], axis=1)
+    joints = skeleton.joints(poses)[:, MIRROR]
+    expected = joints - 2.0 * np.einsum("njk,nk->nj", joints, across)[..., None] * across[:, None]
+    np.testing.assert_allclose(skeleton.joints(mirrored(skeleton, poses)), expected, atol=1e-9)
+
+
+def test_reflected_joints_are_those_of_the_other_side_at_the_other_depth() -> None:
+    poses, sight = drawn(), np.array([np.sin(TOWARDS), 0.0, np.cos(TOWARDS)])
+    joints = SKELETON.joints(poses)[:, MIRROR]
+    expected = joints - 2.0 * (joints @ sight)[..., None] * sight
+    np.testing.assert_allclose(SKELETON.joints(reflected(SKELETON, poses, TOWARDS)), expected, atol=1e-9)
+
+
+def test_who_faces_the_camera_is_reflected_to_face_away_and_who_faces_across_stays() -> None:
+    poses = np.zeros((3, ANGLES))
+    poses[:, 0] = TOWARDS + np.radians([0.0, 90.0, 30.0])
+    found = np.degrees(reflected(SKELETON, poses, TOWARDS)[:, 0] - TOWARDS) % 360.0
+    np.testing.assert_allclose(found, [180.0, 90.0, 150.0], atol=1e-9)
+
+
+def test_a_left_leg_that_is_forward_becomes_a_right_one_by_hand() -> None:
+    poses = np.zeros((1, ANGLES))
+    left, right = (angle_index(JOINTS.index(name)) for name in ("lfemur", "rfemur"))
+    poses[0, left : left + 3] = [-0.5, 0.1, 0.2]
+    for found in (mirrored(SKELETON, poses), exchanged(SKELETON, poses, "legs")):
+        np.testing.assert_allclose(found[0, right : right + 3], [-0.5, -0.1, -0.2])
+        np.testing.assert_allclose(found[0, left : left + 3], 0.0)
+    np.testing.assert_array_equal(exchanged(SKELETON, poses, "arms"), poses)
+
+
+@pytest.mark.parametrize("limbs", ["legs", "arms"])
+def test_exchanged_limbs_leave_everything_else_where_it_is(limbs: str) -> None:
+    poses = drawn()
+    moved = {name for limb in LIMBS for name in LIMBS[limb] if limb.endswith(limbs[:-1])}
+    still = [k for k, name in enumerate(JOINTS) if name not in moved]
+    found = exchanged(SKELETON, poses, limbs)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(SKELETON.joints(found)[:, still], SKELETON.joints(poses)[:, still])
+    np.testing.assert_array_equal(found[:, :3], poses[:, :3])
+
+
+def test_the_opposite_yaw_is_half_a_turn_away_and_wrapped() -> None:
+    poses = np.zeros((2, ANGLES))
+    poses[:, 0] = [1.0, -1.0]
+    np.testing.assert_allclose(turned(poses)[:, 0], [1.0 - np.pi, np.pi - 1.0])
+
+
+def test_limbs_that_are_none_are_a_mistake() -> None:
+    with pytest.raises(ValueError, match="limbs must be one of legs, arms, got 'wings'"):
+        exchanged(SKELETON, drawn(), "wings")  # type: ignore[arg-type]
+
+
+def overlap(view_degrees: float, operator: Callable[[Skeleton, Array, float], Array], poses: Array) -> float:
+    """Return the mean IoU of the silhouettes of poses, seen from far away, with those of what they become."""
+    body, place, found = Body.of(SKELETON), np.zeros(3), []
+    for pose in poses:
+        camera = Camera.around(place, pose[0] + np.radians(view_degrees), 30.0, (160, 120), np.radians(6.0))
+        other = operator(SKELETON, pose[None], facing(camera, place))[0]
+        one, two = (project(body, camera, which, place) for which in (pose, other))
+        found.append((one & two).sum() / (one | two).sum())
+    return float(np.mean(found))
+
+
+def test_silhouettes_are_alike_from_the_sides_that_are_named_and_not_from_others() -> None:
+    def named(name: str) -> Callable[[Skeleton, Array, float], Array]:
+        return lambda skeleton, poses, _: OPERATORS[name](skeleton, poses)
+
+    still = np.zeros((1, ANGLES))
+    assert all(overlap(view, reflected, WALK.poses) > 0.97 for view in (0.0, 45.0, 90.0, 200.0))
+    assert all(overlap(90.0, named(name), WALK.poses) > 0.95 for name in ("mirrored", "legs", "arms"))
+    assert overlap(45.0, named("mirrored"), WALK.poses) < overlap(45.0, named("legs"), WALK.poses) < 0.75
+    assert overlap(0.0, named("turned"), still) > 0.9
+    assert 0.7 < overlap(0.0, named("turned"), WALK.poses) < 0.8
+    assert overlap(90.0, named("turned"), WALK.poses) < 0.5
+
+
+def test_facing_is_the_yaw_of_who_looks_at_the_camera() -> None:
+    place = np.array([1.0, 0.0, 2.0])
+    camera = Camera.around(place, 0.7, 4.0, (160, 120))
+    assert facing(camera, place) == pytest.approx(0.7)
