@@ -9,6 +9,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
+from posefit_exemplars import kernels
 from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 
 BINS = 36  # of a full turn: two states of one pose in one bin are one
@@ -48,7 +49,10 @@ class Beam:
 
     def best(self, count: int) -> "Beam":
         """Return the states of least total, the best first."""
-        return self.chosen(np.argsort(self.totals, kind="stable")[:count])
+        rows = np.arange(len(self))
+        if count < len(self):
+            rows = np.sort(np.argpartition(self.totals, count)[:count])
+        return self.chosen(rows[np.argsort(self.totals[rows], kind="stable")])
 
 
 def joined_beams(*beams: Beam) -> Beam:
@@ -94,8 +98,10 @@ class Ahead:
         return np.minimum.reduce([squares(code[rows], codes) / double + way[rows, None] for code, way in each])
 
 
-def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, root: Array | None = None) -> Beam:
-    """Return the states that those of a beam may be in so much later, each by its cheapest step.
+def stepped(
+    exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, most: int, root: Array | None = None
+) -> Beam:
+    """Return the states, the best `most` of them, that those of a beam may be in so much later, each by its cheapest step.
 
     A pose costs half the square of its distance, over the spread, from what its parent's clip did next at one of the
     speeds; a yaw half the square of its turn away from the clip's own. Where the root is known to be at `root` (3,),
@@ -103,25 +109,44 @@ def stepped(exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, root
     faster or slower than all clips: who walks goes where he faces, and sways to the side of the foot he stands on.
     """
     ahead = Ahead.of(exemplars, beam, seconds, steps, root)
-    codes, facing, places = ahead.codes[SPEEDS.index(1.0)], ahead.yaws, ahead.places
-    bins = bins_of(facing)
     centres = exemplars.codes[exemplars.centres]
     near = min(NEAR, len(centres))
-    groups = np.argpartition(squares(codes, centres), near - 1, axis=1)[:, :near]
+    groups = np.argpartition(squares(ahead.codes[SPEEDS.index(1.0)], centres), near - 1, axis=1)[:, :near]
     limit = beam.totals.min() + steps.jump + HOPELESS
-    found: list[Beam] = []
+    codes, ways = np.stack(ahead.codes), np.stack(ahead.ways)
+    least, owners, touched = np.full(len(exemplars), np.inf), *np.empty((2, len(exemplars)), dtype=np.int64)
+    bins = bins_of(ahead.yaws)
+    found: list[tuple[Rows, Rows, Array]] = []
     for one in np.unique(bins):
         rows = np.flatnonzero(bins == one)
-        states = exemplars.of_groups(np.unique(groups[rows]))
-        costs = beam.totals[rows, None] + ahead.costs(rows, exemplars.codes[states], steps)
-        from_row = costs.argmin(axis=0)
-        least = costs[from_row, np.arange(len(states))]
-        kept = np.flatnonzero(least < limit)
-        parents = rows[from_row[kept]]
-        for turn in (0.0, -TURN, TURN):
-            totals = least[kept] + 0.5 * (turn / steps.turning) ** 2
-            found.append(Beam(states[kept], facing[parents] + turn, parents, totals, places[parents]))
-    return joined_beams(*found)
+        count = kernels.reached(
+            codes,
+            ways,
+            beam.totals,
+            rows,
+            groups,
+            exemplars.grouped,
+            exemplars.bounds,
+            1.0 / (2.0 * steps.spread**2),
+            limit,
+            least,
+            owners,
+            touched,
+        )
+        reached = touched[:count].copy()
+        found.append((exemplars.members[reached], owners[reached], least[reached]))
+        least[reached] = np.inf
+    states, parents, totals = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    turns = np.repeat([0.0, -TURN, TURN], len(states))
+    states, parents, totals = (np.tile(one, 3) for one in (states, parents, totals))
+    every = Beam(
+        states,
+        ahead.yaws[parents] + turns,
+        parents,
+        totals + 0.5 * (turns / steps.turning) ** 2,
+        ahead.places[parents],
+    )
+    return joined_beams(every.best(2 * most)).best(most)
 
 
 def jumped(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:

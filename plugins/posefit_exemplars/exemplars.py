@@ -1,13 +1,14 @@
 """The states of the model: poses of clips, with what came after each of them, and groups of poses that are alike."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.geometry import alike
 from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.motion.motion import Motion
 
@@ -15,7 +16,7 @@ Codes = NDArray[np.float32]  # (n, D): two of them are as far apart as the joint
 Rows = NDArray[np.int64]
 
 DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
-SAME = 0.01  # metres between the codes of poses that need not both be kept
+SAME = 0.02  # metres between the codes of poses that need not both be kept
 GROUPS = 1000  # of poses that are alike; fewer where there are fewer poses
 
 
@@ -32,10 +33,11 @@ class Exemplars:
     centres: Rows = field(repr=False)  # (G,) a pose of each group, so that the first few are as unlike as can be
     members: Rows = field(repr=False)  # (K,) all poses, group by group
     bounds: Rows = field(repr=False)  # (G + 1,) where each group begins in `members`
+    grouped: Codes = field(repr=False)  # (K, D) codes, group by group
 
     @classmethod
-    def of(cls, motions: Sequence[Motion], skeleton: Skeleton) -> Self:
-        """Return the states of motions, as the person with this skeleton would move.
+    def of(cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False) -> Self:
+        """Return the states of motions, as the person with this skeleton would move; and of their mirror images.
 
         A frame nearer than a centimetre to the last one kept is left out. Raises ValueError where a motion has a
         single frame.
@@ -45,6 +47,8 @@ class Exemplars:
         for motion in motions:
             if len(motion) < 2:
                 raise ValueError(f"{motion.name} must have at least 2 frames to be followed, got 1")
+        if mirrored:
+            motions = [*motions, *(mirror_image(motion) for motion in motions)]
         poses = np.concatenate([motion.poses for motion in motions])
         paths = np.concatenate([motion.translations for motion in motions])
         times = np.concatenate([np.arange(len(motion)) / motion.fps for motion in motions])
@@ -56,7 +60,7 @@ class Exemplars:
         members = np.argsort(owners, kind="stable")
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
         lasts = np.searchsorted(clips, np.arange(len(motions)), "right") - 1
-        return cls(poses[kept], codes, paths[kept], times[kept], clips, lasts, centres, members, bounds)
+        return cls(poses[kept], codes, paths[kept], times[kept], clips, lasts, centres, members, bounds, codes[members])
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -84,6 +88,13 @@ class Exemplars:
     def of_groups(self, chosen: Rows) -> Rows:
         """Return the poses of some groups."""
         return np.concatenate([self.members[self.bounds[g] : self.bounds[g + 1]] for g in chosen])
+
+
+def mirror_image(motion: Motion) -> Motion:
+    """Return what a mirror in the plane x = 0 shows of a motion: whose right is his left."""
+    poses = alike.mirrored(motion.skeleton, motion.poses)
+    poses[:, 0] *= -1.0
+    return replace(motion, poses=poses, translations=motion.translations * [-1.0, 1.0, 1.0])
 
 
 def about_vertical(vectors: Array, yaws: Array) -> Array:

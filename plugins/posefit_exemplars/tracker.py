@@ -66,7 +66,7 @@ class ExemplarTracker:
         """Return what is known of a frame, and how many evaluations it took."""
         latest, seconds, root = None if before is None else before.beam, 1.0 / self.task.fps, look.root
         if latest is not None and not observation.usable:
-            beam = stepped(self.exemplars, latest, seconds, self.steps, root).best(WIDTH)
+            beam = stepped(self.exemplars, latest, seconds, self.steps, WIDTH, root)
             if root is not None:
                 beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
             return self._joined(beam, np.zeros(len(beam)), before, root), 0.0
@@ -76,7 +76,7 @@ class ExemplarTracker:
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
         if latest is not None:
-            beams.append(stepped(self.exemplars, latest, seconds, self.steps, root).best(around))
+            beams.append(stepped(self.exemplars, latest, seconds, self.steps, around, root))
         beam = self._at(look, joined_beams(*beams).best(around + len(elsewhere)), latest is not None)
         costs = look.small(self._poses(beam), beam.places)
         used = (looked + len(beam)) * look.share
@@ -164,6 +164,7 @@ def exemplars(
     straying: float = 0.05,
     pace: float = 0.008,
     lag: int = 15,
+    mirrored: bool = True,
 ) -> ExemplarTracker:
     """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
 
@@ -175,6 +176,7 @@ def exemplars(
         straying: metres that a root that is aligned may be off where its clip goes on; above 0.
         pace: metres that a root that is known may be off where its clip goes on; above 0.
         lag: frames that are seen before a pose is told, 0 or more.
+        mirrored: whether the mirror images of all clips are learned from as well.
     """
     for name, value in (
         ("spread", spread),
@@ -193,4 +195,4 @@ def exemplars(
     temperature /= intervals
     slack = math.sqrt(intervals)
     steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, pace * intervals)
-    return ExemplarTracker(task, Exemplars.of(task.training, task.body.skeleton), steps, temperature, lag)
+    return ExemplarTracker(task, Exemplars.of(task.training, task.body.skeleton, mirrored=mirrored), steps, temperature, lag)
