@@ -16,6 +16,7 @@ BINS = 36  # of a full turn: two states of one pose in one bin are one
 SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
 TURN = np.radians(7.0)  # how far a candidate turns away from its clip, to either side, or not at all
 NEAR = 4  # groups of poses that a state goes on to
+KINDS = 20  # of poses and yaws that a beam has room for, when each has all that it may have
 HOPELESS = 8.0  # beyond the cost of a jump; what costs more is not looked at
 
 
@@ -26,7 +27,8 @@ class Steps:
     spread: float  # metres, root mean square over joints, that a pose may be off where its clip goes on
     turning: float  # radians that it may turn away
     jump: float  # the cost of a step to anywhere
-    straying: float  # metres that an aligned root may be off where its clip goes on
+    straying: float  # metres that an aligned root may be off where its clip goes on, across the line of sight
+    depth: float  # and along it
     pace: float  # metres that a known root may be off where its clip goes on
 
 
@@ -53,6 +55,19 @@ class Beam:
         if count < len(self):
             rows = np.sort(np.argpartition(self.totals, count)[:count])
         return self.chosen(rows[np.argsort(self.totals[rows], kind="stable")])
+
+
+def varied(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> Rows:
+    """Return the states of least `totals` (n,), but of those that are alike and face alike only the best few.
+
+    What else somebody may be doing is often behind for a while before silhouettes tell that it is right.
+    """
+    kind = exemplars.kinds[beam.states] * BINS + bins_of(beam.yaws)
+    order = np.lexsort((totals, kind))
+    begins = np.flatnonzero(np.diff(kind[order], prepend=-1))
+    rank = np.arange(len(order)) - np.repeat(begins, np.diff(np.append(begins, len(order))))
+    kept = order[rank < max(most // KINDS, 1)]
+    return kept[np.argsort(totals[kept], kind="stable")[:most]]
 
 
 def joined_beams(*beams: Beam) -> Beam:
@@ -168,11 +183,34 @@ def squares(some: Codes, others: Codes) -> Codes:
     return np.asarray(np.maximum(squares, 0.0))
 
 
-def between(exemplars: Exemplars, before: Beam, beam: Beam, seconds: float, steps: Steps, root: Array | None) -> Array:
+def strayed(places: Array, expected: Array, eye: Array | None, steps: Steps) -> Array:
+    """Return what it costs that aligned roots are at `places` (n, 3) where they were `expected` (..., n, 3).
+
+    `eye` (3,) is where the only camera stands: a silhouette tells little of how far away from it a body is.
+    """
+    off = places - expected
+    along = np.zeros(off.shape[:-1])
+    if eye is not None:
+        sights = places - eye
+        sights /= np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        along = (off * sights).sum(axis=-1) ** 2
+    across = (off**2).sum(axis=-1) - along
+    return np.asarray(np.log1p(0.5 * (across / steps.straying**2 + along / steps.depth**2)))
+
+
+def between(
+    exemplars: Exemplars,
+    before: Beam,
+    beam: Beam,
+    seconds: float,
+    steps: Steps,
+    root: Array | None,
+    eye: Array | None,
+) -> Array:
     """Return what each step from a state of one beam to one of the next costs (n, m); none costs more than a jump."""
     ahead = Ahead.of(exemplars, before, seconds, steps, root)
     costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
-        costs += squares(ahead.places, beam.places) / (2.0 * steps.straying**2)
+        costs += strayed(beam.places, ahead.places[:, None], eye, steps)
     return np.asarray(np.minimum(costs, steps.jump))

@@ -17,6 +17,7 @@ Rows = NDArray[np.int64]
 
 DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
 SAME = 0.02  # metres between the codes of poses that need not both be kept
+KINDS = 40  # of poses, as unlike as can be
 GROUPS = 1000  # of poses that are alike; fewer where there are fewer poses
 
 
@@ -33,7 +34,9 @@ class Exemplars:
     centres: Rows = field(repr=False)  # (G,) a pose of each group, so that the first few are as unlike as can be
     members: Rows = field(repr=False)  # (K,) all poses, group by group
     bounds: Rows = field(repr=False)  # (G + 1,) where each group begins in `members`
+    owners: Rows = field(repr=False)  # (K,) the group of each pose
     grouped: Codes = field(repr=False)  # (K, D) codes, group by group
+    kinds: Rows = field(repr=False)  # (K,) which of a few poses that are as unlike as can be each is nearest to
 
     @classmethod
     def of(cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False) -> Self:
@@ -57,10 +60,11 @@ class Exemplars:
         kept = thinned(codes, clips)
         codes, clips = codes[kept], clips[kept]
         centres, owners = groups(codes, GROUPS)
+        kinds = np.argmin([((codes - codes[centre]) ** 2).sum(axis=1) for centre in centres[:KINDS]], axis=0)
         members = np.argsort(owners, kind="stable")
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
         lasts = np.searchsorted(clips, np.arange(len(motions)), "right") - 1
-        return cls(poses[kept], codes, paths[kept], times[kept], clips, lasts, centres, members, bounds, codes[members])
+        return cls(poses[kept], codes, paths[kept], times[kept], clips, lasts, centres, members, bounds, owners, codes[members], kinds)
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -84,6 +88,16 @@ class Exemplars:
         paths = (1.0 - share)[:, None] * self.paths[before] + share[:, None] * self.paths[following]
         ways = about_vertical(paths - self.paths[states], -self.poses[states, 0])
         return codes.astype(np.float32), yaws - self.poses[states, 0], ways
+
+    def drawn(self, count: int, rng: np.random.Generator) -> Rows:
+        """Return poses drawn at random, of a group as often as the root of its size says.
+
+        All poses alike, nearly all would stand; all groups alike, nearly all would be acrobatic.
+        """
+        sizes = np.diff(self.bounds)
+        ends = np.cumsum(np.sqrt(sizes))
+        group = np.minimum(np.searchsorted(ends, rng.uniform(0.0, ends[-1], count), "right"), len(sizes) - 1)
+        return self.members[self.bounds[group] + (rng.random(count) * sizes[group]).astype(np.int64)]
 
     def of_groups(self, chosen: Rows) -> Rows:
         """Return the poses of some groups."""

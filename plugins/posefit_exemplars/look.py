@@ -39,6 +39,12 @@ class Look:
         return np.asarray(known, dtype=np.float64)
 
     @property
+    def eye(self) -> Array | None:
+        """Where the only camera stands (3,); None where there are several, which see from all sides how far it is."""
+        cameras = self._task.cameras
+        return cameras[0].position if len(cameras) == 1 else None
+
+    @property
     def share(self) -> float:
         """What a look at the small picture counts, beside one at the full picture."""
         return 1.0 / self.factor**2

@@ -10,7 +10,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit_exemplars.beam import BINS, Beam, Steps, between, joined_beams, jumped, stepped
+from posefit_exemplars.beam import BINS, Beam, Steps, between, joined_beams, jumped, stepped, strayed, varied
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.look import Look
 from posefit_exemplars.window import Seen, likeliest, mean_around, seen, weights
@@ -69,7 +69,7 @@ class ExemplarTracker:
             beam = stepped(self.exemplars, latest, seconds, self.steps, WIDTH, root)
             if root is not None:
                 beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
-            return self._joined(beam, np.zeros(len(beam)), before, root), 0.0
+            return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
         full = int(FULL * self.task.evaluations)
         small = int((self.task.evaluations - full - 2) / look.share)
         around = int(AROUND * small) if latest is not None else 0
@@ -80,35 +80,33 @@ class ExemplarTracker:
         beam = self._at(look, joined_beams(*beams).best(around + len(elsewhere)), latest is not None)
         costs = look.small(self._poses(beam), beam.places)
         used = (looked + len(beam)) * look.share
-        beam = beam.chosen(np.argsort(beam.totals + costs / self.temperature, kind="stable")[:full])
+        beam = beam.chosen(varied(self.exemplars, beam, beam.totals + costs / self.temperature, full))
         fits = look.full(self._poses(beam), beam.places) / self.temperature
         used += len(beam)
-        best = np.argsort(beam.totals + fits, kind="stable")[:WIDTH]
-        return self._joined(beam.chosen(best), fits[best], before, root), used
+        best = varied(self.exemplars, beam, beam.totals + fits, WIDTH)
+        return self._joined(beam.chosen(best), fits[best], before, look), used
 
-    def _joined(self, beam: Beam, fits: Array, before: Seen | None, root: Array | None) -> Seen:
+    def _joined(self, beam: Beam, fits: Array, before: Seen | None, look: Look) -> Seen:
         """Return a frame, joined to the one before."""
         if before is None:
             return seen(beam, fits, None, None)
-        costs = between(self.exemplars, before.beam, beam, 1.0 / self.task.fps, self.steps, root)
+        seconds = 1.0 / self.task.fps
+        costs = between(self.exemplars, before.beam, beam, seconds, self.steps, look.root, look.eye)
         return seen(beam, fits, before, costs)
 
     def _elsewhere(self, look: Look, before: Beam | None, most: int, rng: np.random.Generator) -> tuple[Beam, int]:
         """Return states that fit, wherever they are; and how many small pictures were looked at."""
-        yaws = np.arange(BINS) * (2.0 * np.pi / BINS)
-        if before is None and self.task.yaw is not None:
-            off = (yaws - self.task.yaw + np.pi) % (2.0 * np.pi) - np.pi
-            yaws = self.task.yaw + off[np.abs(off) <= FACING]
         taken = min(GROUPS_TAKEN if before is not None else FIRST_GROUPS, max(most // (4 * OF_A_GROUP), 1))
-        centres = self.exemplars.centres
-        count = int(np.clip((most - taken * OF_A_GROUP) // len(yaws), 1, len(centres)))
-        states, facing = np.repeat(centres[:count], len(yaws)), np.tile(yaws, count)
-        beam = self._at(look, self._begun(states, facing, before), False)
+        count = max(most - taken * OF_A_GROUP, 1)
+        states, middle, reach = self.exemplars.drawn(count, rng), 0.0, np.pi
+        if before is None and self.task.yaw is not None:
+            middle, reach = self.task.yaw, FACING
+        yaws = middle + rng.uniform(-reach, reach, count)
+        beam = self._at(look, self._begun(states, yaws, before), False)
         best = np.argsort(look.small(self._poses(beam), beam.places), kind="stable")[:taken]
-        found = [self._some(int(row) // len(yaws), rng) for row in best]
-        states = np.concatenate(found)
-        facing = np.repeat(facing[best], [len(some) for some in found])
-        return self._begun(states, facing, before), len(beam)
+        found = [self._some(int(self.exemplars.owners[states[row]]), rng) for row in best]
+        states, yaws = np.concatenate(found), np.repeat(yaws[best], [len(some) for some in found])
+        return self._begun(states, yaws, before), len(beam)
 
     def _begun(self, states: Rows, yaws: Array, before: Beam | None) -> Beam:
         """Return states that nothing led to but a jump, or the beginning."""
@@ -131,8 +129,8 @@ class ExemplarTracker:
         places = look.placed(self._poses(beam), beam.places)
         if not begun or self.task.translation == "known":
             return replace(beam, places=places)
-        off = ((places - beam.places) ** 2).sum(axis=1)
-        return replace(beam, places=places, totals=beam.totals + 0.5 * off / self.steps.straying**2)
+        off = strayed(places, beam.places, look.eye, self.steps)
+        return replace(beam, places=places, totals=beam.totals + off)
 
     def _told(self, waiting: deque[_Waiting]) -> Frame:
         """Return the oldest frame that waits: the mean of what is likely about the best way to the newest."""
@@ -161,7 +159,8 @@ def exemplars(
     turning_degrees: float = 4.0,
     jump: float = 12.0,
     temperature: float = 2.0,
-    straying: float = 0.05,
+    straying: float = 0.02,
+    depth: float = 0.1,
     pace: float = 0.008,
     lag: int = 15,
     mirrored: bool = True,
@@ -173,7 +172,8 @@ def exemplars(
         turning_degrees: how far a body may turn away from its clip in a frame; above 0.
         jump: what a step to any other pose costs, in units of cost over the temperature; 0 or more.
         temperature: what silhouette costs are divided by; above 0. Costs of frames err together, so more than 1.
-        straying: metres that a root that is aligned may be off where its clip goes on; above 0.
+        straying: metres that a root that is aligned may be off where its clip goes on, to the side or up; above 0.
+        depth: and towards or away from a single camera; above 0.
         pace: metres that a root that is known may be off where its clip goes on; above 0.
         lag: frames that are seen before a pose is told, 0 or more.
         mirrored: whether the mirror images of all clips are learned from as well.
@@ -183,6 +183,7 @@ def exemplars(
         ("turning_degrees", turning_degrees),
         ("temperature", temperature),
         ("straying", straying),
+        ("depth", depth),
         ("pace", pace),
     ):
         if not value > 0.0:
@@ -194,5 +195,5 @@ def exemplars(
     intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
     temperature /= intervals
     slack = math.sqrt(intervals)
-    steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, pace * intervals)
+    steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
     return ExemplarTracker(task, Exemplars.of(task.training, task.body.skeleton, mirrored=mirrored), steps, temperature, lag)
