@@ -26,7 +26,7 @@ _BONES: dict[Limbs, tuple[str, ...]] = {
 }
 
 
-def mirrored(skeleton: Skeleton, poses: Array) -> Array:
+def mirrored_poses(skeleton: Skeleton, poses: Array) -> Array:
     """Return poses (n, 66) whose left and right are exchanged: a stride becomes the one half a cycle later.
 
     The body is reflected in the upright plane that it faces along, and each side takes the name of the other. Seen
@@ -38,7 +38,7 @@ def mirrored(skeleton: Skeleton, poses: Array) -> Array:
     return exchanged
 
 
-def turned(poses: Array) -> Array:
+def turned_poses(poses: Array) -> Array:
     """Return poses (n, 66) that face the other way, their joints as they are.
 
     From in front, and from behind, an upright body that stands still shows the same outline; one that walks, only
@@ -49,20 +49,20 @@ def turned(poses: Array) -> Array:
     return poses
 
 
-def reflected(skeleton: Skeleton, poses: Array, towards: float) -> Array:
+def reflected_poses(skeleton: Skeleton, poses: Array, towards: float) -> Array:
     """Return poses (n, 66) reflected along the line of sight: who comes goes, who faces across stays as he faces.
 
     `towards` is the yaw in radians of somebody who faces the camera, see `facing`. What is near and what is far trade
     places, and so left and right do: a turn of 30 degrees out of the picture becomes one into it. Whatever the pose,
-    and from whatever side, a level camera far away sees the same silhouette. From the side it is `mirrored`, and from
-    in front it is `turned` with left and right exchanged.
+    and from whatever side, a level camera far away sees the same silhouette. From the side it is `mirrored_poses`, and
+    from in front it is `turned_poses` with left and right exchanged.
     """
-    reflected = mirrored(skeleton, poses)
+    reflected = mirrored_poses(skeleton, poses)
     reflected[:, 0] = wrapped(2.0 * towards + np.pi - reflected[:, 0])
     return reflected
 
 
-def exchanged(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
+def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
     """Return poses (n, 66) whose two `legs`, or two `arms`, have each the other's angles, mirrored.
 
     The trunk and the other limbs stay. Seen from the side, the near and the far limb of a pair lie on each other or

@@ -12,7 +12,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.space import ROOT_RANGE_DEGREES
 from posefit.fitting.tracker import Frame, Task
-from posefit.geometry.alike import exchanged, facing, mirrored, reflected, turned
+from posefit.geometry.alike import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
@@ -23,15 +23,16 @@ PACE = 30.0  # a second: how often steps are compared, so that what a search jit
 USUAL = 1.0  # metres a second, of the joints about the root, where there is nothing to learn from: somebody who walks
 LEAST = 0.25  # metres a second that it is taken for at least, where somebody stands still all the time
 TURNING = 2.0  # usual speeds, which a joint's velocity changes by when it turns around on the spot
+ELSEWHERE = 5.0  # usual speeds: where the velocities of all joints change by more, the body is somewhere else
 
 # What becomes of poses (n, 66), given the yaw of somebody who faces the first camera.
 Operator = Callable[[Skeleton, Array, float], Array]
 ALIKE: Mapping[str, Operator] = {
-    "mirrored": lambda skeleton, poses, _: mirrored(skeleton, poses),
-    "reflected": reflected,
-    "legs exchanged": lambda skeleton, poses, _: exchanged(skeleton, poses, "legs"),
-    "turned": lambda _skeleton, poses, _towards: turned(poses),
-    "arms exchanged": lambda skeleton, poses, _: exchanged(skeleton, poses, "arms"),
+    "mirrored": lambda skeleton, poses, _: mirrored_poses(skeleton, poses),
+    "reflected": reflected_poses,
+    "legs exchanged": lambda skeleton, poses, _: exchanged_limbs(skeleton, poses, "legs"),
+    "turned": lambda _skeleton, poses, _towards: turned_poses(poses),
+    "arms exchanged": lambda skeleton, poses, _: exchanged_limbs(skeleton, poses, "arms"),
 }
 # How the tracks after the first are begun, one after the other, and again from the front where there are more: those
 # first that are mistaken for each other most often.
@@ -103,7 +104,8 @@ def whole_cost(frames: Sequence[Frame], usable: Sequence[bool], skeleton: Skelet
 
     The pull of motion is half the squared change of a joint's velocity about the root, from one thirtieth of a second
     to the next, over the square of twice the `usual` speed: a joint that turns around on the spot at that speed costs
-    a half. It is the mean over joints and frames, and is added to the silhouettes' mean cost as it is.
+    a half. It is the mean over joints and frames, and is added to the silhouettes' mean cost as it is. A frame counts
+    for five usual speeds at most: a body that jumped has jumped, however far.
     """
     seen = np.asarray(usable, dtype=bool)
     costs = np.array([frame.cost for frame in frames])
@@ -111,7 +113,7 @@ def whole_cost(frames: Sequence[Frame], usable: Sequence[bool], skeleton: Skelet
     step = _step(fps)
     changes = _squared(velocities[step:] - velocities[:-step])
     followed = seen[: -2 * step] & seen[step:-step] & seen[2 * step :]  # of each change, the three frames it is of
-    pull = 0.5 * changes[followed] / (TURNING * usual) ** 2
+    pull = 0.5 * np.minimum(changes[followed], (ELSEWHERE * usual) ** 2) / (TURNING * usual) ** 2
     cost = costs[seen].mean() if seen.any() else costs.mean()
     return Whole(float(cost), float(pull.mean()) if len(pull) else 0.0)
 

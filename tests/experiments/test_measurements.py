@@ -108,6 +108,20 @@ def test_accuracy_is_that_of_the_tracks_of_all_seeds(
     assert page.stat().st_size > 0
 
 
+def test_accuracy_of_several_tracks_is_that_of_those_that_are_kept(cmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(accuracy, "FRAMES", 3)
+    monkeypatch.setattr(accuracy, "VIEWS", (90.0,))
+    monkeypatch.setattr(accuracy, "WALKS", accuracy.WALKS[:1])
+    found = told("accuracy", "--seeds", 1, "--tracks", 2, cmu=str(cmu))
+    kept = posefit.track(
+        cmu / "16" / "16_17.amc", train=[cmu / "16" / "16_15.amc"], view_degrees=90.0, frames=(0, 3), tracks=2
+    )
+    assert found["tracks"] == 2
+    assert found["rows"][0]["mpjpe_mm"] == kept.measures.mpjpe_mm
+    wrong = run("accuracy", "--tracks", 0, cmu=str(cmu))
+    assert (wrong.exit_code, wrong.stderr) == (2, "posefit: tracks must be a whole number of at least 1, got 0\n")
+
+
 def test_methods_are_compared_at_one_budget(cmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(methods, "FRAMES", 2)
     monkeypatch.setattr(methods, "VIEWS", (0.0, 90.0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.geometry.alike import exchanged, facing, mirrored, reflected, turned
+from posefit.geometry.alike import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS
@@ -21,11 +21,11 @@ TOWARDS = 0.4  # radians
 
 Operator = Callable[[Skeleton, Array], Array]
 OPERATORS: dict[str, Operator] = {
-    "mirrored": mirrored,
-    "turned": lambda _, poses: turned(poses),
-    "reflected": lambda skeleton, poses: reflected(skeleton, poses, TOWARDS),
-    "legs": lambda skeleton, poses: exchanged(skeleton, poses, "legs"),
-    "arms": lambda skeleton, poses: exchanged(skeleton, poses, "arms"),
+    "mirrored": mirrored_poses,
+    "turned": lambda _, poses: turned_poses(poses),
+    "reflected": lambda skeleton, poses: reflected_poses(skeleton, poses, TOWARDS),
+    "legs": lambda skeleton, poses: exchanged_limbs(skeleton, poses, "legs"),
+    "arms": lambda skeleton, poses: exchanged_limbs(skeleton, poses, "arms"),
 }
 
 
@@ -68,20 +68,20 @@ def test_mirrored_joints_are_those_of_the_other_side_across_the_plane_that_is_fa
     across = np.stack([np.cos(poses[:, 0]), np.zeros(len(poses)), -np.sin(poses[:, 0])], axis=1)
     joints = skeleton.joints(poses)[:, MIRROR]
     expected = joints - 2.0 * np.einsum("njk,nk->nj", joints, across)[..., None] * across[:, None]
-    np.testing.assert_allclose(skeleton.joints(mirrored(skeleton, poses)), expected, atol=1e-9)
+    np.testing.assert_allclose(skeleton.joints(mirrored_poses(skeleton, poses)), expected, atol=1e-9)
 
 
 def test_reflected_joints_are_those_of_the_other_side_at_the_other_depth() -> None:
     poses, sight = drawn(), np.array([np.sin(TOWARDS), 0.0, np.cos(TOWARDS)])
     joints = SKELETON.joints(poses)[:, MIRROR]
     expected = joints - 2.0 * (joints @ sight)[..., None] * sight
-    np.testing.assert_allclose(SKELETON.joints(reflected(SKELETON, poses, TOWARDS)), expected, atol=1e-9)
+    np.testing.assert_allclose(SKELETON.joints(reflected_poses(SKELETON, poses, TOWARDS)), expected, atol=1e-9)
 
 
 def test_who_faces_the_camera_is_reflected_to_face_away_and_who_faces_across_stays() -> None:
     poses = np.zeros((3, ANGLES))
     poses[:, 0] = TOWARDS + np.radians([0.0, 90.0, 30.0])
-    found = np.degrees(reflected(SKELETON, poses, TOWARDS)[:, 0] - TOWARDS) % 360.0
+    found = np.degrees(reflected_poses(SKELETON, poses, TOWARDS)[:, 0] - TOWARDS) % 360.0
     np.testing.assert_allclose(found, [180.0, 90.0, 150.0], atol=1e-9)
 
 
@@ -89,10 +89,10 @@ def test_a_left_leg_that_is_forward_becomes_a_right_one_by_hand() -> None:
     poses = np.zeros((1, ANGLES))
     left, right = (angle_index(JOINTS.index(name)) for name in ("lfemur", "rfemur"))
     poses[0, left : left + 3] = [-0.5, 0.1, 0.2]
-    for found in (mirrored(SKELETON, poses), exchanged(SKELETON, poses, "legs")):
+    for found in (mirrored_poses(SKELETON, poses), exchanged_limbs(SKELETON, poses, "legs")):
         np.testing.assert_allclose(found[0, right : right + 3], [-0.5, -0.1, -0.2])
         np.testing.assert_allclose(found[0, left : left + 3], 0.0)
-    np.testing.assert_array_equal(exchanged(SKELETON, poses, "arms"), poses)
+    np.testing.assert_array_equal(exchanged_limbs(SKELETON, poses, "arms"), poses)
 
 
 @pytest.mark.parametrize("limbs", ["legs", "arms"])
@@ -100,7 +100,7 @@ def test_exchanged_limbs_leave_everything_else_where_it_is(limbs: str) -> None:
     poses = drawn()
     moved = {name for limb in LIMBS for name in LIMBS[limb] if limb.endswith(limbs[:-1])}
     still = [k for k, name in enumerate(JOINTS) if name not in moved]
-    found = exchanged(SKELETON, poses, limbs)  # type: ignore[arg-type]
+    found = exchanged_limbs(SKELETON, poses, limbs)  # type: ignore[arg-type]
     np.testing.assert_array_equal(SKELETON.joints(found)[:, still], SKELETON.joints(poses)[:, still])
     np.testing.assert_array_equal(found[:, :3], poses[:, :3])
 
@@ -108,12 +108,12 @@ def test_exchanged_limbs_leave_everything_else_where_it_is(limbs: str) -> None:
 def test_the_opposite_yaw_is_half_a_turn_away_and_wrapped() -> None:
     poses = np.zeros((2, ANGLES))
     poses[:, 0] = [1.0, -1.0]
-    np.testing.assert_allclose(turned(poses)[:, 0], [1.0 - np.pi, np.pi - 1.0])
+    np.testing.assert_allclose(turned_poses(poses)[:, 0], [1.0 - np.pi, np.pi - 1.0])
 
 
 def test_limbs_that_are_none_are_a_mistake() -> None:
     with pytest.raises(ValueError, match="limbs must be one of legs, arms, got 'wings'"):
-        exchanged(SKELETON, drawn(), "wings")  # type: ignore[arg-type]
+        exchanged_limbs(SKELETON, drawn(), "wings")  # type: ignore[arg-type]
 
 
 def overlap(view_degrees: float, operator: Callable[[Skeleton, Array, float], Array], poses: Array) -> float:
@@ -132,7 +132,7 @@ def test_silhouettes_are_alike_from_the_sides_that_are_named_and_not_from_others
         return lambda skeleton, poses, _: OPERATORS[name](skeleton, poses)
 
     still = np.zeros((1, ANGLES))
-    assert all(overlap(view, reflected, WALK.poses) > 0.97 for view in (0.0, 45.0, 90.0, 200.0))
+    assert all(overlap(view, reflected_poses, WALK.poses) > 0.97 for view in (0.0, 45.0, 90.0, 200.0))
     assert all(overlap(90.0, named(name), WALK.poses) > 0.95 for name in ("mirrored", "legs", "arms"))
     assert overlap(45.0, named("mirrored"), WALK.poses) < overlap(45.0, named("legs"), WALK.poses) < 0.75
     assert overlap(0.0, named("turned"), still) > 0.9
