@@ -27,6 +27,7 @@ class Exemplars:
 
     poses: Array = field(repr=False)
     codes: Codes = field(repr=False)  # (K, D) metres
+    squares: Codes = field(repr=False)  # (K,) of the lengths of codes
     paths: Array = field(repr=False)  # (K, 3) metres: where the clip's root was
     times: Array = field(repr=False)  # (K,) seconds since the clip's first frame
     clips: Rows = field(repr=False)  # (K,) number of the clip
@@ -64,7 +65,22 @@ class Exemplars:
         members = np.argsort(owners, kind="stable")
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
         lasts = np.searchsorted(clips, np.arange(len(motions)), "right") - 1
-        return cls(poses[kept], codes, paths[kept], times[kept], clips, lasts, centres, members, bounds, owners, codes[members], kinds)
+        squares = (codes**2).sum(axis=1)
+        return cls(
+            poses[kept],
+            codes,
+            squares,
+            paths[kept],
+            times[kept],
+            clips,
+            lasts,
+            centres,
+            members,
+            bounds,
+            owners,
+            codes[members],
+            kinds,
+        )
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -106,7 +122,7 @@ class Exemplars:
 
 def mirror_image(motion: Motion) -> Motion:
     """Return what a mirror in the plane x = 0 shows of a motion: whose right is his left."""
-    poses = alike.mirrored(motion.skeleton, motion.poses)
+    poses = alike.mirrored_poses(motion.skeleton, motion.poses)
     poses[:, 0] *= -1.0
     return replace(motion, poses=poses, translations=motion.translations * [-1.0, 1.0, 1.0])
 

@@ -5,18 +5,27 @@ import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
+from posefit import settings
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit_exemplars.beam import BINS, Beam, Steps, between, joined_beams, jumped, stepped, strayed, varied
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import ANGLES
+from posefit.registry import registry
+from posefit_exemplars.beam import Beam, Steps, between, joined_beams, jumped, stepped, strayed, varied
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.look import Look
+from posefit_exemplars.refinement import Make, refined, surroundings
+from posefit_exemplars.smoothing import SMOOTHED, Found, smoothed
 from posefit_exemplars.window import Seen, likeliest, mean_around, seen, weights
 
+LEAST = 300  # evaluations that every stage of a frame has something of
 WIDTH = 400  # states that a beam keeps
-FULL = 0.6  # share of the budget that is for full-size costs
+FULL = 0.35  # share of the budget that is for full-size costs of states
+REFINED = 0.45  # share that is for refining
 AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest looks everywhere
 GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are looked at; in the first frame more
 FIRST_GROUPS = 200
@@ -30,6 +39,7 @@ class _Waiting:
 
     seen: Seen
     look: Look
+    usable: bool
     evaluations: float
     seconds: float
     cpu_seconds: float
@@ -44,21 +54,36 @@ class ExemplarTracker:
     steps: Steps
     temperature: float
     lag: int  # frames that are seen before a pose is told
+    make: Make | None  # an optimiser that refines; None where nothing does
+    pull: float
+    smoothing: float  # thirtieths of a second
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
+        yield from smoothed(self._refined(observations, rng), self.smoothing * self.task.fps / 30.0, self._ahead)
+
+    @property
+    def _ahead(self) -> int:
+        """How many of the frames that are waited for are there to smooth with."""
+        return min(math.ceil(SMOOTHED * self.smoothing * self.task.fps / 30.0), self.lag)
+
+    def _refined(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Found]:
+        """Yield what is found in each frame, before it is smoothed."""
         waiting: deque[_Waiting] = deque()
         latest: Seen | None = None
+        off = np.zeros(ANGLES)
         for observation in observations:
             began, begun = time.perf_counter(), time.process_time()
             look = Look(self.task, observation)
             latest, used = self._seen(look, observation, latest, rng)
             spent = time.perf_counter() - began, time.process_time() - begun
-            waiting.append(_Waiting(latest, look, used, *spent))
-            if len(waiting) > self.lag:
-                yield self._told(waiting)
+            waiting.append(_Waiting(latest, look, observation.usable, used, *spent))
+            if len(waiting) > self.lag - self._ahead:
+                found, off = self._told(waiting, off, rng)
+                yield found
         while waiting:
-            yield self._told(waiting)
+            found, off = self._told(waiting, off, rng)
+            yield found
 
     def _seen(
         self, look: Look, observation: Observation, before: Seen | None, rng: np.random.Generator
@@ -71,7 +96,7 @@ class ExemplarTracker:
                 beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
             return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
         full = int(FULL * self.task.evaluations)
-        small = int((self.task.evaluations - full - 2) / look.share)
+        small = int(((1.0 - REFINED) * self.task.evaluations - full - 4) / look.share)
         around = int(AROUND * small) if latest is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
@@ -132,24 +157,32 @@ class ExemplarTracker:
         off = strayed(places, beam.places, look.eye, self.steps)
         return replace(beam, places=places, totals=beam.totals + off)
 
-    def _told(self, waiting: deque[_Waiting]) -> Frame:
-        """Return the oldest frame that waits: the mean of what is likely about the best way to the newest."""
-        began = time.perf_counter()
+    def _told(self, waiting: deque[_Waiting], off: Array, rng: np.random.Generator) -> tuple[Found, Array]:
+        """Return the oldest frame that waits, refined around the best way to the newest; and how far off that it is.
+
+        The path's pose is the mean of what is likely about it. The search begins as far off it as the frame before.
+        """
+        began, begun = time.perf_counter(), time.process_time()
         window = [one.seen for one in waiting]
-        row, found, oldest = likeliest(window), weights(window), waiting.popleft()
-        beam = oldest.seen.beam
-        pose, place = mean_around(row, found, self.exemplars.codes[beam.states], self._poses(beam), beam.places)
-        cost, areas = oldest.look.measured(pose, place)
-        return Frame(
-            pose,
-            place,
-            cost,
-            areas,
-            math.ceil(oldest.evaluations) + 1,
-            oldest.seconds + time.perf_counter() - began,
-            np.array([cost]),
-            cpu_seconds=oldest.cpu_seconds,
-        )
+        row, likely, oldest = likeliest(window), weights(window), waiting.popleft()
+        beam, look, evaluations = oldest.seen.beam, oldest.look, oldest.evaluations
+        codes = self.exemplars.codes[beam.states]
+        path, place, code = mean_around(row, likely, codes, self._poses(beam), beam.places)
+        pose = path + off if oldest.usable else path
+        if self.make is not None and oldest.usable:
+            count = int(REFINED * self.task.evaluations)
+            space = surroundings(self.exemplars, path, code, off)
+
+            def cost(poses: Array) -> Array:
+                return look.full(poses, look.placed(poses, np.repeat(place[None], len(poses), axis=0)))
+
+            pose, used = refined(space, cost, self.make, self.pull, count, rng)
+            evaluations += used
+            off = wrapped(pose - path)
+        if oldest.usable:
+            place = look.placed(pose[None], place[None])[0]
+        seconds = oldest.seconds + time.perf_counter() - began
+        return Found(pose, place, look, evaluations, seconds, oldest.cpu_seconds + time.process_time() - begun), off
 
 
 def exemplars(
@@ -164,6 +197,9 @@ def exemplars(
     pace: float = 0.008,
     lag: int = 15,
     mirrored: bool = True,
+    refiner: str = "cma",
+    pull: float = 0.3,
+    smoothing: float = 1.0,
 ) -> ExemplarTracker:
     """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
 
@@ -176,6 +212,9 @@ def exemplars(
         depth: and towards or away from a single camera; above 0.
         pace: metres that a root that is known may be off where its clip goes on; above 0.
         lag: frames that are seen before a pose is told, 0 or more.
+        refiner: the optimiser that searches around the path, or "none".
+        pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
+        smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         mirrored: whether the mirror images of all clips are learned from as well.
     """
     for name, value in (
@@ -188,12 +227,24 @@ def exemplars(
     ):
         if not value > 0.0:
             raise ValueError(f"{name} must be above 0, got {value}")
-    if not jump >= 0.0:
-        raise ValueError(f"jump must be 0 or more, got {jump}")
+    for name, value in (("jump", jump), ("pull", pull), ("smoothing", smoothing)):
+        if not value >= 0.0:
+            raise ValueError(f"{name} must be 0 or more, got {value}")
+    if task.evaluations < LEAST:
+        raise ValueError(f"evaluations must be at least {LEAST} for exemplars, got {task.evaluations}")
     if lag < 0:
         raise ValueError(f"lag must be 0 or more, got {lag}")
     intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
     temperature /= intervals
     slack = math.sqrt(intervals)
     steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
-    return ExemplarTracker(task, Exemplars.of(task.training, task.body.skeleton, mirrored=mirrored), steps, temperature, lag)
+    states = Exemplars.of(task.training, task.body.skeleton, mirrored=mirrored)
+    return ExemplarTracker(task, states, steps, temperature, lag, _maker(task, refiner), pull, smoothing)
+
+
+def _maker(task: Task, refiner: str) -> Make | None:
+    """Return what makes the optimiser of a frame. Raises ValueError where there is none of that name."""
+    if refiner == "none":
+        return None
+    factory = registry().optimiser(refiner)
+    return partial(factory, **settings.planned(factory, {}, int(REFINED * task.evaluations)))

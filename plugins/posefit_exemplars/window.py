@@ -66,8 +66,8 @@ def weights(window: Sequence[Seen]) -> Array:
     return np.asarray(found / found.sum())
 
 
-def mean_around(row: int, found: Array, codes: Codes, poses: Array, places: Array) -> tuple[Array, Array]:
-    """Return the mean pose (66,) and place (3,) of the states that are like one of them, by their weights (n,).
+def mean_around(row: int, found: Array, codes: Codes, poses: Array, places: Array) -> tuple[Array, Array, Codes]:
+    """Return the mean pose (66,), place (3,) and code (D,) of the states that are like one of them, by weights (n,).
 
     The mean of all would be between a stride and its mirrored half-cycle where both are likely.
     """
@@ -76,4 +76,5 @@ def mean_around(row: int, found: Array, codes: Codes, poses: Array, places: Arra
     share = found * np.exp(-0.5 * (apart + turned**2))
     share[row] += np.finfo(np.float64).tiny
     share /= share.sum()
-    return poses[row] + share @ wrapped(poses - poses[row]), places[row] + share @ (places - places[row])
+    pose = poses[row] + share @ wrapped(poses - poses[row])
+    return pose, places[row] + share @ (places - places[row]), np.asarray(share @ codes, dtype=np.float32)

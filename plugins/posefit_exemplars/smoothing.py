@@ -1,0 +1,71 @@
+"""A zero-phase filter over what was found: a Gaussian that looks as far ahead as back, so that nothing comes late."""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Frame
+from posefit.geometry.rotation import wrapped
+from posefit_exemplars.look import Look
+
+SMOOTHED = 3.0  # standard deviations that the filter reaches to either side
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What was found in a frame."""
+
+    pose: Array  # (66,)
+    place: Array  # (3,)
+    look: Look = field(repr=False)
+    evaluations: float
+    seconds: float
+    cpu_seconds: float
+
+
+def smoothed(frames: Iterable[Found], spread: float, ahead: int) -> Iterator[Frame]:
+    """Yield each frame as the weighted mean of those up to `ahead` before and after it, `ahead` frames later.
+
+    `spread` is the standard deviation of the weights, in frames; 0 leaves everything as it is.
+    """
+    recent: deque[Found] = deque()
+    here = 0  # where in `recent` the next one to tell is
+    for one in frames:
+        recent.append(one)
+        if len(recent) - here > ahead:
+            yield _told(recent, here, spread)
+            here += 1
+            if here > ahead:
+                recent.popleft()
+                here -= 1
+    while here < len(recent):
+        yield _told(recent, here, spread)
+        here += 1
+
+
+def mean_of(poses: Array, places: Array, here: int, spread: float) -> tuple[Array, Array]:
+    """Return the weighted mean pose (66,) and place (3,) of frames (n, 66), (n, 3) about one of them.
+
+    As many frames before as after it count, so that the mean of a steady movement is where it is.
+    """
+    if spread <= 0.0:
+        return poses[here], places[here]
+    reach = min(here, len(poses) - 1 - here)
+    rows = np.arange(here - reach, here + reach + 1)
+    share = np.exp(-0.5 * ((rows - here) / spread) ** 2)
+    share /= share.sum()
+    return poses[here] + share @ wrapped(poses[rows] - poses[here]), share @ places[rows]
+
+
+def _told(recent: Sequence[Found], here: int, spread: float) -> Frame:
+    one = recent[here]
+    poses, places = (np.array([getattr(each, name) for each in recent]) for name in ("pose", "place"))
+    pose, place = mean_of(poses, places, here, spread)
+    if one.look.root is not None:
+        place = one.place
+    cost, areas = one.look.measured(pose, place)
+    used = int(np.ceil(one.evaluations)) + 1
+    return Frame(pose, place, cost, areas, used, one.seconds, np.array([cost]), cpu_seconds=one.cpu_seconds)
