@@ -59,6 +59,11 @@ CELL = {
     "evaluations": ("", "budget of a frame"),
     "translation": ("", "how the root's place is found: known, searched or aligned"),
     "first_pose": ("", "how the first pose is found: searched, or given"),
+    "yaw_off_degrees": (
+        "degrees",
+        "by how much the first yaw that is told is off at most; 180 for none told, empty for 0",
+    ),
+    "body_off_percent": ("%", "by how much bones and radii that are told are off at most; empty for 0"),
     "seed": ("", "the seed of the method"),
 }
 HEAD = "| {0} | unit | meaning |\n|---|---|---|"

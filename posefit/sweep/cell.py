@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 POINTS = 64  # of an anytime trace at most
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # what two runs of a cell do not have in common
+ALL_AROUND = 180.0  # degrees that a yaw may be off when nothing is told of it
+SALT = 2001  # part of the seed of what is told of a person
 DROPPED = "dropped"  # the corruption that takes whole frames away, a share of them
 UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
 
@@ -35,6 +37,9 @@ class Cell:
     `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames that are not seen; what is
     spoilt follows from the instance, so that every method and seed sees the same. `files` holds the SHA-256 of every
     capture file that is read.
+
+    Of the person a method is told where he faces at first, at most `yaw_off_degrees` off, nothing at 180; and his body,
+    each bone's length and radii at most `body_off_percent` off. Both are drawn from the instance and the motion's name.
     """
 
     method: str
@@ -50,6 +55,8 @@ class Cell:
     evaluations: int = 2440
     translation: str = "known"
     first_pose: str = "searched"
+    yaw_off_degrees: float = 0.0
+    body_off_percent: float = 0.0
     seed: int = 0
     files: Mapping[str, str] = field(default_factory=dict)
     version: str = __version__  # of posefit, and of plugins that are not its own
@@ -57,13 +64,17 @@ class Cell:
     @cached_property
     def spec(self) -> dict[str, Any]:
         """The cell as JSON holds it."""
-        spec: dict[str, Any] = json.loads(json.dumps({name: getattr(self, name) for name in FIELDS}))
+        spec: dict[str, Any] = json.loads(json.dumps(self._said(FIELDS)))
         return spec
 
     @cached_property
     def key(self) -> str:
         """The cell's name: the SHA-256 of its spec, version included, as 64 hexadecimal digits."""
-        return hashlib.sha256(json_of({name: getattr(self, name) for name in NAMES}).encode()).hexdigest()
+        return hashlib.sha256(json_of(self._said(NAMES)).encode()).hexdigest()
+
+    def _said(self, names: tuple[str, ...]) -> dict[str, Any]:
+        values = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in values.items() if is_said(name, value)}
 
     def __str__(self) -> str:
         return f"{self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
@@ -71,6 +82,13 @@ class Cell:
 
 FIELDS = tuple(one.name for one in fields(Cell))
 NAMES = tuple(sorted(FIELDS))  # in which order a key is of them
+# Fields that came after the first ledgers, as those have it: where they say no more, keys and specs are without them.
+LATER = {"yaw_off_degrees": 0.0, "body_off_percent": 0.0}
+
+
+def is_said(name: str, value: Any) -> bool:
+    """Return whether a field's value stands in the cell's key and its spec."""
+    return name not in LATER or value != LATER[name]
 
 
 @dataclass(frozen=True)
@@ -127,11 +145,26 @@ def cell_scene(cell: Cell) -> "Scene":
 
     motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
     scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
-    noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
+    scene = _as_told(cell, scene)
     if not cell.corruption:
         return scene
+    noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
     spoilt = Spoilt(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
     return replace(scene, observations=spoilt)
+
+
+def _as_told(cell: Cell, scene: "Scene") -> "Scene":
+    """Return the scene with what a method is told of the person: about where he faces at first, and his body."""
+    import numpy as np
+
+    from posefit.geometry.body import varied
+
+    if not (cell.yaw_off_degrees or cell.body_off_percent):
+        return scene
+    for_yaw, for_body = np.random.default_rng([SALT, cell.instance, *Path(cell.motion).stem.encode()]).spawn(2)
+    off = np.radians(cell.yaw_off_degrees) * for_yaw.uniform(-1.0, 1.0)
+    told = None if cell.yaw_off_degrees >= ALL_AROUND or scene.yaw is None else scene.yaw + float(off)
+    return replace(scene, yaw=told, body=varied(scene.body, cell.body_off_percent, for_body))
 
 
 def json_of(value: Any) -> str:

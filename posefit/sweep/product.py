@@ -10,7 +10,7 @@ from itertools import combinations, product
 from math import prod
 from typing import Any, overload
 
-from posefit.sweep.cell import NAMES, Cell, json_of
+from posefit.sweep.cell import NAMES, Cell, is_said, json_of
 from posefit.sweep.check import FIELDS, checked
 
 CROSSED = ("method", "motion", "train", "settings", "frames", "fps", "evaluations")  # which `cell_of` checks together
@@ -97,7 +97,7 @@ class Product:
             for n, entries in self._loose.items():
                 for place, piece in entries[chosen[n]][1]:
                     pieces[place] = piece
-            yield chosen, cell, hashlib.sha256(f"{{{','.join(pieces)}}}".encode()).digest()
+            yield chosen, cell, hashlib.sha256(f"{{{','.join(filter(None, pieces))}}}".encode()).digest()
 
     def _common(self, chosen: tuple[int, ...]) -> tuple[Cell, list[str]]:
         """Return a cell with the crossed fields of some entries, and its fields as JSON."""
@@ -116,4 +116,5 @@ class Product:
 
 
 def _piece(name: str, value: Any) -> str:
-    return f'"{name}":{json_of(value)}'
+    """Return what a key has of a field; nothing of one that says nothing in it."""
+    return f'"{name}":{json_of(value)}' if is_said(name, value) else ""
