@@ -13,7 +13,6 @@ from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.measures import Measures, Spread
 
-
 MANY = 8_000  # training poses, more than which are not all drawn at full size in every frame
 STRIDE = 4  # of so many poses each is looked at in a small picture
 CLOSE = 200  # of these are looked at closely, with their neighbours in the clip

@@ -1,4 +1,4 @@
-"""posefit's own measurements: `posefit reproduce accuracy`, `methods`, `views`, `degradation`, `builds`, `footage`, `people`."""
+"""posefit's own measurements: `posefit reproduce accuracy`, `methods`, `views`, `degradation` and so on."""
 
 from collections.abc import Callable, Iterable
 from functools import partial

@@ -19,7 +19,7 @@ from posefit.footage.scene import Rendered, Scene, synthetic
 from posefit.footage.training import training_clips
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Silhouette
-from posefit.sweep.cell import cell_scene, parts
+from posefit.sweep.cell import Cell, cell_scene, parts
 from posefit.sweep.check import cell_of
 from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
@@ -67,22 +67,27 @@ def recoveries(
 ) -> list[dict[str, Any]]:
     """Return what came of every trial: some walks, each kind of absence, translations known and aligned."""
     keys = list(product(walks, views, KINDS, TRANSLATIONS))
-    found = each({key: partial(_tried, method, evaluations, *key) for key in keys}, workers, progress)
+    trials = {
+        key: partial(_tried, _cell(method, evaluations, *key[:3]), *key) for key in keys
+    }  # checked before any runs
+    found = each(trials, workers, progress)
     return [found[key] for key in keys]
 
 
-def _tried(
-    method: str, evaluations: int, clip: Clip, views: Views, kind: str, translation: Translation
-) -> dict[str, Any]:
+def _cell(method: str, evaluations: int, clip: Clip, views: Views, kind: str) -> Cell:
+    """Return the cell of the walk as it is, whole or until its end."""
     frames = BEFORE if kind == RETURN else clip.frames
     spec = {"method": method, "motion": clip.name, "train": [clip.library], "view_degrees": views, "frames": frames}
-    cell = cell_of({**spec, "instance": clip.instance, "evaluations": evaluations, **TOLD})
+    return cell_of({**spec, "instance": clip.instance, "evaluations": evaluations, **TOLD})
+
+
+def _tried(cell: Cell, clip: Clip, views: Views, kind: str, translation: Translation) -> dict[str, Any]:
     scene = cell_scene(cell)
     scene, gone, back = returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
-    optimiser, prior, tracker = parts(method)
+    optimiser, prior, tracker = parts(cell.method)
     named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
     training = [one(scene.fps) for one in training_clips(cell.train)]
-    choice, opening = Choice(evaluations=evaluations, **named), Opening(translation=translation)
+    choice, opening = Choice(evaluations=cell.evaluations, **named), Opening(translation=translation)
     track = follow(scene, training, choice=choice, opening=opening)
     told = {"clip": clip.name, "views_degrees": list(views), "kind": kind, "translation": translation}
     mpjpe = np.array([row["mpjpe_mm"] for row in track.frames])

@@ -21,22 +21,25 @@ SHARES = ("lost_rate", "swap_rate")
 TRIVIAL = ("nearest", "mean_pose")  # baselines that tables show
 
 
-def tables(found: Sequence[Track], measured: Sequence[Row], near: Mapping[Clip, float]) -> dict[str, Any]:
+def tables(tracks: Sequence[Track], measured: Sequence[Row], near: Mapping[Clip, float]) -> dict[str, Any]:
     """Return the tables of tracks and their rows; `near` is how far the library's closest poses are from a clip's."""
-    pairs = list(zip(found, measured, strict=True))
+    pairs = list(zip(tracks, measured, strict=True))
     base = {track.place: (track, row) for track, row in pairs if track.part == BASE}
     return {
         "tracks": len(pairs),
-        "groups": [_group(name, list(base.values()), near) for name in GROUPS],
+        "groups": [
+            _group(name, found, near)
+            for name in GROUPS
+            if (found := [one for one in base.values() if one[0].group == name])
+        ],
         "changes": list(_changes(pairs, base)),
         "methods": list(_methods(pairs, base)),
         "own": [_own(track, row) for track, row in pairs if track.part == OWN],
     }
 
 
-def _group(name: str, base: Found, near: Mapping[Clip, float]) -> dict[str, Any]:
+def _group(name: str, mine: Found, near: Mapping[Clip, float]) -> dict[str, Any]:
     """Return what is reached in a group, with one camera and with two, and from each view."""
-    mine = [(track, row) for track, row in base if track.group == name]
     views: list[Views] = list(dict.fromkeys(track.views for track, _ in mine))
     cameras = {
         f"{count}_camera": _figures([(track, row) for track, row in mine if len(track.views) == count])
