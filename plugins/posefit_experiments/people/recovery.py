@@ -67,10 +67,8 @@ def recoveries(
 ) -> list[dict[str, Any]]:
     """Return what came of every trial: some walks, each kind of absence, translations known and aligned."""
     keys = list(product(walks, views, KINDS, TRANSLATIONS))
-    trials = {
-        key: partial(_tried, _cell(method, evaluations, *key[:3]), *key) for key in keys
-    }  # checked before any runs
-    found = each(trials, workers, progress)
+    # all cells are made, and so checked, before any runs
+    found = each({key: partial(_tried, _cell(method, evaluations, *key[:3]), *key) for key in keys}, workers, progress)
     return [found[key] for key in keys]
 
 
