@@ -78,8 +78,8 @@ def page() -> str:
         "`posefit track --json` prints the same object. First what was asked, then what was found.",
         _table("key", _told(ASKED)),
         _table("key", _measured(MEASURES.values())),
-        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill` and `baselines_degrees` hold one "
-        "number for each baseline:",
+        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, `baselines_degrees` and "
+        "`baselines_mm` hold one number for each baseline:",
         _table(
             "baseline",
             [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],

@@ -18,7 +18,7 @@ from posefit.sweep.plan import Plan
 from posefit_experiments.people import experiment
 from posefit_experiments.people.clips import GROUPS, RUNS, WALKS, Clip
 from posefit_experiments.people.closest import closest_mm, distances_mm
-from posefit_experiments.people.design import BASE, CHANGES, FULL, METHODS, OTHERS, OWN, QUICK, Scale, Track, design
+from posefit_experiments.people.design import BASE, CHANGES, FULL, METHODS, OTHERS, OWN, QUICK, Planned, Scale, design
 from posefit_experiments.people.recovery import AWAY, GAPS, RETURN, judged, recoveries, returned, with_gap
 from posefit_experiments.people.tables import interval, people_lines, recovery_lines, recovery_table, tables
 
@@ -196,7 +196,7 @@ def test_trials_of_every_kind_are_made_and_told(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_tracks_are_run_kept_and_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def short(scale: Scale, method: str, evaluations: int, others: Any) -> list[Track]:
+    def short(scale: Scale, method: str, evaluations: int, others: Any) -> list[Planned]:
         found = [track for track in design(scale, method, evaluations, others) if track.part in (BASE, *CHANGES)]
         return [track._replace(spec={**track.spec, "train": ["library:16"], "frames": 2}) for track in found]
 

@@ -40,7 +40,7 @@ PAIRS: tuple[Views, ...] = ((0.0, 90.0), (45.0, 135.0))
 OBLIQUE: Views = (45.0,)
 
 
-class Track(NamedTuple):
+class Planned(NamedTuple):
     """One track: why it is there, and what of."""
 
     part: str  # BASE, a name of CHANGES, OTHERS or OWN
@@ -89,7 +89,7 @@ QUICK = Scale(
 )
 
 
-def design(scale: Scale, method: str, evaluations: int, others: Sequence[str]) -> list[Track]:
+def design(scale: Scale, method: str, evaluations: int, others: Sequence[str]) -> list[Planned]:
     """Return the tracks of a method; with those of `others` on some of the base, and of a walker's own clips."""
     return [
         track
@@ -98,36 +98,36 @@ def design(scale: Scale, method: str, evaluations: int, others: Sequence[str]) -
     ]
 
 
-def _base(scale: Scale) -> Iterator[Track]:
+def _base(scale: Scale) -> Iterator[Planned]:
     counts = {WALKS: (scale.walks, scale.views), RUNS: (scale.runs, scale.run_views)}
     for group, clips in GROUPS.items():
         count, views = counts.get(group, (scale.rest, scale.rest_views))
-        yield from (Track(BASE, group, clip, view, "", TOLD) for clip in clips[:count] for view in views)
+        yield from (Planned(BASE, group, clip, view, "", TOLD) for clip in clips[:count] for view in views)
 
 
-def _changed(scale: Scale) -> Iterator[Track]:
+def _changed(scale: Scale) -> Iterator[Planned]:
     for name, change in CHANGES.items():
         for clip in GROUPS[WALKS][: scale.changed]:
             for view in scale.changed_views:
-                yield Track(name, WALKS, clip, view, "", {**TOLD, **change})
+                yield Planned(name, WALKS, clip, view, "", {**TOLD, **change})
 
 
-def _compared(scale: Scale, others: Sequence[str]) -> Iterator[Track]:
+def _compared(scale: Scale, others: Sequence[str]) -> Iterator[Planned]:
     places = [(WALKS, clip, view) for clip in GROUPS[WALKS][: scale.compared] for view in scale.compared_views]
     places += [
         (group, clip, OBLIQUE) for group in GROUPS if group != WALKS for clip in GROUPS[group][: scale.compared_rest]
     ]
-    yield from (Track(OTHERS, *place, method, TOLD) for method in others for place in places)
+    yield from (Planned(OTHERS, *place, method, TOLD) for method in others for place in places)
 
 
-def _own() -> Iterator[Track]:
+def _own() -> Iterator[Planned]:
     clip = Clip(OWN_CLIP, OWN_FRAMES, 0, "walks and turns left")
     his = [one.name for one in recorded.clips(only=(clip.subject,)) if one.name != clip.name]
     for name, train in ((OWN_TRAIN, [OWN_TRAIN]), ("library and his others", [clip.library, *his])):
-        yield from (Track(OWN, name, clip, view, "", {"train": train}) for view in SIDES[:3])
+        yield from (Planned(OWN, name, clip, view, "", {"train": train}) for view in SIDES[:3])
 
 
-def _completed(track: Track, method: str, evaluations: int) -> Track:
+def _completed(track: Planned, method: str, evaluations: int) -> Planned:
     """Return a track with all that its cell says."""
     clip = track.clip
     spec = {

@@ -10,7 +10,7 @@ from posefit.sweep.plan import Plan
 from posefit_experiments.grid import Progress, Say, rows
 from posefit_experiments.people.clips import GROUPS, WALKS
 from posefit_experiments.people.closest import closest_mm
-from posefit_experiments.people.design import BASE, FULL, METHODS, QUICK, SIDES, Track, design
+from posefit_experiments.people.design import BASE, FULL, METHODS, QUICK, SIDES, Planned, design
 from posefit_experiments.people.recovery import recoveries
 from posefit_experiments.people.tables import recovery_table, tables
 
@@ -64,7 +64,7 @@ def recovery(
     return {"method": method, "evaluations": evaluations, "recovery": recovery_table(trials)}
 
 
-def _lines(found: Sequence[Track], measured: Sequence[dict[str, Any]]) -> list[str]:
+def _lines(found: Sequence[Planned], measured: Sequence[dict[str, Any]]) -> list[str]:
     return [
         json.dumps(
             {

@@ -10,10 +10,10 @@ from posefit.arrays import Array
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit_experiments.columns import head_of, number
 from posefit_experiments.people.clips import GROUPS, Clip
-from posefit_experiments.people.design import BASE, CHANGES, OTHERS, OWN, Track, Views
+from posefit_experiments.people.design import BASE, CHANGES, OTHERS, OWN, Planned, Views
 
 Row = Mapping[str, Any]
-Found = Sequence[tuple[Track, Row]]
+Found = Sequence[tuple[Planned, Row]]
 
 RESAMPLES = 2000
 LEVEL = 0.95
@@ -21,7 +21,7 @@ SHARES = ("lost_rate", "swap_rate")
 TRIVIAL = ("nearest", "mean_pose")  # baselines that tables show
 
 
-def tables(tracks: Sequence[Track], measured: Sequence[Row], near: Mapping[Clip, float]) -> dict[str, Any]:
+def tables(tracks: Sequence[Planned], measured: Sequence[Row], near: Mapping[Clip, float]) -> dict[str, Any]:
     """Return the tables of tracks and their rows; `near` is how far the library's closest poses are from a clip's."""
     pairs = list(zip(tracks, measured, strict=True))
     base = {track.place: (track, row) for track, row in pairs if track.part == BASE}
@@ -81,7 +81,7 @@ def interval(values: Array, names: Sequence[str]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _changes(pairs: Found, base: Mapping[Any, tuple[Track, Row]]) -> Iterator[dict[str, Any]]:
+def _changes(pairs: Found, base: Mapping[Any, tuple[Planned, Row]]) -> Iterator[dict[str, Any]]:
     """Yield what each change comes to, beside the same clips and views without it."""
     same = [base[track.place] for track, _ in pairs if track.part == next(iter(CHANGES))]
     if same:
@@ -93,7 +93,7 @@ def _changes(pairs: Found, base: Mapping[Any, tuple[Track, Row]]) -> Iterator[di
             yield {"change": name, **_figures(mine), "more_mm": float(np.median(more))}
 
 
-def _methods(pairs: Found, base: Mapping[Any, tuple[Track, Row]]) -> Iterator[dict[str, Any]]:
+def _methods(pairs: Found, base: Mapping[Any, tuple[Planned, Row]]) -> Iterator[dict[str, Any]]:
     """Yield what every method reaches on the tracks that all of them have."""
     others = [(track, row) for track, row in pairs if track.part == OTHERS]
     names = dict.fromkeys(track.method for track, _ in others)
@@ -105,7 +105,7 @@ def _methods(pairs: Found, base: Mapping[Any, tuple[Track, Row]]) -> Iterator[di
             yield {"method": one[0][0].method, **_figures(one), "seconds_per_frame": seconds}
 
 
-def _own(track: Track, row: Row) -> dict[str, Any]:
+def _own(track: Planned, row: Row) -> dict[str, Any]:
     return {
         "train": track.group,
         "test": track.clip.name,
