@@ -16,14 +16,14 @@ from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit_experiments.people import experiment
-from posefit_experiments.people.clips import GROUPS, RUNS, WALKS, Clip
+from posefit_experiments.people.clips import GROUPS, RUNS, WALKS, Piece
 from posefit_experiments.people.closest import closest_mm, distances_mm
-from posefit_experiments.people.design import BASE, CHANGES, FULL, METHODS, OTHERS, OWN, QUICK, Planned, Scale, design
+from posefit_experiments.people.design import BASE, CHANGES, FULL, METHODS, OTHERS, OWN, QUICK, Extent, Planned, design
 from posefit_experiments.people.recovery import AWAY, GAPS, RETURN, judged, recoveries, returned, with_gap
 from posefit_experiments.people.tables import interval, people_lines, recovery_lines, recovery_table, tables
 
-CLIP = Clip("02_01", 12, 0, "walks straight")
-TINY = Scale(
+CLIP = Piece("02_01", 12, 0, "walks straight")
+TINY = Extent(
     walks=1, views=((45.0,),), changed=1, changed_views=((45.0,),), runs=0, rest=0, compared=1,
     compared_views=((45.0,),), compared_rest=0,
 )  # fmt: skip
@@ -95,7 +95,7 @@ def row(mpjpe: float, lost: float = 0.0) -> dict[str, Any]:
 
 
 def test_tables_hold_medians_and_the_differences_from_the_base() -> None:
-    scale = Scale(walks=3, views=((0.0,), (0.0, 90.0)), changed=3, changed_views=((0.0,),), runs=0, rest=0, compared=3,
+    scale = Extent(walks=3, views=((0.0,), (0.0, 90.0)), changed=3, changed_views=((0.0,),), runs=0, rest=0, compared=3,
                   compared_views=((0.0,),), compared_rest=0)  # fmt: skip
     found = [track for track in design(scale, "exemplars", 100, ("vsmm",)) if track.part != OWN]
     values = {BASE: 40.0, "first yaw unknown": 47.0, OTHERS: 300.0}
@@ -196,7 +196,7 @@ def test_trials_of_every_kind_are_made_and_told(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_tracks_are_run_kept_and_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def short(scale: Scale, method: str, evaluations: int, others: Any) -> list[Planned]:
+    def short(scale: Extent, method: str, evaluations: int, others: Any) -> list[Planned]:
         found = [track for track in design(scale, method, evaluations, others) if track.part in (BASE, *CHANGES)]
         return [track._replace(spec={**track.spec, "train": ["library:16"], "frames": 2}) for track in found]
 

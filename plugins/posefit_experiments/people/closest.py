@@ -13,17 +13,17 @@ from posefit.footage.training import training_clips
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.motion import recorded
 from posefit_experiments.grid import Progress, each
-from posefit_experiments.people.clips import Clip
+from posefit_experiments.people.clips import Piece
 
 LOOKED_AT = 64  # poses closest in the sense of squares, of which one is closest in that of means
 
 
-def closest_mm(clips: Iterable[Clip], workers: int | None, progress: Progress | None = None) -> dict[Clip, float]:
+def closest_mm(clips: Iterable[Piece], workers: int | None, progress: Progress | None = None) -> dict[Piece, float]:
     """Return for each clip how far, in the sense of MPJPE, the closest poses of everybody else's are from the true."""
     return each({clip: partial(_distance_mm, clip) for clip in dict.fromkeys(clips)}, workers, progress)
 
 
-def _distance_mm(clip: Clip) -> float:
+def _distance_mm(clip: Piece) -> float:
     truth = motion_of_instance(clip.name, clip.instance, frames=clip.frames, fps=FPS)
     return float(np.mean(distances_mm(_joints(truth.skeleton, truth.poses[:, 3:]), _library(clip.subject))))
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from posefit.motion import recorded
 from posefit.sweep.cell import ALL_AROUND
-from posefit_experiments.people.clips import GROUPS, RUNS, WALKS, Clip
+from posefit_experiments.people.clips import GROUPS, RUNS, WALKS, Piece
 
 Views = tuple[float, ...]
 
@@ -45,19 +45,19 @@ class Planned(NamedTuple):
 
     part: str  # BASE, a name of CHANGES, OTHERS or OWN
     group: str
-    clip: Clip
+    clip: Piece
     views: Views
     method: str
     spec: Mapping[str, Any]
 
     @property
-    def place(self) -> tuple[str, Clip, Views]:
+    def place(self) -> tuple[str, Piece, Views]:
         """What two tracks have in common that are compared."""
         return self.group, self.clip, self.views
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scale:
+class Extent:
     """How many of each group's clips, seen from where."""
 
     walks: int = 9
@@ -73,8 +73,8 @@ class Scale:
     compared_rest: int = 2  # of every other group, from 45 degrees
 
 
-FULL = Scale()
-QUICK = Scale(
+FULL = Extent()
+QUICK = Extent(
     walks=4,
     views=(*SIDES[:3], PAIRS[0]),
     changed=1,
@@ -89,39 +89,39 @@ QUICK = Scale(
 )
 
 
-def design(scale: Scale, method: str, evaluations: int, others: Sequence[str]) -> list[Planned]:
+def design(extent: Extent, method: str, evaluations: int, others: Sequence[str]) -> list[Planned]:
     """Return the tracks of a method; with those of `others` on some of the base, and of a walker's own clips."""
     return [
         track
-        for part in (_base(scale), _changed(scale), _compared(scale, others), _own())
+        for part in (_base(extent), _changed(extent), _compared(extent, others), _own())
         for track in (_completed(one, method, evaluations) for one in part)
     ]
 
 
-def _base(scale: Scale) -> Iterator[Planned]:
-    counts = {WALKS: (scale.walks, scale.views), RUNS: (scale.runs, scale.run_views)}
+def _base(extent: Extent) -> Iterator[Planned]:
+    counts = {WALKS: (extent.walks, extent.views), RUNS: (extent.runs, extent.run_views)}
     for group, clips in GROUPS.items():
-        count, views = counts.get(group, (scale.rest, scale.rest_views))
+        count, views = counts.get(group, (extent.rest, extent.rest_views))
         yield from (Planned(BASE, group, clip, view, "", TOLD) for clip in clips[:count] for view in views)
 
 
-def _changed(scale: Scale) -> Iterator[Planned]:
+def _changed(extent: Extent) -> Iterator[Planned]:
     for name, change in CHANGES.items():
-        for clip in GROUPS[WALKS][: scale.changed]:
-            for view in scale.changed_views:
+        for clip in GROUPS[WALKS][: extent.changed]:
+            for view in extent.changed_views:
                 yield Planned(name, WALKS, clip, view, "", {**TOLD, **change})
 
 
-def _compared(scale: Scale, others: Sequence[str]) -> Iterator[Planned]:
-    places = [(WALKS, clip, view) for clip in GROUPS[WALKS][: scale.compared] for view in scale.compared_views]
+def _compared(extent: Extent, others: Sequence[str]) -> Iterator[Planned]:
+    places = [(WALKS, clip, view) for clip in GROUPS[WALKS][: extent.compared] for view in extent.compared_views]
     places += [
-        (group, clip, OBLIQUE) for group in GROUPS if group != WALKS for clip in GROUPS[group][: scale.compared_rest]
+        (group, clip, OBLIQUE) for group in GROUPS if group != WALKS for clip in GROUPS[group][: extent.compared_rest]
     ]
     yield from (Planned(OTHERS, *place, method, TOLD) for method in others for place in places)
 
 
 def _own() -> Iterator[Planned]:
-    clip = Clip(OWN_CLIP, OWN_FRAMES, 0, "walks and turns left")
+    clip = Piece(OWN_CLIP, OWN_FRAMES, 0, "walks and turns left")
     his = [one.name for one in recorded.clips(only=(clip.subject,)) if one.name != clip.name]
     for name, train in ((OWN_TRAIN, [OWN_TRAIN]), ("library and his others", [clip.library, *his])):
         yield from (Planned(OWN, name, clip, view, "", {"train": train}) for view in SIDES[:3])

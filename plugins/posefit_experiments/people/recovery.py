@@ -25,7 +25,7 @@ from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
 from posefit.tracking.run import follow
 from posefit_experiments.grid import Progress, each
-from posefit_experiments.people.clips import Clip
+from posefit_experiments.people.clips import Piece
 from posefit_experiments.people.design import TOLD, Views
 
 WITHIN = 10  # frames after somebody is seen again, in which the track has to be right again
@@ -58,7 +58,7 @@ class Unseen(Sequence[Observation]):
 
 
 def recoveries(
-    walks: Sequence[Clip],
+    walks: Sequence[Piece],
     views: Sequence[Views],
     method: str,
     evaluations: int,
@@ -72,14 +72,14 @@ def recoveries(
     return [found[key] for key in keys]
 
 
-def _cell(method: str, evaluations: int, clip: Clip, views: Views, kind: str) -> Cell:
+def _cell(method: str, evaluations: int, clip: Piece, views: Views, kind: str) -> Cell:
     """Return the cell of the walk as it is, whole or until its end."""
     frames = BEFORE if kind == RETURN else clip.frames
     spec = {"method": method, "motion": clip.name, "train": [clip.library], "view_degrees": views, "frames": frames}
     return cell_of({**spec, "instance": clip.instance, "evaluations": evaluations, **TOLD})
 
 
-def _tried(cell: Cell, clip: Clip, views: Views, kind: str, translation: Translation) -> dict[str, Any]:
+def _tried(cell: Cell, clip: Piece, views: Views, kind: str, translation: Translation) -> dict[str, Any]:
     scene = cell_scene(cell)
     scene, gone, back = returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
     optimiser, prior, tracker = parts(cell.method)

@@ -9,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit_experiments.columns import head_of, number
-from posefit_experiments.people.clips import GROUPS, Clip
+from posefit_experiments.people.clips import GROUPS, Piece
 from posefit_experiments.people.design import BASE, CHANGES, OTHERS, OWN, Planned, Views
 
 Row = Mapping[str, Any]
@@ -21,7 +21,7 @@ SHARES = ("lost_rate", "swap_rate")
 TRIVIAL = ("nearest", "mean_pose")  # baselines that tables show
 
 
-def tables(tracks: Sequence[Planned], measured: Sequence[Row], near: Mapping[Clip, float]) -> dict[str, Any]:
+def tables(tracks: Sequence[Planned], measured: Sequence[Row], near: Mapping[Piece, float]) -> dict[str, Any]:
     """Return the tables of tracks and their rows; `near` is how far the library's closest poses are from a clip's."""
     pairs = list(zip(tracks, measured, strict=True))
     base = {track.place: (track, row) for track, row in pairs if track.part == BASE}
@@ -38,7 +38,7 @@ def tables(tracks: Sequence[Planned], measured: Sequence[Row], near: Mapping[Cli
     }
 
 
-def _group(name: str, mine: Found, near: Mapping[Clip, float]) -> dict[str, Any]:
+def _group(name: str, mine: Found, near: Mapping[Piece, float]) -> dict[str, Any]:
     """Return what is reached in a group, with one camera and with two, and from each view."""
     views: list[Views] = list(dict.fromkeys(track.views for track, _ in mine))
     cameras = {
@@ -141,7 +141,7 @@ def people_lines(told: Mapping[str, Any]) -> Iterator[str]:
     if told["changes"]:
         yield ""
         yield from _head(["walks", *heads, "more than base, mm"], 1)
-        yield from (_line([one["change"], *_cells(one), _mm(one["more_mm"])]) for one in told["changes"])
+        yield from (_line([one["change"], *_cells(one), _mm(round(one["more_mm"]) + 0.0)]) for one in told["changes"])
     if told["methods"]:
         yield ""
         yield from _head(["method", *heads, "ms a frame"], 1)
