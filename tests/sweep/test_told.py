@@ -51,7 +51,7 @@ def test_cells_that_are_told_less_have_keys_of_their_own_however_they_are_made()
     assert len({one.key for one in cells}) == len(told)
     assert cells[1].spec["yaw_off_degrees"] == 25.0
     product = {"methods": ["sapso@pca"], "motions": ["walk"], "seeds": [0]}
-    for one, made in zip(told, cells, strict=True):
+    for one, made in zip([*told, {"yaw_off_degrees": 0.0}], [*cells, cells[0]], strict=True):
         entry = {"instance": 0, **one}  # of fields that are checked by themselves
         plan = Plan.of({"defaults": {"frames": 2, "size": [160, 120]}, "product": {**product, "instances": [entry]}})
         assert list(plan.keys()) == [found.key for found in plan] == [made.key]

@@ -1,8 +1,8 @@
 """The recorded clips that are followed, in groups: whoever moves in them is left out of the library.
 
 What a clip shows was read off its pictures and the database's index; 16_15 and 16_28 are not among them, since an arm
-jumps in their first frames. Frames are counted from the clip's first, at 30 a
-second; an instance other than 0 begins elsewhere in the clip and turns the cameras by a few degrees.
+jumps in their first frames. Frames are counted from the clip's first, at 30 a second; an instance other than 0 begins
+elsewhere in the clip and turns the cameras by a few degrees.
 """
 
 from typing import NamedTuple
