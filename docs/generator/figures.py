@@ -65,6 +65,8 @@ CELL = {
     "translation": ("", "how the root's place is found: known, searched or aligned"),
     "first_pose": ("", "how the first pose is found: searched, or given"),
     "tracks": ("", "how many tracks from different beginnings one was chosen of"),
+    "yaw_off_degrees": ("degrees", "by how much the first yaw that is told is off at most; 180 for none told"),
+    "body_off_percent": ("%", "by how much bones and radii that are told are off at most"),
     "seed": ("", "the seed of the method"),
 }
 HEAD = "| {0} | unit | meaning |\n|---|---|---|"
@@ -79,8 +81,8 @@ def page() -> str:
         "`posefit track --json` prints the same object. First what was asked, then what was found.",
         _table("key", _told(ASKED)),
         _table("key", _measured(MEASURES.values())),
-        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill` and `baselines_degrees` hold one "
-        "number for each baseline:",
+        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, `baselines_degrees` and "
+        "`baselines_mm` hold one number for each baseline:",
         _table(
             "baseline",
             [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],

@@ -8,6 +8,7 @@
     posefit reproduce degradation  silhouettes that get worse and worse
     posefit reproduce builds       how well a person's build is found
     posefit reproduce footage      a real video, whose truth nobody knows
+    posefit reproduce people       people whom a library of motions has never seen
     posefit bench                  how fast the loop is
 
 Each has `--help`, and `--json` for one JSON object on stdout. `--clips`, or the environment variable POSEFIT_CMU, says
@@ -24,6 +25,7 @@ Files:
     accuracy.py, methods.py           plans of cells: `--ledger` keeps the rows for `posefit report`
     views.py, degradation.py, builds.py    jobs that no cell can carry, and why
     filmed/          `posefit reproduce footage`
+    people/          `posefit reproduce people`
     bench/           `posefit bench`
     same.py          compares two reports, but for the times: `python -m posefit_experiments.same BEFORE AFTER`
 

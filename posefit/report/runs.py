@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import COLUMNS, FIGURES
 from posefit.report.repeat import LAST, command_head
-from posefit.sweep.cell import LATER, settings_text
+from posefit.sweep.cell import in_full, settings_text
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
@@ -85,7 +85,8 @@ class _Table:
             self.known[kind] = variant, _index(self.heads, command_head(spec))
         variant, begun = self.known[kind]
         place = _index(
-            self.places, _text({name: value for name, value in spec.items() if name not in (*_VARIANT, "seed")})
+            self.places,
+            _text({name: value for name, value in in_full(spec).items() if name not in (*_VARIANT, "seed")}),
         )
         self.numbers.append((variant, place, begun))
         self.seeds.append(spec["seed"])
@@ -151,7 +152,7 @@ def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _variant(spec: Mapping[str, Any]) -> str:
-    return _text({name: value for name, value in {**LATER, **spec}.items() if name in _VARIANT})
+    return _text({name: value for name, value in in_full(spec).items() if name in _VARIANT})
 
 
 def _variation(variant: Mapping[str, Any]) -> list[str]:

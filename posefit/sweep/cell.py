@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 POINTS = 64  # of an anytime trace at most
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # what two runs of a cell do not have in common
+ALL_AROUND = 180.0  # degrees that a yaw may be off when nothing is told of it
+SALT = 2001  # part of the seed of what is told of a person
 DROPPED = "dropped"  # the corruption that takes whole frames away, a share of them
 UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
 
@@ -35,6 +37,9 @@ class Cell:
     `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames that are not seen; what is
     spoilt follows from the instance, so that every method and seed sees the same. `tracks` is how many times the motion
     is followed, see `posefit.tracking.tracks`. `files` holds the SHA-256 of every capture file that is read.
+
+    Of the person a method is told where he faces at first, at most `yaw_off_degrees` off, nothing at 180; and his body,
+    each bone's length and radii at most `body_off_percent` off. Both are drawn from the instance and the motion's name.
     """
 
     method: str
@@ -51,6 +56,8 @@ class Cell:
     translation: str = "known"
     first_pose: str = "searched"
     tracks: int = 1
+    yaw_off_degrees: float = 0.0
+    body_off_percent: float = 0.0
     seed: int = 0
     files: Mapping[str, str] = field(default_factory=dict)
     version: str = __version__  # of posefit, and of plugins that are not its own
@@ -58,7 +65,7 @@ class Cell:
     @cached_property
     def spec(self) -> dict[str, Any]:
         """The cell as JSON holds it, without fields of `LATER` that say nothing new."""
-        told = {name: value for name in FIELDS if says(name, value := getattr(self, name))}
+        told = {name: value for name in FIELDS if is_told(name, value := getattr(self, name))}
         spec: dict[str, Any] = json.loads(json.dumps(told))
         return spec
 
@@ -74,12 +81,17 @@ class Cell:
 FIELDS = tuple(one.name for one in fields(Cell))
 NAMES = tuple(sorted(FIELDS))  # in which order a key is of them
 # Fields that came after ledgers had been kept, and what a spec means that does not say them: keys stay as they were.
-LATER = {"tracks": 1}
+LATER = {"tracks": 1, "yaw_off_degrees": 0.0, "body_off_percent": 0.0}
 
 
-def says(name: str, value: Any) -> bool:
-    """Return whether a field has to be told, in a spec and for its key."""
+def is_told(name: str, value: Any) -> bool:
+    """Return whether a field's value stands in the cell's spec, and so in its key."""
     return name not in LATER or value != LATER[name]
+
+
+def in_full(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a spec with the fields that it does not tell."""
+    return {**LATER, **spec}
 
 
 @dataclass(frozen=True)
@@ -136,11 +148,26 @@ def cell_scene(cell: Cell) -> "Scene":
 
     motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
     scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
-    noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
+    scene = _as_told(cell, scene)
     if not cell.corruption:
         return scene
+    noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
     spoilt = Spoilt(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
     return replace(scene, observations=spoilt)
+
+
+def _as_told(cell: Cell, scene: "Scene") -> "Scene":
+    """Return the scene with what a method is told of the person: about where he faces at first, and his body."""
+    import numpy as np
+
+    from posefit.geometry.body import varied
+
+    if not (cell.yaw_off_degrees or cell.body_off_percent):
+        return scene
+    for_yaw, for_body = np.random.default_rng([SALT, cell.instance, *Path(cell.motion).stem.encode()]).spawn(2)
+    off = np.radians(cell.yaw_off_degrees) * for_yaw.uniform(-1.0, 1.0)
+    told = None if cell.yaw_off_degrees >= ALL_AROUND or scene.yaw is None else scene.yaw + float(off)
+    return replace(scene, yaw=told, body=varied(scene.body, cell.body_off_percent, for_body))
 
 
 def json_of(value: Any) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,13 @@ from posefit.reading import SHOWN, cut, quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.settings import planned
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.sweep.cell import DROPPED, Cell, digest_of, parts, settings_text
+from posefit.sweep.cell import ALL_AROUND, DROPPED, Cell, digest_of, parts, settings_text
 from posefit.tracking.method import parse_settings
 from posefit.version import __version__
 
 FIELDS = tuple(one.name for one in fields(Cell) if one.name not in ("files", "version"))
 LARGEST = 16_384  # pixels
+MOST_OFF = 50.0  # percent that a body may be off
 BITS = 1_024  # of a whole number: more than anything is counted in, and few enough to be written down
 
 
@@ -207,6 +208,10 @@ def _rate(field: str, value: Any) -> float:
     return _number(field, rate, *RATES)
 
 
+def _between(low: float, high: float) -> Callable[[str, Any], float]:
+    return partial(_number, low=low, high=high)
+
+
 def _whole(least: int) -> Callable[[str, Any], int]:
     def check(field: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > BITS:
@@ -268,5 +273,7 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "translation": _one_of(*TRANSLATIONS),
     "first_pose": _one_of("searched", "given"),
     "tracks": _whole(1),
+    "yaw_off_degrees": _between(0.0, ALL_AROUND),
+    "body_off_percent": _between(0.0, MOST_OFF),
     "seed": _whole(0),
 }

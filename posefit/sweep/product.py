@@ -10,7 +10,7 @@ from itertools import combinations, product
 from math import prod
 from typing import Any, overload
 
-from posefit.sweep.cell import NAMES, Cell, json_of, says
+from posefit.sweep.cell import NAMES, Cell, is_told, json_of
 from posefit.sweep.check import FIELDS, checked
 
 CROSSED = ("method", "motion", "train", "settings", "frames", "fps", "evaluations")  # which `cell_of` checks together
@@ -116,5 +116,5 @@ class Product:
 
 
 def _piece(name: str, value: Any) -> str:
-    """Return a field as JSON holds it in a key; nothing where it need not be told."""
-    return f'"{name}":{json_of(value)}' if says(name, value) else ""
+    """Return a field as JSON holds it in a key; nothing where it is not told."""
+    return f'"{name}":{json_of(value)}' if is_told(name, value) else ""

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from posefit.geometry.skeleton import JOINTS
-from posefit.sweep.cell import LATER, settings_text
+from posefit.sweep.cell import in_full, settings_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,7 +51,7 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     spec = row["spec"]
     flat: dict[str, Any] = {"key": row["key"], "version": spec["version"], "status": row["status"]}
     flat["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
-    flat |= {name: value for name, value in {**LATER, **spec}.items() if name not in ("files", "version")}
+    flat |= {name: value for name, value in in_full(spec).items() if name not in ("files", "version")}
     flat["settings"] = ", ".join(settings_text(spec["settings"]))
     flat["corruption"] = ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items()))
     flat["train"] = ", ".join(spec["train"])

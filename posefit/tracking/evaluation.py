@@ -10,18 +10,49 @@ from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.silhouette.cost import BETA, areas, mismatch
+from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.measures import Measures, Spread
+
+MANY = 8_000  # training poses, more than which are not all drawn at full size in every frame
+STRIDE = 4  # of so many poses each is looked at in a small picture
+CLOSE = 200  # of these are looked at closely, with their neighbours in the clip
+SMALL = 60  # pixels that a side of a small picture has at least
+FACTOR = 4  # by how much it is smaller at most
 
 
 def nearest(scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA) -> Array:
-    """Return the pose (66,) of least cost in frame k of joint angles (n, 63), with the true root and translation."""
+    """Return the pose (66,) of least cost in frame k of joint angles (n, 63), with the true root and translation.
+
+    Of more than 8,000 only those are drawn at full size that lie, in their clips, beside the 200 that fit best of
+    every fourth in a picture a quarter as large: a fifth of the time, and the same pose but for rare ties.
+    """
+    if len(training) <= MANY:
+        return _best(scene, training, k, observation, beta)
+    sides = [side for camera in scene.cameras for side in (camera.width, camera.height)]
+    factor = int(np.clip(min(sides) // SMALL, 1, FACTOR))
+    costs = _costs(scene, training[::STRIDE], k, observation, beta, factor)
+    first = STRIDE * np.argsort(costs, kind="stable")[:CLOSE]
+    rows = np.unique(np.clip(first[:, None] + np.arange(1 - STRIDE, STRIDE), 0, len(training) - 1))
+    return _best(scene, training[rows], k, observation, beta)
+
+
+def _best(scene: Scene, training: Array, k: int, observation: Observation, beta: float) -> Array:
+    assert scene.truth is not None
+    best = training[_costs(scene, training, k, observation, beta).argmin()]
+    return np.concatenate([scene.truth.poses[k, :3], best])
+
+
+def _costs(scene: Scene, training: Array, k: int, observation: Observation, beta: float, factor: int = 1) -> Array:
+    """Return the cost (n,) in frame k of joint angles (n, 63), in pictures `factor` times smaller."""
     assert scene.truth is not None
     poses = np.column_stack([np.tile(scene.truth.poses[k, :3], (len(training), 1)), training])
     translations = np.tile(scene.truth.translations[k], (len(poses), 1))
     costs = np.zeros(len(poses))
     for camera, silhouette in zip(scene.cameras, observation.silhouettes, strict=True):
+        if factor > 1:
+            camera, silhouette = coarser_camera(camera, factor), coarser_silhouette(silhouette, factor)
         costs += mismatch(areas(scene.body, camera, silhouette, poses, translations), beta)
-    return np.array(poses[costs.argmin()])
+    return costs
 
 
 class Evaluation:
@@ -90,16 +121,19 @@ class Evaluation:
         places = self._scene.truth.translations[: len(self._frames)]
         poses = np.array([frame.pose for frame in self._frames])
         skeleton = self._scene.body.skeleton
-        true_joints = skeleton.joints(truth, places)
+        true_joints = self._scene.truth.skeleton.joints(truth, places)  # the body that was told may be another
         joints = skeleton.joints(poses, np.array([frame.translation for frame in self._frames]))
         errors = metrics.pose_error_degrees(truth, poses)
         mpjpe = metrics.mpjpe_mm(true_joints, joints)
         aligned, geodesic = metrics.pa_mpjpe_mm(true_joints, joints), metrics.geodesic_degrees(truth, poses)
         swapped = metrics.swapped(true_joints, joints)
-        baselines = {
-            name: float(metrics.pose_error_degrees(truth, pose).mean()) for name, pose in self._baselines(truth)
-        }
+        trivial = dict(self._baselines(truth))
+        baselines = {name: float(metrics.pose_error_degrees(truth, pose).mean()) for name, pose in trivial.items()}
         floor = baselines.pop("prior_floor", None)
+        distances = {
+            name: float(metrics.mpjpe_mm(true_joints, skeleton.joints(trivial[name], places)).mean())
+            for name in baselines
+        }
         measures = {
             "error_degrees": Spread(
                 float(metrics.mean_error(errors)), float(metrics.error_spread(errors)), float(errors.max())
@@ -112,6 +146,7 @@ class Evaluation:
             "lost_rate": float(metrics.lost_rate(mpjpe)),
             "skill": {name: metrics.skill(float(errors.mean()), error) for name, error in baselines.items()},
             "baselines_degrees": baselines,
+            "baselines_mm": distances,
             "prior_floor_degrees": floor,
         }
         columns = {

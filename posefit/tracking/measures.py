@@ -112,6 +112,9 @@ class Measures:
             "baselines", "degrees", 2, "errors of what anybody reaches, given the true root and translation"
         ),
     )
+    baselines_mm: Mapping[str, float] | None = field(
+        default=None, metadata=_about("baselines' MPJPE", "mm", 0, "MPJPE of what anybody reaches, in the same way")
+    )
     prior_floor_degrees: float | None = field(
         default=None,
         metadata=_about(

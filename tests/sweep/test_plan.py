@@ -1,9 +1,8 @@
 """A plan is checked as a whole, before anything runs; a mistake in it is one line."""
 
-import hashlib
 import json
 import tracemalloc
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.registry import Offer, Registry
 from posefit.sweep import check
-from posefit.sweep.cell import Cell, anytime_trace, cell_scene, digest_of, json_of, run_cell
+from posefit.sweep.cell import LATER, Cell, anytime_trace, cell_scene, digest_of, run_cell
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit.sweep.table import flat
@@ -159,15 +158,27 @@ def test_a_key_follows_from_the_spec_and_the_version_alone() -> None:
     assert Cell("sapso@pca", "walk", ("walk-a",), seed=1, version="0.0.9").key != one.key
 
 
-def test_one_track_is_not_told_so_that_keys_of_earlier_ledgers_are_found_again() -> None:
-    cell = cell_of({"method": "random@pca", "motion": "walk"})
-    before = {name: value for name, value in vars(replace(cell)).items() if name != "tracks"}
-    assert cell.key == hashlib.sha256(json_of(before).encode()).hexdigest()
-    assert "tracks" not in cell.spec
-    assert flat({"key": cell.key, "spec": cell.spec, "status": "done"})["tracks"] == 1
-    several = cell_of({"method": "random@pca", "motion": "walk", "tracks": 2})
-    assert several.key != cell.key
-    assert several.spec == {**cell.spec, "tracks": 2}
+def test_a_key_of_a_ledger_from_before_the_later_fields_is_found_again() -> None:
+    # as posefit had it when cells had no `tracks`, `yaw_off_degrees` and `body_off_percent`
+    before = "87d5e3a83911785010d94a043ebed9b38a7414f921f4e7995c5e1807bdb09a2a"
+    assert Cell("sapso@pca", "walk", ("walk-a",), seed=1, version="0.0.9").key == before
+
+
+@pytest.mark.parametrize(("name", "value"), [("tracks", 2), ("yaw_off_degrees", 25.0), ("body_off_percent", 5.0)])
+def test_a_later_field_is_told_only_where_it_says_something_else(name: str, value: float) -> None:
+    spec = {"method": "random@pca", "motion": "walk"}
+    plain, other = cell_of(spec), cell_of({**spec, name: value})
+    assert cell_of({**spec, name: LATER[name]}).spec == plain.spec
+    assert name not in plain.spec
+    assert other.spec == {**plain.spec, name: value}
+    assert other.key != plain.key
+    for cell, meant in ((plain, LATER[name]), (other, value)):
+        assert flat({"key": cell.key, "spec": cell.spec, "status": "done"})[name] == meant
+
+
+def test_later_fields_are_all_said_with_their_defaults() -> None:
+    defaults = {one.name: one.default for one in fields(Cell)}
+    assert {name: defaults[name] for name in LATER} == LATER
 
 
 def test_a_cell_follows_so_many_tracks() -> None:

@@ -1,7 +1,7 @@
 """`posefit reproduce` and `posefit bench`: one file a group of commands.
 
     papers.py        sapso, vsmm
-    measurements.py  accuracy, methods, views, degradation, builds, footage
+    measurements.py  accuracy, methods, views, degradation, builds, footage, people
     benchmark.py     posefit bench
     options.py       options that several of them have
 
@@ -26,6 +26,7 @@ REPRODUCED = (
     measurements.degradation_command,
     measurements.builds_command,
     measurements.footage_command,
+    measurements.people_command,
 )
 
 

@@ -1,4 +1,4 @@
-"""posefit's own measurements: `posefit reproduce accuracy`, `methods`, `views`, `degradation`, `builds`, `footage`."""
+"""posefit's own measurements: `posefit reproduce accuracy`, `methods`, `views`, `degradation` and so on."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -101,6 +101,29 @@ def footage_command(as_json: bool, **asked: Any) -> None:
     from posefit_experiments.filmed.experiment import filmed, filmed_lines
 
     _print(filmed(**asked, progress=bar), filmed_lines, as_json)
+
+
+@click.command("people")
+@click.option("--method", default="exemplars", show_default=True, help="A tracker, or OPTIMISER@PRIOR.")
+@click.option("--evaluations", type=int, default=2440, show_default=True, help="Budget of a frame, of every method.")
+@click.option("--others/--no-others", default=True, show_default=True, help="Whether other methods are compared.")
+@click.option("--recovery", is_flag=True, help="Whoever is not seen for a while, instead: gaps, and coming back.")
+@click.option("--quick", is_flag=True, help="Some 40 tracks, or 6 trials: a look, not a measurement.")
+@click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")
+@workers(None)
+@LEDGER
+@JSON
+def people_command(recovery: bool, others: bool, ledger: str | None, as_json: bool, **asked: Any) -> None:
+    """People whom a library of motions has never seen: walks, runs, jumps, turns, dances and everyday things."""
+    from posefit_experiments.people import experiment, tables
+
+    if recovery:
+        if ledger is not None:
+            raise ValueError("ledger must be given for tracks only, got --ledger with --recovery")
+        _print(experiment.recovery(**asked, progress=bar), tables.recovery_lines, as_json)
+    else:
+        told = experiment.people(**asked, others=others, ledger=ledger, say=say, progress=bar)
+        _print(told, tables.people_lines, as_json)
 
 
 def _print(told: dict[str, Any], lines: Callable[[dict[str, Any]], Iterable[str]], as_json: bool) -> None:

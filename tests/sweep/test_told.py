@@ -1,0 +1,115 @@
+"""What a cell's method is told of the person: where he faces at first, and how he is built."""
+
+import hashlib
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.report.repeat import repeat_command
+from posefit.sweep.cell import Cell, cell_scene
+from posefit.sweep.check import cell_of
+from posefit.sweep.plan import Plan
+
+SPEC = {"method": "sapso@pca", "motion": "walk", "frames": 2, "size": [160, 120]}
+
+
+def cell(**fields: Any) -> Cell:
+    return cell_of({**SPEC, **fields})
+
+
+def test_a_cell_that_says_nothing_of_it_has_the_key_and_the_spec_of_older_ledgers() -> None:
+    old = [
+        "method",
+        "motion",
+        "train",
+        "settings",
+        "view_degrees",
+        "corruption",
+        "instance",
+        "frames",
+        "fps",
+        "size",
+        "evaluations",
+        "translation",
+        "first_pose",
+        "seed",
+        "files",
+        "version",
+    ]
+    plain = cell()
+    assert list(plain.spec) == old
+    text = json.dumps(plain.spec, sort_keys=True, separators=(",", ":"))
+    assert plain.key == hashlib.sha256(text.encode()).hexdigest()
+    assert cell(yaw_off_degrees=0, body_off_percent=0.0).key == plain.key
+
+
+def test_cells_that_are_told_less_have_keys_of_their_own_however_they_are_made() -> None:
+    told = [{}, {"yaw_off_degrees": 25}, {"yaw_off_degrees": 180}, {"body_off_percent": 10}]
+    cells = [cell(**one) for one in told]
+    assert len({one.key for one in cells}) == len(told)
+    assert cells[1].spec["yaw_off_degrees"] == 25.0
+    product = {"methods": ["sapso@pca"], "motions": ["walk"], "seeds": [0]}
+    for one, made in zip([*told, {"yaw_off_degrees": 0.0}], [*cells, cells[0]], strict=True):
+        entry = {"instance": 0, **one}  # of fields that are checked by themselves
+        plan = Plan.of({"defaults": {"frames": 2, "size": [160, 120]}, "product": {**product, "instances": [entry]}})
+        assert list(plan.keys()) == [found.key for found in plan] == [made.key]
+
+
+def test_the_first_yaw_is_off_by_no_more_than_was_said_and_not_told_at_180() -> None:
+    truth = cell_scene(cell()).yaw
+    assert truth is not None
+    offs = []
+    for instance in range(8):
+        true = cell_scene(cell(instance=instance)).yaw
+        seen = cell_scene(cell(instance=instance, yaw_off_degrees=25.0)).yaw
+        assert true is not None
+        assert seen is not None
+        offs.append(np.degrees(seen - true))
+    assert np.abs(offs).max() <= 25.0
+    assert np.abs(offs).max() > 10.0
+    assert min(offs) < 0.0 < max(offs)
+    assert cell_scene(cell(yaw_off_degrees=180.0)).yaw is None
+
+
+def test_the_body_is_off_and_neither_the_truth_nor_what_is_seen() -> None:
+    exact, off = cell_scene(cell()), cell_scene(cell(body_off_percent=10.0))
+    shares = off.body.skeleton.lengths / exact.body.skeleton.lengths
+    assert 1e-3 < np.abs(shares - 1.0).max() <= 0.1
+    assert exact.truth is not None
+    assert off.truth is not None
+    assert np.array_equal(off.truth.skeleton.offsets, exact.truth.skeleton.offsets)
+    for k in range(2):
+        one, other = (scene.observations[k].silhouettes[0].mask for scene in (exact, off))
+        assert np.array_equal(one, other)
+
+
+def test_what_is_told_is_the_same_for_every_method_and_seed_and_another_for_another_motion() -> None:
+    def told(**fields: Any) -> float:
+        found, true = cell_scene(cell(yaw_off_degrees=25.0, **fields)).yaw, cell_scene(cell(**fields)).yaw
+        assert found is not None
+        assert true is not None
+        return found - true
+
+    assert told() == told(seed=3) == told(method="random@full") == told(body_off_percent=5.0)
+    assert told() != told(motion="run")
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("yaw_off_degrees", 181, "yaw_off_degrees must lie in 0 to 180, got 181"),
+        ("yaw_off_degrees", -1, "yaw_off_degrees must lie in 0 to 180, got -1"),
+        ("yaw_off_degrees", "unknown", "yaw_off_degrees must be a finite number, got 'unknown'"),
+        ("body_off_percent", 51, "body_off_percent must lie in 0 to 50, got 51"),
+    ],
+)
+def test_a_value_that_makes_no_sense_is_named(field: str, value: object, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        cell(**{field: value})
+
+
+def test_the_command_that_repeats_a_row_says_it() -> None:
+    assert "yaw_off_degrees = 25.0\n" in repeat_command(cell(yaw_off_degrees=25.0).spec)
+    assert "yaw_off_degrees" not in repeat_command(cell().spec)
