@@ -10,13 +10,15 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit_exemplars import kernels
-from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
+from posefit_exemplars.codes import Codes, Rows
+from posefit_exemplars.exemplars import Exemplars, about_vertical
 
 BINS = 36  # of a full turn: two states of one pose in one bin are one
 SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
 TURN = np.radians(7.0)  # how far a candidate turns away from its clip, to either side, or not at all
 NEAR = 4  # groups of poses that a state goes on to
 KINDS = 20  # of poses and yaws that a beam has room for, when each has all that it may have
+FACINGS = 4  # yaws, of which each may have its share of a beam to itself
 HOPELESS = 8.0  # beyond the cost of a jump; what costs more is not looked at
 
 
@@ -110,13 +112,15 @@ class Ahead:
         """Return what steps from some states to poses of these codes (m, D) cost (rows, m), at the best speed."""
         double = 2.0 * steps.spread**2
         each = zip(self.codes, self.ways, strict=True)
-        return np.minimum.reduce([squares(code[rows], codes) / double + way[rows, None] for code, way in each])
+        return np.asarray(
+            np.minimum.reduce([squares(code[rows], codes) / double + way[rows, None] for code, way in each])
+        )
 
 
 def stepped(
     exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, most: int, root: Array | None = None
 ) -> Beam:
-    """Return the states, the best `most` of them, that those of a beam may be in so much later, each by its cheapest step.
+    """Return the states that those of a beam may be in so much later, each by its cheapest step; at most so many.
 
     A pose costs half the square of its distance, over the spread, from what its parent's clip did next at one of the
     speeds; a yaw half the square of its turn away from the clip's own. Where the root is known to be at `root` (3,),
@@ -148,9 +152,12 @@ def stepped(
             owners,
             touched,
         )
-        reached = touched[:count].copy()
-        found.append((exemplars.members[reached], owners[reached], least[reached]))
+        reached, total = touched[:count].copy(), least[touched[:count]]
         least[reached] = np.inf
+        if count > most // FACINGS:
+            best = np.argpartition(total, most // FACINGS)[: most // FACINGS]
+            reached, total = reached[best], total[best]
+        found.append((exemplars.members[reached], owners[reached], total))
     states, parents, totals = (np.concatenate(parts) for parts in zip(*found, strict=True))
     turns = np.repeat([0.0, -TURN, TURN], len(states))
     states, parents, totals = (np.tile(one, 3) for one in (states, parents, totals))
@@ -161,7 +168,8 @@ def stepped(
         totals + 0.5 * (turns / steps.turning) ** 2,
         ahead.places[parents],
     )
-    return joined_beams(every.best(2 * most)).best(most)
+    found_all = joined_beams(every)
+    return found_all.chosen(varied(exemplars, found_all, found_all.totals, most))
 
 
 def jumped(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:

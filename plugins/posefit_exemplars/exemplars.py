@@ -1,22 +1,18 @@
 """The states of the model: poses of clips, with what came after each of them, and groups of poses that are alike."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry import alike
-from posefit.geometry.skeleton import JOINTS, Skeleton
+from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
+from posefit_exemplars.codes import Codes, Coding, Rows, groups, thinned
 
-Codes = NDArray[np.float32]  # (n, D): two of them are as far apart as the joints of their poses, root mean square
-Rows = NDArray[np.int64]
-
-DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
-SAME = 0.02  # metres between the codes of poses that need not both be kept
 KINDS = 40  # of poses, as unlike as can be
 GROUPS = 1000  # of poses that are alike; fewer where there are fewer poses
 
@@ -38,6 +34,7 @@ class Exemplars:
     owners: Rows = field(repr=False)  # (K,) the group of each pose
     grouped: Codes = field(repr=False)  # (K, D) codes, group by group
     kinds: Rows = field(repr=False)  # (K,) which of a few poses that are as unlike as can be each is nearest to
+    coding: Coding = field(repr=False)
 
     @classmethod
     def of(cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False) -> Self:
@@ -57,7 +54,8 @@ class Exemplars:
         paths = np.concatenate([motion.translations for motion in motions])
         times = np.concatenate([np.arange(len(motion)) / motion.fps for motion in motions])
         clips = np.repeat(np.arange(len(motions)), [len(motion) for motion in motions])
-        codes = coded(skeleton, poses)
+        coding = Coding.of(skeleton, poses)
+        codes = coding.coded(poses)
         kept = thinned(codes, clips)
         codes, clips = codes[kept], clips[kept]
         centres, owners = groups(codes, GROUPS)
@@ -80,6 +78,7 @@ class Exemplars:
             owners,
             codes[members],
             kinds,
+            coding,
         )
 
     def __len__(self) -> int:
@@ -120,6 +119,29 @@ class Exemplars:
         return np.concatenate([self.members[self.bounds[g] : self.bounds[g + 1]] for g in chosen])
 
 
+_LATEST: dict[bytes, Exemplars] = {}  # one: restarts, builds and cells of a sweep learn from the same motions again
+
+
+def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> Exemplars:
+    """Return the states of motions; those of the same motions and skeleton as the last time are not made again."""
+    told = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps) for motion in motions])).encode())
+    for array in (
+        skeleton.offsets,
+        skeleton.axes,
+        *(motion.skeleton.axes for motion in motions),
+        *(motion.poses for motion in motions),
+    ):
+        told.update(np.ascontiguousarray(array).tobytes())
+    for motion in motions:
+        told.update(motion.translations.tobytes())
+    key = told.digest()
+    if key not in _LATEST:
+        made = Exemplars.of(motions, skeleton, mirrored=mirrored)
+        _LATEST.clear()
+        _LATEST[key] = made
+    return _LATEST[key]
+
+
 def mirror_image(motion: Motion) -> Motion:
     """Return what a mirror in the plane x = 0 shows of a motion: whose right is his left."""
     poses = alike.mirrored_poses(motion.skeleton, motion.poses)
@@ -132,43 +154,3 @@ def about_vertical(vectors: Array, yaws: Array) -> Array:
     sine, cosine = np.sin(yaws), np.cos(yaws)
     x, y, z = vectors.T
     return np.column_stack([cosine * x + sine * z, y, cosine * z - sine * x])
-
-
-def coded(skeleton: Skeleton, poses: Array) -> Codes:
-    """Return the codes (K, D) of poses (K, 66): principal components of the joints, the body turned to yaw 0."""
-    facing = poses.copy()
-    facing[:, 0] = 0.0
-    joints = skeleton.joints(facing).reshape(len(poses), -1)
-    joints -= joints.mean(axis=0)
-    _, axes = np.linalg.eigh(joints.T @ joints)
-    return np.asarray(joints @ axes[:, : -DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)), dtype=np.float32)
-
-
-def thinned(codes: Codes, clips: Rows) -> Rows:
-    """Return which frames to keep: each farther than a centimetre from the last one kept, and both ends of clips."""
-    kept, last = [], -1
-    ends = np.diff(clips, append=-1) != 0
-    for k in range(len(codes)):
-        new = last < 0 or clips[k] != clips[last]
-        if new or ends[k] or float(((codes[k] - codes[last]) ** 2).sum()) > SAME**2:
-            kept.append(k)
-            last = k
-    return np.array(kept)
-
-
-def groups(codes: Codes, most: int) -> tuple[Rows, Rows]:
-    """Return centres (G,), each as far from those before it as any pose, and the group (K,) of each pose's nearest.
-
-    Farthest-first traversal: Gonzalez, Clustering to minimize the maximum intercluster distance, 1985.
-    """
-    squares = (codes**2).sum(axis=1)
-    nearest = np.full(len(codes), np.inf, dtype=np.float32)
-    owners, centres = np.zeros(len(codes), dtype=np.int64), [0]
-    while True:
-        away = squares - 2.0 * (codes @ codes[centres[-1]]) + squares[centres[-1]]
-        closer = away < nearest
-        nearest[closer], owners[closer] = away[closer], len(centres) - 1
-        farthest = int(nearest.argmax())
-        if len(centres) == most or nearest[farthest] <= SAME**2:
-            return np.array(centres), owners
-        centres.append(farthest)

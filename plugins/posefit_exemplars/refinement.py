@@ -12,7 +12,8 @@ from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Optimiser, minimise
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
-from posefit_exemplars.exemplars import Codes, Exemplars
+from posefit_exemplars.codes import Codes
+from posefit_exemplars.exemplars import Exemplars
 
 LIKE = 600  # poses of the exemplars whose differences are searched
 COMPONENTS = 28  # of them
@@ -118,7 +119,7 @@ def refined(
 
     def evaluate(proposals: Array) -> Array:
         away = (proposals**2).sum(axis=1) + ((proposals - begin) ** 2).sum(axis=1)
-        return cost(space.poses(proposals)) + 0.5 * pull * REACH**2 * away
+        return np.asarray(cost(space.poses(proposals)) + 0.5 * pull * REACH**2 * away)
 
     found = minimise(evaluate, make(space, rng), evaluations, told=True)
     if float(evaluate(begin[None])[0]) <= found.cost:

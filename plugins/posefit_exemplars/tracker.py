@@ -15,8 +15,9 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.registry import registry
-from posefit_exemplars.beam import Beam, Steps, between, joined_beams, jumped, stepped, strayed, varied
-from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.beam import TURN, Beam, Steps, between, joined_beams, jumped, stepped, strayed, varied
+from posefit_exemplars.codes import Rows
+from posefit_exemplars.exemplars import Exemplars, exemplars_of
 from posefit_exemplars.look import Look
 from posefit_exemplars.refinement import Make, refined, surroundings
 from posefit_exemplars.smoothing import SMOOTHED, Found, smoothed
@@ -100,9 +101,11 @@ class ExemplarTracker:
         around = int(AROUND * small) if latest is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
+        if latest is None and self.task.first_pose is not None:
+            beams = [replace(elsewhere, totals=elsewhere.totals + self.steps.jump), self._given(self.task.first_pose)]
         if latest is not None:
             beams.append(stepped(self.exemplars, latest, seconds, self.steps, around, root))
-        beam = self._at(look, joined_beams(*beams).best(around + len(elsewhere)), latest is not None)
+        beam = self._at(look, joined_beams(*beams), latest is not None)
         costs = look.small(self._poses(beam), beam.places)
         used = (looked + len(beam)) * look.share
         beam = beam.chosen(varied(self.exemplars, beam, beam.totals + costs / self.temperature, full))
@@ -132,6 +135,15 @@ class ExemplarTracker:
         found = [self._some(int(self.exemplars.owners[states[row]]), rng) for row in best]
         states, yaws = np.concatenate(found), np.repeat(yaws[best], [len(some) for some in found])
         return self._begun(states, yaws, before), len(beam)
+
+    def _given(self, angles: Array) -> Beam:
+        """Return the states that are most like a first pose whose joint angles (63,) and yaw somebody knows."""
+        yaw = self.task.yaw or 0.0
+        code = self.exemplars.coding.coded(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
+        apart = self.exemplars.squares - 2.0 * (self.exemplars.codes @ code)
+        states = np.tile(np.argsort(apart, kind="stable")[:WIDTH], 3)
+        yaws = yaw + np.repeat([-TURN, 0.0, TURN], len(states) // 3)
+        return self._begun(states, yaws, None)
 
     def _begun(self, states: Rows, yaws: Array, before: Beam | None) -> Beam:
         """Return states that nothing led to but a jump, or the beginning."""
@@ -192,8 +204,8 @@ def exemplars(
     turning_degrees: float = 4.0,
     jump: float = 12.0,
     temperature: float = 2.0,
-    straying: float = 0.02,
-    depth: float = 0.1,
+    straying: float = 0.01,
+    depth: float = 0.03,
     pace: float = 0.008,
     lag: int = 15,
     mirrored: bool = True,
@@ -238,7 +250,7 @@ def exemplars(
     temperature /= intervals
     slack = math.sqrt(intervals)
     steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
-    states = Exemplars.of(task.training, task.body.skeleton, mirrored=mirrored)
+    states = exemplars_of(task.training, task.body.skeleton, mirrored)
     return ExemplarTracker(task, states, steps, temperature, lag, _maker(task, refiner), pull, smoothing)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit_exemplars.beam import Beam
-from posefit_exemplars.exemplars import Codes
+from posefit_exemplars.codes import Codes
 
 ALIKE = 0.06  # metres: how near the codes of states are that are averaged, a standard deviation
 ALIKE_YAW = np.radians(20.0)

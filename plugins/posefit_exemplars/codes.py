@@ -1,0 +1,74 @@
+"""Codes: a few numbers a pose, by which poses are compared, left out where they repeat, and put into groups."""
+
+from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import JOINTS, Skeleton
+
+Codes = NDArray[np.float32]  # (n, D): two of them are as far apart as the joints of their poses, root mean square
+Rows = NDArray[np.int64]
+
+DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
+SAME = 0.02  # metres between the codes of poses that need not both be kept
+
+
+@dataclass(frozen=True, eq=False)
+class Coding:
+    """Principal components of the joints of bodies that are turned to yaw 0."""
+
+    skeleton: Skeleton
+    mean: Array  # (81,) metres
+    axes: Array = field(repr=False)  # (81, D)
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, poses: Array) -> Self:
+        """Return the components of poses (K, 66)."""
+        joints = _facing(skeleton, poses)
+        mean = joints.mean(axis=0)
+        joints -= mean
+        _, axes = np.linalg.eigh(joints.T @ joints)
+        return cls(skeleton, mean, axes[:, : -DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)))
+
+    def coded(self, poses: Array) -> Codes:
+        """Return the codes (K, D) of poses (K, 66)."""
+        return np.asarray((_facing(self.skeleton, poses) - self.mean) @ self.axes, dtype=np.float32)
+
+
+def _facing(skeleton: Skeleton, poses: Array) -> Array:
+    facing = poses.copy()
+    facing[:, 0] = 0.0
+    return np.asarray(skeleton.joints(facing).reshape(len(poses), -1))
+
+
+def thinned(codes: Codes, clips: Rows) -> Rows:
+    """Return which frames to keep: each farther than a centimetre from the last one kept, and both ends of clips."""
+    kept, last = [], -1
+    ends = np.diff(clips, append=-1) != 0
+    for k in range(len(codes)):
+        new = last < 0 or clips[k] != clips[last]
+        if new or ends[k] or float(((codes[k] - codes[last]) ** 2).sum()) > SAME**2:
+            kept.append(k)
+            last = k
+    return np.array(kept)
+
+
+def groups(codes: Codes, most: int) -> tuple[Rows, Rows]:
+    """Return centres (G,), each as far from those before it as any pose, and the group (K,) of each pose's nearest.
+
+    Farthest-first traversal: Gonzalez, Clustering to minimize the maximum intercluster distance, 1985.
+    """
+    squares = (codes**2).sum(axis=1)
+    nearest = np.full(len(codes), np.inf, dtype=np.float32)
+    owners, centres = np.zeros(len(codes), dtype=np.int64), [0]
+    while True:
+        away = squares - 2.0 * (codes @ codes[centres[-1]]) + squares[centres[-1]]
+        closer = away < nearest
+        nearest[closer], owners[closer] = away[closer], len(centres) - 1
+        farthest = int(nearest.argmax())
+        if len(centres) == most or nearest[farthest] <= SAME**2:
+            return np.array(centres), owners
+        centres.append(farthest)
