@@ -3,6 +3,7 @@
 A state is a pose of the exemplars and a yaw. Its total is what its best way has cost: silhouettes, steps and jumps.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -206,19 +207,27 @@ def strayed(places: Array, expected: Array, eye: Array | None, steps: Steps) -> 
     return np.asarray(np.log1p(0.5 * (across / steps.straying**2 + along / steps.depth**2)))
 
 
-def between(
-    exemplars: Exemplars,
-    before: Beam,
-    beam: Beam,
-    seconds: float,
-    steps: Steps,
-    root: Array | None,
-    eye: Array | None,
-) -> Array:
-    """Return what each step from a state of one beam to one of the next costs (n, m); none costs more than a jump."""
-    ahead = Ahead.of(exemplars, before, seconds, steps, root)
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """From one frame to the next: all that a model of transitions may know."""
+
+    exemplars: Exemplars
+    before: Beam  # n states of a frame
+    beam: Beam  # m states of the next one
+    seconds: float  # between them
+    root: Array | None  # (3,) metres: where the root is in the next one, where somebody knows
+    eye: Array | None  # (3,) metres: where the only camera stands; None where there are several
+
+
+Transitions = Callable[[Passage], Array]
+
+
+def between(passage: Passage, *, steps: Steps) -> Array:
+    """Return what each step from a state of one frame to one of the next costs (n, m); none costs more than a jump."""
+    exemplars, before, beam, root = passage.exemplars, passage.before, passage.beam, passage.root
+    ahead = Ahead.of(exemplars, before, passage.seconds, steps, root)
     costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
-        costs += strayed(beam.places, ahead.places[:, None], eye, steps)
+        costs += strayed(beam.places, ahead.places[:, None], passage.eye, steps)
     return np.asarray(np.minimum(costs, steps.jump))

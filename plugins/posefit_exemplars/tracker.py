@@ -1,29 +1,36 @@
-"""The tracker by name: settings, checked; a frame's work; and the path that is told `lag` frames later."""
+"""The tracker: a frame's work, and the path that is told `lag` frames later."""
 
 import math
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
-from posefit import settings
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
-from posefit.registry import registry
-from posefit_exemplars.beam import TURN, Beam, Steps, between, joined_beams, jumped, stepped, strayed, varied
+from posefit_exemplars.beam import (
+    TURN,
+    Beam,
+    Passage,
+    Steps,
+    Transitions,
+    joined_beams,
+    jumped,
+    stepped,
+    strayed,
+    varied,
+)
 from posefit_exemplars.codes import Rows
-from posefit_exemplars.exemplars import Exemplars, exemplars_of
+from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.look import Look
 from posefit_exemplars.refinement import Make, refined, surroundings
 from posefit_exemplars.smoothing import SMOOTHED, Found, smoothed
 from posefit_exemplars.window import Seen, likeliest, mean_around, seen, weights
 
-LEAST = 300  # evaluations that every stage of a frame has something of
 WIDTH = 400  # states that a beam keeps
 FULL = 0.35  # share of the budget that is for full-size costs of states
 REFINED = 0.45  # share that is for refining
@@ -53,6 +60,7 @@ class ExemplarTracker:
     task: Task
     exemplars: Exemplars = field(repr=False)
     steps: Steps
+    transitions: Transitions
     temperature: float
     lag: int  # frames that are seen before a pose is told
     make: Make | None  # an optimiser that refines; None where nothing does
@@ -118,9 +126,8 @@ class ExemplarTracker:
         """Return a frame, joined to the one before."""
         if before is None:
             return seen(beam, fits, None, None)
-        seconds = 1.0 / self.task.fps
-        costs = between(self.exemplars, before.beam, beam, seconds, self.steps, look.root, look.eye)
-        return seen(beam, fits, before, costs)
+        passage = Passage(self.exemplars, before.beam, beam, 1.0 / self.task.fps, look.root, look.eye)
+        return seen(beam, fits, before, self.transitions(passage))
 
     def _elsewhere(self, look: Look, before: Beam | None, most: int, rng: np.random.Generator) -> tuple[Beam, int]:
         """Return states that fit, wherever they are; and how many small pictures were looked at."""
@@ -195,68 +202,3 @@ class ExemplarTracker:
             place = look.placed(pose[None], place[None])[0]
         seconds = oldest.seconds + time.perf_counter() - began
         return Found(pose, place, look, evaluations, seconds, oldest.cpu_seconds + time.process_time() - begun), off
-
-
-def exemplars(
-    task: Task,
-    *,
-    spread: float = 0.03,
-    turning_degrees: float = 4.0,
-    jump: float = 12.0,
-    temperature: float = 2.0,
-    straying: float = 0.01,
-    depth: float = 0.03,
-    pace: float = 0.008,
-    lag: int = 15,
-    mirrored: bool = True,
-    refiner: str = "cma",
-    pull: float = 0.3,
-    smoothing: float = 1.0,
-) -> ExemplarTracker:
-    """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
-
-    Settings:
-        spread: metres that joints may be off where a clip goes on, root mean square; above 0.
-        turning_degrees: how far a body may turn away from its clip in a frame; above 0.
-        jump: what a step to any other pose costs, in units of cost over the temperature; 0 or more.
-        temperature: what silhouette costs are divided by; above 0. Costs of frames err together, so more than 1.
-        straying: metres that a root that is aligned may be off where its clip goes on, to the side or up; above 0.
-        depth: and towards or away from a single camera; above 0.
-        pace: metres that a root that is known may be off where its clip goes on; above 0.
-        lag: frames that are seen before a pose is told, 0 or more.
-        refiner: the optimiser that searches around the path, or "none".
-        pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
-        smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        mirrored: whether the mirror images of all clips are learned from as well.
-    """
-    for name, value in (
-        ("spread", spread),
-        ("turning_degrees", turning_degrees),
-        ("temperature", temperature),
-        ("straying", straying),
-        ("depth", depth),
-        ("pace", pace),
-    ):
-        if not value > 0.0:
-            raise ValueError(f"{name} must be above 0, got {value}")
-    for name, value in (("jump", jump), ("pull", pull), ("smoothing", smoothing)):
-        if not value >= 0.0:
-            raise ValueError(f"{name} must be 0 or more, got {value}")
-    if task.evaluations < LEAST:
-        raise ValueError(f"evaluations must be at least {LEAST} for exemplars, got {task.evaluations}")
-    if lag < 0:
-        raise ValueError(f"lag must be 0 or more, got {lag}")
-    intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
-    temperature /= intervals
-    slack = math.sqrt(intervals)
-    steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
-    states = exemplars_of(task.training, task.body.skeleton, mirrored)
-    return ExemplarTracker(task, states, steps, temperature, lag, _maker(task, refiner), pull, smoothing)
-
-
-def _maker(task: Task, refiner: str) -> Make | None:
-    """Return what makes the optimiser of a frame. Raises ValueError where there is none of that name."""
-    if refiner == "none":
-        return None
-    factory = registry().optimiser(refiner)
-    return partial(factory, **settings.planned(factory, {}, int(REFINED * task.evaluations)))

@@ -14,7 +14,7 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.footage.scene import synthetic
 from posefit.geometry.body import Body
 from posefit.motion import built_in, recorded
-from posefit_exemplars.tracker import exemplars
+from posefit_exemplars.factory import exemplars
 
 
 @pytest.fixture(scope="module")
