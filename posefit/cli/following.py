@@ -89,6 +89,7 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     that an optimiser and a prior are driven by.
     """
     from posefit.footage.segmentation import Extraction
+    from posefit.footage.source import kind_of, useless_for
     from posefit.tracking.front import prior_of
     from posefit.tracking.method import parse_settings
 
@@ -98,8 +99,11 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
             raise ValueError(f"{name} must not be given beside a tracker, got {options[name]} and {options['tracker']}")
     how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
     given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
-    options["extraction"] = Extraction(**given) if given else None
     options["source"] = options["source"] or ("walk",)
+    if given and (kind := kind_of(options["source"][0])) != "video":
+        name = next(iter(given))
+        raise useless_for(kind, "extraction" if name == "method" else name, given[name], "video")
+    options["extraction"] = Extraction(**given) if given else None
     options["view_degrees"] = options["view_degrees"] or None
     options["train"] = _without(options["train"], options.pop("without_subject"))
     prior = options["prior"] or prior_of(options["source"][0])

@@ -6,7 +6,9 @@ from typing import Any
 import click
 
 
-def _size(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
+def _size(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:
+    if value is None:
+        return None
     width, _sign, height = value.lower().partition("x")
     if not (width.isdigit() and height.isdigit()):
         raise click.BadParameter(f"expected WIDTHxHEIGHT such as 320x240, got {value!r}")
@@ -68,7 +70,7 @@ TRACK = (
         multiple=True,
         help="Where a camera stands: 0 in front, 90 to the side; repeatable.",
     ),
-    click.option("--size", default="320x240", show_default=True, callback=_size, help="Image of a rendered motion."),
+    click.option("--size", callback=_size, metavar="WxH", help="Image of a rendered motion, by default 320x240."),
     click.option("--fps", type=float, help="Rate to resample a motion to, or of masks; by default 30, or theirs."),
     click.option("--evaluations", type=int, help="Budget of a frame; by default N (C + 1) = 2440."),
     click.option("--particles", type=int, help="N, by default 40."),

@@ -56,7 +56,7 @@ def track(
     tracker: str | TrackerFactory | None = None,
     train: Sequence[Source] = (),
     view_degrees: float | Sequence[float] | None = None,
-    size: tuple[int, int] = (320, 240),
+    size: tuple[int, int] | None = None,
     fps: float | None = None,
     frames: Range = (None, None),
     particles: int | None = None,
