@@ -90,13 +90,8 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     """
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import kind_of, useless_for
-    from posefit.tracking.front import prior_of
-    from posefit.tracking.method import parse_settings
+    from posefit.tracking.method import FOLLOWER, parse_settings, usual
 
-    context = click.get_current_context()
-    for name in ("optimiser", "prior"):
-        if options["tracker"] and context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
-            raise ValueError(f"{name} must not be given beside a tracker, got {options[name]} and {options['tracker']}")
     how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
     given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
     options["source"] = options["source"] or ("walk",)
@@ -106,8 +101,10 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     options["extraction"] = Extraction(**given) if given else None
     options["view_degrees"] = options["view_degrees"] or None
     options["train"] = _without(options["train"], options.pop("without_subject"))
-    prior = options["prior"] or prior_of(options["source"][0])
-    return options | parse_settings(options.pop("settings"), options["optimiser"], prior, options["tracker"])
+    settings, named = options.pop("settings"), {name: options[name] for name in ("optimiser", "prior", "tracker")}
+    searched = any(text.partition(".")[0] != FOLLOWER for text in settings)
+    chosen = usual(options["source"][0], **named, searched=searched)
+    return options | chosen.method | parse_settings(settings, **chosen.method)
 
 
 def _without(train: tuple[str, ...], subjects: tuple[str, ...]) -> tuple[str, ...]:

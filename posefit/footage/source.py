@@ -2,11 +2,11 @@
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from numbers import Real
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -124,34 +124,60 @@ def _known(sources: Sequence[Source], viewing: Viewing) -> Scene:
     return synthetic(motion, viewing.view_degrees, viewing.size or SIZE, cameras, viewing.frames)
 
 
-def clip_of(source: Source, asf: str | Path | None = None) -> Callable[[float], Motion]:
+@dataclass(frozen=True)
+class Clip:
+    """Gives a motion at any rate, which is `clip(fps)`; before it is made, `clip.count(fps)` says how long it is."""
+
+    motion: Callable[[float], Motion] = field(repr=False)
+    poses: int  # of the motion as it is stored
+    fps: float | None  # None for a built-in motion, which has as many at any rate
+
+    def __call__(self, fps: float) -> Motion:
+        """Return the motion at a rate."""
+        return self.motion(fps)
+
+    @classmethod
+    def of(cls, motion: Motion) -> Self:
+        """Return the clip of a motion."""
+        return cls(motion.resampled, len(motion), motion.fps)
+
+    @classmethod
+    def of_recorded(cls, clip: recorded.RecordedClip) -> Self:
+        """Return that of a recorded clip, whose motion is made when it is asked for."""
+        return cls(lambda fps: clip.motion().resampled(fps), int(clip.times[-1]) + 1, recorded.FPS)
+
+    def count(self, fps: float) -> int:
+        """Return about how many poses the motion has at a rate."""
+        return self.poses if self.fps is None else round(self.poses * fps / self.fps)
+
+
+def clip_of(source: Source, asf: str | Path | None = None) -> Clip:
     """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
 
     A file is read once, now; the .asf of an .amc is `asf`, or the only one beside it. Raises ValueError where there is
     no such motion.
     """
     if isinstance(source, Motion):
-        return source.resampled
+        return Clip.of(source)
     if source in built_in.names():
-        return partial(_built_in, str(source))
+        return Clip(partial(_built_in, str(source)), len(built_in.motion(str(source))), None)
     if recorded.is_recorded(source):
-        return recorded.clip(str(source)).motion().resampled
+        return Clip.of_recorded(recorded.clip(str(source)))
     path = Path(source)
     if path.suffix.lower() == ".amc":
         from posefit.motion.amc import read_clip
 
-        return read_clip(_skeleton_file(path, asf), existing(path)).resampled
+        return Clip.of(read_clip(_skeleton_file(path, asf), existing(path)))
     if path.suffix.lower() == ".bvh":
         from posefit.motion.bvh import read_bvh
 
-        return read_bvh(existing(path)).resampled
+        return Clip.of(read_bvh(existing(path)))
     if path.exists() or path.suffix or _has_folders(source):
         existing(path)
         raise ValueError(
             f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}"
         )
-    built_in.motion(str(source))  # raises: there is none of that name
-    return partial(_built_in, str(source))
+    return Clip.of(built_in.motion(str(source)))  # raises: there is none of that name
 
 
 def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:
