@@ -125,7 +125,7 @@ def _known(sources: Sequence[Source], viewing: Viewing) -> Scene:
 
 
 @dataclass(frozen=True)
-class Clip:
+class SourceClip:
     """Gives a motion at any rate, which is `clip(fps)`; before it is made, `clip.count(fps)` says how long it is."""
 
     motion: Callable[[float], Motion] = field(repr=False)
@@ -151,33 +151,33 @@ class Clip:
         return self.poses if self.fps is None else round(self.poses * fps / self.fps)
 
 
-def clip_of(source: Source, asf: str | Path | None = None) -> Clip:
+def clip_of(source: Source, asf: str | Path | None = None) -> SourceClip:
     """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
 
     A file is read once, now; the .asf of an .amc is `asf`, or the only one beside it. Raises ValueError where there is
     no such motion.
     """
     if isinstance(source, Motion):
-        return Clip.of(source)
+        return SourceClip.of(source)
     if source in built_in.names():
-        return Clip(partial(_built_in, str(source)), len(built_in.motion(str(source))), None)
+        return SourceClip(partial(_built_in, str(source)), len(built_in.motion(str(source))), None)
     if recorded.is_recorded(source):
-        return Clip.of_recorded(recorded.clip(str(source)))
+        return SourceClip.of_recorded(recorded.clip(str(source)))
     path = Path(source)
     if path.suffix.lower() == ".amc":
         from posefit.motion.amc import read_clip
 
-        return Clip.of(read_clip(_skeleton_file(path, asf), existing(path)))
+        return SourceClip.of(read_clip(_skeleton_file(path, asf), existing(path)))
     if path.suffix.lower() == ".bvh":
         from posefit.motion.bvh import read_bvh
 
-        return Clip.of(read_bvh(existing(path)))
+        return SourceClip.of(read_bvh(existing(path)))
     if path.exists() or path.suffix or _has_folders(source):
         existing(path)
         raise ValueError(
             f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}"
         )
-    return Clip.of(built_in.motion(str(source)))  # raises: there is none of that name
+    return SourceClip.of(built_in.motion(str(source)))  # raises: there is none of that name
 
 
 def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:

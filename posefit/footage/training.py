@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from posefit.footage.masks import FPS
-from posefit.footage.source import MOTIONS, Clip, Source, clip_of
+from posefit.footage.source import MOTIONS, Source, SourceClip, clip_of
 from posefit.limits import allowed_bytes
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
@@ -14,7 +14,7 @@ POSE_BYTES = 3_000  # that a method takes to learn from a pose: its angles, join
 
 def training_clips(
     sources: Sequence[Source], asf: str | Path | None = None, *, followed: Source | None = None
-) -> list[Clip]:
+) -> list[SourceClip]:
     """Return the clips that sources name, each of which gives its motion at any rate.
 
     A source is what `clip_of` takes; a folder of .amc files with their .asf, or of .bvh files; or `library`,
@@ -31,7 +31,7 @@ def training_clips(
     return clips
 
 
-def training_motions(clips: Sequence[Clip], fps: float) -> list[Motion]:
+def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
     """Return the motions of clips at a rate. Raises ValueError where they would take more memory than there may be."""
     _check_memory(sum(clip.count(fps) for clip in clips), fps)
     return [clip(fps) for clip in clips]
@@ -45,14 +45,14 @@ def _check_memory(poses: int, fps: float) -> None:
         raise ValueError(f"train must take at most the {most / 1e9:.1f} GB of memory that there may be, got {took}")
 
 
-def _clips(source: Source, asf: str | Path | None, followed: Source | None) -> Iterator[Clip]:
+def _clips(source: Source, asf: str | Path | None, followed: Source | None) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
         found = [one for one in recorded.named(source) if one.name != _stem(followed)]
         if not found:
             raise ValueError(f"train must hold another clip than the source, got {source} for {followed}")
-        yield from (Clip.of_recorded(one) for one in found)
+        yield from (SourceClip.of_recorded(one) for one in found)
     elif not isinstance(source, Motion) and Path(source).is_dir():
-        paths = sorted(path for path in Path(source).iterdir() if path.suffix.lower() in MOTIONS)
+        paths = sorted(path for path in Path(source).iterdir() if path.suffix.lower() in MOTIONS and path.is_file())
         if not paths:
             raise ValueError(f"{source}: expected a folder of {' or '.join(MOTIONS)} files, got none in it")
         others = [path for path in paths if not _same(path, followed)]
