@@ -44,7 +44,7 @@ def drive(
         raise error.Error(str(mistake)) from None
 
 
-def reference(
+def track_reference(
     env: Env[Any, Any], tracker: str = "exemplars", *, seed: int = 0, train: Sequence[str] = (), **settings: Any
 ) -> list[dict[str, Any]]:
     """Return what a tracker would commit in each frame of the current episode of `posefit/Track-v0`, as infos say it.
