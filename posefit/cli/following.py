@@ -1,5 +1,6 @@
 """`posefit track`, `fit` and `extract`."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -100,22 +101,21 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
         raise useless_for(kind, "extraction" if name == "method" else name, given[name], "video")
     options["extraction"] = Extraction(**given) if given else None
     options["view_degrees"] = options["view_degrees"] or None
-    options["train"] = _without(options["train"], options.pop("without_subject"))
     settings, named = options.pop("settings"), {name: options[name] for name in ("optimiser", "prior", "tracker")}
     searched = any(text.partition(".")[0] != FOLLOWER for text in settings)
-    chosen = usual(options["source"][0], **named, searched=searched)
+    chosen = usual(options["source"][0], **named, train=options["train"], searched=searched)
+    if left_out := options.pop("without_subject"):
+        options["train"] = _without(chosen.train, left_out)
     return options | chosen.method | parse_settings(settings, **chosen.method)
 
 
-def _without(train: tuple[str, ...], subjects: tuple[str, ...]) -> tuple[str, ...]:
+def _without(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:
     """Return what a method learns from, some people of the library left out."""
     from posefit.motion import recorded
 
-    if not subjects:
-        return train
     if not any(recorded.is_library(one) for one in train):
-        raise ValueError(f"without_subject must be given with --train library, got {', '.join(train) or 'no --train'}")
-    return tuple(recorded.leaving_out(one, subjects) if recorded.is_library(one) else one for one in train)
+        raise ValueError(f"without_subject must be given with --train library, got {', '.join(train)}")
+    return [recorded.leaving_out(one, subjects) if recorded.is_library(one) else one for one in train]
 
 
 def _degrees(pose: Any) -> list[float]:

@@ -56,6 +56,7 @@ def test_a_plan_may_train_on_people_of_the_library() -> None:
             ["--train", "walk-a", "--without-subject", "16"],
             "without_subject must be given with --train library, got walk-a",
         ),
+        (["--without-subject", "16"], "without_subject must be given with --train library, got walk-a, walk-b, walk-c"),
         (["--train", "library", "--without-subject", "99"], "a subject of the library must be one of 02, 05"),
         (["--train", "library:"], "a library must be library, library:02,16 or library:-16, got 'library:'"),
         (["--train", "library:99"], "a subject of the library must be one of 02, 05"),

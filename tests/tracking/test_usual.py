@@ -1,5 +1,6 @@
 """What a source is followed with, and what that learns from, where nobody says."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,7 @@ def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
     ("words", "method"),
     [
         ([], "exemplars"),
+        (["--tracker", "exemplars"], "exemplars"),
         (["--set", "exemplars.lag=0"], "exemplars"),
         (["--set", "sapso.cooling=0.9"], "sapso + loose"),
         (["--set", "tracker.floor=0.1"], "sapso + loose"),
@@ -101,3 +103,11 @@ def test_settings_say_whose_they_are(masks: Path, words: list[str], method: str)
     done = CliRunner().invoke(main, ["track", str(masks), *quick, *words])
     assert done.exit_code == 0, done.output
     assert f": 2 frames, {method}, " in done.stdout.splitlines()[0]
+
+
+def test_somebody_is_left_out_of_the_library_that_is_learned_from_by_default(masks: Path) -> None:
+    quick = ["--evaluations", "400", "--body-frames", "0", "--frames", "0:2", "--json"]
+    others = [f"--without-subject={one}" for one in recorded.subjects() if one != "17"]
+    done = CliRunner().invoke(main, ["track", str(masks), *quick, *others])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["train"] == ["17_03", "17_10"]
