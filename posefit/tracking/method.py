@@ -91,11 +91,12 @@ def prepare(choice: Choice, task: Task) -> Method:
     settings.check("tracker", Prediction, choice.tracker_settings)
     prior, learned = _prior(choice, task)
     prediction = Prediction(**choice.tracker_settings)
+    tilt = prediction.tilted(learned, task.training)
 
     def make(task: Task, patience: float) -> SynthesisTracker:
         limit = None if choice.ask_seconds is None else choice.ask_seconds + patience
         build = partial(_guarded, offer, mine, limit, task.evaluations)
-        return SynthesisTracker(task, learned, build, offer.next_frame, prediction)
+        return SynthesisTracker(task, learned, build, offer.next_frame, prediction, tilt)
 
     made_of = {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)}
     return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, Audit(), make)
