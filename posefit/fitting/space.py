@@ -103,10 +103,7 @@ class SearchSpace:
         poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
         box, filled = (proposals, self.centre, self.half, self.anchor, first), (poses, translations, latents)
         tilt = self.tilt
-        if tilt is None:
-            finite = unpack_proposals(*box, *filled)
-        else:
-            finite = unpack_tilted(*box, tilt.mean, *filled)
+        finite = unpack_proposals(*box, *filled) if tilt is None else unpack_tilted(*box, tilt.mean, *filled)
         if not finite:
             raise ValueError("proposals must be finite, got nan or infinity")
         poses[:, 3:] = self.prior.inverse_transform(latents)
