@@ -90,7 +90,9 @@ def prepare(choice: Choice, task: Task) -> Method:
     settings.check(offer.name, offer.factory, mine)
     settings.check("tracker", Prediction, choice.tracker_settings)
     prior, learned = _prior(choice, task)
-    prediction = Prediction(**choice.tracker_settings)
+    # what a prior that came learned has learned from, nobody says: its tilt is not that of other motions
+    usual: dict[str, Any] = {} if isinstance(choice.prior, str) else {"tilt": "box"}
+    prediction = Prediction(**{**usual, **choice.tracker_settings})
     tilt = prediction.tilted(learned, task.training)
 
     def make(task: Task, patience: float) -> SynthesisTracker:

@@ -8,10 +8,11 @@ import pytest
 from posefit import SearchSpace, Task
 from posefit.arrays import Array
 from posefit.fitting.prior import Tilt
-from posefit.fitting.tracker import Follower, Observation, Prediction
+from posefit.fitting.tracker import Follower, Observation, Prediction, SynthesisTracker
 from posefit.geometry.body import Body
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.tracking.method import Choice, prepare
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
 
@@ -164,6 +165,22 @@ def test_a_tilt_that_was_learned_before_is_not_learned_again() -> None:
     tilt = Tilt.of(Hip(), [bending(np.full(4, 0.5), np.zeros(4))], 1.0, DEGREE)
     space = Follower(task_of(), Hip(), Prediction(), tilt).space(Observation([], np.zeros(3)))
     assert space.tilt is tilt
+
+
+def test_a_prior_that_has_learned_already_has_a_box_unless_somebody_wants_its_tilt_learned() -> None:
+    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
+    task = task_of(*walks)
+    learned = PCA().fit(task.angles)
+
+    def tilt(choice: Choice) -> Tilt | None:
+        tracker = prepare(choice, task).tracker(task)
+        assert isinstance(tracker, SynthesisTracker)
+        return Follower(task, learned, tracker.prediction, tracker.tilt).space(Observation([], np.zeros(3))).tilt
+
+    assert tilt(Choice(prior="pca")) is not None
+    assert tilt(Choice(prior="pca", tracker_settings={"tilt": "box"})) is None
+    assert tilt(Choice(prior=learned)) is None
+    assert tilt(Choice(prior=learned, tracker_settings={"tilt": "learned"})) is not None
 
 
 def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
