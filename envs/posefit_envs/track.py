@@ -145,7 +145,7 @@ class Passage:
 
     def __init__(self, world: World, number: int, frames: int, evaluations: int) -> None:
         self.instance: Instance = instance(world, number, frames, evaluations)
-        self._follower = Follower(self.instance.task, world.learned, Prediction())
+        self._follower = Follower(self.instance.task, world.learned, Prediction(tilt="box"))
         self._frames, self.frame, self.ended = frames, 0, False
         self._enter()
 

@@ -135,12 +135,15 @@ def prepare(choice: Choice, task: Task) -> Method:
     settings.check(offer.name, offer.factory, mine)
     settings.check("tracker", Prediction, choice.tracker_settings)
     prior, learned = _prior(choice, task)
-    prediction = Prediction(**choice.tracker_settings)
+    # what a prior that came learned has learned from, nobody says: its tilt is not that of other motions
+    usual: dict[str, Any] = {} if isinstance(choice.prior, str) else {"tilt": "box"}
+    prediction = Prediction(**{**usual, **choice.tracker_settings})
+    tilt = prediction.tilted(learned, task.training)
 
     def make(task: Task, patience: float) -> SynthesisTracker:
         limit = None if choice.ask_seconds is None else choice.ask_seconds + patience
         build = partial(_guarded, offer, mine, limit, task.evaluations)
-        return SynthesisTracker(task, learned, build, offer.next_frame, prediction)
+        return SynthesisTracker(task, learned, build, offer.next_frame, prediction, tilt)
 
     made_of = {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)}
     return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, Audit(), make)
