@@ -46,7 +46,8 @@ def test_somebody_unknown_walks_and_nobody_says_that_it_is_a_walk() -> None:
 
 
 def test_who_is_recorded_is_found_again() -> None:
-    track = posefit.track("16_15", train=["library:16"], tracker="exemplars", frames=(0, 20))
+    himself = replace(recorded.clip("16_15").motion(), name="again")  # nobody learns from a clip of the same name
+    track = posefit.track(himself, train=["library:16"], tracker="exemplars", frames=(0, 20))
     assert track.measures.mpjpe_mm < 15.0
 
 

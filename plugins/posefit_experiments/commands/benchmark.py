@@ -1,5 +1,6 @@
 """`posefit bench`."""
 
+import tempfile
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,8 +23,7 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
     `cpu` tells for which processor the loops are compiled, and which instructions it has. It is this machine's, or the
     one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
     """
-    if pictures is not None and not growth:
-        raise ValueError("pictures are of --growth, got --pictures without it")
+    _check(threads, growth, pictures, compiling)
     if growth:
         _growth(as_json, pictures)
         return
@@ -32,8 +32,6 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
         return
     from posefit_experiments.bench.experiment import loop_figures
 
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads must be at least 1, got {threads}")
     say("timing; this takes half a minute ...")
     figures = loop_figures(threads)
     if as_json:
@@ -41,6 +39,22 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
         return
     for name, value in _named(figures):
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
+
+
+def _check(threads: int | None, growth: bool, pictures: str | None, compiling: bool) -> None:
+    """Return nothing. Raises ValueError for options that do not go together, and for a processor that LLVM lacks."""
+    from posefit_experiments.bench.processor import check_named
+
+    if growth and compiling:
+        raise ValueError("growth and compile must not both be given, got --growth --compile")
+    if pictures is not None and not growth:
+        raise ValueError("pictures are of --growth, got --pictures without it")
+    if threads is not None and (growth or compiling):
+        other = "--growth" if growth else "--compile"
+        raise ValueError(f"threads must not be given beside {other}, which has one, got --threads {threads}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be at least 1, got {threads}")
+    check_named()
 
 
 def _named(figures: Mapping[str, Any], group: str = "") -> Iterator[tuple[str, Any]]:
@@ -57,6 +71,8 @@ def _growth(as_json: bool, pictures: str | None) -> None:
 
     if pictures is not None and find_spec("matplotlib") is None:
         raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
+    if pictures is not None:
+        _check_folder(Path(pictures))
     say("timing; this takes half a minute ...")
     found = growths()
     told = {one.name: dict(zip(one.labels, one.us, strict=True)) for one in found}
@@ -64,6 +80,15 @@ def _growth(as_json: bool, pictures: str | None) -> None:
     if pictures is not None:
         for path in draw_growths(found, Path(pictures)):
             say(f"{path}")
+
+
+def _check_folder(folder: Path) -> None:
+    """Make a folder. Raises ValueError where it cannot be written to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise ValueError(f"{folder}: expected a folder that can be written to, got {error.strerror}") from None
 
 
 def _compile(as_json: bool) -> None:
