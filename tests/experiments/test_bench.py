@@ -104,12 +104,25 @@ def test_growth_is_a_table_and_four_figures(monkeypatch: pytest.MonkeyPatch, tmp
     assert {path.name for path in (tmp_path / "new").iterdir()} == {f"growth-{name}.png" for name in told}
 
 
+@pytest.mark.slow
+def test_following_is_timed_and_weighed() -> None:
+    found = CliRunner().invoke(main, ["bench", "--follow", "3", "--json"])
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert told["frames"] == 3
+    assert 0.0 < told["ms"] <= told["slowest_ms"]
+    assert 0.0 < told["mb"] <= told["mb_end"]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         ("--threads 0", "threads must be at least 1, got 0"),
         ("--pictures .", "pictures are of --growth, got --pictures without it"),
         ("--growth --compile", "growth and compile must not both be given, got --growth --compile"),
+        ("--follow 9 --compile", "follow must not be given beside --compile, got --follow 9"),
+        ("--follow 9 --threads 2", "threads must not be given beside --follow, which has one, got --threads 2"),
+        ("--follow 0", "follow must be at least 1 frame, got 0"),
         ("--growth --threads 0", "threads must not be given beside --growth, which has one, got --threads 0"),
         ("--compile --threads 2", "threads must not be given beside --compile, which has one, got --threads 2"),
         ("--growth --pictures /dev/null/a", "/dev/null/a: expected a folder that can be written to, got Not a directory"),

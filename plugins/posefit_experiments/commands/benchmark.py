@@ -17,18 +17,24 @@ from posefit.cli.output import json_line, say
 @click.option("--growth", is_flag=True, help="Time how a pose's cost grows with size, poses, views and dimensions.")
 @click.option("--pictures", metavar="DIR", help="With --growth: write a figure of each, growth-*.png, to DIR.")
 @click.option("--compile", "compiling", is_flag=True, help="Time what compiles for the default sweep instead.")
-def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: str | None, compiling: bool) -> None:
+@click.option("--follow", type=int, metavar="FRAMES", help="Time and weigh the tracker of the library instead.")
+def bench_command(
+    threads: int | None, as_json: bool, growth: bool, pictures: str | None, compiling: bool, follow: int | None
+) -> None:
     """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
 
     `cpu` tells for which processor the loops are compiled, and which instructions it has. It is this machine's, or the
     one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
     """
-    _check(threads, growth, pictures, compiling)
+    _check(threads, growth, pictures, compiling, follow)
     if growth:
         _growth(as_json, pictures)
         return
     if compiling:
         _compile(as_json)
+        return
+    if follow is not None:
+        _follow(as_json, follow)
         return
     from posefit_experiments.bench.experiment import loop_figures
 
@@ -41,16 +47,22 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
 
 
-def _check(threads: int | None, growth: bool, pictures: str | None, compiling: bool) -> None:
+def _check(threads: int | None, growth: bool, pictures: str | None, compiling: bool, follow: int | None) -> None:
     """Return nothing. Raises ValueError for options that do not go together, and for a processor that LLVM lacks."""
     from posefit_experiments.bench.processor import check_named
 
     if growth and compiling:
         raise ValueError("growth and compile must not both be given, got --growth --compile")
+    if follow is not None and (growth or compiling):
+        raise ValueError(
+            f"follow must not be given beside {'--growth' if growth else '--compile'}, got --follow {follow}"
+        )
+    if follow is not None and follow < 1:
+        raise ValueError(f"follow must be at least 1 frame, got {follow}")
     if pictures is not None and not growth:
         raise ValueError("pictures are of --growth, got --pictures without it")
-    if threads is not None and (growth or compiling):
-        other = "--growth" if growth else "--compile"
+    if threads is not None and (growth or compiling or follow is not None):
+        other = "--growth" if growth else "--compile" if compiling else "--follow"
         raise ValueError(f"threads must not be given beside {other}, which has one, got --threads {threads}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, got {threads}")
@@ -98,3 +110,13 @@ def _compile(as_json: bool) -> None:
     figures = compile_figures()
     for line in [json_line(figures)] if as_json else compile_lines(figures):
         click.echo(line)
+
+
+def _follow(as_json: bool, frames: int) -> None:
+    from posefit_experiments.bench.follow import follow_figures
+
+    say(f"following somebody for {frames:,} frames; a thousand take one or two minutes ...")
+    figures = follow_figures(frames)
+    click.echo(
+        json_line(figures) if as_json else "\n".join(f"{name:12} {value:.4g}" for name, value in figures.items())
+    )
