@@ -45,7 +45,7 @@ def _facing(skeleton: Skeleton, poses: Array) -> Array:
 
 
 def thinned(codes: Codes, clips: Rows) -> Rows:
-    """Return which frames to keep: each farther than a centimetre from the last one kept, and both ends of clips."""
+    """Return which frames to keep: each two centimetres from the last one kept, and both ends of clips."""
     kept, last = [], -1
     ends = np.diff(clips, append=-1) != 0
     for k in range(len(codes)):
@@ -71,4 +71,4 @@ def groups(codes: Codes, most: int) -> tuple[Rows, Rows]:
         farthest = int(nearest.argmax())
         if len(centres) == most or nearest[farthest] <= SAME**2:
             return np.array(centres), owners
-        centres.append(farthest)
+        centres.append(farthest)  # TOYAMA2001 (exemplars)

@@ -40,7 +40,7 @@ class Exemplars:
     def of(cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False) -> Self:
         """Return the states of motions, as the person with this skeleton would move; and of their mirror images.
 
-        A frame nearer than a centimetre to the last one kept is left out. Raises ValueError where a motion has a
+        A frame nearer than two centimetres to the last one kept is left out. Raises ValueError where a motion has a
         single frame.
         """
         if not motions:
@@ -124,7 +124,7 @@ _LATEST: dict[bytes, Exemplars] = {}  # one: restarts, builds and cells of a swe
 
 def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> Exemplars:
     """Return the states of motions; those of the same motions and skeleton as the last time are not made again."""
-    told = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps) for motion in motions])).encode())
+    told = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
     for array in (
         skeleton.offsets,
         skeleton.axes,
