@@ -105,7 +105,8 @@ class Ahead:
         places = [beam.places + about_vertical(way, beam.yaws) for _, _, way in ahead]
         ways = [np.zeros(len(beam)) for _ in SPEEDS]
         if root is not None:
-            ways = [np.log1p(((place - root) ** 2).sum(axis=1) / (2.0 * steps.pace**2)) for place in places]
+            offs = [((place - root) ** 2).sum(axis=1) / (2.0 * steps.pace**2) for place in places]
+            ways = [np.minimum(np.log1p(off), steps.jump) for off in offs]  # or nothing might be within reach
         own = SPEEDS.index(1.0)
         return cls([codes for codes, _, _ in ahead], ways, beam.yaws + ahead[own][1], places[own])
 
@@ -226,7 +227,7 @@ def between(passage: Passage, *, steps: Steps) -> Array:
     """Return what each step from a state of one frame to one of the next costs (n, m); none costs more than a jump."""
     exemplars, before, beam, root = passage.exemplars, passage.before, passage.beam, passage.root
     ahead = Ahead.of(exemplars, before, passage.seconds, steps, root)
-    costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)
+    costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)  # TOYAMA2001 (dynamics)
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
         costs += strayed(beam.places, ahead.places[:, None], passage.eye, steps)

@@ -71,4 +71,4 @@ def groups(codes: Codes, most: int) -> tuple[Rows, Rows]:
         farthest = int(nearest.argmax())
         if len(centres) == most or nearest[farthest] <= SAME**2:
             return np.array(centres), owners
-        centres.append(farthest)
+        centres.append(farthest)  # TOYAMA2001 (exemplars)

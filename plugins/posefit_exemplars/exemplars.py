@@ -128,7 +128,7 @@ _LATEST: dict[bytes, Exemplars] = {}  # one: restarts, builds and cells of a swe
 
 def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> Exemplars:
     """Return the states of motions; those of the same motions and skeleton as the last time are not made again."""
-    told = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps) for motion in motions])).encode())
+    told = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
     for array in (
         skeleton.offsets,
         skeleton.axes,

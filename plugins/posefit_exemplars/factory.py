@@ -64,11 +64,11 @@ def exemplars(
         ("depth", depth),
         ("pace", pace),
     ):
-        if not value > 0.0:
-            raise ValueError(f"{name} must be above 0, got {value}")
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"{name} must be above 0 and finite, got {value}")
     for name, value in (("jump", jump), ("pull", pull), ("smoothing", smoothing)):
-        if not value >= 0.0:
-            raise ValueError(f"{name} must be 0 or more, got {value}")
+        if not 0.0 <= value < math.inf:
+            raise ValueError(f"{name} must be 0 or more and finite, got {value}")
     if task.evaluations < LEAST:
         raise ValueError(f"evaluations must be at least {LEAST} for exemplars, got {task.evaluations}")
     if lag < 0:

@@ -106,11 +106,12 @@ class ExemplarTracker:
             return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
         full = int(FULL * self.task.evaluations)
         small = int(((1.0 - REFINED) * self.task.evaluations - full - 4) / look.share)
-        around = int(AROUND * small) if latest is not None else 0
+        around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
         if latest is None and self.task.first_pose is not None:
-            beams = [replace(elsewhere, totals=elsewhere.totals + self.steps.jump), self._given(self.task.first_pose)]
+            given = self._given(self.task.first_pose, around)
+            beams = [replace(elsewhere, totals=elsewhere.totals + self.steps.jump), given]
         if latest is not None:
             beams.append(stepped(self.exemplars, latest, seconds, self.steps, around, root))
         beam = self._at(look, joined_beams(*beams), latest is not None)
@@ -143,13 +144,14 @@ class ExemplarTracker:
         states, yaws = np.concatenate(found), np.repeat(yaws[best], [len(some) for some in found])
         return self._begun(states, yaws, before), len(beam)
 
-    def _given(self, angles: Array) -> Beam:
-        """Return the states that are most like a first pose whose joint angles (63,) and yaw somebody knows."""
+    def _given(self, angles: Array, most: int) -> Beam:
+        """Return the states, at most so many, that are most like a first pose whose angles (63,) and yaw are known."""
         yaw = self.task.yaw or 0.0
         code = self.exemplars.coding.coded(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
         apart = self.exemplars.squares - 2.0 * (self.exemplars.codes @ code)
-        states = np.tile(np.argsort(apart, kind="stable")[:WIDTH], 3)
-        yaws = yaw + np.repeat([-TURN, 0.0, TURN], len(states) // 3)
+        turns = [-TURN, 0.0, TURN]
+        near = np.argsort(apart, kind="stable")[: min(most // len(turns), WIDTH)]
+        states, yaws = np.tile(near, len(turns)), yaw + np.repeat(turns, len(near))
         return self._begun(states, yaws, None)
 
     def _begun(self, states: Rows, yaws: Array, before: Beam | None) -> Beam:

@@ -17,6 +17,7 @@ from posefit_exemplars.codes import Codes
 
 ALIKE = 0.06  # metres: how near the codes of states are that are averaged, a standard deviation
 ALIKE_YAW = np.radians(20.0)
+HIGHEST = 80.0  # cost of a step beyond which its likelihood would be 0, and so the sum of all might be
 
 Kernel = NDArray[np.float32]
 
@@ -33,16 +34,16 @@ class Seen:
 
 def seen(beam: Beam, fits: Array, before: Seen | None, steps: Array | None) -> Seen:
     """Return a frame whose states have costs of fit (n,), to which steps from the frame before cost (m, n)."""
-    likelihoods = np.exp(fits.min() - fits)
+    likelihoods = np.exp(fits.min() - fits)  # TOYAMA2001 (likelihood)
     if before is None or steps is None:
         totals = fits - fits.min()
         beam = replace(beam, totals=totals, parents=np.full(len(beam), -1))
         return Seen(beam, likelihoods, None, likelihoods / likelihoods.sum())
     ways = before.beam.totals[:, None] + steps
     parents = ways.argmin(axis=0)
-    totals = ways[parents, np.arange(len(beam))] + fits
-    kernel = np.exp(-steps).astype(np.float32)
-    forward = (before.forward @ kernel) * likelihoods
+    totals = ways[parents, np.arange(len(beam))] + fits  # RABINER1989 (Viterbi)
+    kernel = np.exp(-np.minimum(steps, HIGHEST)).astype(np.float32)
+    forward = (before.forward @ kernel) * likelihoods  # RABINER1989 (forward)
     beam = replace(beam, totals=totals - totals.min(), parents=parents)
     return Seen(beam, likelihoods, kernel, forward / forward.sum())
 
@@ -60,7 +61,7 @@ def weights(window: Sequence[Seen]) -> Array:
     backward = np.ones(len(window[-1].beam))
     for one in window[:0:-1]:
         assert one.kernel is not None
-        backward = one.kernel @ (backward * one.likelihoods)
+        backward = one.kernel @ (backward * one.likelihoods)  # RABINER1989 (backward)
         backward /= backward.max()
     found = window[0].forward * backward
     return np.asarray(found / found.sum())

@@ -1,54 +1,160 @@
-"""Viterbi's recursion against one that looks at every pair of states."""
+"""Steps from the states of one frame to those of the next, against twins that look at every pair."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from posefit.motion import built_in
-from posefit.motion.built_in import average_skeleton
-from posefit_exemplars.beam import BINS, SPEEDS, TURN, Beam, Steps, bins_of, joined_beams, jumped, stepped
-from posefit_exemplars.exemplars import Exemplars
+from posefit.arrays import Array
+from posefit.geometry.rotation import wrapped
+from posefit_exemplars import kernels
+from posefit_exemplars.beam import (
+    BINS,
+    FACINGS,
+    HOPELESS,
+    KINDS,
+    SPEEDS,
+    TURN,
+    Beam,
+    Steps,
+    between,
+    bins_of,
+    joined_beams,
+    jumped,
+    squares,
+    stepped,
+    strayed,
+    varied,
+)
+from posefit_exemplars.exemplars import Exemplars, about_vertical
 
-STEPS = Steps(0.03, np.radians(8.0), 12.0, 0.05)
+STEPS = Steps(0.03, np.radians(8.0), 12.0, 0.01, 0.03, 0.008)
 SECONDS = 1.0 / 30.0
+MOST = 4000
+OWN = SPEEDS.index(1.0)
 
 
-@pytest.fixture(scope="module")
-def small() -> Exemplars:
-    return Exemplars.of([built_in.motion(name, frames=20) for name in ("walk-a", "walk-b")], average_skeleton())
-
-
-def beam(states: list[int], yaws: list[float], totals: list[float]) -> Beam:
+def beam(states: list[int], yaws: list[float], totals: list[float], places: Array | None = None) -> Beam:
     many = len(states)
-    return Beam(np.array(states), np.array(yaws), np.full(many, -1), np.array(totals), np.zeros((many, 3)))
+    where = np.zeros((many, 3)) if places is None else places
+    return Beam(np.array(states), np.array(yaws), np.full(many, -1), np.array(totals), where)
 
 
-def test_a_step_costs_what_the_slow_twin_says(small: Exemplars) -> None:
+def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Array:
+    """Return what a step from each state to each pose costs (n, K), pair by pair; whoever it is does not turn away."""
+    costs = np.full((len(before), len(exemplars)), np.inf)
+    for row, state in enumerate(before.states):
+        for speed in SPEEDS:
+            code, _, way = exemplars.after(np.array([state]), SECONDS * speed)
+            pace = 0.0
+            if root is not None:
+                off = before.places[row] + about_vertical(way, before.yaws[row : row + 1])[0] - root
+                pace = np.log1p(off @ off / 2.0 / STEPS.pace**2)
+            for pose in range(len(exemplars)):
+                away = ((code[0] - exemplars.codes[pose]) ** 2).sum() / (2.0 * STEPS.spread**2)
+                costs[row, pose] = min(costs[row, pose], away + min(pace, STEPS.jump))
+    return costs
+
+
+@pytest.mark.pure
+@pytest.mark.parametrize("limit", [np.inf, 3.0])
+def test_each_pose_is_reached_by_its_cheapest_step(limit: float) -> None:
+    rng = np.random.default_rng(0)
+    ahead = rng.normal(size=(3, 5, 8)).astype(np.float32)
+    ways, totals = rng.random((3, 5)), rng.random(5)
+    codes = rng.normal(size=(20, 8)).astype(np.float32)
+    bounds = np.array([0, 4, 9, 9, 15, 20])  # one group is empty
+    rows, near = np.array([0, 2, 3]), rng.integers(0, 4, (5, 2))  # nobody looks at the last group
+    least, owners, touched = np.full(20, np.inf), np.zeros(20, dtype=np.int64), np.zeros(20, dtype=np.int64)
+    count = kernels.reached(ahead, ways, totals, rows, near, codes, bounds, 0.25, limit, least, owners, touched)
+    twin = np.full((5, 20), np.inf)
+    for r in rows:
+        for k in range(20):
+            if any(bounds[g] <= k < bounds[g + 1] for g in near[r]):
+                away = [((ahead[s, r] - codes[k]) ** 2).sum() for s in range(3)]
+                twin[r, k] = min(totals[r] + ways[s, r] + 0.25 * away[s] for s in range(3))
+    best = twin.min(axis=0)
+    found = np.flatnonzero(best < limit)
+    assert 0 < len(found) < 20
+    assert sorted(touched[:count].tolist()) == found.tolist()
+    np.testing.assert_allclose(least[found], best[found], rtol=1e-5)
+    np.testing.assert_array_equal(owners[found], twin.argmin(axis=0)[found])
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_step_costs_what_the_slow_twin_says(small: Exemplars, known: bool) -> None:
+    root = np.array([0.0, 0.0, 0.05]) if known else None
     before = beam([3, 11, 25], [0.1, 0.1, 2.0], [0.0, 2.5, 1.0])
-    found = stepped(small, before, SECONDS, STEPS)
+    found = stepped(small, before, SECONDS, STEPS, MOST, root)
+    steps = costs_of_steps(small, before, root) + before.totals[:, None]
+    codes, turned, _ = small.after(before.states, SECONDS)
     twin: dict[tuple[int, int], float] = {}
     for row in range(3):
-        ahead = [small.after(before.states[row : row + 1], SECONDS * speed) for speed in SPEEDS]
-        facing = before.yaws[row] + ahead[SPEEDS.index(1.0)][1][0]
         for state in range(len(small)):
-            away = min(float(((code[0] - small.codes[state]) ** 2).sum()) for code, *_ in ahead)
             for turn in (-TURN, 0.0, TURN):
-                cost = before.totals[row] + away / (2.0 * 0.03**2) + 0.5 * (turn / np.radians(8.0)) ** 2
-                place = state, int(bins_of(np.array([facing + turn]))[0])
+                facing = np.array([before.yaws[row] + turned[row] + turn])
+                place = state, int(bins_of(facing)[0])
+                cost = steps[row, state] + 0.5 * (turn / STEPS.turning) ** 2
                 twin[place] = min(twin.get(place, np.inf), cost)
     mine = dict(zip(zip(found.states.tolist(), bins_of(found.yaws).tolist(), strict=True), found.totals, strict=True))
     assert len(mine) == len(found)
     for place, cost in mine.items():
         assert cost == pytest.approx(twin[place], rel=1e-4, abs=1e-3)
-    # what it leaves out costs more than a jump
-    left = [cost for place, cost in twin.items() if place not in mine]
-    assert min(left, default=np.inf) > min(twin.values())
-    for state in (4, 12):  # the next poses of two of them are among the found
-        assert state in found.states
+    assert min(mine.values()) == pytest.approx(min(twin.values()), abs=1e-3)
+    for row in range(3):  # what a clip does next is among the found
+        following = int(squares(codes[row : row + 1], small.codes).argmin())
+        assert following in found.states
+    assert found.totals.max() < before.totals.min() + STEPS.jump + HOPELESS + 0.5 * (TURN / STEPS.turning) ** 2
+
+
+def test_a_step_says_where_it_came_from_and_leads(small: Exemplars) -> None:
+    places = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 5.0]])
+    before = beam([3, 25], [0.0, 3.0], [0.0, 0.0], places)
+    found = stepped(small, before, SECONDS, STEPS, MOST)
+    _, turned, ways = small.after(before.states, SECONDS)
+    expected = places + about_vertical(ways, before.yaws)
+    np.testing.assert_allclose(found.places, expected[found.parents])
+    turns = wrapped(found.yaws - (before.yaws + turned)[found.parents])
+    np.testing.assert_allclose(np.abs(turns)[np.abs(turns) > 1e-9], TURN)
+
+
+def test_a_known_root_is_borne_to_be_anywhere_at_the_cost_of_a_jump(small: Exemplars) -> None:
+    before = beam([3], [0.0], [0.0])
+    near = stepped(small, before, SECONDS, STEPS, MOST, small.after(np.array([3]), SECONDS)[2][0])
+    free = stepped(small, before, SECONDS, STEPS, MOST).totals.min()
+    assert free <= near.totals.min() < free + 0.2
+    far = stepped(small, before, SECONDS, STEPS, MOST, np.array([1e6, 0.0, 0.0]))
+    assert far.totals.min() == pytest.approx(STEPS.jump + free, abs=0.2)
+
+
+def test_there_are_at_most_so_many_and_a_yaw_has_its_share_of_them(small: Exemplars) -> None:
+    before = beam([3, 3, 3], [0.0, 2.0, 4.0], [0.0, 0.0, 0.0])
+    every = stepped(small, before, SECONDS, STEPS, MOST)
+    few = stepped(small, before, SECONDS, STEPS, 8)
+    assert len(few) <= 8 < len(every)
+    for yaw in (0.0, 2.0, 4.0):  # of 8 / FACINGS poses, each with three yaws
+        share = int((np.abs(wrapped(few.yaws - yaw)) < 0.5).sum())
+        assert 0 < share <= 3 * (8 // FACINGS)
+    assert few.totals.min() == pytest.approx(every.totals.min())
+
+
+def test_of_those_alike_only_the_best_few_are_kept(small: Exemplars) -> None:
+    rng = np.random.default_rng(1)
+    many = beam(rng.integers(0, len(small), 300).tolist(), rng.uniform(-4.0, 4.0, 300).tolist(), [0.0] * 300)
+    totals, most = rng.random(300), 2 * KINDS
+    kept = varied(small, many, totals, most)
+    kinds = list(zip(small.kinds[many.states].tolist(), bins_of(many.yaws).tolist(), strict=True))
+    twin, had = [], dict.fromkeys(kinds, 0)
+    for row in np.argsort(totals):
+        had[kinds[row]] += 1
+        if had[kinds[row]] <= 2:
+            twin.append(int(row))
+    assert kept.tolist() == twin[:most]
 
 
 def test_a_clip_that_goes_on_costs_next_to_nothing(small: Exemplars) -> None:
-    found = stepped(small, beam([3], [0.0], [0.0]), SECONDS, STEPS)
-    assert found.totals.min() < 0.05
+    # poses are two centimetres apart, and the spread is three
+    assert stepped(small, beam([3], [0.0], [0.0]), SECONDS, STEPS, MOST).totals.min() < 0.5 * (2.0 / 3.0) ** 2
 
 
 def test_one_pose_in_one_bin_is_one_state_the_cheapest() -> None:
@@ -58,10 +164,60 @@ def test_one_pose_in_one_bin_is_one_state_the_cheapest() -> None:
 
 
 def test_a_jump_comes_from_the_best_and_costs_the_same_anywhere() -> None:
-    found = jumped(np.array([7, 9]), np.array([1.0, 2.0]), beam([1, 2], [0.0, 0.0], [4.0, 3.0]), STEPS)
+    before = beam([1, 2], [0.0, 0.0], [4.0, 3.0], np.array([[0.0] * 3, [1.0, 2.0, 3.0]]))
+    found = jumped(np.array([7, 9]), np.array([1.0, 2.0]), before, STEPS)
     assert found.parents.tolist() == [1, 1]
     assert found.totals.tolist() == [15.0, 15.0]
+    assert found.places.tolist() == [[1.0, 2.0, 3.0]] * 2
 
 
 def test_the_best_come_first() -> None:
     assert beam([1, 2, 3], [0.0] * 3, [5.0, 1.0, 2.0]).best(2).states.tolist() == [2, 3]
+
+
+def test_a_root_strays_more_easily_along_the_line_of_sight_than_across_it() -> None:
+    eye, place = np.zeros(3), np.array([[0.0, 0.0, 5.0]])
+    along, across = np.array([[0.0, 0.0, 5.03]]), np.array([[0.01, 0.0, 5.0]])
+    # a standard deviation either way: log(1 + 1 / 2)
+    for expected in (along, across):
+        assert strayed(place, expected, eye, STEPS)[0] == pytest.approx(np.log(1.5), rel=1e-6)
+    # with cameras on all sides there is no such line: 3 standard deviations
+    assert strayed(place, along, None, STEPS)[0] == pytest.approx(np.log(1.0 + 4.5))
+    assert strayed(place, place, eye, STEPS)[0] == 0.0
+    both = strayed(np.repeat(place, 2, axis=0), np.stack([along, across]).repeat(2, axis=1), eye, STEPS)
+    np.testing.assert_allclose(both, np.log(1.5), rtol=1e-6)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_between_two_beams_a_step_costs_what_the_twin_says_and_never_more_than_a_jump(
+    small: Exemplars, known: bool
+) -> None:
+    root = np.array([0.0, 0.01, 0.04]) if known else None
+    eye = np.array([3.0, 1.0, 0.0])
+    before = beam([3, 11, 25], [0.1, 6.2, 2.0], [0.0, 2.5, 1.0])
+    after = beam([4, 12, 26, 3], [0.15, -0.1, 2.1, 0.1], [0.0] * 4, np.full((4, 3), 0.02))
+    found = between(small, before, after, SECONDS, STEPS, root, eye)
+    _, turned, ways = small.after(before.states, SECONDS)
+    twin = costs_of_steps(small, before, root)[:, after.states]
+    for i in range(3):
+        for j in range(4):
+            twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / STEPS.turning) ** 2
+            if root is None:
+                went = before.places[i] + about_vertical(ways[i : i + 1], before.yaws[i : i + 1])
+                twin[i, j] += strayed(after.places[j : j + 1], went, eye, STEPS)[0]
+    np.testing.assert_allclose(found, np.minimum(twin, STEPS.jump), rtol=1e-3, atol=1e-3)
+    assert found.max() == STEPS.jump
+    assert found[0, 0] < 8.0  # the clip goes on
+
+
+def test_a_turn_costs_as_much_to_the_left_as_to_the_right(small: Exemplars) -> None:
+    before = beam([3], [0.0], [0.0])
+    facing = float(small.after(before.states, SECONDS)[1][0])
+    root = small.after(before.states, SECONDS)[2][0]
+    after = beam([4] * 5, [facing + turn for turn in (-0.2, -0.1, 0.0, 0.1, 0.2)], [0.0] * 5)
+    costs = between(small, before, after, SECONDS, STEPS, root, None)[0]
+    np.testing.assert_allclose(costs, costs[::-1], atol=1e-9)
+    np.testing.assert_allclose(costs[3:] - costs[2], 0.5 * (np.array([0.1, 0.2]) / STEPS.turning) ** 2)
+    # nor does a whole turn make a difference
+    round_ = replace(after, yaws=after.yaws + 2.0 * np.pi)
+    np.testing.assert_allclose(between(small, before, round_, SECONDS, STEPS, root, None)[0], costs, atol=1e-9)
