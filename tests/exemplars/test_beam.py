@@ -16,6 +16,7 @@ from posefit_exemplars.beam import (
     SPEEDS,
     TURN,
     Beam,
+    Passage,
     Steps,
     between,
     bins_of,
@@ -196,7 +197,7 @@ def test_between_two_beams_a_step_costs_what_the_twin_says_and_never_more_than_a
     eye = np.array([3.0, 1.0, 0.0])
     before = beam([3, 11, 25], [0.1, 6.2, 2.0], [0.0, 2.5, 1.0])
     after = beam([4, 12, 26, 3], [0.15, -0.1, 2.1, 0.1], [0.0] * 4, np.full((4, 3), 0.02))
-    found = between(small, before, after, SECONDS, STEPS, root, eye)
+    found = between(Passage(small, before, after, SECONDS, root, eye), steps=STEPS)
     _, turned, ways = small.after(before.states, SECONDS)
     twin = costs_of_steps(small, before, root)[:, after.states]
     for i in range(3):
@@ -215,9 +216,11 @@ def test_a_turn_costs_as_much_to_the_left_as_to_the_right(small: Exemplars) -> N
     facing = float(small.after(before.states, SECONDS)[1][0])
     root = small.after(before.states, SECONDS)[2][0]
     after = beam([4] * 5, [facing + turn for turn in (-0.2, -0.1, 0.0, 0.1, 0.2)], [0.0] * 5)
-    costs = between(small, before, after, SECONDS, STEPS, root, None)[0]
+    costs = between(Passage(small, before, after, SECONDS, root, None), steps=STEPS)[0]
     np.testing.assert_allclose(costs, costs[::-1], atol=1e-9)
     np.testing.assert_allclose(costs[3:] - costs[2], 0.5 * (np.array([0.1, 0.2]) / STEPS.turning) ** 2)
     # nor does a whole turn make a difference
     round_ = replace(after, yaws=after.yaws + 2.0 * np.pi)
-    np.testing.assert_allclose(between(small, before, round_, SECONDS, STEPS, root, None)[0], costs, atol=1e-9)
+    np.testing.assert_allclose(
+        between(Passage(small, before, round_, SECONDS, root, None), steps=STEPS)[0], costs, atol=1e-9
+    )

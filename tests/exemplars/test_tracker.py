@@ -103,7 +103,7 @@ def test_the_root_is_found_where_nobody_says_where_it_is() -> None:
 
 def test_the_budget_holds_and_small_pictures_count_by_their_pixels(walker: Any) -> None:
     task, seen, _ = walker
-    for budget in (200, 2440):
+    for budget in (300, 2440):
         frames = list(exemplars(replace(task, evaluations=budget)).track(seen[:5], np.random.default_rng(0)))
         assert max(frame.evaluations for frame in frames) <= budget
 
@@ -121,11 +121,14 @@ def test_several_cameras_see_better_than_one() -> None:
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("spread=0", "spread must be above 0, got 0"),
-        ("turning_degrees=-1", "turning_degrees must be above 0, got -1"),
-        ("temperature=nan", "temperature must be above 0, got nan"),
-        ("jump=-1", "jump must be 0 or more, got -1"),
+        ("spread=0", "spread must be above 0 and finite, got 0"),
+        ("turning_degrees=-1", "turning_degrees must be above 0 and finite, got -1"),
+        ("temperature=nan", "temperature must be above 0 and finite, got nan"),
+        ("jump=-1", "jump must be 0 or more and finite, got -1"),
         ("lag=-1", "lag must be 0 or more, got -1"),
+        ("refiner=nobody", "optimiser must be one of"),
+        ("transitions=nothing", "transitions must be clips or MODULE:FUNCTION that can be imported, got nothing"),
+        ("transitions=math:pi", "transitions must name a function, got math:pi, which is a float"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(setting: str, message: str) -> None:
