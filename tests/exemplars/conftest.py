@@ -40,9 +40,9 @@ class Walk:
         return np.asarray(1000.0 * np.linalg.norm(skeleton.joints(poses, places) - true, axis=-1).mean(axis=1))
 
 
-def walk_of(motion: Motion, views: Sequence[float] = (45.0,)) -> Walk:
+def walk_of(motion: Motion, views: Sequence[float] = (45.0,), size: tuple[int, int] = (160, 120)) -> Walk:
     """Return a walk as cameras see it, to be followed by what other built-in motions teach."""
-    scene = synthetic(motion, list(views), (160, 120), [], (None, None))
+    scene = synthetic(motion, list(views), size, [], (None, None))
     training = [built_in.motion(name, frames=60) for name in ("walk-b", "walk-c", "run-b")]
     task = Task(
         Body.of(motion.skeleton),
