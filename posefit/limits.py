@@ -1,4 +1,4 @@
-"""How long something that others wrote may take, how much memory it may have, and that it cannot end the program."""
+"""How long something may take that others wrote, how much memory there may be, and that nothing ends the program."""
 
 import os
 import signal
@@ -6,12 +6,16 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
 AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
 SOON = 1e-6  # seconds, for a timer that should have ended meanwhile; 0 would switch it off
+# of Linux: the memory that a container may have, in control groups of version 2 and 1
+_CONTAINER = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
 
 
 class _OvertimeError(BaseException):
@@ -68,6 +72,29 @@ def memory(gigabytes: float) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+def allowed_bytes() -> int:
+    """Return how much memory this process may have: what the machine, its container and its own limits leave."""
+    own = []
+    with suppress(ImportError):
+        import resource
+
+        limits = (resource.getrlimit(one)[0] for one in (resource.RLIMIT_DATA, resource.RLIMIT_AS))
+        own = [limit for limit in limits if limit != resource.RLIM_INFINITY]
+    return min(_machine_bytes(), *own) if own else _machine_bytes()
+
+
+@lru_cache(maxsize=1)
+def _machine_bytes() -> int:
+    """Return the memory of this machine, or of the container that this process is in."""
+    found = [sys.maxsize]
+    with suppress(AttributeError, ValueError, OSError):
+        found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    for path in _CONTAINER:
+        with suppress(OSError, ValueError):  # "max" is no number
+            found.append(int(path.read_text()))
+    return min(found)
 
 
 @contextmanager

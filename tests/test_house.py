@@ -39,6 +39,15 @@ def test_every_importable_package_says_that_it_is_typed() -> None:
     assert [shown(package) for package in sorted(set(PACKAGES)) if not (package / "py.typed").is_file()] == []
 
 
+def test_everything_that_a_package_reads_is_in_what_is_installed() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    patterns = project["tool"]["setuptools"]["package-data"]["*"]
+    data = [path for package in PACKAGES for path in package.rglob("*") if path.is_file()]
+    data = [path for path in data if path.suffix != ".py" and "__pycache__" not in path.parts]
+    assert len(data) > 20
+    assert [shown(path) for path in data if not any(path.match(pattern) for pattern in patterns)] == []
+
+
 def test_nothing_in_posefit_names_a_plugin() -> None:
     # but for hooks; templates, which are no .py files, may name what they make
     names = re.compile(r"\bposefit_(?!register_)[a-z]+")

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from posefit.limits import memory, timed
+from posefit.limits import allowed_bytes, memory, timed
 
 
 def test_what_takes_too_long_is_ended() -> None:
@@ -73,3 +73,11 @@ def test_other_processes_end_as_they_like() -> None:
     )
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "5\n", "")
+
+
+def test_a_process_may_have_no_more_than_its_limit_and_the_machine_leave() -> None:
+    machine = allowed_bytes()
+    assert 1e8 < machine <= 1e15
+    with memory(0.9 * machine / 1e9):
+        assert allowed_bytes() == int(0.9 * machine / 1e9 * 1e9)
+    assert allowed_bytes() == machine

@@ -8,8 +8,9 @@
 
 `Fit-v0` is a search for the pose in one silhouette; `Track-v0` follows a sequence; `Configure-v0` steers a running
 swarm. Their docstrings are their manual. Importing this package registers them; the environments themselves are
-imported when they are made. `drive` runs an optimiser against a vector environment, `to_sb3_vec_env` hands one to
-Stable-Baselines3, and `check_vector_env` compares any vector environment with single ones.
+imported when they are made. `drive` runs an optimiser against a vector environment, `track_reference` says what a
+tracker would commit in Track-v0, `to_sb3_vec_env` hands a vector environment to Stable-Baselines3, and
+`check_vector_env` compares any vector environment with single ones.
 
 | looking for | file |
 |---|---|
@@ -20,7 +21,7 @@ Stable-Baselines3, and `check_vector_env` compares any vector environment with s
 | what is seen in a frame; actions that are not allowed | search.py |
 | proposals become poses, costs and pictures, in many scenes at once; compiled | stage.py, kernels.py |
 | what is rendered | drawing.py |
-| optimisers that search an environment; Stable-Baselines3 | driving.py, sb3.py |
+| optimisers that search an environment, trackers as references; Stable-Baselines3 | driving.py, sb3.py |
 | a checker for vector environments | checker.py |
 """
 
@@ -32,9 +33,10 @@ from gymnasium.envs.registration import register
 if TYPE_CHECKING:
     from posefit_envs.checker import check_vector_env as check_vector_env
     from posefit_envs.driving import drive as drive
+    from posefit_envs.driving import track_reference as track_reference
     from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
 
-_HOME = {"check_vector_env": "checker", "drive": "driving", "to_sb3_vec_env": "sb3"}
+_HOME = {"check_vector_env": "checker", "drive": "driving", "track_reference": "driving", "to_sb3_vec_env": "sb3"}
 __all__ = list(_HOME)
 
 register(

@@ -1,15 +1,20 @@
-"""Runs an optimiser against a vector environment, so that what searches a library searches an environment."""
+"""What searches a library searches an environment: optimisers step it, and trackers give its references."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gymnasium import error
+from gymnasium import Env, error
 from gymnasium.vector import VectorEnv
 
 from posefit import Minimum, Optimiser, minimise
 from posefit.fitting.optimiser import BudgetError
+from posefit.footage.training import training_clips, training_motions
 from posefit.registry import registry
 from posefit.settings import check, planned
+from posefit.tracking.method import Choice, prepare
+from posefit_envs.track import TrackEnv, committed
 
 
 def drive(
@@ -37,6 +42,30 @@ def drive(
         return minimise(lambda proposals: _costs(env, proposals.astype(dtype)), searching, evaluations, told=True)
     except BudgetError as mistake:
         raise error.Error(str(mistake)) from None
+
+
+def track_reference(
+    env: Env[Any, Any], tracker: str = "exemplars", *, seed: int = 0, train: Sequence[str] = (), **settings: Any
+) -> list[dict[str, Any]]:
+    """Return what a tracker would commit in each frame of the current episode of `posefit/Track-v0`, as infos say it.
+
+    It has the environment's budget for a frame, and sees the same silhouettes: all of them, if it looks ahead, so it is
+    a measure for policies and no policy. Its poses need not lie in the box of proposals. It learns from `train`, named
+    as in `posefit.track`; by default from what the environment's prior learns from. The episode is not stepped. Raises
+    gymnasium.error.ResetNeeded before the first reset, gymnasium.error.Error for another environment, and ValueError
+    where a name or a setting is wrong.
+    """
+    followed = env.unwrapped
+    if not isinstance(followed, TrackEnv):
+        raise error.Error(f"env must be posefit/Track-v0, got {type(followed).__name__}")
+    made, world = followed.instance, followed.world
+    motions = training_motions(training_clips(train or world.training, followed=world.motion), made.task.fps)
+    task = replace(made.task, training=motions)
+    method = prepare(Choice(tracker=tracker, tracker_settings=settings), task)
+    frames = method.tracker(task).track(made.observations, np.random.default_rng(seed))
+    return [
+        committed(made, k, frame.pose, frame.translation, frame.cost, errors=True) for k, frame in enumerate(frames)
+    ]
 
 
 def _built(

@@ -21,6 +21,7 @@ from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.footage.instance import motion_of_instance, variation
 from posefit.footage.source import motion_of
 from posefit.geometry.body import varied
+from posefit.motion import built_in
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
@@ -62,7 +63,12 @@ class World:
     @property
     def learned(self) -> Prior:
         """The prior, fitted to the training motions."""
-        return _learned(self.prior, self.motion, self.train)
+        return _learned(self.prior, self.motion, self.training)
+
+    @property
+    def training(self) -> tuple[str, ...]:
+        """The training motions: by default the other styles of a built-in motion, else the built-in walks."""
+        return self.train or built_in.other_styles(self.motion if self.motion in built_in.names() else "walk")
 
 
 class Arguments(TypedDict, total=False):
@@ -217,10 +223,6 @@ def _body(motion: str) -> Body:
 
 @lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
-    from posefit.motion import built_in
-
-    if not train:
-        train = built_in.other_styles(motion if motion in built_in.names() else "walk")
     angles = np.concatenate([motion_of(one, None, FPS).poses[:, 3:] for one in train])
     fitted: Prior = registry().prior(prior)().fit(angles, _source(motion).skeleton)
     return fitted
@@ -282,8 +284,6 @@ def instance(setting: World, number: int, frames: int, evaluations: int) -> Inst
 
 
 def _truth(name: str, number: int, frames: int) -> Motion:
-    from posefit.motion import built_in
-
     try:
         return motion_of_instance(name if name in built_in.names() else _source(name), number, frames=frames, fps=FPS)
     except ValueError as mistake:  # a file that is too short

@@ -84,6 +84,11 @@ class TrackEnv(gym.Env[Image, Any]):
         self._screen = Screen(self.metadata["render_fps"])
 
     @property
+    def instance(self) -> Instance:
+        """The instance of this episode. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return self._current().passage.instance
+
+    @property
     def search_space(self) -> SearchSpace:
         """The space of the current frame. Raises gymnasium.error.ResetNeeded before the first reset."""
         return self._current().passage.space
@@ -140,7 +145,7 @@ class Passage:
 
     def __init__(self, world: World, number: int, frames: int, evaluations: int) -> None:
         self.instance: Instance = instance(world, number, frames, evaluations)
-        self._follower = Follower(self.instance.task, world.learned, Prediction())
+        self._follower = Follower(self.instance.task, world.learned, Prediction(tilt="box"))
         self._frames, self.frame, self.ended = frames, 0, False
         self._enter()
 
@@ -151,18 +156,23 @@ class Passage:
 
     def commit(self, proposal: Array, pose: Array, place: Array, cost: float, errors: bool) -> dict[str, Any]:
         """Commit the best pose, go on to the next frame, if there is one, and return what is said of it."""
-        frame, made = self.frame, self.instance
-        info = {"committed_frame": frame, "committed_cost": cost, "committed_pose": pose.copy()}
-        if errors:
-            ours = made.task.body.skeleton.joints(pose[None], place[None])
-            info |= {f"committed_{name}": error for name, error in made.errors(frame, pose).items()}
-            info["committed_mpjpe_mm"] = float(metrics.mpjpe_mm(made.joints[frame][None], ours)[0])
+        info = committed(self.instance, self.frame, pose, place, cost, errors)
         self._follower.commit(proposal)
-        self.ended = frame + 1 >= self._frames
+        self.ended = self.frame + 1 >= self._frames
         if not self.ended:
             self.frame += 1
             self._enter()
         return info
+
+
+def committed(made: Instance, frame: int, pose: Array, place: Array, cost: float, errors: bool) -> dict[str, Any]:
+    """Return what is said of the pose that is committed in a frame of an instance."""
+    info = {"committed_frame": frame, "committed_cost": cost, "committed_pose": pose.copy()}
+    if errors:
+        ours = made.task.body.skeleton.joints(pose[None], place[None])
+        info |= {f"committed_{name}": error for name, error in made.errors(frame, pose).items()}
+        info["committed_mpjpe_mm"] = float(metrics.mpjpe_mm(made.joints[frame][None], ours)[0])
+    return info
 
 
 class TrackEpisode:

@@ -5,8 +5,11 @@ poses of recorded clips, each with a yaw; they go on as their clips do, at about
 goes on alike, turn, or jump; and what is told is the likeliest way through all frames seen, some frames later. After
 Toyama and Blake, Probabilistic tracking in a metric space, 2001.
 
-`exemplars` are the poses and what came after each; `beam` the recursion over ways; `look` what a pose costs in a frame;
-`tracker` what is registered.
+- `codes` compares poses by a few numbers each, `exemplars` are the poses and what came after each.
+- `beam` says where the states of a frame may be in the next one and what that costs, `kernels` has its loop.
+- `look` is what a pose costs in a frame, `window` the likeliest way through the last frames, and how likely others are.
+- `refinement` searches around that way, `smoothing` filters what it found over time.
+- `tracker` does a frame after the other, `factory` is registered.
 
 >>> import posefit
 >>> track = posefit.track("walk-a", tracker="exemplars", train=["walk-b", "walk-c"], frames=(0, 10))
@@ -21,6 +24,6 @@ from posefit.hooks import RegisterTracker
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
     """Offer `exemplars`."""
-    from posefit_exemplars.tracker import exemplars
+    from posefit_exemplars.factory import exemplars
 
     register("exemplars", exemplars)

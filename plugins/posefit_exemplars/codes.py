@@ -1,5 +1,6 @@
 """Codes: a few numbers a pose, by which poses are compared, left out where they repeat, and put into groups."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -25,12 +26,14 @@ class Coding:
     axes: Array = field(repr=False)  # (81, D)
 
     @classmethod
-    def of(cls, skeleton: Skeleton, poses: Array) -> Self:
-        """Return the components of poses (K, 66)."""
-        joints = _facing(skeleton, poses)
-        mean = joints.mean(axis=0)
-        joints -= mean
-        _, axes = np.linalg.eigh(joints.T @ joints)
+    def of(cls, skeleton: Skeleton, clips: Iterable[Array]) -> Self:
+        """Return the components of the poses (K, 66) of all clips, which are looked at one after the other."""
+        count, total, squares = 0, np.zeros(3 * len(JOINTS)), np.zeros((3 * len(JOINTS), 3 * len(JOINTS)))
+        for poses in clips:
+            joints = _facing(skeleton, poses)
+            count, total, squares = count + len(joints), total + joints.sum(axis=0), squares + joints.T @ joints
+        mean = total / count
+        _, axes = np.linalg.eigh(squares - count * np.outer(mean, mean))
         return cls(skeleton, mean, axes[:, : -DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)))
 
     def coded(self, poses: Array) -> Codes:
@@ -44,15 +47,12 @@ def _facing(skeleton: Skeleton, poses: Array) -> Array:
     return np.asarray(skeleton.joints(facing).reshape(len(poses), -1))
 
 
-def thinned(codes: Codes, clips: Rows) -> Rows:
-    """Return which frames to keep: each two centimetres from the last one kept, and both ends of clips."""
-    kept, last = [], -1
-    ends = np.diff(clips, append=-1) != 0
-    for k in range(len(codes)):
-        new = last < 0 or clips[k] != clips[last]
-        if new or ends[k] or float(((codes[k] - codes[last]) ** 2).sum()) > SAME**2:
+def thinned(codes: Codes) -> Rows:
+    """Return which frames of a clip to keep: each two centimetres or more from the last one kept, and both ends."""
+    kept = [0]
+    for k in range(1, len(codes)):
+        if k == len(codes) - 1 or float(((codes[k] - codes[kept[-1]]) ** 2).sum()) > SAME**2:
             kept.append(k)
-            last = k
     return np.array(kept)
 
 

@@ -48,28 +48,32 @@ class Exemplars:
         for motion in motions:
             if len(motion) < 2:
                 raise ValueError(f"{motion.name} must have at least 2 frames to be followed, got 1")
-        if mirrored:
-            motions = [*motions, *(mirror_image(motion) for motion in motions)]
-        poses = np.concatenate([motion.poses for motion in motions])
-        paths = np.concatenate([motion.translations for motion in motions])
-        times = np.concatenate([np.arange(len(motion)) / motion.fps for motion in motions])
-        clips = np.repeat(np.arange(len(motions)), [len(motion) for motion in motions])
-        coding = Coding.of(skeleton, poses)
-        codes = coding.coded(poses)
-        kept = thinned(codes, clips)
-        codes, clips = codes[kept], clips[kept]
+        sources = [(motion, image) for image in (False, True)[: 1 + mirrored] for motion in motions]
+
+        def clip(motion: Motion, image: bool) -> Motion:
+            return mirror_image(motion) if image else motion  # made when needed: all at once would be large
+
+        coding = Coding.of(skeleton, (clip(*one).poses for one in sources))
+        kept: list[tuple[Array, Codes, Array, Array]] = []
+        for source in sources:
+            motion = clip(*source)
+            codes = coding.coded(motion.poses)
+            rows = thinned(codes)
+            kept.append((motion.poses[rows], codes[rows], motion.translations[rows], rows / motion.fps))
+        poses, codes, paths, times = (np.concatenate(parts) for parts in zip(*kept, strict=True))
+        clips = np.repeat(np.arange(len(kept)), [len(one[0]) for one in kept])
         centres, owners = groups(codes, GROUPS)
         kinds = np.argmin([((codes - codes[centre]) ** 2).sum(axis=1) for centre in centres[:KINDS]], axis=0)
         members = np.argsort(owners, kind="stable")
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
-        lasts = np.searchsorted(clips, np.arange(len(motions)), "right") - 1
+        lasts = np.searchsorted(clips, np.arange(len(kept)), "right") - 1
         squares = (codes**2).sum(axis=1)
         return cls(
-            poses[kept],
+            poses,
             codes,
             squares,
-            paths[kept],
-            times[kept],
+            paths,
+            times,
             clips,
             lasts,
             centres,

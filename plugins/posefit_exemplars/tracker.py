@@ -1,29 +1,36 @@
-"""The tracker by name: settings, checked; a frame's work; and the path that is told `lag` frames later."""
+"""The tracker: a frame's work, and the path that is told `lag` frames later."""
 
 import math
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
-from posefit import settings
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
-from posefit.registry import registry
-from posefit_exemplars.beam import TURN, Beam, Steps, between, joined_beams, jumped, stepped, strayed, varied
+from posefit_exemplars.beam import (
+    TURN,
+    Beam,
+    Steps,
+    Transition,
+    Transitions,
+    assorted,
+    joined_beams,
+    jumped,
+    stepped,
+    strayed,
+)
 from posefit_exemplars.codes import Rows
-from posefit_exemplars.exemplars import Exemplars, exemplars_of
+from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.look import Look
 from posefit_exemplars.refinement import Make, refined, surroundings
-from posefit_exemplars.smoothing import SMOOTHED, Found, smoothed
+from posefit_exemplars.smoothing import SMOOTHED, Finding, smoothed
 from posefit_exemplars.window import Seen, likeliest, mean_around, seen, weights
 
-LEAST = 300  # evaluations that every stage of a frame has something of
 WIDTH = 400  # states that a beam keeps
 FULL = 0.35  # share of the budget that is for full-size costs of states
 REFINED = 0.45  # share that is for refining
@@ -53,6 +60,7 @@ class ExemplarTracker:
     task: Task
     exemplars: Exemplars = field(repr=False)
     steps: Steps
+    transitions: Transitions
     temperature: float
     lag: int  # frames that are seen before a pose is told
     make: Make | None  # an optimiser that refines; None where nothing does
@@ -68,7 +76,7 @@ class ExemplarTracker:
         """How many of the frames that are waited for are there to smooth with."""
         return min(math.ceil(SMOOTHED * self.smoothing * self.task.fps / 30.0), self.lag)
 
-    def _refined(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Found]:
+    def _refined(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Finding]:
         """Yield what is found in each frame, before it is smoothed."""
         waiting: deque[_Waiting] = deque()
         latest: Seen | None = None
@@ -109,19 +117,18 @@ class ExemplarTracker:
         beam = self._at(look, joined_beams(*beams), latest is not None)
         costs = look.small(self._poses(beam), beam.places)
         used = (looked + len(beam)) * look.share
-        beam = beam.chosen(varied(self.exemplars, beam, beam.totals + costs / self.temperature, full))
+        beam = beam.chosen(assorted(self.exemplars, beam, beam.totals + costs / self.temperature, full))
         fits = look.full(self._poses(beam), beam.places) / self.temperature
         used += len(beam)
-        best = varied(self.exemplars, beam, beam.totals + fits, WIDTH)
+        best = assorted(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used
 
     def _joined(self, beam: Beam, fits: Array, before: Seen | None, look: Look) -> Seen:
         """Return a frame, joined to the one before."""
         if before is None:
             return seen(beam, fits, None, None)
-        seconds = 1.0 / self.task.fps
-        costs = between(self.exemplars, before.beam, beam, seconds, self.steps, look.root, look.eye)
-        return seen(beam, fits, before, costs)
+        transition = Transition(self.exemplars, before.beam, beam, 1.0 / self.task.fps, look.root, look.eye)
+        return seen(beam, fits, before, self.transitions(transition))
 
     def _elsewhere(self, look: Look, before: Beam | None, most: int, rng: np.random.Generator) -> tuple[Beam, int]:
         """Return states that fit, wherever they are; and how many small pictures were looked at."""
@@ -171,7 +178,7 @@ class ExemplarTracker:
         off = strayed(places, beam.places, look.eye, self.steps)
         return replace(beam, places=places, totals=beam.totals + off)
 
-    def _told(self, waiting: deque[_Waiting], off: Array, rng: np.random.Generator) -> tuple[Found, Array]:
+    def _told(self, waiting: deque[_Waiting], off: Array, rng: np.random.Generator) -> tuple[Finding, Array]:
         """Return the oldest frame that waits, refined around the best way to the newest; and how far off that it is.
 
         The path's pose is the mean of what is likely about it. The search begins as far off it as the frame before.
@@ -196,69 +203,4 @@ class ExemplarTracker:
         if oldest.usable:
             place = look.placed(pose[None], place[None])[0]
         seconds = oldest.seconds + time.perf_counter() - began
-        return Found(pose, place, look, evaluations, seconds, oldest.cpu_seconds + time.process_time() - begun), off
-
-
-def exemplars(
-    task: Task,
-    *,
-    spread: float = 0.03,
-    turning_degrees: float = 4.0,
-    jump: float = 12.0,
-    temperature: float = 2.0,
-    straying: float = 0.01,
-    depth: float = 0.03,
-    pace: float = 0.008,
-    lag: int = 15,
-    mirrored: bool = True,
-    refiner: str = "cma",
-    pull: float = 0.3,
-    smoothing: float = 1.0,
-) -> ExemplarTracker:
-    """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
-
-    Settings:
-        spread: metres that joints may be off where a clip goes on, root mean square; above 0.
-        turning_degrees: how far a body may turn away from its clip in a frame; above 0.
-        jump: what a step to any other pose costs, in units of cost over the temperature; 0 or more.
-        temperature: what silhouette costs are divided by; above 0. Costs of frames err together, so more than 1.
-        straying: metres that a root that is aligned may be off where its clip goes on, to the side or up; above 0.
-        depth: and towards or away from a single camera; above 0.
-        pace: metres that a root that is known may be off where its clip goes on; above 0.
-        lag: frames that are seen before a pose is told, 0 or more.
-        refiner: the optimiser that searches around the path, or "none".
-        pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
-        smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        mirrored: whether the mirror images of all clips are learned from as well.
-    """
-    for name, value in (
-        ("spread", spread),
-        ("turning_degrees", turning_degrees),
-        ("temperature", temperature),
-        ("straying", straying),
-        ("depth", depth),
-        ("pace", pace),
-    ):
-        if not 0.0 < value < math.inf:
-            raise ValueError(f"{name} must be above 0 and finite, got {value}")
-    for name, value in (("jump", jump), ("pull", pull), ("smoothing", smoothing)):
-        if not 0.0 <= value < math.inf:
-            raise ValueError(f"{name} must be 0 or more and finite, got {value}")
-    if task.evaluations < LEAST:
-        raise ValueError(f"evaluations must be at least {LEAST} for exemplars, got {task.evaluations}")
-    if lag < 0:
-        raise ValueError(f"lag must be 0 or more, got {lag}")
-    intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
-    temperature /= intervals
-    slack = math.sqrt(intervals)
-    steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
-    states = exemplars_of(task.training, task.body.skeleton, mirrored)
-    return ExemplarTracker(task, states, steps, temperature, lag, _maker(task, refiner), pull, smoothing)
-
-
-def _maker(task: Task, refiner: str) -> Make | None:
-    """Return what makes the optimiser of a frame. Raises ValueError where there is none of that name."""
-    if refiner == "none":
-        return None
-    factory = registry().optimiser(refiner)
-    return partial(factory, **settings.planned(factory, {}, int(REFINED * task.evaluations)))
+        return Finding(pose, place, look, evaluations, seconds, oldest.cpu_seconds + time.process_time() - begun), off

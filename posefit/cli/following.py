@@ -1,5 +1,6 @@
 """`posefit track`, `fit` and `extract`."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -89,32 +90,32 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     that an optimiser and a prior are driven by.
     """
     from posefit.footage.segmentation import Extraction
-    from posefit.tracking.front import prior_of
-    from posefit.tracking.method import parse_settings
+    from posefit.footage.source import kind_of, useless_for
+    from posefit.tracking.method import FOLLOWER, parse_settings, usual
 
-    context = click.get_current_context()
-    for name in ("optimiser", "prior"):
-        if options["tracker"] and context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
-            raise ValueError(f"{name} must not be given beside a tracker, got {options[name]} and {options['tracker']}")
     how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
     given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
-    options["extraction"] = Extraction(**given) if given else None
     options["source"] = options["source"] or ("walk",)
+    if given and (kind := kind_of(options["source"][0])) != "video":
+        name = next(iter(given))
+        raise useless_for(kind, "extraction" if name == "method" else name, given[name], "video")
+    options["extraction"] = Extraction(**given) if given else None
     options["view_degrees"] = options["view_degrees"] or None
-    options["train"] = _without(options["train"], options.pop("without_subject"))
-    prior = options["prior"] or prior_of(options["source"][0])
-    return options | parse_settings(options.pop("settings"), options["optimiser"], prior, options["tracker"])
+    settings, named = options.pop("settings"), {name: options[name] for name in ("optimiser", "prior", "tracker")}
+    searched = any(text.partition(".")[0] != FOLLOWER for text in settings)
+    chosen = usual(options["source"][0], **named, train=options["train"], searched=searched)
+    if left_out := options.pop("without_subject"):
+        options["train"] = _without(chosen.train, left_out)
+    return options | chosen.method | parse_settings(settings, **chosen.method)
 
 
-def _without(train: tuple[str, ...], subjects: tuple[str, ...]) -> tuple[str, ...]:
+def _without(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:
     """Return what a method learns from, some people of the library left out."""
     from posefit.motion import recorded
 
-    if not subjects:
-        return train
     if not any(recorded.is_library(one) for one in train):
-        raise ValueError(f"without_subject must be given with --train library, got {', '.join(train) or 'no --train'}")
-    return tuple(recorded.leaving_out(one, subjects) if recorded.is_library(one) else one for one in train)
+        raise ValueError(f"without_subject must be given with --train library, got {', '.join(train)}")
+    return [recorded.leaving_out(one, subjects) if recorded.is_library(one) else one for one in train]
 
 
 def _degrees(pose: Any) -> list[float]:

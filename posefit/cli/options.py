@@ -6,7 +6,9 @@ from typing import Any
 import click
 
 
-def _size(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
+def _size(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:
+    if value is None:
+        return None
     width, _sign, height = value.lower().partition("x")
     if not (width.isdigit() and height.isdigit()):
         raise click.BadParameter(f"expected WIDTHxHEIGHT such as 320x240, got {value!r}")
@@ -47,9 +49,11 @@ TRACK = (
     click.option("--asf", metavar="FILE", help="Skeleton of SOURCE; by default the only .asf beside an .amc."),
     click.option("--camera", multiple=True, metavar="FILE", help="Calibration, one a view; guessed where absent."),
     click.option("--up", type=click.Choice(["x", "y", "z"]), help="Axis that points up in the calibration's world."),
-    click.option("--optimiser", default="sapso", show_default=True, help="See `posefit plugins`."),
+    click.option("--optimiser", help="By default sapso; see `posefit plugins`."),
     click.option("--prior", help="By default pca, or loose where the truth is not known; see `posefit plugins`."),
-    click.option("--tracker", help="A tracker instead of optimiser and prior; see `posefit plugins`."),
+    click.option(
+        "--tracker", help="Instead of optimiser and prior; exemplars where neither is named and the truth not known."
+    ),
     click.option(
         "--set", "settings", multiple=True, metavar="NAME.SETTING=VALUE", help="Such as sapso.cooling=0.9; repeatable."
     ),
@@ -57,7 +61,8 @@ TRACK = (
         "--train",
         multiple=True,
         metavar="SOURCE",
-        help="What the method learns from: a motion, a folder, library, or library:16; may be repeated.",
+        help="What the method learns from: a motion, a folder, library, or library:16; may be repeated. By default "
+        "library for exemplars where the truth is not known, else other styles of a built-in motion, or walks.",
     ),
     click.option(
         "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
@@ -68,7 +73,7 @@ TRACK = (
         multiple=True,
         help="Where a camera stands: 0 in front, 90 to the side; repeatable.",
     ),
-    click.option("--size", default="320x240", show_default=True, callback=_size, help="Image of a rendered motion."),
+    click.option("--size", callback=_size, metavar="WxH", help="Image of a rendered motion, by default 320x240."),
     click.option("--fps", type=float, help="Rate to resample a motion to, or of masks; by default 30, or theirs."),
     click.option("--evaluations", type=int, help="Budget of a frame; by default N (C + 1) = 2440."),
     click.option("--particles", type=int, help="N, by default 40."),
@@ -77,7 +82,7 @@ TRACK = (
     click.option("--ask-seconds", type=float, help="How long a plugin may take to propose a population."),
     click.option("--translation", help="Root translation: known, searched or aligned."),
     click.option("--height", type=float, metavar="METRES", help="How tall the person in the footage stands."),
-    click.option("--restarts", type=int, help="Searches of a first pose nobody knows; by default 8."),
+    click.option("--restarts", type=int, help="Searches of a first pose nobody knows: 8, or 0 for exemplars."),
     click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
     click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks."),
     *EXTRACTION,

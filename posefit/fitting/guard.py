@@ -193,6 +193,7 @@ class GuardedTracker:
 
     def __init__(self, tracker: Tracker, task: Task, name: str, beta: float, audit: Audit) -> None:
         self._tracker, self._task, self._name, self._beta, self._audit = tracker, task, name, beta, audit
+        self.lag: int | None = getattr(tracker, "lag", None)  # None where it does not say that it looks ahead
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield the tracker's frame for each observation. Raises BrokenRuleError where it is none, or misses."""

@@ -90,6 +90,20 @@ def unpack_proposals(proposals, centre, half, anchor, first, poses, translations
 
 
 @jit
+def unpack_tilted(proposals, centre, half, anchor, first, mean, poses, translations, latents):
+    """As `unpack_proposals`, but that pitch and roll are added to the mean (3 + m, 2) that goes with the latents."""
+    finite = unpack_proposals(proposals, centre, half, anchor, first, poses, translations, latents)
+    for i in range(proposals.shape[0]):
+        pitch, roll = mean[2, 0], mean[2, 1]
+        for j in range(latents.shape[1]):
+            pitch += mean[3 + j, 0] * latents[i, j]
+            roll += mean[3 + j, 1] * latents[i, j]
+        poses[i, 1] += min(max(pitch, mean[0, 0]), mean[1, 0])
+        poses[i, 2] += min(max(roll, mean[0, 1]), mean[1, 1])
+    return finite
+
+
+@jit
 def within(proposals, centre, half, inside, latents):
     """Write which proposals (n, d) lie in the box (n,), and the latents (n, m), their last coordinates, of all.
 

@@ -1,6 +1,10 @@
-"""What a prior is: a space of joint angles with few coordinates, in the manner of scikit-learn."""
+"""What a prior is: a space of joint angles with few coordinates, in the manner of scikit-learn.
 
-from collections.abc import Callable
+And how far the body tilts with them: the root is no part of a prior, but its pitch and roll go with the pose.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, Self
 
@@ -8,7 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
+from posefit.motion.motion import Motion
+
+RIDGE = 0.05  # ours: of the regression, where a latent's range is 2
+OVER = 0.75 * np.pi  # ours: radians to either side; who tilts so far turns over
 
 
 class Prior(Protocol):
@@ -45,3 +54,61 @@ class Prior(Protocol):
 
 # Builds an unfitted prior, as `factory(**settings)`.
 PriorFactory = Callable[..., Prior]
+
+
+@dataclass(frozen=True, eq=False)
+class Tilt:
+    """The pitch and roll that go with latents: their mean by ridge regression, and how far off they are.
+
+    The mean is affine in the latents, and kept within what it is for the training poses.
+    """
+
+    base: Array  # (2,) radians: mean pitch and roll where all latents are 0
+    slopes: Array  # (m, 2) radians a unit of each latent
+    least: Array  # (2,) radians: the range of the mean
+    most: Array  # (2,)
+    low: Array  # (2,) radians: the range of what is added to the mean; pi to either side is the whole circle
+    high: Array  # (2,)
+    mean: Array = field(init=False, repr=False)  # (3 + m, 2) least, most, base and slopes, as the kernel wants them
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mean", np.vstack([self.least, self.most, self.base, self.slopes]))
+
+    @classmethod
+    def of(cls, prior: Prior, motions: Sequence[Motion], share: float, margin: float) -> Self:
+        """Learn from the poses of one motion or more.
+
+        The range holds a `share` of what is left of each of the two angles, and `margin` radians more to either side.
+        """
+        tilts = np.concatenate([motion.poses[:, 1:3] for motion in motions])
+        latents = np.asarray(prior.transform(np.concatenate([motion.poses[:, 3:] for motion in motions])))
+        scales = 0.5 * (np.asarray(prior.high) - np.asarray(prior.low))
+        scaled = latents / np.where(scales > 0.0, scales, 1.0)
+        middle = np.arctan2(np.sin(tilts).mean(axis=0), np.cos(tilts).mean(axis=0))
+        around = wrapped(tilts - middle)
+        centre, offset = scaled.mean(axis=0), around.mean(axis=0)
+        scaled -= centre
+        gram = scaled.T @ scaled + RIDGE * len(scaled) * np.eye(len(scales))
+        slopes = np.linalg.solve(gram, scaled.T @ (around - offset))
+        mean = offset + scaled @ slopes
+        left = wrapped(around - mean)
+        low, high = np.quantile(left, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=0)
+        low, high = low - margin, high + margin
+        whole = high - low > 2.0 * OVER
+        return cls(
+            middle + offset - centre @ slopes,
+            slopes / np.where(scales > 0.0, scales, 1.0)[:, None],
+            middle + mean.min(axis=0),
+            middle + mean.max(axis=0),
+            np.where(whole, -np.pi, low),
+            np.where(whole, np.pi, high),
+        )
+
+    def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
+        """Return the middle and the half sides (2,) of the box around what was added last (2,).
+
+        It goes as far as `reach` (2,) to either side, and stays in the range: near its end it is off the middle.
+        """
+        half = np.minimum(reach, 0.5 * (self.high - self.low))
+        whole = self.high - self.low >= 2.0 * np.pi - 1e-12
+        return np.where(whole, added, np.clip(added, self.low + half, self.high - half)), half

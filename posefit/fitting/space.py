@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.fitting import box
 from posefit.fitting.box import Space, Start
-from posefit.fitting.kernels import unpack_proposals, within
-from posefit.fitting.prior import Prior
+from posefit.fitting.kernels import unpack_proposals, unpack_tilted, within
+from posefit.fitting.prior import Prior, Tilt
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted
@@ -27,16 +27,18 @@ class SearchSpace:
     """Maps proposals (n, d) in [-1, 1]^d to poses (n, 66) and translations (n, 3).
 
     A proposal's coordinates, in this order: root yaw, pitch, roll in radians; the translation in metres, where it is
-    searched; the latents of the prior.
+    searched; the latents of the prior. Where there is a `tilt`, pitch and roll are what is added to the mean that goes
+    with the latents, and the box of both moves with the last pose.
     """
 
     prior: Prior = field(repr=False)
     root_centre: Array  # (3,) radians: the middle of the root's range
-    root_range: Array  # (3,) radians to either side; a yaw range of pi wraps around
+    root_range: Array  # (3,) radians to either side; a range of pi wraps around
     anchor: Array  # (3,) metres: the known translation, the middle of the searched range, or where aligning starts
     translation: Translation = "known"
     translation_range: Array = field(default_factory=lambda: np.array(TRANSLATION_RANGE))  # (3,) metres
     start: Start | None = None  # None: the first population is drawn uniformly from the box
+    tilt: Tilt | None = field(default=None, repr=False)  # None: pitch and roll are those of the pose
     centre: Array = field(init=False, repr=False)  # (d,) coordinates of the box's middle
     half: Array = field(init=False, repr=False)  # (d,) half its sides
     periodic: NDArray[np.bool_] = field(init=False, repr=False)  # (d,) coordinates that wrap around
@@ -57,7 +59,7 @@ class SearchSpace:
         object.__setattr__(self, "half", np.concatenate(half).astype(np.float64))
         object.__setattr__(self, "anchor", np.array(self.anchor, dtype=np.float64))
         periodic = np.zeros(len(self.centre), dtype=bool)
-        periodic[0] = self.root_range[0] >= np.pi - 1e-12
+        periodic[:3] = np.asarray(self.root_range) >= np.pi - 1e-12
         object.__setattr__(self, "periodic", periodic)
 
     @property
@@ -66,8 +68,13 @@ class SearchSpace:
         return len(self.centre)
 
     def around(self, coordinates: Array, start: Start | None = None, anchor: Array | None = None) -> "SearchSpace":
-        """Return the space whose yaw range, and searched translation, are centred on coordinates (d,)."""
+        """Return the space whose yaw range, and searched translation, are centred on coordinates (d,).
+
+        With a tilt so are pitch and roll, as far as its range lets them.
+        """
         root = np.array([coordinates[0], *self.root_centre[1:]])
+        if self.tilt is not None:
+            root[1:] = self.tilt.around(coordinates[1:3], self.root_range[1:])[0]
         if self.translation == "searched":
             anchor = coordinates[3:6]
         return replace(self, root_centre=root, anchor=self.anchor if anchor is None else anchor, start=start)
@@ -79,7 +86,7 @@ class SearchSpace:
     def proposals(self, coordinates: Array) -> Array:
         """Return the proposals (..., d) of coordinates (..., d), the nearest ones in the box."""
         away = coordinates - self.centre
-        away[..., 0] = wrapped(away[..., 0])
+        away[..., :3] = wrapped(away[..., :3])
         return np.clip(away / np.where(self.half > 0.0, self.half, 1.0), -1.0, 1.0)
 
     def decode(self, proposals: Array) -> tuple[Array, Array]:
@@ -94,7 +101,10 @@ class SearchSpace:
             raise ValueError(f"proposals must have shape (n, {d}), got {proposals.shape}")
         n, first = len(proposals), d - m
         poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
-        if not unpack_proposals(proposals, self.centre, self.half, self.anchor, first, poses, translations, latents):
+        box, filled = (proposals, self.centre, self.half, self.anchor, first), (poses, translations, latents)
+        tilt = self.tilt
+        finite = unpack_proposals(*box, *filled) if tilt is None else unpack_tilted(*box, tilt.mean, *filled)
+        if not finite:
             raise ValueError("proposals must be finite, got nan or infinity")
         poses[:, 3:] = self.prior.inverse_transform(latents)
         return poses, translations

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
-from posefit.fitting.prior import Prior
+from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, SearchSpace, Translation
 from posefit.geometry.body import Body
@@ -22,6 +22,8 @@ from posefit.silhouette.mask import Silhouette
 
 SPREAD = 1.0  # k of Reading S5: Sigma's standard deviations, as multiples of the predicted step
 KEPT = 3  # frames: how far back a prediction looks
+TILT_SHARE = 0.99  # ours: of the training poses, whose tilt can be found
+TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
 FLOOR = 0.05  # Reading S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
 
 
@@ -99,6 +101,9 @@ class Prediction:
         floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Reading S5.
         prediction (v_pred): the "latest" step, or the "literal" one before it. Reading S12.
         root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
+        tilt: pitch and roll are "learned" with the latents, or a "box" around upright. Reading S16.
+        tilt_share: of the training poses, above 0 and at most 1, whose tilt can be found. Ours.
+        tilt_margin_degrees: what can be found beyond them, to either side, 0 or more. Ours.
         translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
     """
@@ -107,6 +112,9 @@ class Prediction:
     floor: float = FLOOR
     prediction: Literal["latest", "literal"] = "latest"
     root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
+    tilt: Literal["learned", "box"] = "learned"
+    tilt_share: float = TILT_SHARE
+    tilt_margin_degrees: float = TILT_MARGIN_DEGREES
     translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     beta: float = BETA
 
@@ -119,23 +127,41 @@ class Prediction:
         for name in ("root_range_degrees", "translation_range"):
             if not (np.isfinite(getattr(self, name)).all() and np.min(getattr(self, name)) >= 0.0):
                 raise ValueError(f"{name} must be 0 or more to either side, got {getattr(self, name)}")
+        if self.tilt not in ("learned", "box"):
+            raise ValueError(f"tilt must be one of learned, box, got {self.tilt!r}")
+        if not 0.0 < self.tilt_share <= 1.0:
+            raise ValueError(f"tilt_share must be above 0 and at most 1, got {self.tilt_share}")
+        if not 0.0 <= self.tilt_margin_degrees < np.inf:
+            raise ValueError(f"tilt_margin_degrees must be 0 or more, got {self.tilt_margin_degrees}")
         if self.prediction not in ("latest", "literal"):
             raise ValueError(f"prediction must be one of latest, literal, got {self.prediction!r}")
         if not 0.0 <= self.beta <= 1.0:
             raise ValueError(f"beta must lie in 0 to 1, got {self.beta}")
 
+    def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
+        """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""
+        if self.tilt == "box" or not training:
+            return None
+        return Tilt.of(prior, training, self.tilt_share, float(np.radians(self.tilt_margin_degrees)))
+
 
 class Follower:
-    """Goes from frame to frame: gives the space of the next one, and takes the proposal that was found in it."""
+    """Goes from frame to frame: gives the space of the next one, and takes the proposal that was found in it.
 
-    def __init__(self, task: Task, prior: Prior, prediction: Prediction) -> None:
+    A `tilt` that was learned from the task's training before is not learned again.
+    """
+
+    def __init__(self, task: Task, prior: Prior, prediction: Prediction, tilt: Tilt | None = None) -> None:
         self._task, self._prior, self._how = task, prior, prediction
+        self._tilt = tilt or prediction.tilted(prior, task.training)
         reach = np.radians(prediction.root_range_degrees)
         if task.yaw is None:
             reach[0] = np.pi
         centre = np.array([task.yaw or 0.0, 0.0, 0.0])
+        if self._tilt is not None:  # the first frame looks at all tilts
+            centre[1:], reach[1:] = self._tilt.around(np.zeros(2), np.full(2, np.inf))
         limits = np.array(prediction.translation_range)
-        self._space = SearchSpace(prior, centre, reach, task.anchor, task.translation, limits)
+        self._space = SearchSpace(prior, centre, reach, task.anchor, task.translation, limits, tilt=self._tilt)
         earlier = [frame.coordinates for frame in task.before if frame.coordinates is not None]
         self._found: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
 
@@ -149,14 +175,15 @@ class Follower:
                 space = replace(space, start=self._given(space, self._task.first_pose))
             self._space = space
             return space
-        if self._task.yaw is None:  # only the first frame looks all around
+        if self._task.yaw is None or self._tilt is not None:  # only the first frame looks all around
             space = self._narrowed(space)
         space = space.around(found[-1], anchor=anchor)
         # Reading S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
         back = 1 if self._how.prediction == "latest" else 2
         step = np.zeros(space.dimensions)
         if len(found) > back:
-            step = space.towards(found[-back - 1] / space.half, found[-back] / space.half)
+            half = np.where(space.half > 0.0, space.half, 1.0)  # as in proposals: 0 where nothing is searched
+            step = space.towards(found[-back - 1] / half, found[-back] / half)
         mean = space.proposals(found[-1])
         spread = np.maximum(self._how.spread * np.abs(step), self._how.floor)  # Reading S5
         self._space = space.around(found[-1], Start(mean, spread, step), anchor)
@@ -168,10 +195,11 @@ class Follower:
 
     def _given(self, space: SearchSpace, angles: Array) -> Start:
         """Return the start of a first frame whose joint angles are about known; its root need not be."""
-        away = np.zeros(space.dimensions)
         latents = self._prior.transform(np.asarray(angles, dtype=np.float64)[None])[0]
         first = space.dimensions - len(latents)
-        away[first:] = space.proposals(np.concatenate([space.centre[:first], latents]))[first:]
+        root = space.centre[:first].copy()
+        root[1:3] = 0.0  # upright, or as the pose lets expect
+        away = space.proposals(np.concatenate([root, latents]))
         spread = np.full(space.dimensions, self._how.floor)
         if self._task.yaw is None:
             spread[0] = 1.0
@@ -179,8 +207,9 @@ class Follower:
 
     def _narrowed(self, space: SearchSpace) -> SearchSpace:
         reach = np.radians(self._how.root_range_degrees)
-        limits = space.translation_range
-        return SearchSpace(self._prior, space.root_centre, reach, space.anchor, self._task.translation, limits)
+        if self._tilt is not None:
+            reach[1:] = self._tilt.around(space.root_centre[1:], reach[1:])[1]
+        return replace(space, root_range=reach)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,10 +224,11 @@ class SynthesisTracker:
     make: Callable[[Space, np.random.Generator], Optimiser]
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)
+    tilt: Tilt | None = field(default=None, repr=False)  # of the prior and the training, where it was learned before
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
-        task, follower = self.task, Follower(self.task, self.prior, self.prediction)
+        task, follower = self.task, Follower(self.task, self.prior, self.prediction, self.tilt)
         optimiser: Optimiser | None = None
         latest: Frame | None = task.before[-1] if task.before else None
         for observation in observations:

@@ -9,6 +9,7 @@
 | looking for | file |
 |---|---|
 | what a user names becomes a scene: motions, masks, videos; how it is looked at | source.py |
+| what a method learns from: motions, folders of them, people of the library | training.py |
 | what a scene is; a known motion rendered; masks whose truth nobody knows | scene.py |
 | observations that are spoilt on purpose | spoilt.py |
 | several cameras: calibrations, lens distortion, which camera saw what | cameras.py |

@@ -210,7 +210,8 @@ def span(frames: Range, count: int) -> tuple[int, int]:
 def existing(path: Path) -> Path:
     """Return a path. Raises ValueError where there is nothing, or an empty file."""
     if not path.exists():
-        raise ValueError(f"{path}: expected a file, got nothing of that name")
+        expected = "a file" if path.suffix else "a file or a folder"
+        raise ValueError(f"{path}: expected {expected}, got nothing of that name")
     if path.is_file() and not path.stat().st_size:
         raise ValueError(f"{path}: expected a file with content, got an empty one")
     return path

@@ -1,11 +1,12 @@
 """What a user names, a motion or what one camera or several saw, becomes a scene, once."""
 
+import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from numbers import Real
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from posefit.reading import quoted
 
 MOTIONS = (".amc", ".bvh")
 NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".asf", ".json", ".csv", ".txt")
+SIZE = (320, 240)  # pixels of a rendered picture
 HEIGHTS = (0.3, 2.8)  # metres that a person may stand
 Kind = Literal["motion", "masks", "video"]
 _KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video"}
@@ -36,15 +38,15 @@ class Viewing:
     """How a source is looked at.
 
     `cameras`, or calibration files, one a view; `view_degrees` from where, where no camera says; the `size` of
-    rendered pictures; the rate `fps` of motions and masks, by default 30 or what a file of masks states; which
-    `frames`. For real footage: its `extraction`, how tall the person stands in metres (`height`), and which axis of
-    the calibration's world points up (`up`).
+    rendered pictures, by default 320 x 240; the rate `fps` of motions and masks, by default 30 or what a file of masks
+    states; which `frames`. For real footage: its `extraction`, how tall the person stands in metres (`height`), and
+    which axis of the calibration's world points up (`up`).
     """
 
     asf: str | Path | None = None
     cameras: Sequence[Camera | str | Path] = ()
     view_degrees: Sequence[float] = ()
-    size: tuple[int, int] = (320, 240)
+    size: tuple[int, int] | None = None
     fps: float | None = None
     frames: Range = (None, None)
     extraction: Extraction | None = None
@@ -58,7 +60,7 @@ class Viewing:
             raise ValueError(f"fps must be a positive number, got {quoted(self.fps)}")
         if self.fps is not None and not RATES[0] <= self.fps <= RATES[1]:
             raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(self.fps)}")
-        sides = pair("size", self.size, "(width, height)")
+        sides = pair("size", SIZE if self.size is None else self.size, "(width, height)")
         if not all(isinstance(side, int | np.integer) and 1 <= side <= 16_384 for side in sides):
             raise ValueError(f"size must be from 1x1 to 16384x16384 pixels, got {sides[0]}x{sides[1]}")
         for end in pair("frames", self.frames, "(start, stop), either of which may be None"):
@@ -76,11 +78,18 @@ class Viewing:
             useless.append(("fps", self.fps, "motions and masks"))
         if kind == "motion":
             useless.append(("height", self.height, "footage"))
+        else:
+            useless.append(("size", self.size, "motions"))
         if not self.cameras:
             useless.append(("up", self.up, "calibrations"))
         for name, value, where in useless:
             if value is not None:
-                raise ValueError(f"{name} must be given for {where} only, got {quoted(value)} for {_KINDS[kind]}")
+                raise useless_for(kind, name, value, where)
+
+
+def useless_for(kind: Kind, name: str, value: object, where: str) -> ValueError:
+    """Return the error of an option that sources of this kind have no use for, and says for which it is given."""
+    return ValueError(f"{name} must be given for {where} only, got {quoted(value)} for {_KINDS[kind]}")
 
 
 def scene_of(sources: Sequence[Source], viewing: Viewing, work: Path, listener: Listener = QUIET) -> Scene:
@@ -112,37 +121,63 @@ def _known(sources: Sequence[Source], viewing: Viewing) -> Scene:
         raise ValueError(f"source must be one motion, or views of one person, got {len(sources)} motions")
     cameras = [camera for one in viewing.cameras for camera in _cameras(one, viewing)]
     motion = motion_of(sources[0], viewing.asf, viewing.fps or FPS)
-    return synthetic(motion, viewing.view_degrees, viewing.size, cameras, viewing.frames)
+    return synthetic(motion, viewing.view_degrees, viewing.size or SIZE, cameras, viewing.frames)
 
 
-def clip_of(source: Source, asf: str | Path | None = None) -> Callable[[float], Motion]:
+@dataclass(frozen=True)
+class SourceClip:
+    """Gives a motion at any rate, which is `clip(fps)`; before it is made, `clip.count(fps)` says how long it is."""
+
+    motion: Callable[[float], Motion] = field(repr=False)
+    poses: int  # of the motion as it is stored
+    fps: float | None  # None for a built-in motion, which has as many at any rate
+
+    def __call__(self, fps: float) -> Motion:
+        """Return the motion at a rate."""
+        return self.motion(fps)
+
+    @classmethod
+    def of(cls, motion: Motion) -> Self:
+        """Return the clip of a motion."""
+        return cls(motion.resampled, len(motion), motion.fps)
+
+    @classmethod
+    def of_recorded(cls, clip: recorded.RecordedClip) -> Self:
+        """Return that of a recorded clip, whose motion is made when it is asked for."""
+        return cls(lambda fps: clip.motion().resampled(fps), int(clip.times[-1]) + 1, recorded.FPS)
+
+    def count(self, fps: float) -> int:
+        """Return about how many poses the motion has at a rate."""
+        return self.poses if self.fps is None else round(self.poses * fps / self.fps)
+
+
+def clip_of(source: Source, asf: str | Path | None = None) -> SourceClip:
     """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
 
     A file is read once, now; the .asf of an .amc is `asf`, or the only one beside it. Raises ValueError where there is
     no such motion.
     """
     if isinstance(source, Motion):
-        return source.resampled
+        return SourceClip.of(source)
     if source in built_in.names():
-        return partial(_built_in, str(source))
+        return SourceClip(partial(_built_in, str(source)), len(built_in.motion(str(source))), None)
     if recorded.is_recorded(source):
-        return recorded.clip(str(source)).motion().resampled
+        return SourceClip.of_recorded(recorded.clip(str(source)))
     path = Path(source)
     if path.suffix.lower() == ".amc":
         from posefit.motion.amc import read_clip
 
-        return read_clip(_skeleton_file(path, asf), existing(path)).resampled
+        return SourceClip.of(read_clip(_skeleton_file(path, asf), existing(path)))
     if path.suffix.lower() == ".bvh":
         from posefit.motion.bvh import read_bvh
 
-        return read_bvh(existing(path)).resampled
-    if path.exists() or path.suffix:
+        return SourceClip.of(read_bvh(existing(path)))
+    if path.exists() or path.suffix or _has_folders(source):
         existing(path)
         raise ValueError(
             f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}"
         )
-    built_in.motion(str(source))  # raises: there is none of that name
-    return partial(_built_in, str(source))
+    return SourceClip.of(built_in.motion(str(source)))  # raises: there is none of that name
 
 
 def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:
@@ -151,13 +186,21 @@ def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:
 
 
 def kind_of(source: Source) -> Kind:
-    """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video."""
+    """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video.
+
+    A name with folders in it and no suffix is a folder's, even where there is none.
+    """
     if isinstance(source, Motion) or source in built_in.names() or recorded.is_recorded(source):
         return "motion"
     path = Path(source)
-    if path.is_dir() or path.suffix.lower() == ".npz":
+    if path.is_dir() or path.suffix.lower() == ".npz" or (not path.suffix and _has_folders(source)):
         return "masks"
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
+
+
+def _has_folders(source: str | Path) -> bool:
+    """Return whether a name is a path beyond doubt: with a separator, if only at its end."""
+    return os.sep in str(source)
 
 
 def _filmed(

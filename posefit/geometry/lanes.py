@@ -6,7 +6,7 @@ The function stands here as plain Python, and below it as numba compiles it.
 from collections.abc import Sequence
 from typing import Any
 
-from llvmlite import ir  # type: ignore[import-untyped]
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 

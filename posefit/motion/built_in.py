@@ -103,4 +103,7 @@ def _check(name: str) -> None:
     if name not in names():
         near = get_close_matches(name[:SHOWN], names(), 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"motion must be a file, a folder or one of {', '.join(names())}, got {quoted(name)}{hint}")
+        raise ValueError(
+            "motion must be a file, a folder, a recorded one that posefit motions lists, or one of "
+            f"{', '.join(names())}, got {quoted(name)}{hint}"
+        )

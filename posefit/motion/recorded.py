@@ -136,9 +136,10 @@ def named(name: str) -> Sequence[RecordedClip]:
 
     Raises ValueError where one of them is not in the library, or where nobody is left.
     """
-    if not is_library(name):
+    _, colon, listed = name.partition(":")
+    people = [one.strip() for one in listed.split(",")] if colon else []
+    if not is_library(name) or "" in people or "-" in people:
         raise ValueError(f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}")
-    people = [one.strip() for one in name.partition(":")[2].split(",") if one.strip()]
     return clips([one for one in people if one[0] != "-"], [one[1:] for one in people if one[0] == "-"])
 
 

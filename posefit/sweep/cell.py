@@ -107,7 +107,7 @@ def run_cell(cell: Cell) -> CellResult:
 
     And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
     """
-    from posefit.footage.training import training_clips
+    from posefit.footage.training import training_clips, training_motions
     from posefit.tracking.measures import MEASURES
     from posefit.tracking.run import follow
 
@@ -118,7 +118,7 @@ def run_cell(cell: Cell) -> CellResult:
         if (found := digest_of(path)) != digest:
             raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
     scene = cell_scene(cell)
-    training = [clip(scene.fps) for clip in training_clips(cell.train)]
+    training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
     result = follow(scene, training, choice=_choice(cell), opening=_opening(cell), seed=cell.seed, tracks=cell.tracks)
     truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
     errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()

@@ -18,7 +18,7 @@ from posefit.footage.masks import Range
 from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Extraction
 from posefit.footage.source import Source, Viewing, kind_of, scene_of
-from posefit.footage.training import training_clips
+from posefit.footage.training import training_clips, training_motions
 from posefit.geometry.calibration import Up
 from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
@@ -26,7 +26,7 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.reading import quoted
 from posefit.tracking.identity import Told
-from posefit.tracking.method import Choice
+from posefit.tracking.method import Choice, usual
 from posefit.tracking.opening import Opening
 from posefit.tracking.outputs import Nowhere, OutputFolder
 from posefit.tracking.run import Track, follow
@@ -51,12 +51,12 @@ def track(
     *,
     asf: str | Path | None = None,
     camera: Camera | str | Path | Sequence[Camera | str | Path] | None = None,
-    optimiser: str | OptimiserFactory = "sapso",
+    optimiser: str | OptimiserFactory | None = None,
     prior: str | Prior | None = None,
     tracker: str | TrackerFactory | None = None,
     train: Sequence[Source] = (),
     view_degrees: float | Sequence[float] | None = None,
-    size: tuple[int, int] = (320, 240),
+    size: tuple[int, int] | None = None,
     fps: float | None = None,
     frames: Range = (None, None),
     particles: int | None = None,
@@ -85,20 +85,22 @@ def track(
 ) -> Track:
     """Return the motion followed through a source's silhouettes, with its errors where the truth is known.
 
-    `source` is a built-in motion's name, a `Motion`, an .amc or .bvh file, a folder of mask images, an .npz of masks, a
-    video, or several masks or videos that cameras took at the same time; or a `Scene` of a known motion, as it is.
-    `train` names the motions a prior learns from; by default the other styles of a built-in motion, else the built-in
-    walks. The method is `optimiser` with `prior`, or `tracker`. The budget of a frame is `evaluations`, by default
-    particles x (iterations + 1) = 40 x 61, the same for every method. `translation` is "known" where the truth is, else
-    "aligned". A `first_pose` that is "given" starts the first frame around the true one. `ask_seconds` is how long a
-    plugin may take to propose a population.
+    `source` is a built-in motion's name, a recorded one's, a `Motion`, an .amc or .bvh file, a folder of mask images,
+    an .npz of masks, a video, or several masks or videos that cameras took at the same time; or a `Scene` of a known
+    motion, as it is. The method is `optimiser` with `prior`, or `tracker`, and `train` names the motions that it learns
+    from: built-in or recorded ones, files, folders of them, or people of the library, such as `library:-16`. The budget
+    of a frame is `evaluations`, by default particles x (iterations + 1) = 40 x 61, the same for every method.
+    `translation` is "known" where the truth is, else "aligned". A `first_pose` that is "given" starts the first frame
+    around the true one. `ask_seconds` is how long a plugin may take to propose a population.
 
-    Where the truth is known the prior is `pca`. Where it is not it is `loose`, the first frame is searched `restarts`
-    times (8), and the person's build is fitted to `body_frames` (30; none where an .asf is given), as tall as `height`
-    says. With several `tracks` the person is followed so many times from different beginnings, each at the full budget,
-    and the track is kept whose whole cost is least. `view_degrees` gives where the camera stands, several of them
-    several cameras; `camera` is a camera or a calibration, one a view, in whose world `up` points up; `extraction` is
-    how masks are taken from video.
+    Where the truth is known the method is `sapso` with `pca`, which learns from the other styles of a built-in motion,
+    else from the built-in walks. Where it is not, it is the tracker `exemplars`, which learns from the library; or, if
+    an optimiser or a prior is given, `sapso` with `loose`, which learns from the built-in walks. There the first frame
+    is searched `restarts` times (8; 0 for a tracker that looks ahead), and the person's build is fitted to
+    `body_frames` (30; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
+    followed so many times from different beginnings, each at the full budget, and the track is kept whose whole cost is
+    least. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
+    calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at
     all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
@@ -131,10 +133,10 @@ def track(
     )
     if isinstance(source, Scene) and viewing != Viewing():
         raise ValueError(f"a scene must be followed as it is, got {viewing}")
+    searched = bool(optimiser_settings or prior_settings)
+    chosen = usual(sources[0], optimiser=optimiser, prior=prior, tracker=tracker, train=train, searched=searched)
     choice = Choice(
-        optimiser=optimiser,
-        prior=prior or prior_of(sources[0]),
-        tracker=tracker,
+        **chosen.method,
         optimiser_settings=optimiser_settings or {},
         prior_settings=prior_settings or {},
         tracker_settings=tracker_settings or {},
@@ -156,7 +158,7 @@ def track(
     if kind == "motion":
         _check_known(asf, restarts, [*sources, *train])
     opening.check(kind == "motion")
-    clips = training_clips(_training(sources, train), asf)  # before the work, as a name may be wrong
+    clips = training_clips(chosen.train, asf, followed=sources[0])  # before the work, as a name may be wrong
     if resume and out is None:
         raise ValueError("resume must be given with out, the folder of the track that goes on, got none")
     if rerun is not None:
@@ -173,7 +175,7 @@ def track(
         scene = source if isinstance(source, Scene) else scene_of(sources, viewing, output.work, listener)
         result = follow(
             scene,
-            [clip(scene.fps) for clip in clips],
+            training_motions(clips, scene.fps),
             choice=choice,
             opening=opening,
             seed=seed,
@@ -228,31 +230,12 @@ def fit(source: Source | Sequence[Source] = "walk", *, frame: int = 0, **setting
     return Fit(result.motion.poses[0], result.motion.translations[0], result.measures.cost, history, result.summary)
 
 
-def prior_of(source: Source) -> str:
-    """Return the prior that a source is followed with by default."""
-    return "pca" if kind_of(source) == "motion" else "loose"
-
-
 def _sources(source: Source | Scene | Sequence[Source]) -> Sequence[Source]:
     if isinstance(source, Scene):
         if source.truth is None:
             raise ValueError(f"a scene must be of a known motion, got {source.name}, whose truth nobody knows")
         return [source.truth]
     return source if isinstance(source, Sequence) and not isinstance(source, str) else [source]
-
-
-def _training(sources: Sequence[Source], train: Sequence[Source]) -> Sequence[Source]:
-    """Return what a prior learns from: by default the other styles of a built-in motion, else the built-in walks."""
-    source, chosen = sources[0], train
-    if not chosen:
-        known = isinstance(source, str) and source in built_in.names()
-        chosen = built_in.other_styles(str(source) if known else "walk")
-    for one in chosen:
-        if one is source or (
-            not isinstance(one, Motion) and not isinstance(source, Motion) and str(one) == str(source)
-        ):
-            raise ValueError(f"train must not contain the source itself, got {one}")
-    return chosen
 
 
 def _told(

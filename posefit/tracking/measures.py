@@ -98,7 +98,9 @@ class Measures:
         default=None, metadata=_about("lost", "%", 0, "share of frames with an MPJPE above 150 mm", 100.0)
     )
     held_frames: int = field(
-        metadata=_about("held", "frames", 0, "frames that show too little: the pose is held, not searched")
+        metadata=_about(
+            "held", "frames", 0, "frames that show too little: the pose is held or carried on, not searched"
+        )
     )
     skill: Mapping[str, float | None] | None = field(
         default=None,

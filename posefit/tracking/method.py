@@ -1,4 +1,7 @@
-"""A method, by names: an optimiser and a prior, or a tracker; with its settings checked and its plugins watched."""
+"""A method, by names: an optimiser and a prior, or a tracker; with its settings checked and its plugins watched.
+
+`usual` says which one is used, and what it learns from, where nobody does.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -21,9 +24,12 @@ from posefit.fitting.tracker import (
     Tracker,
     TrackerFactory,
 )
+from posefit.footage.source import Source, kind_of
+from posefit.motion import built_in, recorded
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 
+FOLLOWER = "exemplars"  # the tracker of footage, where nobody names another method and it is installed
 ITERATIONS = 60  # C of the SAPSO paper, section 5.2
 SOME = 1000  # poses of which one at least has to be feasible in a prior
 
@@ -62,6 +68,45 @@ class Choice:
 
 
 @dataclass(frozen=True, eq=False)
+class Usual:
+    """What a source is followed with, and what that learns from."""
+
+    method: dict[str, Any]  # a tracker, or an optimiser and a prior, as `Choice` takes them
+    train: Sequence[Source]
+
+
+def usual(
+    source: Source,
+    *,
+    optimiser: str | OptimiserFactory | None = None,
+    prior: str | Prior | None = None,
+    tracker: str | TrackerFactory | None = None,
+    train: Sequence[Source] = (),
+    searched: bool = False,
+) -> Usual:
+    """Return what a source is followed with; what a user has not said is as follows.
+
+    A motion is followed by `sapso` with `pca`, which learns from the other styles of a built-in motion, or else from
+    the built-in walks. Footage, whose truth nobody knows, is followed by the tracker `exemplars`, which learns from the
+    library of recorded motions; where an optimiser, a prior or settings of theirs (`searched`) are given, by `sapso`
+    with `loose`. Other trackers than `exemplars`, too, learn from the built-in walks, as they have to be told what kind
+    of motion it is. Raises ValueError for a tracker beside an optimiser or a prior.
+    """
+    for name, value in (("optimiser", optimiser), ("prior", prior)):
+        if tracker is not None and value is not None:
+            raise ValueError(f"{name} must not be given beside a tracker, got {value} and {tracker}")
+    footage = kind_of(source) != "motion"
+    if footage and tracker is None and optimiser is None and prior is None and not searched:
+        tracker = FOLLOWER if FOLLOWER in registry().offers["tracker"] else None
+    method: dict[str, Any] = {"tracker": tracker}
+    if tracker is None:
+        method = {"optimiser": optimiser or "sapso", "prior": prior or ("loose" if footage else "pca")}
+    if not train and footage and tracker == FOLLOWER:
+        train = [recorded.LIBRARY]
+    return Usual(method, train or built_in.other_styles(str(source) if source in built_in.names() else "walk"))
+
+
+@dataclass(frozen=True, eq=False)
 class Method:
     """What was chosen, ready to follow: a prior has been learned, and trackers are made of it."""
 
@@ -90,18 +135,23 @@ def prepare(choice: Choice, task: Task) -> Method:
     settings.check(offer.name, offer.factory, mine)
     settings.check("tracker", Prediction, choice.tracker_settings)
     prior, learned = _prior(choice, task)
-    prediction = Prediction(**choice.tracker_settings)
+    # what a prior that came learned has learned from, nobody says: its tilt is not that of other motions
+    usual: dict[str, Any] = {} if isinstance(choice.prior, str) else {"tilt": "box"}
+    prediction = Prediction(**{**usual, **choice.tracker_settings})
+    tilt = prediction.tilted(learned, task.training)
 
     def make(task: Task, patience: float) -> SynthesisTracker:
         limit = None if choice.ask_seconds is None else choice.ask_seconds + patience
         build = partial(_guarded, offer, mine, limit, task.evaluations)
-        return SynthesisTracker(task, learned, build, offer.next_frame, prediction)
+        return SynthesisTracker(task, learned, build, offer.next_frame, prediction, tilt)
 
     made_of = {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)}
     return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, Audit(), make)
 
 
-def parse_settings(texts: Sequence[str], optimiser: str, prior: str, tracker: str | None) -> dict[str, dict[str, Any]]:
+def parse_settings(
+    texts: Sequence[str], optimiser: str = "sapso", prior: str = "pca", tracker: str | None = None
+) -> dict[str, dict[str, Any]]:
     """Return the settings of optimiser, prior and tracker that texts such as `sapso.cooling=0.9` give.
 
     The name before the dot is the plugin's, or its family's for `family:NAME`; `tracker` stands for what drives an

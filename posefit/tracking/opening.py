@@ -82,11 +82,11 @@ def opened(
     """Return a task with what was found out before the first frame, and the person's build where it was fitted."""
     began = time.perf_counter()
     with _announced(listener.say):
-        _warm_up(method, task, scene)
+        looks_ahead = _warm_up(method, task, scene)
     listener.say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
 
     follow, blind = following(method), scene.truth is None
-    restarts = (RESTARTS if blind else 0) if how.restarts is None else how.restarts
+    restarts = (RESTARTS if blind and not looks_ahead else 0) if how.restarts is None else how.restarts
     body_frames = (BODY_FRAMES if blind else 0) if how.body_frames is None else how.body_frames
     if restarts:
         listener.say(f"looking for the first pose, {restarts} times")
@@ -128,10 +128,12 @@ def begun(task: Task, observations: Sequence[Observation], follow: Follow, resta
     Each start searches the first usable frame anew, all around where no yaw is known, and follows the person through a
     few more frames. The least mean cost wins; a start that would have somebody walk backwards pays for it. Large
     pictures are looked at smaller, and the first frame is then searched once more in the whole one, around the best.
+    A tracker that looks ahead over the clip has no need of it.
     """
     chosen = usable(observations, FRAMES, STRIDE) or usable(observations, 1)
     factor = max(min(camera.height for camera in task.cameras) // ROWS, 1)
-    looked, seen = _smaller(task, chosen, factor) if factor > 1 else (task, chosen)
+    apart = replace(task, fps=task.fps / STRIDE)  # as a model of motion has to know
+    looked, seen = _smaller(apart, chosen, factor) if factor > 1 else (apart, chosen)
     best, least = None, np.inf
     for k in range(restarts):
         frames = list(follow(looked, seen, np.random.default_rng([seed, k])))
@@ -190,13 +192,19 @@ def built(
     )
 
 
-def _warm_up(method: Method, task: Task, scene: Scene) -> None:
-    """Compile what is not compiled yet: a few populations of the first frame, whatever comes of them."""
+def _warm_up(method: Method, task: Task, scene: Scene) -> bool:
+    """Compile what is not compiled yet: a few populations of the first frame, whatever comes of them.
+
+    Return whether it is a tracker that looks ahead.
+    """
     particles = method.settings.get("optimiser", {}).get("particles", PARTICLES)
     few = replace(task, evaluations=min(task.evaluations, POPULATIONS * particles))
     first = next(iter(scene.observations))
+    tracker = None
     with suppress(ValueError):  # what does not work with so few evaluations is told where it does not with all
-        next(method.tracker(few, COMPILING).track([first], np.random.default_rng(0)))
+        tracker = method.tracker(few, COMPILING)
+        next(tracker.track([first], np.random.default_rng(0)))
+    return getattr(tracker, "lag", None) is not None
 
 
 @contextmanager

@@ -33,8 +33,8 @@ def table(summary: Mapping[str, Any]) -> str:
         held = summary["held_frames"]
         show = "frame shows" if held == 1 else "frames show"
         lines.append(
-            f"{held} {show} too little of the person: the pose is held, not searched, and may be off the person; "
-            "IoU is that of the others"
+            f"{held} {show} too little of the person: the pose is held or carried on, not searched, and may be off "
+            "the person; IoU is that of the others"
         )
     if summary["body"] is not None:
         body = summary["body"]

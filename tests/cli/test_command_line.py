@@ -19,7 +19,8 @@ from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
 from tests.files import arrays
 
-QUICK = ["--particles", "10", "--iterations", "4", "--size", "120x90"]
+FEW = ["--particles", "10", "--iterations", "4"]
+QUICK = [*FEW, "--size", "120x90"]
 FILES = {
     "poses.npz",
     "track.amc",
@@ -188,7 +189,7 @@ def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> 
     stack = np.stack([cv2.imread(str(path), 0) for path in sorted(folder.iterdir())])
     np.savez(tmp_path / "masks.npz", masks=stack > 0)
     results = [
-        json.loads(run("track", source, "--view-degrees", "45", "--json", *QUICK).stdout)
+        json.loads(run("track", source, "--view-degrees", "45", "--json", *FEW).stdout)
         for source in (folder, tmp_path / "masks.npz")
     ]
     assert results[0]["error_degrees"] is None
@@ -221,6 +222,13 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     ("words", "message"),
     [
         (["wlak"], "did you mean 'walk'?"),
+        (["16_999"], "motion must be a file, a folder, a recorded one that posefit motions lists, or one of walk, "),
+        (["library"], "a recorded one that posefit motions lists, or one of walk, "),
+        (["lost/"], "lost: expected a file or a folder, got nothing of that name"),
+        (["walk", "--train", "lost/"], "lost: expected a file or a folder, got nothing of that name"),
+        (["walk", "--roi", "1,2,3,4"], "roi must be given for video only, got (1, 2, 3, 4) for a motion"),
+        (["walk", "--extraction", "median"], "extraction must be given for video only, got 'median' for a motion"),
+        (["lost.avi", "--size", "320x240"], "size must be given for motions only, got (320, 240) for a video"),
         (["lost.amc"], "lost.amc: expected a file, got nothing of that name"),
         (["walk.txt"], "walk.txt: expected a file"),
         (["walk", "--particles", "0"], "particles must be at least 1, got 0"),
@@ -274,9 +282,9 @@ def test_bad_masks_are_refused(tmp_path: Path) -> None:
         (good[:, :60], "0002.png: mask must have shape (90, 120), got (90, 60)"),
     ):
         cv2.imwrite(str(folder / "0002.png"), image)
-        assert message in fails("track", folder, "--out", out, *QUICK)
+        assert message in fails("track", folder, "--out", out, *FEW)
     (folder / "0002.png").write_bytes(b"no image")
-    assert "0002.png: expected an image" in fails("track", folder, "--out", out, *QUICK)
+    assert "0002.png: expected an image" in fails("track", folder, "--out", out, *FEW)
     (tmp_path / "empty").mkdir()
     assert "expected a folder with mask images" in fails("track", tmp_path / "empty")
     np.savez(tmp_path / "a.npz", other=np.zeros(3))

@@ -9,7 +9,7 @@ import pytest
 
 from posefit.motion import built_in
 from posefit.registry import registry
-from posefit_exemplars.tracker import LEAST, exemplars
+from posefit_exemplars.factory import LEAST, exemplars
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
 

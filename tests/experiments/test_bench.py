@@ -22,7 +22,7 @@ from posefit_experiments.bench import experiment, optimisers, timing
 from posefit_experiments.bench.growth import Growth, growth_table
 from posefit_experiments.bench.kernel import bench_problem, opencv_costs
 from posefit_experiments.bench.optimisers import Stopwatch, wide_space
-from posefit_experiments.bench.processor import instructions, processor
+from posefit_experiments.bench.processor import check_named, instructions, processor
 
 
 class Line:
@@ -88,7 +88,6 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     assert figures["sapso_loose_overhead"] == pytest.approx(figures["frame"]["sapso+loose"]["overhead"], abs=1e-3)
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0
-    assert CliRunner().invoke(main, ["bench", "--threads", "0"]).exit_code == 2
 
 
 @pytest.mark.slow
@@ -103,7 +102,48 @@ def test_growth_is_a_table_and_four_figures(monkeypatch: pytest.MonkeyPatch, tmp
     assert "9" in told["dimensions"]
     assert all(us > 0.0 for row in told.values() for us in row.values())
     assert {path.name for path in (tmp_path / "new").iterdir()} == {f"growth-{name}.png" for name in told}
-    assert CliRunner().invoke(main, ["bench", "--pictures", str(tmp_path)]).exit_code == 2
+
+
+@pytest.mark.slow
+def test_following_is_timed_and_weighed() -> None:
+    found = CliRunner().invoke(main, ["bench", "--follow", "3", "--json"])
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert told["frames"] == 3
+    assert 0.0 < told["ms"] <= told["slowest_ms"]
+    assert 0.0 < told["mb"] <= told["mb_end"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--threads 0", "threads must be at least 1, got 0"),
+        ("--pictures .", "pictures are of --growth, got --pictures without it"),
+        ("--growth --compile", "growth and compile must not both be given, got --growth --compile"),
+        ("--follow 9 --compile", "follow must not be given beside --compile, got --follow 9"),
+        ("--follow 9 --threads 2", "threads must not be given beside --follow, which has one, got --threads 2"),
+        ("--follow 0", "follow must be at least 1 frame, got 0"),
+        ("--growth --threads 0", "threads must not be given beside --growth, which has one, got --threads 0"),
+        ("--compile --threads 2", "threads must not be given beside --compile, which has one, got --threads 2"),
+        ("--growth --pictures /dev/null/a", "/dev/null/a: expected a folder that can be written to, got Not a directory"),
+    ],
+)  # fmt: skip
+def test_options_that_do_not_go_together_are_one_line_before_anything_is_timed(words: str, message: str) -> None:
+    done = CliRunner().invoke(main, ["bench", *words.split()])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr == f"posefit: {message}\n"
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names are of x86-64")
+@pytest.mark.parametrize("name", ["nonsense", "pentium3"])  # the other is LLVM's, and has 32 bits
+def test_a_processor_that_nothing_compiles_for_is_one_line(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.setenv("NUMBA_CPU_NAME", name)
+    done = CliRunner().invoke(main, ["bench"])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr == f"posefit: NUMBA_CPU_NAME must name a processor of x86_64, got '{name}'\n"
+    for known in ("x86-64-v3", "generic", ""):
+        monkeypatch.setenv("NUMBA_CPU_NAME", known)
+        check_named()
 
 
 def test_a_table_of_growth_has_a_line_for_each_point() -> None:

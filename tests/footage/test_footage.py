@@ -30,7 +30,13 @@ from posefit.registry import registry
 from tests.files import arrays
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, truth, walk
 
-QUICK: dict[str, Any] = {"evaluations": 400, "restarts": 2, "body_frames": 0, "frames": (EMPTY + 6, EMPTY + 30)}
+QUICK: dict[str, Any] = {
+    "optimiser": "sapso",
+    "evaluations": 400,
+    "restarts": 2,
+    "body_frames": 0,
+    "frames": (EMPTY + 6, EMPTY + 30),
+}
 BRIEF = ["--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--frames", f"{EMPTY + 6}:{EMPTY + 14}"]
 
 

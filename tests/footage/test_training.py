@@ -3,13 +3,18 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import posefit
 from posefit.cli import main
-from posefit.footage.training import training_clips
-from posefit.motion import recorded
+from posefit.footage import training
+from posefit.footage.training import POSE_BYTES, training_clips, training_motions
+from posefit.motion import built_in, recorded
+from posefit.motion.amc import write_amc
+from posefit.motion.asf import write_asf
+from posefit.motion.bvh import write_bvh
 from posefit.sweep.plan import Plan
 
 
@@ -51,6 +56,9 @@ def test_a_plan_may_train_on_people_of_the_library() -> None:
             ["--train", "walk-a", "--without-subject", "16"],
             "without_subject must be given with --train library, got walk-a",
         ),
+        (["--without-subject", "16"], "without_subject must be given with --train library, got walk-a, walk-b, walk-c"),
+        (["--train", "library", "--without-subject", "99"], "a subject of the library must be one of 02, 05"),
+        (["--train", "library:"], "a library must be library, library:02,16 or library:-16, got 'library:'"),
         (["--train", "library:99"], "a subject of the library must be one of 02, 05"),
         (
             ["--train", "library:16", "--without-subject", "16"],
@@ -68,3 +76,102 @@ def test_mistakes_are_one_line(words: list[str], message: str) -> None:
 def test_many_clips_are_counted_not_listed() -> None:
     done = CliRunner().invoke(main, ["track", "walk", "--train", "library:16", "--frames", "0:1"])
     assert "trained on 54 clips, 16_01 to 16_58" in done.stdout.splitlines()[0]
+
+
+def test_clips_of_a_folder_have_their_own_rates(tmp_path: Path) -> None:
+    write_bvh(tmp_path / "a.bvh", built_in.motion("walk-a", frames=41, fps=60.0))
+    write_asf(tmp_path / "b.asf", built_in.average_skeleton())
+    write_amc(tmp_path / "b.amc", built_in.motion("walk-b", frames=121, fps=120.0))  # as .amc files are read
+    clips = training_clips([tmp_path])
+    assert [len(clip(30.0)) for clip in clips] == [21, 31]
+    assert [clip.count(30.0) for clip in clips] == [20, 30]  # about as many, before it is made
+    found, whole = clips[0](30.0), built_in.motion("walk-a", frames=41, fps=60.0)
+    joints = whole.skeleton.joints(whole.poses, whole.translations)[::2]
+    np.testing.assert_allclose(found.skeleton.joints(found.poses, found.translations), joints, atol=1e-5)
+
+
+def test_nobody_learns_from_the_clip_that_is_followed(tmp_path: Path) -> None:
+    names = {clip(30.0).name for clip in training_clips(["library:16"], followed="16_15")}
+    assert names == {one.name for one in recorded.clips(only=["16"])} - {"16_15"}
+    same = {clip(30.0).name for clip in training_clips(["library:16"], followed=Path("somewhere/16_15.amc"))}
+    assert same == names
+    for name in ("a", "b"):
+        write_bvh(tmp_path / f"{name}.bvh", built_in.motion(f"walk-{name}", frames=5))
+    assert [clip(30.0).name for clip in training_clips([tmp_path], followed=tmp_path / "a.bvh")] == ["b"]
+    (tmp_path / "b.bvh").unlink()
+    with pytest.raises(ValueError, match="expected a folder with another clip than the source, got that one alone"):
+        training_clips([tmp_path], followed=tmp_path / "a.bvh")
+    with pytest.raises(ValueError, match="train must not contain the source itself, got .*a.bvh"):
+        training_clips([tmp_path / "a.bvh"], followed=str(tmp_path / "x" / ".." / "a.bvh"))
+
+
+def test_more_than_the_memory_holds_is_told_before_a_motion_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    poses = sum(int(one.times[-1]) + 1 for one in recorded.clips())
+    clips = training_clips(["library"])
+    assert sum(clip.count(recorded.FPS) for clip in clips) == poses
+    monkeypatch.setattr(training, "allowed_bytes", lambda: 3 * poses * POSE_BYTES)
+    assert len(training_motions(clips[:1], 120.0)) == 1
+    message = (
+        f"at most the 0.6 GB of memory that there may be, got 0.8 GB for {4 * poses:,} poses at 120 frames a second"
+    )
+    with pytest.raises(ValueError, match=message):
+        training_motions(clips, 120.0)
+    monkeypatch.setattr(training, "allowed_bytes", lambda: 100_000_000)
+    done = CliRunner().invoke(main, ["track", "walk", "--train", "library"])
+    assert done.exit_code == 2
+    assert done.stderr.startswith("posefit: train must take at most the 0.1 GB of memory that there may be, got 0.1 GB")
+    assert len(done.stderr.splitlines()) == 1
+
+
+BVH = built_in.motion("walk-a", frames=3, fps=60.0)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (
+            lambda text: text.replace(text.split()[-5], "nan", 1),
+            "a.bvh: expected finite numbers below 1e[+]06, got nan",
+        ),
+        (lambda text: "\x00 no clip", "a.bvh: expected a BVH file, got one that pybvh cannot read"),
+        (
+            lambda text: text.partition("Frames:")[0] + "Frames: 0\nFrame Time: 0.02\n",
+            "a.bvh: expected a BVH file, got",
+        ),
+        (lambda text: "", "a.bvh: expected a file with content, got an empty one"),
+        (None, "expected a folder of .amc or .bvh files, got none in it"),
+    ],
+    ids=["nan", "garbage", "no-frames", "empty", "a-folder"],
+)
+def test_a_folder_with_a_clip_that_cannot_be_read_is_one_line(spoil: object, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.bvh"
+    if callable(spoil):
+        write_bvh(path, BVH)
+        path.write_text(spoil(path.read_text()))
+    else:
+        path.mkdir()
+    done = CliRunner().invoke(main, ["track", "walk", "--train", str(tmp_path), "--out", str(tmp_path / "out")])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 1
+    with pytest.raises(ValueError, match=message):
+        training_clips([tmp_path])
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("method", "message"),
+    [
+        (["--tracker", "exemplars"], "a must have at least 2 frames to be followed, got 1"),
+        (["--prior", "pca"], "angles must hold at least 7 frames, got 1"),
+    ],
+)
+def test_a_clip_of_one_frame_is_too_short_to_learn_from(method: list[str], message: str, tmp_path: Path) -> None:
+    write_bvh(tmp_path / "a.bvh", built_in.motion("walk-a", frames=1))
+    done = CliRunner().invoke(main, ["track", "walk", "--train", str(tmp_path), "--frames", "0:2", *method])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr.splitlines()[-1] == f"posefit: {message}"
+
+
+def test_a_library_of_one_person_is_one_to_learn_from() -> None:
+    track = posefit.track("02_01", train=["library:17"], tracker="exemplars", frames=(0, 3), evaluations=400)
+    assert track.summary["train"] == ["17_03", "17_10"]

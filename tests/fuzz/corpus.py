@@ -19,26 +19,8 @@ from posefit_priors.full import Full
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
 from posefit_priors.union import Union
+from tests.geometry.calibrations import QUALISYS, TOML, opencv
 
-TOML = """
-[left]
-name = "left"
-size = [ 640, 480]
-matrix = [ [ 500.0, 0.0, 319.5], [ 0.0, 510.0, 239.5], [ 0.0, 0.0, 1.0]]
-distortions = [ 0.1, 0.0, 0.0, 0.0]
-rotation = [ 1.5707963267948966, 0.0, 0.0]
-translation = [ 0.0, 1.0, 4.0]
-fisheye = false
-
-[metadata]
-adjusted = false
-"""
-QUALISYS = """<?xml version='1.0'?><calibration><cameras><camera serial="7">
-<fov_video left="10" top="20" right="649" bottom="499"/>
-<transform x="0" y="-4000" z="1000" r11="1" r12="0" r13="0" r21="0" r22="0" r23="1" r31="0" r32="-1" r33="0"/>
-<intrinsic focalLengthU="32000" focalLengthV="32640" centerPointU="21088" centerPointV="16608"
- radialDistortion1="-0.05" radialDistortion2="0.1" tangentalDistortion1="0.001" tangentalDistortion2="0.002"/>
-</camera></cameras></calibration>"""
 PLAN = """[defaults]
 frames = 3
 settings = { sapso.cooling = 0.9 }
@@ -85,7 +67,7 @@ def corpus(folder: Path) -> list[Seed]:
         prior().fit(angles, motion.skeleton).save(path)
         seeds.append(Seed(prior.__name__, ".npz", path.read_bytes()))
     texts = [(".json", camera.to_json()), (".toml", TOML), (".xml", QUALISYS)]
-    texts += [(suffix, _opencv(folder / f"calibration{suffix}")) for suffix in (".yml", ".json", ".xml")]
+    texts += [(suffix, opencv(folder / f"calibration{suffix}").read_text()) for suffix in (".yml", ".json", ".xml")]
     seeds += [Seed("calibration", suffix, text.encode()) for suffix, text in texts]
     return [*seeds, Seed("plan", ".toml", PLAN.encode()), Seed("ledger", ".json", LEDGER.encode())]
 
@@ -100,15 +82,3 @@ def _image(mask: Any, suffix: str) -> bytes:
     written, content = cv2.imencode(suffix, np.where(mask, 255, 0).astype(np.uint8))
     assert written
     return content.tobytes()
-
-
-def _opencv(path: Path) -> str:
-    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
-    storage.write("image_width", 640)
-    storage.write("image_height", 480)
-    storage.write("camera_matrix", np.array([[500.0, 0, 319.5], [0, 510.0, 239.5], [0, 0, 1]]))
-    storage.write("distortion_coefficients", np.array([[0.1, 0.0, 0.0, 0.0, 0.0]]))
-    storage.write("rvec", np.array([np.pi / 2, 0.0, 0.0]))
-    storage.write("tvec", np.array([[0.0], [1.0], [4.0]]))
-    storage.release()
-    return path.read_text()

@@ -116,12 +116,16 @@ def test_a_long_clip_does_not_push_a_short_one_out() -> None:
 
 @pytest.mark.parametrize(("source", "wrong"), [("walk", "run"), ("run", "walk")])
 def test_one_union_tracks_walk_and_run_and_the_wrong_prior_does_not(source: str, wrong: str) -> None:
-    settings: dict[str, Any] = {"frames": (0, 30), "view_degrees": 0}
-    both = ("walk-a", "walk-b", "run-a", "run-b")
-    joined = posefit.track(source, train=both, prior="union", **settings).summary
-    other = posefit.track(source, train=(f"{wrong}-a", f"{wrong}-b"), prior="pca", **settings).summary
-    assert joined["lost_rate"] == 0.0
-    assert joined["error_degrees"]["mean"] < 0.5 * other["error_degrees"]["mean"]
+    # medians, since one first frame in five or so settles beside the best pose
+    both, one = ("walk-a", "walk-b", "run-a", "run-b"), (f"{wrong}-a", f"{wrong}-b")
+    joined, other = [], []
+    for seed in range(3):
+        settings: dict[str, Any] = {"frames": (0, 30), "view_degrees": 0, "seed": seed}
+        union = posefit.track(source, train=both, prior="union", **settings).summary
+        assert union["lost_rate"] == 0.0
+        joined.append(union["error_degrees"]["mean"])
+        other.append(posefit.track(source, train=one, prior="pca", **settings).summary["error_degrees"]["mean"])
+    assert np.median(joined) < 0.5 * np.median(other)
 
 
 # scikit-learn

@@ -78,8 +78,8 @@ def test_a_preview_lists_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> 
 
 
 def test_times_are_told_as_people_say_them() -> None:
-    assert [duration_text(seconds) for seconds in (4.4, 89.0, 90.0, 5400.0)] == [
-        "4 seconds", "89 seconds", "1.5 minutes", "1.5 hours",
+    assert [duration_text(seconds) for seconds in (0.2, 1.3, 4.4, 89.0, 90.0, 5400.0)] == [
+        "0 seconds", "1 second", "4 seconds", "89 seconds", "1.5 minutes", "1.5 hours",
     ]  # fmt: skip
 
 

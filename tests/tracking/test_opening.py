@@ -63,10 +63,12 @@ def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole
     scene = synthetic(motion, [90.0], size, [], (None, None))
     task = Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
     looked: list[int] = []
+    rates: list[float] = []
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         for seen in observations:
             looked.append(task.cameras[0].height)
+            rates.append(task.fps)
             assert seen.silhouettes[0].mask.shape[0] == task.cameras[0].height
             pose, where = motion.poses[:1], motion.translations[:1]
             counts = areas(task.body, task.cameras[0], seen.silhouettes[0], pose, where)
@@ -75,6 +77,9 @@ def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole
     begin = begun(task, scene.observations, follow, 3, 0)
     # frames 0 and 3 of each start, and the best one's first once more where they were seen small
     assert looked == [rows] * 6 + ([size[1]] if rows != size[1] else [])
+    # a model of motion knows how far apart they are
+    assert rates == [10.0] * 6 + [30.0] * (len(looked) - 6)
+    assert begin.fps == 30.0
     (first,) = begin.before
     whole = areas(
         scene.body, scene.cameras[0], scene.observations[0].silhouettes[0], motion.poses[:1], motion.translations[:1]

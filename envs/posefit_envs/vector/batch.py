@@ -15,6 +15,7 @@ from posefit.fitting.check import whole
 from posefit_envs.drawing import MODES, check_mode
 from posefit_envs.instance import Selection, approved
 from posefit_envs.search import Doorkeeper
+from posefit_envs.stage import Stage
 
 Flags = NDArray[np.bool_]  # (n,)
 Infos = dict[str, Any]
@@ -38,6 +39,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         num_envs: int,
         selection: Selection,
         spaces: tuple[Space[Any], Space[Any]],
+        threads: int,
         render_mode: str | None,
         max_episode_steps: int | None,
     ) -> None:
@@ -47,6 +49,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
         self.num_envs, self.render_mode = num_envs, render_mode
         self._selection, self.world = selection, selection.world
+        self._stage = Stage(self.world, num_envs, approved(whole, "threads", threads, 1))
         self.single_action_space, self.single_observation_space = spaces
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.box import MANY, REDRAWS, fold
-from posefit.fitting.check import whole
 from posefit.fitting.metrics import pose_error_degrees
 from posefit.geometry.skeleton import ANGLES
 from posefit_envs.configure import (
@@ -24,8 +23,7 @@ from posefit_envs.configure import (
     steering,
 )
 from posefit_envs.drawing import portray
-from posefit_envs.instance import Arguments, approved, select
-from posefit_envs.stage import Stage
+from posefit_envs.instance import Arguments, select
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
 
@@ -50,9 +48,8 @@ class ConfigureVectorEnv(SearchVectorEnv):
     ) -> None:
         check_swarm(particles, iterations)
         selection = select(**arguments)
-        super().__init__(num_envs, selection, spaces_of_swarm(), render_mode, max_episode_steps)
+        super().__init__(num_envs, selection, spaces_of_swarm(), threads, render_mode, max_episode_steps)
         self.particles, self._iterations = int(particles), int(iterations)
-        self._stage = Stage(self.world, num_envs, approved(whole, "threads", threads, 1))
         self._swarms: list[SteeredSwarm | None] = [None] * num_envs
         self._truths = np.empty((num_envs, ANGLES))
 

@@ -7,14 +7,13 @@ from gymnasium import error
 
 from posefit import PoseProblem, SearchSpace
 from posefit.arrays import Array
-from posefit.fitting.check import whole
 from posefit.fitting.metrics import pose_error_degrees
 from posefit.geometry.skeleton import ANGLES
 from posefit_envs.drawing import portray
 from posefit_envs.fit import MAX_EVALUATIONS, TARGET_COST, Episode, check_budget, spaces_of
-from posefit_envs.instance import Arguments, approved, select
+from posefit_envs.instance import Arguments, select
 from posefit_envs.search import Image
-from posefit_envs.stage import Evaluated, Stage
+from posefit_envs.stage import Evaluated
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
 
@@ -39,9 +38,8 @@ class FitVectorEnv(SearchVectorEnv):
     ) -> None:
         check_budget(target_cost, "max_evaluations", max_evaluations)
         selection = select(**arguments)
-        super().__init__(num_envs, selection, spaces_of(selection.world), render_mode, max_episode_steps)
+        super().__init__(num_envs, selection, spaces_of(selection.world), threads, render_mode, max_episode_steps)
         self._target, self._most = float(target_cost), int(max_evaluations)
-        self._stage = Stage(self.world, num_envs, approved(whole, "threads", threads, 1))
         self._episodes: list[Episode | None] = [None] * num_envs
         self._truths, self._best = np.empty((num_envs, ANGLES)), np.full(num_envs, np.inf)
         self._last: Evaluated | None = None

@@ -15,7 +15,6 @@ from posefit_envs.drawing import portray
 from posefit_envs.fit import check_budget, spaces_of
 from posefit_envs.instance import Arguments, approved, select
 from posefit_envs.search import Image
-from posefit_envs.stage import Stage
 from posefit_envs.track import EVALUATIONS, FRAMES, Passage, track_label
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
@@ -44,9 +43,8 @@ class TrackVectorEnv(SearchVectorEnv):
         check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
         approved(whole, "frames", frames, 1)
         selection = select(**arguments)
-        super().__init__(num_envs, selection, spaces_of(selection.world), render_mode, max_episode_steps)
+        super().__init__(num_envs, selection, spaces_of(selection.world), threads, render_mode, max_episode_steps)
         self._frames, self._most = int(frames), int(evaluations_per_frame)
-        self._stage = Stage(self.world, num_envs, approved(whole, "threads", threads, 1))
         self._passages: list[Passage | None] = [None] * num_envs
         # of the current frame: proposals made, the truth, what the last and the best proposal came to
         n, d = self._shape

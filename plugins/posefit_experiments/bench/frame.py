@@ -13,7 +13,7 @@ from posefit.fitting.optimiser import Filter, NextFrame, Optimiser
 from posefit.fitting.prior import Prior
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.fitting.tracker import Observation, SynthesisTracker, Task
+from posefit.fitting.tracker import Observation, Prediction, SynthesisTracker, Task
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
@@ -88,9 +88,11 @@ class Walk:
         ]
         task = Task(body, cameras, BUDGET, float(motion.poses[0, 0]), motion.translations[0])
         self._make, self._next_frame = make, next_frame
-        self._tracker = SynthesisTracker(task, learned, make, next_frame)
+        tilt = Prediction().tilted(learned, styles)
+        self._tracker = SynthesisTracker(task, learned, make, next_frame, tilt=tilt)
         watched = _Watched(make)
-        self.frames = list(SynthesisTracker(task, learned, watched.make, next_frame).track(self._seen, _rng()))
+        watcher = SynthesisTracker(task, learned, watched.make, next_frame, tilt=tilt)
+        self.frames = list(watcher.track(self._seen, _rng()))
         self.searches = watched.searches
         self._problems = [
             PoseProblem(body, cameras, observation.silhouettes, search.space)

@@ -81,10 +81,9 @@ def growth_table(found: Sequence[Growth]) -> str:
 
 
 def draw_growths(found: Sequence[Growth], folder: Path) -> list[Path]:
-    """Write growth-size.png, growth-poses.png, ... to a folder, which is made, and return their paths."""
+    """Write growth-size.png, growth-poses.png, ... to a folder, and return their paths."""
     from matplotlib.figure import Figure
 
-    folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for one in found:
         figure = Figure(figsize=(4.6, 3.0), layout="constrained")

@@ -1,5 +1,6 @@
 """`posefit bench`."""
 
+import tempfile
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,24 +17,27 @@ from posefit.cli.output import json_line, say
 @click.option("--growth", is_flag=True, help="Time how a pose's cost grows with size, poses, views and dimensions.")
 @click.option("--pictures", metavar="DIR", help="With --growth: write a figure of each, growth-*.png, to DIR.")
 @click.option("--compile", "compiling", is_flag=True, help="Time what compiles for the default sweep instead.")
-def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: str | None, compiling: bool) -> None:
+@click.option("--follow", type=int, metavar="FRAMES", help="Time and weigh the tracker of the library instead.")
+def bench_command(
+    threads: int | None, as_json: bool, growth: bool, pictures: str | None, compiling: bool, follow: int | None
+) -> None:
     """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
 
     `cpu` tells for which processor the loops are compiled, and which instructions it has. It is this machine's, or the
     one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
     """
-    if pictures is not None and not growth:
-        raise ValueError("pictures are of --growth, got --pictures without it")
+    _check(threads, growth, pictures, compiling, follow)
     if growth:
         _growth(as_json, pictures)
         return
     if compiling:
         _compile(as_json)
         return
+    if follow is not None:
+        _follow(as_json, follow)
+        return
     from posefit_experiments.bench.experiment import loop_figures
 
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads must be at least 1, got {threads}")
     say("timing; this takes half a minute ...")
     figures = loop_figures(threads)
     if as_json:
@@ -41,6 +45,28 @@ def bench_command(threads: int | None, as_json: bool, growth: bool, pictures: st
         return
     for name, value in _named(figures):
         click.echo(f"{name:38} {value:.4g}" if isinstance(value, float) else f"{name:38} {value}")
+
+
+def _check(threads: int | None, growth: bool, pictures: str | None, compiling: bool, follow: int | None) -> None:
+    """Return nothing. Raises ValueError for options that do not go together, and for a processor that LLVM lacks."""
+    from posefit_experiments.bench.processor import check_named
+
+    if growth and compiling:
+        raise ValueError("growth and compile must not both be given, got --growth --compile")
+    if follow is not None and (growth or compiling):
+        raise ValueError(
+            f"follow must not be given beside {'--growth' if growth else '--compile'}, got --follow {follow}"
+        )
+    if follow is not None and follow < 1:
+        raise ValueError(f"follow must be at least 1 frame, got {follow}")
+    if pictures is not None and not growth:
+        raise ValueError("pictures are of --growth, got --pictures without it")
+    if threads is not None and (growth or compiling or follow is not None):
+        other = "--growth" if growth else "--compile" if compiling else "--follow"
+        raise ValueError(f"threads must not be given beside {other}, which has one, got --threads {threads}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be at least 1, got {threads}")
+    check_named()
 
 
 def _named(figures: Mapping[str, Any], group: str = "") -> Iterator[tuple[str, Any]]:
@@ -57,6 +83,8 @@ def _growth(as_json: bool, pictures: str | None) -> None:
 
     if pictures is not None and find_spec("matplotlib") is None:
         raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
+    if pictures is not None:
+        _check_folder(Path(pictures))
     say("timing; this takes half a minute ...")
     found = growths()
     told = {one.name: dict(zip(one.labels, one.us, strict=True)) for one in found}
@@ -66,6 +94,15 @@ def _growth(as_json: bool, pictures: str | None) -> None:
             say(f"{path}")
 
 
+def _check_folder(folder: Path) -> None:
+    """Make a folder. Raises ValueError where it cannot be written to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise ValueError(f"{folder}: expected a folder that can be written to, got {error.strerror}") from None
+
+
 def _compile(as_json: bool) -> None:
     from posefit_experiments.bench.compiling import compile_figures, compile_lines
 
@@ -73,3 +110,13 @@ def _compile(as_json: bool) -> None:
     figures = compile_figures()
     for line in [json_line(figures)] if as_json else compile_lines(figures):
         click.echo(line)
+
+
+def _follow(as_json: bool, frames: int) -> None:
+    from posefit_experiments.bench.follow import follow_figures
+
+    say(f"following somebody for {frames:,} frames; a thousand take one or two minutes ...")
+    figures = follow_figures(frames)
+    click.echo(
+        json_line(figures) if as_json else "\n".join(f"{name:12} {value:.4g}" for name, value in figures.items())
+    )

@@ -57,7 +57,8 @@ def filmed_figures(source: str | Path, roi: Box, frames: Range, seed: int) -> di
     video = Video.of(source)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "track"
-        result = track(source, extraction=Extraction(roi=roi), frames=frames, seed=seed, out=out)
+        how = Extraction(roi=roi)
+        result = track(source, extraction=how, frames=frames, optimiser="sapso", prior="loose", seed=seed, out=out)
         camera = Camera.from_json(out / "camera.json")
         with np.load(out / "poses.npz") as stored:
             radii = stored["radii"]

@@ -60,7 +60,8 @@ def _times(seen: Scene, choice: Choice) -> tuple[float, float]:
         centre = np.array([frame.pose[0], 0.0, 0.0])
         space = SearchSpace(method.prior, centre, np.radians(ROOT_RANGE_DEGREES), seen.anchor, "aligned")
         problem = PoseProblem(seen.body, seen.cameras, observation.silhouettes, space)
-        near = np.tile(space.proposals(frame.coordinates.copy()), (POPULATION, 1))
+        found = np.concatenate([frame.pose[:3], frame.coordinates[3:]])  # its root itself, whatever tilt was learned
+        near = np.tile(space.proposals(found), (POPULATION, 1))
         began = time.perf_counter()
         for _ in range(frame.evaluations // POPULATION):
             problem.evaluate(near)

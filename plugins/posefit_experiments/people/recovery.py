@@ -16,7 +16,7 @@ from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Rendered, Scene, synthetic
-from posefit.footage.training import training_clips
+from posefit.footage.training import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Silhouette
 from posefit.sweep.cell import Cell, cell_scene, parts
@@ -84,7 +84,7 @@ def _tried(cell: Cell, clip: Piece, views: Views, kind: str, translation: Transl
     scene, gone, back = returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
     optimiser, prior, tracker = parts(cell.method)
     named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
-    training = [one(scene.fps) for one in training_clips(cell.train)]
+    training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
     choice, opening = Choice(evaluations=cell.evaluations, **named), Opening(translation=translation)
     track = follow(scene, training, choice=choice, opening=opening)
     told = {"clip": clip.name, "views_degrees": list(views), "kind": kind, "translation": translation}

@@ -16,7 +16,7 @@ from posefit.arrays import Array
 from posefit.tracking.evaluation import nearest
 from posefit.tracking.front import track
 from posefit_experiments.grid import Progress, check_seeds, each
-from posefit_experiments.sapso.design import COMPARED, METHODS, WORKERS, Scale
+from posefit_experiments.sapso.design import COMPARED, DRIVEN, METHODS, WORKERS, Scale
 from posefit_experiments.sapso.motions import PaperMotion, paper_scene
 from posefit_experiments.sapso.results import PaperResults, PaperTrack, TrackKey
 
@@ -77,6 +77,7 @@ def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack
         optimiser=method.optimiser,
         prior=method.prior,
         prior_settings=method.prior_settings,
+        tracker_settings=DRIVEN,
         iterations=scale.iterations,
         seed=key.seed,
     )
@@ -102,8 +103,15 @@ def baseline_poses(motion: PaperMotion, view: float) -> dict[str, Array]:
 def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array:
     """Return the lowest cost after each iteration (swarms, iterations + 1) in the first frame, for each N."""
     scene = paper_scene(motion, view, (0, 1))
-    histories = [
-        track(scene, train=motion.training, particles=count, iterations=scale.iterations, seed=seed).found[0].history
+    tracks = [
+        track(
+            scene,
+            train=motion.training,
+            particles=count,
+            iterations=scale.iterations,
+            tracker_settings=DRIVEN,
+            seed=seed,
+        )
         for count in scale.swarms
     ]
-    return np.array(histories)
+    return np.array([one.found[0].history for one in tracks])

@@ -9,7 +9,7 @@ from posefit.arrays import Array
 from posefit.fitting.space import SearchSpace
 from posefit.footage.scene import Scene
 from posefit.tracking.front import track
-from posefit_experiments.sapso.design import Scale
+from posefit_experiments.sapso.design import DRIVEN, Scale
 from posefit_experiments.sapso.motions import PaperMotion, paper_scene
 from posefit_priors.pca import PCA
 from posefit_swarm.sapso import SAPSO
@@ -68,6 +68,7 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
         train=motion.training,
         particles=particles,
         iterations=scale.iterations,
+        tracker_settings=DRIVEN,
         seed=seed,
     )
     seen = searches[-1]  # the one before it only compiles

@@ -1,0 +1,112 @@
+"""The tracker by name: its settings, checked."""
+
+import importlib
+import math
+from functools import partial
+from typing import cast
+
+import numpy as np
+
+from posefit import settings
+from posefit.arrays import Array
+from posefit.fitting.tracker import Task
+from posefit.registry import registry
+from posefit_exemplars.beam import Steps, Transition, Transitions, transition_costs
+from posefit_exemplars.exemplars import exemplars_of
+from posefit_exemplars.refinement import Make
+from posefit_exemplars.tracker import REFINED, ExemplarTracker
+
+LEAST = 300  # evaluations that every stage of a frame has something of
+
+
+def exemplars(
+    task: Task,
+    *,
+    spread: float = 0.03,
+    turning_degrees: float = 4.0,
+    jump: float = 12.0,
+    temperature: float = 2.0,
+    straying: float = 0.01,
+    depth: float = 0.03,
+    pace: float = 0.008,
+    lag: int = 15,
+    mirrored: bool = True,
+    refiner: str = "cma",
+    pull: float = 0.3,
+    smoothing: float = 1.0,
+    transitions: str = "clips",
+) -> ExemplarTracker:
+    """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
+
+    What a person may stray or turn is meant for a thirtieth of a second, whatever the frame rate.
+
+    Settings:
+        spread: metres that joints may be off where a clip goes on, root mean square; above 0.
+        turning_degrees: how far a body may turn away from its clip; above 0.
+        jump: what a step to any other pose costs, in units of cost over the temperature; 0 or more.
+        temperature: what silhouette costs are divided by; above 0. Costs of frames err together, so more than 1.
+        straying: metres that a root that is aligned may be off where its clip goes on, to the side or up; above 0.
+        depth: and towards or away from a single camera; above 0.
+        pace: metres that a root that is known may be off where its clip goes on; above 0.
+        lag: frames that are seen before a pose is told, 0 or more.
+        refiner: the optimiser that searches around the path, or "none".
+        pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
+        smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
+        transitions: what steps cost: "clips", as above; or MODULE:FUNCTION, a function of your own, which takes a
+            `posefit_exemplars.beam.Transition` and returns the costs (n, m) of all steps from a frame to the next.
+        mirrored: whether the mirror images of all clips are learned from as well.
+    """
+    for name, value in (
+        ("spread", spread),
+        ("turning_degrees", turning_degrees),
+        ("temperature", temperature),
+        ("straying", straying),
+        ("depth", depth),
+        ("pace", pace),
+    ):
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"{name} must be above 0 and finite, got {value}")
+    for name, value in (("jump", jump), ("pull", pull), ("smoothing", smoothing)):
+        if not 0.0 <= value < math.inf:
+            raise ValueError(f"{name} must be 0 or more and finite, got {value}")
+    if task.evaluations < LEAST:
+        raise ValueError(f"evaluations must be at least {LEAST} for exemplars, got {task.evaluations}")
+    if lag < 0:
+        raise ValueError(f"lag must be 0 or more, got {lag}")
+    intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
+    temperature /= intervals
+    slack = math.sqrt(intervals)
+    steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
+    states = exemplars_of(task.training, task.body.skeleton, mirrored)
+    costs = partial(transition_costs, steps=steps) if transitions == "clips" else partial(_checked, _named(transitions))
+    return ExemplarTracker(task, states, steps, costs, temperature, lag, _maker(task, refiner), pull, smoothing)
+
+
+def _maker(task: Task, refiner: str) -> Make | None:
+    """Return what makes the optimiser of a frame. Raises ValueError where there is none of that name."""
+    if refiner == "none":
+        return None
+    factory = registry().optimiser(refiner)
+    return partial(factory, **settings.planned(factory, {}, int(REFINED * task.evaluations)))
+
+
+def _named(name: str) -> Transitions:
+    """Return the function MODULE:FUNCTION. Raises ValueError where there is none."""
+    module, _, function = name.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ValueError(
+            f"transitions must be clips or MODULE:FUNCTION that can be imported, got {name}: {error}"
+        ) from None
+    if not callable(found):
+        raise ValueError(f"transitions must name a function, got {name}, which is a {type(found).__name__}")
+    return cast(Transitions, found)
+
+
+def _checked(transitions: Transitions, transition: Transition) -> Array:
+    """Return what somebody's model says. Raises ValueError where that is no number for every step."""
+    costs, shape = np.asarray(transitions(transition), dtype=np.float64), (len(transition.before), len(transition.beam))
+    if costs.shape != shape or not np.isfinite(costs).all():
+        raise ValueError(f"transitions must return finite costs of shape {shape}, got shape {costs.shape}")
+    return costs

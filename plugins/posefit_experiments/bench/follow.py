@@ -1,0 +1,68 @@
+"""What it costs to follow somebody by the library: seconds before the first frame, milliseconds a frame, memory."""
+
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from posefit.fitting.tracker import Observation
+from posefit.footage.scene import synthetic
+from posefit.motion import recorded
+from posefit.registry import registry
+from posefit.tracking.opening import Opening, task_of
+
+CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes
+SETTLED = 100  # frames after which memory should grow no more
+BUDGET = 2440
+
+
+def follow_figures(frames: int) -> dict[str, float]:
+    """Return what following so many frames takes on one thread, with the library of everybody else.
+
+    `library_s` is reading the library, `states_s` making a tracker's states of it; `ms` is the CPU time of a frame, and
+    `slowest_ms` that of the slowest one; `mb` is the process's peak memory after 100 frames, and `mb_end` at the end.
+    """
+    began = time.process_time()
+    others = recorded.clips(without=[recorded.clip(CLIP).subject])
+    library = time.process_time() - began
+    training = [clip.motion() for clip in others]
+    scene = synthetic(recorded.clip(CLIP).motion(), (45.0,), (320, 240), [], (None, None))
+    task = replace(task_of(scene, Opening(translation="aligned"), training, BUDGET, 1), yaw=None)
+    began = time.process_time()
+    with threadpool_limits(1):
+        tracker = registry().offer("tracker", "exemplars").factory(task)
+    states = time.process_time() - began
+
+    def seen(count: int) -> Iterator[Observation]:
+        last = scene.count - 1
+        for k in range(count):
+            yield scene.observations[last - abs(k % (2 * last) - last)]
+
+    spent, settled = [], 0.0
+    with threadpool_limits(1):
+        list(tracker.track(seen(2), np.random.default_rng(0)))  # loads what is compiled
+        for frame in tracker.track(seen(frames), np.random.default_rng(0)):
+            spent.append(frame.cpu_seconds)
+            if len(spent) <= SETTLED:
+                settled = _peak_mb()
+    milliseconds = 1e3 * np.array(spent)
+    return {
+        "frames": frames,
+        "library_s": library,
+        "states_s": states,
+        "ms": float(milliseconds.mean()),
+        "slowest_ms": float(milliseconds.max()),
+        "mb": settled,
+        "mb_end": _peak_mb(),
+    }
+
+
+def _peak_mb() -> float:
+    """Return the most memory that the process has had, in 1e6 bytes."""
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak * 1024 / 1e6

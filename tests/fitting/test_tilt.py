@@ -1,0 +1,213 @@
+"""The root's pitch and roll: learned with the latents, followed from pose to pose, never a box around upright."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefit import SearchSpace, Task
+from posefit.arrays import Array
+from posefit.fitting.prior import Tilt
+from posefit.fitting.tracker import Follower, Observation, Prediction, SynthesisTracker
+from posefit.geometry.body import Body
+from posefit.motion import built_in
+from posefit.motion.motion import Motion
+from posefit.tracking.method import Choice, prepare
+from posefit_priors.loose import Loose
+from posefit_priors.pca import PCA
+
+LEFT_HIP = 3  # of a pose: its first joint angle
+DEGREE = np.radians(1.0)
+
+
+class Hip:
+    """A prior of one latent, the first joint angle, from -1 to 1 radians."""
+
+    low, high = np.array([-1.0]), np.array([1.0])
+
+    def transform(self, angles: Array) -> Array:
+        return angles[:, :1]
+
+    def inverse_transform(self, latents: Array) -> Array:
+        return np.column_stack([latents, np.zeros((len(latents), 62))])
+
+    def feasible(self, latents: Array) -> Array:
+        return np.ones(len(latents), dtype=bool)
+
+
+def bending(pitch: Array, roll: Array, hip: Array | float = 0.0) -> Motion:
+    poses = np.zeros((len(pitch), 66))
+    poses[:, 1], poses[:, 2], poses[:, LEFT_HIP] = pitch, roll, hip
+    return Motion("bending", built_in.average_skeleton(), poses, np.zeros((len(pitch), 3)), 30.0)
+
+
+def task_of(*training: Motion, yaw: float | None = 0.3) -> Task:
+    return Task(Body.of(built_in.average_skeleton()), [], 10, yaw, np.zeros(3), training=training)
+
+
+def space_of(tilt: Tilt, reach: float = 1.0) -> SearchSpace:
+    return SearchSpace(Hip(), np.zeros(3), np.full(3, reach), np.zeros(3), tilt=tilt)
+
+
+def test_who_bends_his_hips_tilts_as_in_training() -> None:
+    hip = np.linspace(-1.0, 1.0, 201)
+    tilt = Tilt.of(Hip(), [bending(0.2 + 0.9 * hip, -0.1 * hip, hip)], 1.0, 2.0 * DEGREE)
+    found = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -0.8], [0.0, 0.0, 0.0, 0.8]]))[0]
+    # a third of a latent's variance and a ridge of 0.05: slopes come out smaller by 0.333 / 0.383
+    shrunk = 0.8 / (1.0 + 0.05 / np.mean(hip**2))
+    np.testing.assert_allclose(found[:, 1], 0.2 + 0.9 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
+    np.testing.assert_allclose(found[:, 2], -0.1 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
+    lost = 0.9 * (1.0 - shrunk / 0.8)  # what the ridge leaves to the range
+    np.testing.assert_allclose([tilt.low[0], tilt.high[0]], [-lost - 2.0 * DEGREE, lost + 2.0 * DEGREE])
+
+
+def test_what_is_proposed_is_added_to_what_goes_with_the_latents() -> None:
+    hip = np.linspace(-1.0, 1.0, 50)
+    space = space_of(Tilt.of(Hip(), [bending(hip, 0.0 * hip, hip)], 1.0, 0.1), reach=0.5)
+    mean, added = space.decode(np.array([[0.0, 0.0, 0.0, 0.4], [0.0, 0.6, -0.2, 0.4]]))[0]
+    np.testing.assert_allclose(added[:3] - mean[:3], [0.0, 0.3, -0.1], atol=1e-12)
+    np.testing.assert_array_equal(added[3:], mean[3:])
+
+
+def test_latents_that_training_never_had_tilt_no_farther_than_training() -> None:
+    hip = np.linspace(-0.1, 0.1, 50)
+    tilt = Tilt.of(Hip(), [bending(4.0 * hip, 0.0 * hip, hip)], 1.0, 0.0)
+    least, most = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]]))[0][:, 1]
+    assert [least, most] == pytest.approx([tilt.least[0], tilt.most[0]])
+    assert most < 0.4
+
+
+@pytest.mark.parametrize("turns", [0, 1, -2])
+def test_a_roll_past_half_a_turn_is_the_same_as_before_it(turns: int) -> None:
+    rolls = np.radians([170.0, 175.0, -175.0, -170.0]) + 2.0 * np.pi * turns
+    tilt = Tilt.of(Hip(), [bending(np.zeros(4), rolls)], 1.0, DEGREE)
+    roll = space_of(tilt).decode(np.zeros((1, 4)))[0][0, 2]
+    assert np.cos(roll) == pytest.approx(-1.0)
+    np.testing.assert_allclose([tilt.low[1], tilt.high[1]], np.radians([-11.0, 11.0]))
+
+
+def test_who_turned_over_in_training_may_turn_over_again_and_again() -> None:
+    cartwheel = bending(np.zeros(73), np.linspace(0.0, 2.0 * np.pi, 73))
+    follower = Follower(task_of(cartwheel), Hip(), Prediction())
+    observation = Observation([], np.zeros(3))
+    space = follower.space(observation)
+    assert space.periodic.tolist() == [False, False, True, False]
+    seen = []
+    for _ in range(50):  # as far as it goes to one side, from frame to frame
+        proposal = np.array([0.0, 0.0, 0.9, 0.0])
+        follower.commit(proposal)
+        seen.append(space.decode(proposal[None])[0][0, 2])
+        space = follower.space(observation)
+    steps = np.diff(seen)
+    np.testing.assert_allclose(steps, np.radians(0.9 * 15.0))
+    assert seen[-1] - seen[0] > 2.0 * np.pi
+    assert not space.periodic[2]
+
+
+def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
+    rng = np.random.default_rng(0)
+    rolling = bending(np.zeros(500), rng.uniform(-1.0, 1.0, 500))
+    prediction = Prediction(tilt_share=1.0, tilt_margin_degrees=0.0)
+    follower = Follower(task_of(rolling), Hip(), prediction)
+    observation = Observation([], np.zeros(3))
+    space = follower.space(observation)
+    tilt = space.tilt
+    assert tilt is not None
+    np.testing.assert_allclose(space.centre[2] + np.array([-1.0, 1.0]) * space.half[2], [tilt.low[1], tilt.high[1]])
+    centres = []
+    for roll in (0.5, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0):
+        last = space.coordinates(np.array([0.0, 0.0, roll, 0.0]))
+        moved = space.centre[2] + roll * space.half[2]
+        follower.commit(np.array([0.0, 0.0, roll, 0.0]))
+        space = follower.space(observation)
+        assert space.half[2] == pytest.approx(np.radians(15.0))
+        assert space.start is not None
+        np.testing.assert_allclose(space.coordinates(space.start.mean), last, atol=1e-12)
+        centres.append(space.centre[2])
+        assert centres[-1] == pytest.approx(min(moved, tilt.high[1] - np.radians(15.0)))
+    assert centres[-1] == pytest.approx(tilt.high[1] - np.radians(15.0))
+
+
+def test_a_walker_tilts_a_few_degrees_more_than_others_did_at_most() -> None:
+    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
+    angles = np.concatenate([walk.poses[:, 3:] for walk in walks])
+    tilts = np.concatenate([walk.poses[:, 1:3] for walk in walks])
+    for prior in (PCA().fit(angles), Loose().fit(angles)):
+        space = Follower(task_of(*walks), prior, Prediction()).space(Observation([], np.zeros(3)))
+        poses = space.decode(space.draw(np.random.default_rng(0), 500))[0]
+        assert (poses[:, 1:3] > tilts.min(axis=0) - np.radians(8.0)).all()
+        assert (poses[:, 1:3] < tilts.max(axis=0) + np.radians(8.0)).all()
+
+
+@pytest.mark.parametrize("how", [Prediction(), Prediction(tilt="box")])
+def test_nothing_to_learn_from_or_a_box_is_a_box_around_upright(how: Prediction) -> None:
+    training = [bending(np.full(9, 0.8), np.zeros(9))] if how.tilt == "box" else []
+    follower = Follower(task_of(*training), Hip(), how)
+    space = follower.space(Observation([], np.zeros(3)))
+    assert space.tilt is None
+    np.testing.assert_allclose(space.centre[:3], [0.3, 0.0, 0.0])
+    np.testing.assert_allclose(space.half[:3], np.radians([45.0, 15.0, 15.0]))
+    follower.commit(np.array([0.5, 1.0, 1.0, 0.0]))
+    np.testing.assert_array_equal(follower.space(Observation([], np.zeros(3))).centre[1:3], 0.0)
+
+
+def test_a_first_pose_that_is_given_begins_with_the_tilt_that_goes_with_it() -> None:
+    hip = np.linspace(-1.0, 1.0, 100)
+    lying = bending(0.9 * hip + np.where(hip > 0.5, 0.8, 0.0), 0.0 * hip, hip)
+    task = replace(task_of(lying), first_pose=np.eye(63)[0] * 0.4)
+    space = Follower(task, Hip(), Prediction()).space(Observation([], np.zeros(3)))
+    assert space.start is not None
+    assert space.centre[1] != 0.0
+    np.testing.assert_allclose(space.coordinates(space.start.mean), [0.3, 0.0, 0.0, 0.4], atol=1e-12)
+
+
+def test_a_tilt_that_was_learned_before_is_not_learned_again() -> None:
+    tilt = Tilt.of(Hip(), [bending(np.full(4, 0.5), np.zeros(4))], 1.0, DEGREE)
+    space = Follower(task_of(), Hip(), Prediction(), tilt).space(Observation([], np.zeros(3)))
+    assert space.tilt is tilt
+
+
+def test_a_prior_that_has_learned_already_has_a_box_unless_somebody_wants_its_tilt_learned() -> None:
+    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
+    task = task_of(*walks)
+    learned = PCA().fit(task.angles)
+
+    def tilt(choice: Choice) -> Tilt | None:
+        tracker = prepare(choice, task).tracker(task)
+        assert isinstance(tracker, SynthesisTracker)
+        return Follower(task, learned, tracker.prediction, tracker.tilt).space(Observation([], np.zeros(3))).tilt
+
+    assert tilt(Choice(prior="pca")) is not None
+    assert tilt(Choice(prior="pca", tracker_settings={"tilt": "box"})) is None
+    assert tilt(Choice(prior=learned)) is None
+    assert tilt(Choice(prior=learned, tracker_settings={"tilt": "learned"})) is not None
+
+
+def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
+    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
+    prior = PCA().fit(np.concatenate([walk.poses[:, 3:] for walk in walks]))
+    space = Follower(task_of(*walks), prior, Prediction()).space(Observation([], np.zeros(3)))
+    proposals = space.draw(np.random.default_rng(0), 60)
+    poses = space.decode(proposals)[0]
+    np.testing.assert_array_equal(poses[7:8], space.decode(proposals[7:8])[0])
+    np.testing.assert_array_equal(poses[::-1], space.decode(proposals[::-1])[0])
+    np.testing.assert_allclose(space.proposals(space.coordinates(proposals)), proposals, atol=1e-12)
+    proposals[3, 1] = np.nan
+    with pytest.raises(ValueError, match="proposals must be finite, got nan or infinity"):
+        space.decode(proposals)
+
+
+@pytest.mark.parametrize(
+    ("setting", "error"),
+    [
+        ({"tilt": "upright"}, "tilt must be one of learned, box, got 'upright'"),
+        ({"tilt_share": 0.0}, "tilt_share must be above 0 and at most 1, got 0.0"),
+        ({"tilt_share": 1.5}, "tilt_share must be above 0 and at most 1, got 1.5"),
+        ({"tilt_share": np.nan}, "tilt_share must be above 0 and at most 1, got nan"),
+        ({"tilt_margin_degrees": -1.0}, "tilt_margin_degrees must be 0 or more, got -1.0"),
+        ({"tilt_margin_degrees": np.inf}, "tilt_margin_degrees must be 0 or more, got inf"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(setting: dict[str, float | str], error: str) -> None:
+    with pytest.raises(ValueError, match=error):
+        Prediction(**setting)  # type: ignore[arg-type]
