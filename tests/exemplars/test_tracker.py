@@ -29,7 +29,7 @@ def test_it_keeps_the_rules_of_the_kit() -> None:
 
 
 def test_somebody_unknown_walks_and_nobody_says_that_it_is_a_walk() -> None:
-    track = posefit.track("02_01", train=ELSEWHERE, tracker="exemplars", frames=(0, 20))
+    track = posefit.track("02_01", train=ELSEWHERE, tracker="exemplars", frames=(0, 30))
     assert track.measures.mpjpe_mm < 60.0  # a swarm in nine components of the same library is 200 mm off
     assert track.measures.lost_rate == 0.0
     assert track.measures.swap_rate == 0.0
@@ -37,8 +37,8 @@ def test_somebody_unknown_walks_and_nobody_says_that_it_is_a_walk() -> None:
 
 def test_who_is_recorded_is_found_again() -> None:
     himself = replace(recorded.clip("16_15").motion(), name="again")  # nobody learns from a clip of the same name
-    track = posefit.track(himself, train=["library:16"], tracker="exemplars", frames=(0, 15))
-    assert track.measures.mpjpe_mm < 20.0
+    track = posefit.track(himself, train=["library:16"], tracker="exemplars", frames=(0, 20))
+    assert track.measures.mpjpe_mm < 15.0
 
 
 @pytest.mark.parametrize("fps", [10.0, 30.0, 60.0, 120.0])
@@ -60,10 +60,22 @@ def test_the_root_is_found_where_nobody_says_where_it_is(walker: Walk) -> None:
     assert off.max() < 150.0
 
 
+def test_an_unknown_walker_is_found_as_well_where_nobody_says_where_he_is() -> None:
+    known, found = (
+        posefit.track(
+            "02_01", train=ELSEWHERE, tracker="exemplars", frames=(0, 20), view_degrees=90.0, translation=translation
+        ).measures.mpjpe_mm
+        for translation in ("known", "aligned")
+    )
+    assert found < known + 15.0
+
+
 def test_several_cameras_see_better_than_one() -> None:
-    motion = built_in.motion("walk-a", frames=10)
-    one, two = (followed(walk_of(motion, views)).mean() for views in ((90.0,), (90.0, 0.0)))
-    assert two < one
+    one, two = (
+        posefit.track("09_01", train=["library:16,127"], tracker="exemplars", frames=(0, 20), view_degrees=views)
+        for views in ((90.0,), (90.0, 0.0))
+    )
+    assert two.measures.mpjpe_mm < one.measures.mpjpe_mm
 
 
 def test_a_search_around_the_path_makes_it_better(walker: Walk) -> None:
@@ -78,8 +90,8 @@ def test_a_first_pose_that_is_given_is_where_it_begins() -> None:
     walk = walk_of(motion, (90.0,))
     given = {"first_pose": motion.poses[0, 3:]}
     off = followed(walk, given, lag=0)
-    assert off[0] < 60.0
-    assert off[0] <= followed(walk, lag=0)[0] + 1.0
+    assert off.max() < 80.0
+    assert off.max() < followed(walk, lag=0).max()
 
 
 def test_a_track_goes_on_where_it_was_interrupted(walker: Walk) -> None:
