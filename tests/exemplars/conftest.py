@@ -1,10 +1,11 @@
 """Clips to learn from, and a walk to follow that is none of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation, Task
@@ -54,6 +55,13 @@ def walk_of(motion: Motion, views: Sequence[float] = (45.0,), size: tuple[int, i
         training=training,
     )
     return Walk(task, list(scene.observations), motion)
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    """Have matrices multiplied by one thread, as a track has them: on a busy machine more are ten times as slow."""
+    with threadpool_limits(1):
+        yield
 
 
 @pytest.fixture(scope="session")
