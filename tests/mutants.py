@@ -262,6 +262,30 @@ MUTANTS = (
         (("exchanged[:, 2] *= -1.0", "exchanged[:, 2] *= 1.0"),),
         "tests/geometry/test_alike.py::test_mirrored_joints_are_those_of_the_other_side_across_the_plane_that_is_faced_along",
     ),
+    Mutant(
+        "a pose keeps the last step that reaches it, not the cheapest",
+        "plugins/posefit_exemplars/kernels.py",
+        (("best = min(least[k], limit)", "best = limit"),),
+        "tests/exemplars/test_beam.py::test_each_pose_is_reached_by_its_cheapest_step",
+    ),
+    Mutant(
+        "what was seen later weighs nothing",
+        "plugins/posefit_exemplars/window.py",
+        (("backward = one.kernel @ (backward * one.likelihoods)", "backward = one.kernel @ backward"),),
+        "tests/sources/test_exemplars_steps.py::test_what_follows_weighs_a_state_as_all_ways_on_from_it_do",
+    ),
+    Mutant(
+        "a first pose that is given is looked for beyond the budget",
+        "plugins/posefit_exemplars/tracker.py",
+        (("[: min(most // len(turns), WIDTH)]", "[:WIDTH]"),),
+        "tests/exemplars/test_frames.py::test_the_budget_holds_and_small_pictures_count_by_their_pixels",
+    ),
+    Mutant(
+        "the filter leans on the frames before",
+        "plugins/posefit_exemplars/smoothing.py",
+        (("np.arange(here - reach, here + reach + 1)", "np.arange(here - reach, here + 1)"),),
+        "tests/exemplars/test_smoothing.py::test_a_steady_movement_stays_where_it_is_and_every_frame_comes_in_its_order",
+    ),
 )
 
 

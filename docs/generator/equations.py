@@ -15,6 +15,8 @@ SOURCES = {
     "DEUTSCHER2005": "Deutscher and Reid, Articulated body motion capture by stochastic search, 2005",
     "HANSEN2016": "Hansen, The CMA evolution strategy: a tutorial, 2016",
     "AUGER2005": "Auger and Hansen, A restart CMA evolution strategy with increasing population size, 2005",
+    "TOYAMA2001": "Toyama and Blake, Probabilistic tracking in a metric space, 2001",
+    "RABINER1989": "Rabiner, A tutorial on hidden Markov models and selected applications in speech recognition, 1989",
 }
 _TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")

@@ -60,7 +60,7 @@ class Beam:
         return self.chosen(rows[np.argsort(self.totals[rows], kind="stable")])
 
 
-def varied(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> Rows:
+def assorted(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> Rows:
     """Return the states of least `totals` (n,), but of those that are alike and face alike only the best few.
 
     What else somebody may be doing is often behind for a while before silhouettes tell that it is right.
@@ -140,7 +140,7 @@ def stepped(
     found: list[tuple[Rows, Rows, Array]] = []
     for one in np.unique(bins):
         rows = np.flatnonzero(bins == one)
-        count = kernels.reached(
+        count = kernels.cheapest_steps(
             codes,
             ways,
             beam.totals,
@@ -171,7 +171,7 @@ def stepped(
         ahead.places[parents],
     )
     found_all = joined_beams(every)
-    return found_all.chosen(varied(exemplars, found_all, found_all.totals, most))
+    return found_all.chosen(assorted(exemplars, found_all, found_all.totals, most))
 
 
 def jumped(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:
@@ -209,7 +209,7 @@ def strayed(places: Array, expected: Array, eye: Array | None, steps: Steps) -> 
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
+class Transition:
     """From one frame to the next: all that a model of transitions may know."""
 
     exemplars: Exemplars
@@ -220,15 +220,15 @@ class Passage:
     eye: Array | None  # (3,) metres: where the only camera stands; None where there are several
 
 
-Transitions = Callable[[Passage], Array]
+Transitions = Callable[[Transition], Array]
 
 
-def between(passage: Passage, *, steps: Steps) -> Array:
+def transition_costs(transition: Transition, *, steps: Steps) -> Array:
     """Return what each step from a state of one frame to one of the next costs (n, m); none costs more than a jump."""
-    exemplars, before, beam, root = passage.exemplars, passage.before, passage.beam, passage.root
-    ahead = Ahead.of(exemplars, before, passage.seconds, steps, root)
+    exemplars, before, beam, root = transition.exemplars, transition.before, transition.beam, transition.root
+    ahead = Ahead.of(exemplars, before, transition.seconds, steps, root)
     costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)  # TOYAMA2001 (dynamics)
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
-        costs += strayed(beam.places, ahead.places[:, None], passage.eye, steps)
+        costs += strayed(beam.places, ahead.places[:, None], transition.eye, steps)
     return np.asarray(np.minimum(costs, steps.jump))

@@ -11,7 +11,7 @@ from posefit import settings
 from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.registry import registry
-from posefit_exemplars.beam import Passage, Steps, Transitions, between
+from posefit_exemplars.beam import Steps, Transition, Transitions, transition_costs
 from posefit_exemplars.exemplars import exemplars_of
 from posefit_exemplars.refinement import Make
 from posefit_exemplars.tracker import REFINED, ExemplarTracker
@@ -53,7 +53,7 @@ def exemplars(
         pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         transitions: what steps cost: "clips", as above; or MODULE:FUNCTION, a function of your own, which takes a
-            `posefit_exemplars.beam.Passage` and returns the costs (n, m) of all steps from a frame to the next.
+            `posefit_exemplars.beam.Transition` and returns the costs (n, m) of all steps from a frame to the next.
         mirrored: whether the mirror images of all clips are learned from as well.
     """
     for name, value in (
@@ -78,7 +78,7 @@ def exemplars(
     slack = math.sqrt(intervals)
     steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
     states = exemplars_of(task.training, task.body.skeleton, mirrored)
-    costs = partial(between, steps=steps) if transitions == "clips" else partial(_checked, _named(transitions))
+    costs = partial(transition_costs, steps=steps) if transitions == "clips" else partial(_checked, _named(transitions))
     return ExemplarTracker(task, states, steps, costs, temperature, lag, _maker(task, refiner), pull, smoothing)
 
 
@@ -104,9 +104,9 @@ def _named(name: str) -> Transitions:
     return cast(Transitions, found)
 
 
-def _checked(transitions: Transitions, passage: Passage) -> Array:
+def _checked(transitions: Transitions, transition: Transition) -> Array:
     """Return what somebody's model says. Raises ValueError where that is no number for every step."""
-    costs, shape = np.asarray(transitions(passage), dtype=np.float64), (len(passage.before), len(passage.beam))
+    costs, shape = np.asarray(transitions(transition), dtype=np.float64), (len(transition.before), len(transition.beam))
     if costs.shape != shape or not np.isfinite(costs).all():
         raise ValueError(f"transitions must return finite costs of shape {shape}, got shape {costs.shape}")
     return costs

@@ -8,7 +8,7 @@ STRETCH = 4  # dimensions of a code after which a distance is looked at; their n
 
 
 @jit
-def reached(ahead, ways, totals, rows, near, codes, bounds, scale, limit, least, owners, touched):
+def cheapest_steps(ahead, ways, totals, rows, near, codes, bounds, scale, limit, least, owners, touched):
     """Return how many poses some states of a beam go on to, each by its cheapest step.
 
     `ahead` (speeds, n, D) is where clips go on, `ways` (speeds, n) what the root's way costs there; `rows` are the

@@ -15,7 +15,7 @@ SMOOTHED = 3.0  # standard deviations that the filter reaches to either side
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Finding:
     """What was found in a frame."""
 
     pose: Array  # (66,)
@@ -26,12 +26,12 @@ class Found:
     cpu_seconds: float
 
 
-def smoothed(frames: Iterable[Found], spread: float, ahead: int) -> Iterator[Frame]:
+def smoothed(frames: Iterable[Finding], spread: float, ahead: int) -> Iterator[Frame]:
     """Yield each frame as the weighted mean of those up to `ahead` before and after it, `ahead` frames later.
 
     `spread` is the standard deviation of the weights, in frames; 0 leaves everything as it is.
     """
-    recent: deque[Found] = deque()
+    recent: deque[Finding] = deque()
     here = 0  # where in `recent` the next one to tell is
     for one in frames:
         recent.append(one)
@@ -46,7 +46,7 @@ def smoothed(frames: Iterable[Found], spread: float, ahead: int) -> Iterator[Fra
         here += 1
 
 
-def mean_of(poses: Array, places: Array, here: int, spread: float) -> tuple[Array, Array]:
+def mean_about(poses: Array, places: Array, here: int, spread: float) -> tuple[Array, Array]:
     """Return the weighted mean pose (66,) and place (3,) of frames (n, 66), (n, 3) about one of them.
 
     As many frames before as after it count, so that the mean of a steady movement is where it is.
@@ -60,10 +60,10 @@ def mean_of(poses: Array, places: Array, here: int, spread: float) -> tuple[Arra
     return poses[here] + share @ wrapped(poses[rows] - poses[here]), share @ places[rows]
 
 
-def _told(recent: Sequence[Found], here: int, spread: float) -> Frame:
+def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
     one = recent[here]
     poses, places = (np.array([getattr(each, name) for each in recent]) for name in ("pose", "place"))
-    pose, place = mean_of(poses, places, here, spread)
+    pose, place = mean_about(poses, places, here, spread)
     if one.look.root is not None:
         place = one.place
     cost, areas = one.look.measured(pose, place)

@@ -15,20 +15,20 @@ from posefit.geometry.skeleton import ANGLES
 from posefit_exemplars.beam import (
     TURN,
     Beam,
-    Passage,
     Steps,
+    Transition,
     Transitions,
+    assorted,
     joined_beams,
     jumped,
     stepped,
     strayed,
-    varied,
 )
 from posefit_exemplars.codes import Rows
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.look import Look
 from posefit_exemplars.refinement import Make, refined, surroundings
-from posefit_exemplars.smoothing import SMOOTHED, Found, smoothed
+from posefit_exemplars.smoothing import SMOOTHED, Finding, smoothed
 from posefit_exemplars.window import Seen, likeliest, mean_around, seen, weights
 
 WIDTH = 400  # states that a beam keeps
@@ -76,7 +76,7 @@ class ExemplarTracker:
         """How many of the frames that are waited for are there to smooth with."""
         return min(math.ceil(SMOOTHED * self.smoothing * self.task.fps / 30.0), self.lag)
 
-    def _refined(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Found]:
+    def _refined(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Finding]:
         """Yield what is found in each frame, before it is smoothed."""
         waiting: deque[_Waiting] = deque()
         latest: Seen | None = None
@@ -117,18 +117,18 @@ class ExemplarTracker:
         beam = self._at(look, joined_beams(*beams), latest is not None)
         costs = look.small(self._poses(beam), beam.places)
         used = (looked + len(beam)) * look.share
-        beam = beam.chosen(varied(self.exemplars, beam, beam.totals + costs / self.temperature, full))
+        beam = beam.chosen(assorted(self.exemplars, beam, beam.totals + costs / self.temperature, full))
         fits = look.full(self._poses(beam), beam.places) / self.temperature
         used += len(beam)
-        best = varied(self.exemplars, beam, beam.totals + fits, WIDTH)
+        best = assorted(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used
 
     def _joined(self, beam: Beam, fits: Array, before: Seen | None, look: Look) -> Seen:
         """Return a frame, joined to the one before."""
         if before is None:
             return seen(beam, fits, None, None)
-        passage = Passage(self.exemplars, before.beam, beam, 1.0 / self.task.fps, look.root, look.eye)
-        return seen(beam, fits, before, self.transitions(passage))
+        transition = Transition(self.exemplars, before.beam, beam, 1.0 / self.task.fps, look.root, look.eye)
+        return seen(beam, fits, before, self.transitions(transition))
 
     def _elsewhere(self, look: Look, before: Beam | None, most: int, rng: np.random.Generator) -> tuple[Beam, int]:
         """Return states that fit, wherever they are; and how many small pictures were looked at."""
@@ -178,7 +178,7 @@ class ExemplarTracker:
         off = strayed(places, beam.places, look.eye, self.steps)
         return replace(beam, places=places, totals=beam.totals + off)
 
-    def _told(self, waiting: deque[_Waiting], off: Array, rng: np.random.Generator) -> tuple[Found, Array]:
+    def _told(self, waiting: deque[_Waiting], off: Array, rng: np.random.Generator) -> tuple[Finding, Array]:
         """Return the oldest frame that waits, refined around the best way to the newest; and how far off that it is.
 
         The path's pose is the mean of what is likely about it. The search begins as far off it as the frame before.
@@ -203,4 +203,4 @@ class ExemplarTracker:
         if oldest.usable:
             place = look.placed(pose[None], place[None])[0]
         seconds = oldest.seconds + time.perf_counter() - began
-        return Found(pose, place, look, evaluations, seconds, oldest.cpu_seconds + time.process_time() - begun), off
+        return Finding(pose, place, look, evaluations, seconds, oldest.cpu_seconds + time.process_time() - begun), off

@@ -1,10 +1,11 @@
 """Clips to learn from, and a walk to follow that is none of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation, Task
@@ -40,9 +41,9 @@ class Walk:
         return np.asarray(1000.0 * np.linalg.norm(skeleton.joints(poses, places) - true, axis=-1).mean(axis=1))
 
 
-def walk_of(motion: Motion, views: Sequence[float] = (45.0,)) -> Walk:
+def walk_of(motion: Motion, views: Sequence[float] = (45.0,), size: tuple[int, int] = (160, 120)) -> Walk:
     """Return a walk as cameras see it, to be followed by what other built-in motions teach."""
-    scene = synthetic(motion, list(views), (160, 120), [], (None, None))
+    scene = synthetic(motion, list(views), size, [], (None, None))
     training = [built_in.motion(name, frames=60) for name in ("walk-b", "walk-c", "run-b")]
     task = Task(
         Body.of(motion.skeleton),
@@ -54,6 +55,13 @@ def walk_of(motion: Motion, views: Sequence[float] = (45.0,)) -> Walk:
         training=training,
     )
     return Walk(task, list(scene.observations), motion)
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    """Have matrices multiplied by one thread, as a track has them: on a busy machine more are ten times as slow."""
+    with threadpool_limits(1):
+        yield
 
 
 @pytest.fixture(scope="session")

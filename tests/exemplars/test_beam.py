@@ -16,16 +16,16 @@ from posefit_exemplars.beam import (
     SPEEDS,
     TURN,
     Beam,
-    Passage,
     Steps,
-    between,
+    Transition,
+    assorted,
     bins_of,
     joined_beams,
     jumped,
     squares,
     stepped,
     strayed,
-    varied,
+    transition_costs,
 )
 from posefit_exemplars.exemplars import Exemplars, about_vertical
 
@@ -67,7 +67,7 @@ def test_each_pose_is_reached_by_its_cheapest_step(limit: float) -> None:
     bounds = np.array([0, 4, 9, 9, 15, 20])  # one group is empty
     rows, near = np.array([0, 2, 3]), rng.integers(0, 4, (5, 2))  # nobody looks at the last group
     least, owners, touched = np.full(20, np.inf), np.zeros(20, dtype=np.int64), np.zeros(20, dtype=np.int64)
-    count = kernels.reached(ahead, ways, totals, rows, near, codes, bounds, 0.25, limit, least, owners, touched)
+    count = kernels.cheapest_steps(ahead, ways, totals, rows, near, codes, bounds, 0.25, limit, least, owners, touched)
     twin = np.full((5, 20), np.inf)
     for r in rows:
         for k in range(20):
@@ -143,7 +143,7 @@ def test_of_those_alike_only_the_best_few_are_kept(small: Exemplars) -> None:
     rng = np.random.default_rng(1)
     many = beam(rng.integers(0, len(small), 300).tolist(), rng.uniform(-4.0, 4.0, 300).tolist(), [0.0] * 300)
     totals, most = rng.random(300), 2 * KINDS
-    kept = varied(small, many, totals, most)
+    kept = assorted(small, many, totals, most)
     kinds = list(zip(small.kinds[many.states].tolist(), bins_of(many.yaws).tolist(), strict=True))
     twin, had = [], dict.fromkeys(kinds, 0)
     for row in np.argsort(totals):
@@ -197,7 +197,7 @@ def test_between_two_beams_a_step_costs_what_the_twin_says_and_never_more_than_a
     eye = np.array([3.0, 1.0, 0.0])
     before = beam([3, 11, 25], [0.1, 6.2, 2.0], [0.0, 2.5, 1.0])
     after = beam([4, 12, 26, 3], [0.15, -0.1, 2.1, 0.1], [0.0] * 4, np.full((4, 3), 0.02))
-    found = between(Passage(small, before, after, SECONDS, root, eye), steps=STEPS)
+    found = transition_costs(Transition(small, before, after, SECONDS, root, eye), steps=STEPS)
     _, turned, ways = small.after(before.states, SECONDS)
     twin = costs_of_steps(small, before, root)[:, after.states]
     for i in range(3):
@@ -216,11 +216,11 @@ def test_a_turn_costs_as_much_to_the_left_as_to_the_right(small: Exemplars) -> N
     facing = float(small.after(before.states, SECONDS)[1][0])
     root = small.after(before.states, SECONDS)[2][0]
     after = beam([4] * 5, [facing + turn for turn in (-0.2, -0.1, 0.0, 0.1, 0.2)], [0.0] * 5)
-    costs = between(Passage(small, before, after, SECONDS, root, None), steps=STEPS)[0]
+    costs = transition_costs(Transition(small, before, after, SECONDS, root, None), steps=STEPS)[0]
     np.testing.assert_allclose(costs, costs[::-1], atol=1e-9)
     np.testing.assert_allclose(costs[3:] - costs[2], 0.5 * (np.array([0.1, 0.2]) / STEPS.turning) ** 2)
     # nor does a whole turn make a difference
     round_ = replace(after, yaws=after.yaws + 2.0 * np.pi)
     np.testing.assert_allclose(
-        between(Passage(small, before, round_, SECONDS, root, None), steps=STEPS)[0], costs, atol=1e-9
+        transition_costs(Transition(small, before, round_, SECONDS, root, None), steps=STEPS)[0], costs, atol=1e-9
     )

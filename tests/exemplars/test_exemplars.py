@@ -42,14 +42,21 @@ def test_a_turn_of_the_whole_body_makes_no_other_code() -> None:
     walk = built_in.motion("walk-a", frames=20)
     turned = walk.poses.copy()
     turned[:, 0] += 1.2
-    coding = Coding.of(SKELETON, [walk.poses[:9], walk.poses[9:]])
+    coding = Coding.of(SKELETON, [walk.poses])
     np.testing.assert_allclose(coding.coded(turned), coding.coded(walk.poses), atol=1e-6)
 
 
 def test_frames_that_are_alike_are_kept_once_but_ends_of_clips_always() -> None:
-    codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1]], dtype=np.float32) * SAME
-    assert thinned(codes).tolist() == [0, 3, 4, 5]
+    codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1], [5.2]], dtype=np.float32) * SAME
+    assert thinned(codes).tolist() == [0, 3, 4, 6]
     assert thinned(codes[:2]).tolist() == [0, 1]
+
+
+def test_codes_are_the_same_however_the_poses_are_divided_into_clips() -> None:
+    walk = built_in.motion("walk-a", frames=30).poses
+    whole, parts = Coding.of(SKELETON, [walk]), Coding.of(SKELETON, [walk[:7], walk[7:]])
+    apart = [np.linalg.norm(one.coded(walk)[:, None] - one.coded(walk), axis=-1) for one in (whole, parts)]
+    np.testing.assert_allclose(*apart, atol=1e-5)
 
 
 def test_groups_begin_with_poses_that_are_as_unlike_as_can_be() -> None:

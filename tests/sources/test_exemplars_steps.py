@@ -1,0 +1,121 @@
+"""Toyama and Blake 2001, and Rabiner 1989: each step by hand, or against all ways through a small model."""
+
+from itertools import pairwise, product
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit.motion import built_in
+from posefit.motion.built_in import average_skeleton
+from posefit_exemplars.beam import Beam, Steps, Transition, transition_costs
+from posefit_exemplars.codes import groups
+from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.window import Seen, likeliest, seen, weights
+
+SIZES = (3, 4, 2, 3, 4)  # states of each frame: 288 ways
+
+
+class Model(NamedTuple):
+    """Costs over the temperature of silhouettes (n,) and of steps (m, n), and the frames that came of them."""
+
+    fits: list[Array]
+    steps: list[Array]
+    frames: list[Seen]
+
+
+def model(seed: int) -> Model:
+    rng = np.random.default_rng(seed)
+    fits = [rng.uniform(0.0, 3.0, size) for size in SIZES]
+    steps = [rng.uniform(0.0, 3.0, sizes) for sizes in pairwise(SIZES)]
+    frames: list[Seen] = []
+    for k, fit in enumerate(fits):
+        many = len(fit)
+        beam = Beam(np.arange(many), np.zeros(many), np.full(many, -1), np.zeros(many), np.zeros((many, 3)))
+        frames.append(seen(beam, fit, frames[-1] if k else None, steps[k - 1] if k else None))
+    return Model(fits, steps, frames)
+
+
+def ways(model: Model, count: int) -> dict[tuple[int, ...], float]:
+    """Return what every way through the first frames costs."""
+    return {
+        way: sum(float(model.fits[k][row]) for k, row in enumerate(way))
+        + sum(float(model.steps[k][way[k], way[k + 1]]) for k in range(count - 1))
+        for way in product(*(range(size) for size in SIZES[:count]))
+    }
+
+
+def shares(costs: dict[tuple[int, ...], float], frame: int) -> Array:
+    """Return how likely each state of a frame is: the share of all ways that lead through it."""
+    found = np.zeros(SIZES[frame])
+    for way, cost in costs.items():
+        found[way[frame]] += np.exp(-cost)
+    return found / found.sum()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_state_is_as_likely_as_all_ways_to_it_together(seed: int) -> None:  # RABINER1989 (forward)
+    one = model(seed)
+    for k, frame in enumerate(one.frames):
+        np.testing.assert_allclose(frame.forward, shares(ways(one, k + 1), k), rtol=1e-5)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do(seed: int) -> None:  # RABINER1989 (backward)
+    one = model(seed)
+    for first in range(len(SIZES)):
+        for count in range(first + 1, len(SIZES) + 1):
+            np.testing.assert_allclose(weights(one.frames[first:count]), shares(ways(one, count), first), rtol=1e-5)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_way_that_is_told_is_the_cheapest_of_all(seed: int) -> None:  # RABINER1989 (Viterbi)
+    one = model(seed)
+    for count in range(1, len(SIZES) + 1):
+        costs = ways(one, count)
+        best = min(costs, key=lambda way: costs[way])
+        assert [likeliest(one.frames[k:count]) for k in range(count)] == list(best)
+        each = [min(cost for way, cost in costs.items() if way[-1] == row) for row in range(SIZES[count - 1])]
+        np.testing.assert_allclose(one.frames[count - 1].beam.totals, np.array(each) - min(each), atol=1e-12)
+
+
+def test_exemplars_are_poses_of_the_clips_that_lie_apart() -> None:  # TOYAMA2001 (exemplars)
+    # on a line: after 0 the farthest is 9, after both it is 4 (4 from 0, 5 from 9), then 6
+    line = np.array([[0.0], [4.0], [1.0], [9.0], [6.0]], dtype=np.float32)
+    assert line[groups(line, 4)[0]].ravel().tolist() == [0.0, 9.0, 4.0, 6.0]
+    rng = np.random.default_rng(0)
+    codes = rng.normal(size=(200, 4)).astype(np.float32)
+    centres, _ = groups(codes, 12)
+    for count in range(1, 12):  # the slow twin
+        away = np.linalg.norm(codes[:, None] - codes[centres[:count]], axis=-1).min(axis=1)
+        assert centres[count] == away.argmax()
+
+
+def test_likelihood_is_an_exponential_of_the_distance_over_a_temperature() -> None:  # TOYAMA2001 (likelihood)
+    beam = Beam(np.arange(3), np.zeros(3), np.full(3, -1), np.zeros(3), np.zeros((3, 3)))
+    # distances of 6, 6 + 2 ln 2 and 6 + 2 ln 4 over a temperature of 2: likelihoods as 4 : 2 : 1
+    found = seen(beam, (6.0 + 2.0 * np.log([1.0, 2.0, 4.0])) / 2.0, None, None)
+    np.testing.assert_allclose(found.likelihoods, [1.0, 0.5, 0.25])
+    np.testing.assert_allclose(found.forward, [4 / 7, 2 / 7, 1 / 7])
+
+
+def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:  # TOYAMA2001 (dynamics)
+    # a clip of 30 frames a second: who does what it did next pays nothing, who is 3 cm off half a unit
+    walk = built_in.motion("walk-a", frames=20)
+    clips = Exemplars.of([walk], average_skeleton())
+    steps = Steps(0.03, np.radians(8.0), 12.0, 0.01, 0.03, 0.008)
+    after = int(clips.lasts[0])
+    for state in range(after):
+        seconds = float(clips.times[state + 1] - clips.times[state])
+        yaws = clips.poses[[state, state + 1], 0]
+        before = Beam(np.array([state]), yaws[:1], np.array([-1]), np.zeros(1), clips.paths[[state]])
+        beams = Beam(
+            np.array([state + 1, after]), np.repeat(yaws[1:], 2), np.zeros(2, int), np.zeros(2), np.zeros((2, 3))
+        )
+        following, last = transition_costs(
+            Transition(clips, before, beams, seconds, clips.paths[state + 1], None), steps=steps
+        )[0]
+        assert following == pytest.approx(0.0, abs=1e-4)
+        off = float(((clips.codes[state + 1] - clips.codes[after]) ** 2).sum())
+        assert last <= min(0.5 * off / 0.03**2, 12.0) + 1e-4  # or less, at another speed
