@@ -49,12 +49,11 @@ def exemplars(
         depth: and towards or away from a single camera; above 0.
         pace: metres that a root that is known may be off where its clip goes on; above 0.
         lag: frames that are seen before a pose is told, 0 or more.
+        mirrored: whether the mirror images of all clips are learned from as well.
         refiner: the optimiser that searches around the path, or "none".
         pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        transitions: what steps cost: "clips", as above; or MODULE:FUNCTION, a function of your own, which takes a
-            `posefit_exemplars.beam.Transition` and returns the costs (n, m) of all steps from a frame to the next.
-        mirrored: whether the mirror images of all clips are learned from as well.
+        transitions: what gives the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
     """
     for name, value in (
         ("spread", spread),

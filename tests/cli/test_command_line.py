@@ -189,7 +189,7 @@ def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> 
     stack = np.stack([cv2.imread(str(path), 0) for path in sorted(folder.iterdir())])
     np.savez(tmp_path / "masks.npz", masks=stack > 0)
     results = [
-        json.loads(run("track", source, "--view-degrees", "45", "--json", *FEW).stdout)
+        json.loads(run("track", source, "--view-degrees", "45", "--prior", "loose", "--json", *FEW).stdout)
         for source in (folder, tmp_path / "masks.npz")
     ]
     assert results[0]["error_degrees"] is None
@@ -282,9 +282,9 @@ def test_bad_masks_are_refused(tmp_path: Path) -> None:
         (good[:, :60], "0002.png: mask must have shape (90, 120), got (90, 60)"),
     ):
         cv2.imwrite(str(folder / "0002.png"), image)
-        assert message in fails("track", folder, "--out", out, *FEW)
+        assert message in fails("track", folder, "--out", out, "--prior", "loose", *FEW)
     (folder / "0002.png").write_bytes(b"no image")
-    assert "0002.png: expected an image" in fails("track", folder, "--out", out, *FEW)
+    assert "0002.png: expected an image" in fails("track", folder, "--out", out, "--prior", "loose", *FEW)
     (tmp_path / "empty").mkdir()
     assert "expected a folder with mask images" in fails("track", tmp_path / "empty")
     np.savez(tmp_path / "a.npz", other=np.zeros(3))

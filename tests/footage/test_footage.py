@@ -37,7 +37,18 @@ QUICK: dict[str, Any] = {
     "body_frames": 0,
     "frames": (EMPTY + 6, EMPTY + 30),
 }
-BRIEF = ["--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--frames", f"{EMPTY + 6}:{EMPTY + 14}"]
+BRIEF = [
+    "--prior",
+    "loose",
+    "--evaluations",
+    "200",
+    "--restarts",
+    "1",
+    "--body-frames",
+    "0",
+    "--frames",
+    f"{EMPTY + 6}:{EMPTY + 14}",
+]
 
 
 def run(*words: object) -> Result:
@@ -140,7 +151,9 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path
     assert views[3].silhouettes[0].valid.all()
     calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
     sources = [tmp_path / "a.npz", tmp_path / "b.npz"]
-    result = posefit.track(sources, camera=calibration, up="y", evaluations=200, restarts=1, body_frames=0)
+    result = posefit.track(
+        sources, camera=calibration, up="y", prior="loose", evaluations=200, restarts=1, body_frames=0
+    )
     assert result.summary["held_frames"] == 0
     blind = PoseProblem(AVERAGE, [camera(np.pi / 2), camera(0.6)], views[2].silhouettes, line(AVERAGE))
     alone = PoseProblem(AVERAGE, [camera(0.6)], views[2].silhouettes[1:], line(AVERAGE))
@@ -217,7 +230,13 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path, optimiser: str) -> None:
 def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8))
-    settings: dict[str, Any] = {"evaluations": 200, "restarts": 1, "body_frames": 0, "out": tmp_path / "out"}
+    settings: dict[str, Any] = {
+        "prior": "loose",
+        "evaluations": 200,
+        "restarts": 1,
+        "body_frames": 0,
+        "out": tmp_path / "out",
+    }
     with pytest.raises(ValueError, match="expected a track that was interrupted to resume, got none"):
         posefit.track(path, resume=True, **settings)
     with pytest.raises(ValueError, match="resume must be given with out"):
@@ -251,7 +270,7 @@ def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
         "resource.setrlimit(resource.RLIMIT_FSIZE, (24_000, 24_000))\n"
         "from posefit.cli import main\n"
         f"sys.exit(main(['track', {str(tmp_path / 'a.npz')!r}, '--out', {str(tmp_path / 'out')!r}, '--evaluations', "
-        "'200', '--restarts', '0', '--body-frames', '0']))\n"
+        "'200', '--prior', 'loose', '--restarts', '0', '--body-frames', '0']))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     lines = [line for line in done.stderr.splitlines() if line.startswith("posefit:")]
@@ -261,8 +280,8 @@ def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
     assert "finished frames are kept" in lines[0]
     assert not (tmp_path / "out").exists()
     again = run(
-        "track", tmp_path / "a.npz", "--out", tmp_path / "out", "--evaluations", "200", "--restarts", "0",
-        "--body-frames", "0", "--resume",
+        "track", tmp_path / "a.npz", "--out", tmp_path / "out", "--evaluations", "200", "--prior", "loose",
+        "--restarts", "0", "--body-frames", "0", "--resume",
     )  # fmt: skip
     assert again.exit_code == 0, again.stderr
     assert "going on from frame" in again.stderr
