@@ -18,7 +18,7 @@ BINS = 36  # of a full turn: two states of one pose in one bin are one
 SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
 TURN = np.radians(7.0)  # how far a candidate turns away from its clip, to either side, or not at all
 NEAR = 4  # groups of poses that a state goes on to
-KINDS = 20  # of poses and yaws that a beam has room for, when each has all that it may have
+SHARES = 20  # of a beam: poses that are alike and face alike have one of them at most
 FACINGS = 4  # yaws, of which each may have its share of a beam to itself
 HOPELESS = 8.0  # beyond the cost of a jump; what costs more is not looked at
 
@@ -52,13 +52,6 @@ class Beam:
         """Return some of the states."""
         return Beam(self.states[rows], self.yaws[rows], self.parents[rows], self.totals[rows], self.places[rows])
 
-    def best(self, count: int) -> "Beam":
-        """Return the states of least total, the best first."""
-        rows = np.arange(len(self))
-        if count < len(self):
-            rows = np.sort(np.argpartition(self.totals, count)[:count])
-        return self.chosen(rows[np.argsort(self.totals[rows], kind="stable")])
-
 
 def assorted(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> Rows:
     """Return the states of least `totals` (n,), but of those that are alike and face alike only the best few.
@@ -69,7 +62,7 @@ def assorted(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> Rows
     order = np.lexsort((totals, kind))
     begins = np.flatnonzero(np.diff(kind[order], prepend=-1))
     rank = np.arange(len(order)) - np.repeat(begins, np.diff(np.append(begins, len(order))))
-    kept = order[rank < max(most // KINDS, 1)]
+    kept = order[rank < max(most // SHARES, 1)]
     return kept[np.argsort(totals[kept], kind="stable")[:most]]
 
 

@@ -12,7 +12,7 @@ from posefit_exemplars.beam import (
     BINS,
     FACINGS,
     HOPELESS,
-    KINDS,
+    SHARES,
     SPEEDS,
     TURN,
     Beam,
@@ -142,7 +142,7 @@ def test_there_are_at_most_so_many_and_a_yaw_has_its_share_of_them(small: Exempl
 def test_of_those_alike_only_the_best_few_are_kept(small: Exemplars) -> None:
     rng = np.random.default_rng(1)
     many = beam(rng.integers(0, len(small), 300).tolist(), rng.uniform(-4.0, 4.0, 300).tolist(), [0.0] * 300)
-    totals, most = rng.random(300), 2 * KINDS
+    totals, most = rng.random(300), 2 * SHARES
     kept = assorted(small, many, totals, most)
     kinds = list(zip(small.kinds[many.states].tolist(), bins_of(many.yaws).tolist(), strict=True))
     twin, had = [], dict.fromkeys(kinds, 0)
@@ -170,10 +170,6 @@ def test_a_jump_comes_from_the_best_and_costs_the_same_anywhere() -> None:
     assert found.parents.tolist() == [1, 1]
     assert found.totals.tolist() == [15.0, 15.0]
     assert found.places.tolist() == [[1.0, 2.0, 3.0]] * 2
-
-
-def test_the_best_come_first() -> None:
-    assert beam([1, 2, 3], [0.0] * 3, [5.0, 1.0, 2.0]).best(2).states.tolist() == [2, 3]
 
 
 def test_a_root_strays_more_easily_along_the_line_of_sight_than_across_it() -> None:

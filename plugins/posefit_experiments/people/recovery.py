@@ -54,7 +54,7 @@ class Unseen(Sequence[Observation]):
         if not self.start <= k < self.stop:
             return seen
         empty = [Silhouette.of(np.zeros_like(one.mask)) for one in seen.silhouettes]
-        return Observation(empty, self.observations[self.start - 1].translation, usable=False)
+        return Observation(empty, None, usable=False)
 
 
 def recoveries(
