@@ -7,6 +7,7 @@ joint is found from all joints of its group; that is the thirty lines below.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,10 @@ class Recalibration:
             object.__setattr__(self, name, value)
         if not 0.0 <= self.second_side <= 1.0:
             raise ValueError(f"second_side must lie in 0 to 1, got {self.second_side}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON holds it; its names are those that it is made from."""
+        return {name: np.asarray(value).tolist() for name, value in vars(self).items()}
 
 
 def coverage(distances: Array, radii: Array) -> float:

@@ -11,7 +11,7 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.posterior.calibration import LEVELS, Recalibration
 from posefit.posterior.modes import Posterior
 
-HALVINGS = 20  # of where a radius may be: to a millionth of the widest
+HALVINGS = 12  # of where a radius may be: to a quarter of a thousandth of the widest
 NARROWEST = 1e-6  # metres or radians: the least that every pose is blurred by
 FARTHEST = 6.0  # spreads, beyond which nothing is looked for
 CLOSE = 1e-3  # spreads: what is nearer to the middle is as if it were so far off, where a difference of two is divided
@@ -34,15 +34,14 @@ class AngleIntervals:
     halves: Array = field(repr=False)  # (levels, 66): how far to either side of the told angles the true ones are
 
 
-def joint_intervals(
-    skeleton: Skeleton, posterior: Posterior, pose: Array, recalibration: Recalibration | None = None
-) -> JointIntervals:
+def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> JointIntervals:
     """Return where joints are, by weighted poses, and the balls about those of a `pose` (66,) that hold them.
 
     A ball's radius is the quantile, at each of the `LEVELS`, of the distance to a joint of a pose drawn by weight and
     blurred by a normal error along each axis: where two modes are likely, the wider balls reach from one to the other.
+    Then it is multiplied by its factor. The posterior's recalibration has spreads and factors.
     """
-    model = recalibration or Recalibration()
+    model = posterior.recalibration or Recalibration()
     joints, told = skeleton.joints(posterior.poses), skeleton.joints(pose)
     mean = np.einsum("k,kjd->jd", posterior.weights, joints)
     off = joints - mean
@@ -52,12 +51,12 @@ def joint_intervals(
     return JointIntervals(mean, covariance, model.joint_factors * radii)
 
 
-def angle_intervals(posterior: Posterior, pose: Array, recalibration: Recalibration | None = None) -> AngleIntervals:
+def angle_intervals(posterior: Posterior, pose: Array) -> AngleIntervals:
     """Return the circular means of angles, and how far to either side of those of a `pose` (66,) the true ones are.
 
     As for joints, but that an interval is never more than half a turn to either side.
     """
-    model = recalibration or Recalibration()
+    model = posterior.recalibration or Recalibration()
     turns = np.einsum("k,ka->a", posterior.weights, np.exp(1j * posterior.poses))
     off = np.abs(wrapped(posterior.poses - pose))
     halves = model.angle_factors * _quantiles(off, posterior.weights, model.angle_spreads, 1)
