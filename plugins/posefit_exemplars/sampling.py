@@ -50,7 +50,7 @@ def onward(window: Sequence[Seen], rows: Rows | None, count: int, power: float, 
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class Ways:
     """The states that ways have in one frame."""
 
     poses: Array = field(repr=False)  # (K, 66)
@@ -78,7 +78,7 @@ class Sampler:
         self._rng = rng.spawn(1)[0]  # of its own: what is told is the same however many ways are drawn
         self._rows: Rows | None = None
 
-    def drawn(self, window: Sequence[Seen], path: int) -> Drawn | None:
+    def drawn(self, window: Sequence[Seen], path: int) -> Ways | None:
         """Return where ways are in the first frame of a window, in which the path is at a state; None for no ways."""
         if not self._count:
             return None
@@ -90,4 +90,4 @@ class Sampler:
         codes = self._exemplars.codes
         apart = ((codes[states] - codes[beam.states[path]]) ** 2).sum(axis=1) / ALIKE**2
         apart += (wrapped(yaws - beam.yaws[path]) / ALIKE_YAW) ** 2
-        return Drawn(poses, beam.places[self._rows], apart <= OF_THE_PATH**2)
+        return Ways(poses, beam.places[self._rows], apart <= OF_THE_PATH**2)

@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.geometry.rotation import wrapped
 from posefit_exemplars.look import Look
-from posefit_exemplars.sampling import Drawn
+from posefit_exemplars.sampling import Ways
 
 SMOOTHED = 3.0  # standard deviations that the filter reaches to either side
 
@@ -25,7 +25,7 @@ class Finding:
     evaluations: float
     seconds: float
     cpu_seconds: float
-    drawn: Drawn | None = None  # where ways through the states are
+    drawn: Ways | None = None  # where ways through the states are
 
 
 def smoothed(frames: Iterable[Finding], spread: float, ahead: int) -> Iterator[Frame]:

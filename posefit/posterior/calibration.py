@@ -83,9 +83,8 @@ def calibration_error(probabilities: Array, right: NDArray[np.bool_], bins: int 
 
     The mean over `bins` of equal width, weighted by how many fall into each.
     """
-    return float(sum(count * abs(told - came) for count, told, came in reliability(probabilities, right, bins))) / len(
-        right
-    )
+    off = sum(count * abs(told - came) for count, told, came in reliability(probabilities, right, bins))
+    return float(off / len(right))  # GUO2017 (3)
 
 
 def reliability(probabilities: Array, right: NDArray[np.bool_], bins: int = BINS) -> list[tuple[int, float, float]]:
@@ -95,7 +94,7 @@ def reliability(probabilities: Array, right: NDArray[np.bool_], bins: int = BINS
     return [
         (int((bin_of == k).sum()), float(told[bin_of == k].mean()), float(came[bin_of == k].mean()))
         for k in np.unique(bin_of)
-    ]  # GUO2017 (3)
+    ]
 
 
 def auroc(scores: Array, positive: NDArray[np.bool_]) -> float | None:
