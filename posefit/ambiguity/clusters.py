@@ -11,6 +11,7 @@ from posefit.geometry.alike import facing, mirrored_poses, reflected_poses, turn
 from posefit.geometry.skeleton import Skeleton
 from posefit.posterior.modes import Posterior, modes_of
 
+COMPARED = 1500  # poses that are compared with each other; of more, so many that are drawn stand for all
 NEARER = 0.5  # of the way to the first mode: as near as this to an image of it, a mode is that image
 
 
@@ -32,7 +33,8 @@ def clusters_of(look: Look, states: States, weights: Array) -> list[Cluster]:
     Joints are compared with both roots at one point, facing as they face.
     """
     skeleton = look.body.skeleton
-    modes = modes_of(skeleton, Posterior(states.poses, states.translations, weights))
+    some = np.sort(np.random.default_rng(0).permutation(len(states))[:COMPARED])  # every so many'th may all be alike
+    modes = modes_of(skeleton, Posterior(states.poses[some], states.translations[some], weights[some]))
     joints, middles = (_rooted(skeleton, poses) for poses in (states.poses, np.array([mode.pose for mode in modes])))
     away = np.array([_distances(joints, middle) for middle in middles])
     nearest = away.argmin(axis=0)
@@ -95,9 +97,10 @@ def _images(look: Look, pose: Array) -> dict[str, Array]:
 
 def _image(joints: Array, first: Array, images: dict[str, Array]) -> str:
     """Return which image of the first pose some joints (27, 3) are, or "" where they are none."""
-    name = min(images, key=lambda name: float(_distances(joints[None], images[name])[0]))
-    near, own = (float(_distances(joints[None], other)[0]) for other in (images[name], first))
-    return name if near < NEARER * own else ""
+    # to a millimetre, as from its very side a mirrored pose is the reflected one as well
+    away = {name: round(float(_distances(joints[None], image)[0])) for name, image in images.items()}
+    name = min(away, key=away.__getitem__)
+    return name if away[name] < NEARER * float(_distances(joints[None], first)[0]) else ""
 
 
 def _rooted(skeleton: Skeleton, poses: Array) -> Array:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -19,8 +18,10 @@ FEWEST = 3  # columns that the picture is wide, for what is written on it
 WIDTH, HEIGHT, BAND = 260, 320, 62  # pixels of a view, and of what is written above the first
 AROUND = 1.15  # the silhouette's box, times this, is seen
 GREY = (120, 112, 108)  # what was seen
-BARS = (BOTH, SPILLED, MISSED, (205, 205, 205), (225, 165, 85))  # one a floor
+BARS = (BOTH, SPILLED, MISSED, (205, 205, 205), (225, 165, 85))  # one a floor, then the first again
 TITLE, LINE, LEGEND = 34, 20, 22  # pixels high
+LABEL, FIGURE = 110, 38  # pixels wide
+NUMBERED = 4  # floors whose numbers are written beside their bars
 
 
 def picture_of(found: Ambiguity) -> Image:
@@ -28,16 +29,12 @@ def picture_of(found: Ambiguity) -> Image:
     shown = found.clusters[:SHOWN]
     camera, silhouette = nearer(found.look.cameras[0], found.look.silhouettes[0])
     columns = [_column(found, k, camera, silhouette) for k in range(len(shown))]
-    columns += [np.full_like(columns[0], BACKGROUND[0])] * (FEWEST - len(columns))
+    columns += [_blank(len(columns[0]), WIDTH)] * (FEWEST - len(columns))
     bodies = np.hstack(columns)
     title = _blank(TITLE, bodies.shape[1])
+    told = f"{found.scene.name}, frame {found.frame}: {len(found.states):,} poses within {found.within:g} of the least"
     rest = len(found.clusters) - len(shown)
-    write(
-        title,
-        f"{found.scene.name}, frame {found.frame}: {len(found.states):,} poses within {found.within:g} of the least cost"
-        + (f", {rest} more modes" if rest else ""),
-        (12, 23),
-    )
+    write(title, f"{told}, {rest} more modes" if rest else told, (12, 23))
     return np.vstack([title, bodies, floors_of(found.floors, bodies.shape[1])])
 
 
@@ -47,9 +44,7 @@ def nearer(camera: Camera, silhouette: Silhouette) -> tuple[Camera, Image]:
     middle = np.array([left + 0.5 * wide, top + 0.5 * high])
     zoom = min(WIDTH / wide, HEIGHT / high) / AROUND
     shift = np.array([WIDTH, HEIGHT]) / 2.0 - zoom * middle
-    near = replace(
-        camera, width=WIDTH, height=HEIGHT, focal=camera.focal * zoom, centre=camera.centre * zoom + shift
-    )
+    near = replace(camera, width=WIDTH, height=HEIGHT, focal=camera.focal * zoom, centre=camera.centre * zoom + shift)
     # pixel centres are at +0.5 here, and at whole numbers in OpenCV
     matrix = np.column_stack([zoom * np.eye(2), shift + 0.5 * zoom - 0.5])
     seen = cv2.warpAffine(silhouette.mask.astype(np.uint8), matrix, (WIDTH, HEIGHT), flags=cv2.INTER_NEAREST)
@@ -83,29 +78,26 @@ def _column(found: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Imag
 def floors_of(floors: Sequence[Floor], width: int) -> Image:
     """Return bars of each joint's spread, by one camera and by more (height, width, 3)."""
     spreads = [by_kind(floor.joints_mm) for floor in floors]
-    names = list(spreads[0])
+    names, shown = list(spreads[0]), min(len(floors), NUMBERED)
+    longest = width - LABEL - FIGURE * shown - 20
     bar = max(LINE // len(floors) - 1, 3)
     row = len(floors) * bar + 5
     image = _blank(LEGEND * (len(floors) + 1) + 20 + row * len(names), width)
     write(image, "spread of what cannot be told apart, mm", (12, 20))
-    for floor, colour, k in zip(floors, _colours(len(floors)), range(len(floors)), strict=True):
-        write(
-            image, f"{floor.spread_mm:.0f}  by {floor.views}, {floor.count:,} poses", (12, 20 + LEGEND * (k + 1)), colour
-        )
+    for k, floor in enumerate(floors):
+        told = f"{floor.spread_mm:.0f}  by {floor.views}, {floor.count:,} poses"
+        write(image, told, (12, 20 + LEGEND * (k + 1)), BARS[k % len(BARS)])
     top = LEGEND * (len(floors) + 1) + 10
     most = max(max(max(one.values()) for one in spreads), 1e-9)
     for n, name in enumerate(names):
         y = top + n * row
         write(image, name, (12, y + row - 6), scale=0.4)
-        for k, (one, colour) in enumerate(zip(spreads, _colours(len(floors)), strict=True)):
-            end = 110 + round((width - 180) * one[name] / most)
-            cv2.rectangle(image, (110, y + k * bar), (end, y + (k + 1) * bar - 2), colour, -1)
-        write(image, " ".join(f"{one[name]:.0f}" for one in spreads[:2]), (width - 64, y + row - 6), scale=0.36)
+        for k, one in enumerate(spreads):
+            end = LABEL + round(longest * one[name] / most)
+            cv2.rectangle(image, (LABEL, y + k * bar), (end, y + (k + 1) * bar - 2), BARS[k % len(BARS)], -1)
+            if k < NUMBERED:
+                write(image, f"{one[name]:4.0f}", (width - FIGURE * (shown - k) - 6, y + row - 6), scale=0.4)
     return image
-
-
-def _colours(count: int) -> list[Any]:
-    return [BARS[k % len(BARS)] for k in range(count)]
 
 
 def _blank(height: int, width: int) -> Image:

@@ -54,7 +54,7 @@ class Ambiguity:
     library: LibraryPoses = field(repr=False)
     states: States = field(repr=False)  # of all cameras together
     clusters: Sequence[Cluster]  # the heaviest first
-    floors: Sequence[Floor]  # that of all cameras together comes first where there is one; see `views`
+    floors: Sequence[Floor]  # the first is that of `states`
     truth_mm: Sequence[float] | None  # how far each cluster's best pose is from the truth, where somebody knows it
     seconds: float
 
@@ -81,9 +81,9 @@ def ambiguity_of(
     cameras, against that of each. Raises ValueError for every mistake in the arguments or files.
     """
     frame, threads = whole("frame", frame, 0), whole("threads", threads, 1)
-    if not 0.0 <= finite_number("within", within):
+    if not finite_number("within", within) >= 0.0:
         raise ValueError(f"within must be 0 or more, got {within:g}")
-    if not 0.0 < finite_number("temperature", temperature):
+    if not finite_number("temperature", temperature) > 0.0:
         raise ValueError(f"temperature must be above 0, got {temperature:g}")
     if translation not in (None, "known", "aligned"):
         raise ValueError(f"translation must be known or aligned, got {translation}")
@@ -113,9 +113,7 @@ def ambiguity_of(
     for name, other in _others(scene, look, frame):
         floors.append(_floor(name, other, states_within(other, library.poses, within), temperature))
     seconds = time.perf_counter() - began
-    return Ambiguity(
-        scene, frame, within, temperature, look, library, states, clusters, floors, truth, seconds
-    )
+    return Ambiguity(scene, frame, within, temperature, look, library, states, clusters, floors, truth, seconds)
 
 
 def _look(scene: Scene, k: int, frame: int, translation: str | None, threads: int) -> Look:
@@ -142,10 +140,8 @@ def _others(scene: Scene, look: Look, frame: int) -> list[tuple[str, Look]]:
     pose, place = scene.truth.poses[frame], scene.truth.translations[frame]
     camera = turned_about(look.cameras[0], place, RIGHT_ANGLE)
     seen = Silhouette.of(project(look.body, camera, pose, place))
-    both = Look(
-        look.body, [*look.cameras, camera], [*look.silhouettes, seen], look.anchor, look.known, look.threads
-    )
-    return [("and one at right angles", both)]
+    both = Look(look.body, [*look.cameras, camera], [*look.silhouettes, seen], look.anchor, look.known, look.threads)
+    return [("two cameras, the second at right angles", both)]
 
 
 def turned_about(camera: Camera, place: Array, angle: float) -> Camera:
@@ -158,10 +154,8 @@ def turned_about(camera: Camera, place: Array, angle: float) -> Camera:
 
 
 def _name(look: Look) -> str:
-    return "one camera" if len(look.cameras) == 1 else f"all {len(look.cameras)} cameras"
+    return {1: "one camera", 2: "both cameras"}.get(len(look.cameras), f"all {len(look.cameras)} cameras")
 
 
 def _floor(name: str, look: Look, states: States, temperature: float) -> Floor:
-    return Floor(
-        name, len(states), float(states.costs.min()), floor_mm(look, states, states.weights(temperature))
-    )
+    return Floor(name, len(states), float(states.costs.min()), floor_mm(look, states, states.weights(temperature)))

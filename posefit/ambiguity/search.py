@@ -24,7 +24,7 @@ from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 
 YAWS = 72  # of a full turn: five degrees apart
 EVERY = 3  # of them are looked at first
-MARGIN = 10.0  # units of cost that a pose may be worse, at the next of these yaws, in a small picture
+MARGIN = 12.0  # units of cost that a pose may be worse, at the next of these yaws, in a small picture
 BLUR = 4.0  # units of cost that a pose may be worse in a small picture, beside the best one there
 FACTORS = (8, 4, 2)  # of small pictures
 PIXELS = 400  # of a person in a small picture, at least
@@ -52,15 +52,11 @@ class Look:
     def coarser(self, factor: int) -> Self:
         """Return the same in a smaller picture."""
         cameras = [coarser_camera(camera, factor) for camera in self.cameras]
-        return replace(
-            self, cameras=cameras, silhouettes=[coarser_silhouette(one, factor) for one in self.silhouettes]
-        )
+        return replace(self, cameras=cameras, silhouettes=[coarser_silhouette(one, factor) for one in self.silhouettes])
 
     def only(self, views: Sequence[int]) -> Self:
         """Return what some of the cameras saw."""
-        return replace(
-            self, cameras=[self.cameras[v] for v in views], silhouettes=[self.silhouettes[v] for v in views]
-        )
+        return replace(self, cameras=[self.cameras[v] for v in views], silhouettes=[self.silhouettes[v] for v in views])
 
     def placed(self, poses: Array) -> Array:
         """Return where poses (n, 66) stand (n, 3)."""
@@ -98,8 +94,7 @@ def states_within(look: Look, poses: Array, within: float) -> States:
     Raises ValueError where they are too many to be compared with each other.
     """
     small = look.coarser(look.factor)
-    rows = np.tile(np.arange(len(poses)), YAWS // EVERY)
-    yaws = np.repeat(np.arange(0, YAWS, EVERY), len(poses))
+    rows, yaws = np.tile(np.arange(len(poses)), YAWS // EVERY), np.repeat(np.arange(0, YAWS, EVERY), len(poses))
     rows, yaws, _ = _best(small, poses, rows, yaws, within + MARGIN)
     beside = [np.mod(yaws + step, YAWS) for step in range(-(EVERY // 2), EVERY // 2 + 1)]
     rows, yaws, _ = _best(small, poses, np.tile(rows, EVERY), np.concatenate(beside), within + BLUR)

@@ -76,7 +76,7 @@ def table(found: Ambiguity) -> str:
         lines.append(f"{floor.spread_mm:6.0f}  by {floor.views}: {_widest(floor.joints_mm)}; {floor.count:,} poses")
     if min(floor.count for floor in found.floors) < FEW:
         lines.append(
-            f"fewer than {FEW} poses say more of how many the library has than of the silhouette: try a larger --within"
+            f"fewer than {FEW} poses say more of what is in the library than of the silhouette: try a larger --within"
         )
     return "\n".join(lines)
 
@@ -108,7 +108,7 @@ def _mode(found: Ambiguity, k: int) -> dict[str, Any]:
         "away_mm": one.away_mm,
         **({} if found.truth_mm is None else {"truth_mm": found.truth_mm[k]}),
         "yaw_degrees": float(np.degrees(yaw)),
-        "view_degrees": float(np.degrees(wrapped(towards - yaw))),
+        "view_degrees": float(np.degrees(wrapped(np.array(towards - yaw)))),
         "image": one.image or None,
         "cost": float(found.states.costs[one.best]),
         "clip": library.names[library.clips[row]],
