@@ -12,6 +12,7 @@
 | the poses that are compared | library.py |
 | the search for all that fit nearly as well as the best | search.py |
 | groups of poses that are alike, and the spread of them all | clusters.py |
+| the build of a person who was followed before | build.py |
 | one frame of a source, by one camera and by more | run.py |
 | what is printed, drawn and written | table.py, picture.py, outputs.py |
 """

@@ -3,12 +3,13 @@
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from posefit.ambiguity.build import body_of
 from posefit.ambiguity.clusters import Cluster, clusters_of, distance_mm, floor_mm, total
 from posefit.ambiguity.library import LibraryPoses
 from posefit.ambiguity.search import Look, States, states_within
@@ -16,7 +17,7 @@ from posefit.arrays import Array
 from posefit.fitting.check import finite_number, whole
 from posefit.footage.masks import FPS
 from posefit.footage.scene import Scene
-from posefit.footage.source import Source, Viewing, kind_of, scene_of
+from posefit.footage.source import Source, Viewing, kind_of, scene_of, useless_for
 from posefit.footage.training import training_clips, training_motions
 from posefit.geometry.camera import Camera
 from posefit.listening import QUIET, Listener
@@ -68,6 +69,7 @@ def ambiguity_of(
     train: Sequence[Source] = (recorded.LIBRARY,),
     translation: Literal["known", "aligned"] | None = None,
     viewing: Viewing | None = None,
+    build: str | Path | None = None,
     threads: int = 1,
     say: Callable[[str], None] | None = None,
 ) -> Ambiguity:
@@ -76,7 +78,8 @@ def ambiguity_of(
     `source` and `viewing` are what `posefit.track` takes; of motions the frame is counted after resampling, of footage
     as filmed. The poses are those of `train` and their mirror images, each at 72 yaws, but for the clip that is the
     source. Their weights are exp(-cost / temperature). The root stands where it is known to be, or, where
-    `translation` is "aligned" and for footage, where the body fills the silhouettes' borders. One camera's floor is
+    `translation` is "aligned" and for footage, where the body fills the silhouettes' borders. `build` is the folder of
+    a track of the same footage, whose build the person has; without it he has the average one. One camera's floor is
     held against that of two: of a known motion, whose second camera stands at right angles to the only one; of several
     cameras, against that of each. Raises ValueError for every mistake in the arguments or files.
     """
@@ -91,13 +94,17 @@ def ambiguity_of(
     motion = kind_of(sources[0]) == "motion"
     if not motion and translation == "known":
         raise ValueError("translation must be aligned where only masks are given, got known")
+    if motion and build is not None:
+        raise useless_for("motion", "build", str(build), "footage")
     viewing = viewing or Viewing()
     clips = training_clips(train, viewing.asf, followed=sources[0])  # before the work, as a name may be wrong
     listener = Listener(say or QUIET.say, QUIET.progress)
     with tempfile.TemporaryDirectory(prefix="posefit-") as work:
         if not motion:
-            viewing = Viewing(**{**vars(viewing), "frames": (frame, frame + 1)})
+            viewing = replace(viewing, frames=(frame, frame + 1))
         scene = scene_of(sources, viewing, Path(work), listener)
+        if build is not None:
+            scene = replace(scene, body=body_of(build, scene.body))
         look = _look(scene, frame if motion else 0, frame, translation, threads)
     for warning in scene.warnings:
         listener.say(f"warning: {warning}")

@@ -20,6 +20,7 @@ from posefit.cli.output import json_line, results_alone, say
     "--train", multiple=True, default=("library",), metavar="SOURCE", help="Poses to compare; by default library."
 )
 @options(WITHOUT)
+@click.option("--build", metavar="DIR", help="Of footage: the folder of a track, whose build the person has.")
 @click.option("--translation", help="Root translation: known, by default where it is, or aligned.")
 @options(EXTRACTION)
 @click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number.")
@@ -57,6 +58,7 @@ def ambiguity(as_json: bool, out: str | None, **given: Any) -> None:
             train=without_subjects(given["train"], subjects) if subjects else given["train"],
             translation=given["translation"],
             viewing=viewing,
+            build=given["build"],
             threads=given["threads"],
             say=say,
         )
