@@ -24,8 +24,12 @@ def body_of(folder: str | Path, body: Body) -> Body:
     path = Path(folder) / SUMMARY
     if not path.is_file():
         raise ValueError(f"{folder}: expected the folder of a track with its {SUMMARY}, got none")
+    text = read_text(path, LARGEST)
     try:
-        summary = parsed_json(read_text(path, LARGEST))
+        summary = parsed_json(text)
+    except ValueError as error:
+        raise ValueError(f"{path}: expected a JSON object, got {error}") from None
+    try:
         told = summary["body"] if isinstance(summary, Mapping) else None
         if not isinstance(told, Mapping):
             raise ValueError("expected the build of a person, got none: it was not fitted")

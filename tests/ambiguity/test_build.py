@@ -66,7 +66,7 @@ def test_a_folder_of_no_track_and_a_motion_are_mistakes_of_one_line(tmp_path: Pa
     with pytest.raises(ValueError, match=r"expected the folder of a track with its summary.json, got none$"):
         body_of(tmp_path, BODY)
     (tmp_path / "summary.json").write_text("{" * 100_000, encoding="utf-8")
-    with pytest.raises(ValueError, match=r"summary.json: expected "):
+    with pytest.raises(ValueError, match=r"summary.json: expected a JSON object, got "):
         body_of(tmp_path, BODY)
     result = CliRunner().invoke(main, ["ambiguity", "walk", "--build", str(tmp_path)])
     assert result.exit_code == 2
