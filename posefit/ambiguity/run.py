@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 
 from posefit.ambiguity.build import body_of
-from posefit.ambiguity.clusters import Cluster, clusters_of, distance_mm, floor_mm, total
+from posefit.ambiguity.clusters import AlikePoses, clusters_of, distance_mm, floor_mm, total
 from posefit.ambiguity.library import LibraryPoses
-from posefit.ambiguity.search import Look, States, states_within
+from posefit.ambiguity.search import Sighting, States, states_within
 from posefit.arrays import Array
 from posefit.fitting.check import finite_number, whole
 from posefit.footage.masks import FPS
@@ -51,10 +51,10 @@ class Ambiguity:
     frame: int
     within: float
     temperature: float
-    look: Look = field(repr=False)
+    sighting: Sighting = field(repr=False)
     library: LibraryPoses = field(repr=False)
     states: States = field(repr=False)  # of all cameras together
-    clusters: Sequence[Cluster]  # the heaviest first
+    clusters: Sequence[AlikePoses]  # the heaviest first
     floors: Sequence[Floor]  # the first is that of `states`
     truth_mm: Sequence[float] | None  # how far each cluster's best pose is from the truth, where somebody knows it
     seconds: float
@@ -105,25 +105,25 @@ def ambiguity_of(
         scene = scene_of(sources, viewing, Path(work), listener)
         if build is not None:
             scene = replace(scene, body=body_of(build, scene.body))
-        look = _look(scene, frame if motion else 0, frame, translation, threads)
+        sighting = _sighting(scene, frame if motion else 0, frame, translation, threads)
     for warning in scene.warnings:
         listener.say(f"warning: {warning}")
     began = time.perf_counter()
     library = LibraryPoses.of(training_motions(clips, FPS), scene.body.skeleton)
-    states = states_within(look, library.poses, within)
-    clusters = clusters_of(look, states, states.weights(temperature))
+    states = states_within(sighting, library.poses, within)
+    clusters = clusters_of(sighting, states, states.weights(temperature))
     truth = None
     if scene.truth is not None:
         right = scene.truth.poses[frame]
         truth = [distance_mm(scene.body.skeleton, states.poses[one.best], right) for one in clusters]
-    floors = [_floor(_name(look), look, states, temperature)]
-    for name, other in _others(scene, look, frame):
+    floors = [_floor(_name(sighting), sighting, states, temperature)]
+    for name, other in _others(scene, sighting, frame):
         floors.append(_floor(name, other, states_within(other, library.poses, within), temperature))
     seconds = time.perf_counter() - began
-    return Ambiguity(scene, frame, within, temperature, look, library, states, clusters, floors, truth, seconds)
+    return Ambiguity(scene, frame, within, temperature, sighting, library, states, clusters, floors, truth, seconds)
 
 
-def _look(scene: Scene, k: int, frame: int, translation: str | None, threads: int) -> Look:
+def _sighting(scene: Scene, k: int, frame: int, translation: str | None, threads: int) -> Sighting:
     """Return what was seen in frame k of a scene, which users call `frame`. Raises ValueError where that is nothing."""
     if not k < scene.count:
         raise ValueError(f"frame must lie in 0 to {scene.count - 1} of {scene.name}, got {frame}")
@@ -134,24 +134,31 @@ def _look(scene: Scene, k: int, frame: int, translation: str | None, threads: in
         raise ValueError(f"frame must show the person, got {came} in frame {frame} of {scene.name}")
     known = scene.truth is not None and translation != "aligned"
     anchor = scene.anchor if observation.translation is None else np.asarray(observation.translation)
-    return Look(scene.body, scene.cameras, observation.silhouettes, anchor, known, threads)
+    return Sighting(scene.body, scene.cameras, observation.silhouettes, anchor, known, threads)
 
 
-def _others(scene: Scene, look: Look, frame: int) -> list[tuple[str, Look]]:
+def _others(scene: Scene, sighting: Sighting, frame: int) -> list[tuple[str, Sighting]]:
     """Return the looks that one is held against, by name: each camera alone, or one camera and another."""
-    if len(look.cameras) > 1:
-        seeing = [v for v, silhouette in enumerate(look.silhouettes) if silhouette.mask.any()]
-        return [(f"camera {v + 1}", look.only([v])) for v in seeing]
+    if len(sighting.cameras) > 1:
+        seeing = [v for v, silhouette in enumerate(sighting.silhouettes) if silhouette.mask.any()]
+        return [(f"camera {v + 1}", sighting.only([v])) for v in seeing]
     if scene.truth is None:
         return []
     pose, place = scene.truth.poses[frame], scene.truth.translations[frame]
-    camera = turned_about(look.cameras[0], place, RIGHT_ANGLE)
-    seen = Silhouette.of(project(look.body, camera, pose, place))
-    both = Look(look.body, [*look.cameras, camera], [*look.silhouettes, seen], look.anchor, look.known, look.threads)
+    camera = camera_about(sighting.cameras[0], place, RIGHT_ANGLE)
+    seen = Silhouette.of(project(sighting.body, camera, pose, place))
+    both = Sighting(
+        sighting.body,
+        [*sighting.cameras, camera],
+        [*sighting.silhouettes, seen],
+        sighting.anchor,
+        sighting.known,
+        sighting.threads,
+    )
     return [("two cameras, the second at right angles", both)]
 
 
-def turned_about(camera: Camera, place: Array, angle: float) -> Camera:
+def camera_about(camera: Camera, place: Array, angle: float) -> Camera:
     """Return the camera that sees a place (3,) as this one does, from so many radians farther about the vertical."""
     sine, cosine = np.sin(angle), np.cos(angle)
     turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
@@ -160,9 +167,9 @@ def turned_about(camera: Camera, place: Array, angle: float) -> Camera:
     return Camera(camera.width, camera.height, camera.focal, camera.centre, rotation, translation)
 
 
-def _name(look: Look) -> str:
-    return {1: "one camera", 2: "both cameras"}.get(len(look.cameras), f"all {len(look.cameras)} cameras")
+def _name(sighting: Sighting) -> str:
+    return {1: "one camera", 2: "both cameras"}.get(len(sighting.cameras), f"all {len(sighting.cameras)} cameras")
 
 
-def _floor(name: str, look: Look, states: States, temperature: float) -> Floor:
-    return Floor(name, len(states), float(states.costs.min()), floor_mm(look, states, states.weights(temperature)))
+def _floor(name: str, sighting: Sighting, states: States, temperature: float) -> Floor:
+    return Floor(name, len(states), float(states.costs.min()), floor_mm(sighting, states, states.weights(temperature)))

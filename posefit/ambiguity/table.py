@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.ambiguity.clusters import Cluster
+from posefit.ambiguity.clusters import AlikePoses
 from posefit.ambiguity.run import Ambiguity
 from posefit.ambiguity.search import YAWS
 from posefit.geometry.alike import facing
@@ -24,8 +24,8 @@ def summary_of(found: Ambiguity) -> dict[str, Any]:
         "frame": found.frame,
         "within": found.within,
         "temperature": found.temperature,
-        "translation": "known" if found.look.known else "aligned",
-        "views": len(found.look.cameras),
+        "translation": "known" if found.sighting.known else "aligned",
+        "views": len(found.sighting.cameras),
         "library": {"clips": len(found.library.names), "poses": len(found.library), "yaws": YAWS},
         "alike": len(found.states),
         "least_cost": float(found.states.costs.min()),
@@ -46,7 +46,7 @@ def summary_of(found: Ambiguity) -> dict[str, Any]:
     }
 
 
-def table(found: Ambiguity) -> str:
+def lines_of(found: Ambiguity) -> str:
     """Return the lines that `posefit ambiguity` prints."""
     count, alike = len(found.library), len(found.states)
     lines = [
@@ -97,9 +97,9 @@ def _widest(joints_mm: Any) -> str:
 
 def _mode(found: Ambiguity, k: int) -> dict[str, Any]:
     """Return what is told of a cluster."""
-    one: Cluster = found.clusters[k]
+    one: AlikePoses = found.clusters[k]
     row, yaw = int(found.states.rows[one.best]), float(found.states.poses[one.best, 0])
-    towards = facing(found.look.cameras[0], found.states.translations[one.best])
+    towards = facing(found.sighting.cameras[0], found.states.translations[one.best])
     library = found.library
     return {
         "weight": one.weight,
