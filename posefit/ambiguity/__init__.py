@@ -1,10 +1,10 @@
 """What the silhouette of one frame leaves open: every pose of the library that fits nearly as well as the best.
 
     from posefit.ambiguity.run import ambiguity_of
-    from posefit.ambiguity.table import lines_of
+    from posefit.ambiguity.table import ambiguity_table
 
     found = ambiguity_of("16_15", frame=20, within=2.0, train=["library:-16"])
-    print(lines_of(found))
+    print(ambiguity_table(found))
     print(found.floors[0].spread_mm, found.floors[1].spread_mm)    # by one camera, and by two
 
 | looking for | file |

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from posefit.ambiguity.library import Rows
-from posefit.ambiguity.search import Sighting, States
+from posefit.ambiguity.search import Moment, States
 from posefit.arrays import Array
 from posefit.geometry.alike import facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.geometry.skeleton import Skeleton
@@ -27,12 +27,12 @@ class AlikePoses:
     image: str  # of the first cluster: mirrored, turned or reflected, see posefit.geometry.alike; or ""
 
 
-def clusters_of(sighting: Sighting, states: States, weights: Array) -> list[AlikePoses]:
+def clusters_of(moment: Moment, states: States, weights: Array) -> list[AlikePoses]:
     """Return states with weights (n,), put into groups by their joints: the heaviest first.
 
     Joints are compared with both roots at one point, facing as they face.
     """
-    skeleton = sighting.body.skeleton
+    skeleton = moment.body.skeleton
     some = np.sort(np.random.default_rng(0).permutation(len(states))[:COMPARED])  # every so many'th may all be alike
     modes = modes_of(skeleton, Posterior(states.poses[some], states.translations[some], weights[some]))
     joints, middles = (_rooted(skeleton, poses) for poses in (states.poses, np.array([mode.pose for mode in modes])))
@@ -42,7 +42,7 @@ def clusters_of(sighting: Sighting, states: States, weights: Array) -> list[Alik
     groups.sort(key=lambda rows: -weights[rows].sum())
     best = [int(rows[states.costs[rows].argmin()]) for rows in groups]
     first = joints[best[0]]
-    images = _images(sighting, states.poses[best[0]])
+    images = _images(moment, states.poses[best[0]])
     return [
         AlikePoses(
             float(weights[rows].sum()),
@@ -67,9 +67,9 @@ def spread_mm(joints: Array, weights: Array) -> Array:
     return np.asarray(1e3 * np.sqrt(weights @ squares))
 
 
-def floor_mm(sighting: Sighting, states: States, weights: Array) -> Array:
+def floor_mm(moment: Moment, states: States, weights: Array) -> Array:
     """Return the spread (27,) in millimetres of what cannot be told apart, all roots at one point."""
-    return spread_mm(_rooted(sighting.body.skeleton, states.poses), weights)
+    return spread_mm(_rooted(moment.body.skeleton, states.poses), weights)
 
 
 def distance_mm(skeleton: Skeleton, pose: Array, other: Array) -> float:
@@ -83,10 +83,10 @@ def total(spreads_mm: Array) -> float:
     return float(np.sqrt((spreads_mm**2).mean()))
 
 
-def _images(sighting: Sighting, pose: Array) -> dict[str, Array]:
+def _images(moment: Moment, pose: Array) -> dict[str, Array]:
     """Return the joints of what looks like a pose, by name."""
-    skeleton, poses = sighting.body.skeleton, pose[None]
-    towards = facing(sighting.cameras[0], sighting.anchor)
+    skeleton, poses = moment.body.skeleton, pose[None]
+    towards = facing(moment.cameras[0], moment.anchor)
     found = {
         "mirrored": mirrored_poses(skeleton, poses),
         "turned": turned_poses(poses),

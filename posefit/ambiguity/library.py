@@ -32,7 +32,7 @@ class LibraryPoses:
 
         A frame nearer than two centimetres to the last one kept of its clip is left out.
         """
-        kept = [kept_frames(skeleton, motion.poses) for motion in motions]
+        kept = [spaced_frames(skeleton, motion.poses) for motion in motions]
         poses = [motion.poses[rows] for motion, rows in zip(motions, kept, strict=True)]
         images = [mirrored_poses(motion.skeleton, one) for motion, one in zip(motions, poses, strict=True)]
         clips = np.repeat(np.arange(len(motions)), [len(rows) for rows in kept])
@@ -47,7 +47,7 @@ class LibraryPoses:
         return row >= len(self) // 2
 
 
-def kept_frames(skeleton: Skeleton, poses: Array) -> Rows:
+def spaced_frames(skeleton: Skeleton, poses: Array) -> Rows:
     """Return which poses (n, 66) of a clip to keep: each two centimetres or more from the last one kept."""
     facing = poses.copy()
     facing[:, 0] = 0.0  # as the yaw of every pose is searched

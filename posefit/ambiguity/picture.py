@@ -27,7 +27,7 @@ NUMBERED = 4  # floors whose numbers are written beside their bars
 def picture_of(found: Ambiguity) -> Image:
     """Return the picture (height, width, 3)."""
     shown = found.clusters[:SHOWN]
-    camera, silhouette = nearer(found.sighting.cameras[0], found.sighting.silhouettes[0])
+    camera, silhouette = nearer(found.moment.cameras[0], found.moment.silhouettes[0])
     columns = [_column(found, k, camera, silhouette) for k in range(len(shown))]
     columns += [_blank(len(columns[0]), WIDTH)] * (FEWEST - len(columns))
     bodies = np.hstack(columns)
@@ -54,7 +54,7 @@ def nearer(camera: Camera, silhouette: Silhouette) -> tuple[Camera, Image]:
 def _column(found: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Image:
     """Return what is written of a cluster, its body before the silhouette, and its body from the side."""
     one = found.clusters[k]
-    body, pose, place = found.sighting.body, found.states.poses[one.best], found.states.translations[one.best]
+    body, pose, place = found.moment.body, found.states.poses[one.best], found.states.translations[one.best]
     head = _blank(BAND, WIDTH)
     write(head, f"{one.weight:.2f}", (12, 26), scale=0.75)
     write(head, one.image or ("first" if k == 0 else ""), (90, 26))
@@ -67,7 +67,7 @@ def _column(found: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Imag
     front = np.asarray(cv2.addWeighted(drawn, SOLID, front, 1.0 - SOLID, 0.0), np.uint8)
     edges, _ = cv2.findContours(silhouette, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(front, edges, -1, TEXT, 1, cv2.LINE_AA)
-    side = side_view(body, found.sighting.cameras[0], pose, place, WIDTH)
+    side = side_view(body, found.moment.cameras[0], pose, place, WIDTH)
     write(front, "from the camera", (8, HEIGHT - 10), scale=0.4)
     write(side, "from its right", (8, WIDTH - 10), scale=0.4)
     column = np.vstack([head, front, side])

@@ -12,7 +12,7 @@ import numpy as np
 from posefit.ambiguity.build import body_of
 from posefit.ambiguity.clusters import AlikePoses, clusters_of, distance_mm, floor_mm, total
 from posefit.ambiguity.library import LibraryPoses
-from posefit.ambiguity.search import Sighting, States, states_within
+from posefit.ambiguity.search import Moment, States, states_within
 from posefit.arrays import Array
 from posefit.fitting.check import finite_number, whole
 from posefit.footage.masks import FPS
@@ -51,7 +51,7 @@ class Ambiguity:
     frame: int
     within: float
     temperature: float
-    sighting: Sighting = field(repr=False)
+    moment: Moment = field(repr=False)
     library: LibraryPoses = field(repr=False)
     states: States = field(repr=False)  # of all cameras together
     clusters: Sequence[AlikePoses]  # the heaviest first
@@ -105,25 +105,25 @@ def ambiguity_of(
         scene = scene_of(sources, viewing, Path(work), listener)
         if build is not None:
             scene = replace(scene, body=body_of(build, scene.body))
-        sighting = _sighting(scene, frame if motion else 0, frame, translation, threads)
+        moment = _moment(scene, frame if motion else 0, frame, translation, threads)
     for warning in scene.warnings:
         listener.say(f"warning: {warning}")
     began = time.perf_counter()
     library = LibraryPoses.of(training_motions(clips, FPS), scene.body.skeleton)
-    states = states_within(sighting, library.poses, within)
-    clusters = clusters_of(sighting, states, states.weights(temperature))
+    states = states_within(moment, library.poses, within)
+    clusters = clusters_of(moment, states, states.weights(temperature))
     truth = None
     if scene.truth is not None:
         right = scene.truth.poses[frame]
         truth = [distance_mm(scene.body.skeleton, states.poses[one.best], right) for one in clusters]
-    floors = [_floor(_name(sighting), sighting, states, temperature)]
-    for name, other in _others(scene, sighting, frame):
+    floors = [_floor(_name(moment), moment, states, temperature)]
+    for name, other in _others(scene, moment, frame):
         floors.append(_floor(name, other, states_within(other, library.poses, within), temperature))
     seconds = time.perf_counter() - began
-    return Ambiguity(scene, frame, within, temperature, sighting, library, states, clusters, floors, truth, seconds)
+    return Ambiguity(scene, frame, within, temperature, moment, library, states, clusters, floors, truth, seconds)
 
 
-def _sighting(scene: Scene, k: int, frame: int, translation: str | None, threads: int) -> Sighting:
+def _moment(scene: Scene, k: int, frame: int, translation: str | None, threads: int) -> Moment:
     """Return what was seen in frame k of a scene, which users call `frame`. Raises ValueError where that is nothing."""
     if not k < scene.count:
         raise ValueError(f"frame must lie in 0 to {scene.count - 1} of {scene.name}, got {frame}")
@@ -134,26 +134,26 @@ def _sighting(scene: Scene, k: int, frame: int, translation: str | None, threads
         raise ValueError(f"frame must show the person, got {came} in frame {frame} of {scene.name}")
     known = scene.truth is not None and translation != "aligned"
     anchor = scene.anchor if observation.translation is None else np.asarray(observation.translation)
-    return Sighting(scene.body, scene.cameras, observation.silhouettes, anchor, known, threads)
+    return Moment(scene.body, scene.cameras, observation.silhouettes, anchor, known, threads)
 
 
-def _others(scene: Scene, sighting: Sighting, frame: int) -> list[tuple[str, Sighting]]:
+def _others(scene: Scene, moment: Moment, frame: int) -> list[tuple[str, Moment]]:
     """Return the looks that one is held against, by name: each camera alone, or one camera and another."""
-    if len(sighting.cameras) > 1:
-        seeing = [v for v, silhouette in enumerate(sighting.silhouettes) if silhouette.mask.any()]
-        return [(f"camera {v + 1}", sighting.only([v])) for v in seeing]
+    if len(moment.cameras) > 1:
+        seeing = [v for v, silhouette in enumerate(moment.silhouettes) if silhouette.mask.any()]
+        return [(f"camera {v + 1}", moment.only([v])) for v in seeing]
     if scene.truth is None:
         return []
     pose, place = scene.truth.poses[frame], scene.truth.translations[frame]
-    camera = camera_about(sighting.cameras[0], place, RIGHT_ANGLE)
-    seen = Silhouette.of(project(sighting.body, camera, pose, place))
-    both = Sighting(
-        sighting.body,
-        [*sighting.cameras, camera],
-        [*sighting.silhouettes, seen],
-        sighting.anchor,
-        sighting.known,
-        sighting.threads,
+    camera = camera_about(moment.cameras[0], place, RIGHT_ANGLE)
+    seen = Silhouette.of(project(moment.body, camera, pose, place))
+    both = Moment(
+        moment.body,
+        [*moment.cameras, camera],
+        [*moment.silhouettes, seen],
+        moment.anchor,
+        moment.known,
+        moment.threads,
     )
     return [("two cameras, the second at right angles", both)]
 
@@ -167,9 +167,9 @@ def camera_about(camera: Camera, place: Array, angle: float) -> Camera:
     return Camera(camera.width, camera.height, camera.focal, camera.centre, rotation, translation)
 
 
-def _name(sighting: Sighting) -> str:
-    return {1: "one camera", 2: "both cameras"}.get(len(sighting.cameras), f"all {len(sighting.cameras)} cameras")
+def _name(moment: Moment) -> str:
+    return {1: "one camera", 2: "both cameras"}.get(len(moment.cameras), f"all {len(moment.cameras)} cameras")
 
 
-def _floor(name: str, sighting: Sighting, states: States, temperature: float) -> Floor:
-    return Floor(name, len(states), float(states.costs.min()), floor_mm(sighting, states, states.weights(temperature)))
+def _floor(name: str, moment: Moment, states: States, temperature: float) -> Floor:
+    return Floor(name, len(states), float(states.costs.min()), floor_mm(moment, states, states.weights(temperature)))

@@ -33,7 +33,7 @@ MOST = 20_000  # poses and yaws that can be compared with each other
 
 
 @dataclass(frozen=True, eq=False)
-class Sighting:
+class Moment:
     """What one camera or several saw of a person in one frame."""
 
     body: Body
@@ -88,24 +88,24 @@ class States:
         return np.asarray(weights / weights.sum())
 
 
-def states_within(sighting: Sighting, poses: Array, within: float) -> States:
+def states_within(moment: Moment, poses: Array, within: float) -> States:
     """Return all of poses (K, 66), at any of 72 yaws, whose cost is at most so much above the least.
 
     Raises ValueError where they are too many to be compared with each other.
     """
-    small = sighting.coarser(sighting.factor)
+    small = moment.coarser(moment.factor)
     rows, yaws = np.tile(np.arange(len(poses)), YAWS // EVERY), np.repeat(np.arange(0, YAWS, EVERY), len(poses))
     rows, yaws, _ = _best(small, poses, rows, yaws, within + MARGIN)
     beside = [np.mod(yaws + step, YAWS) for step in range(-(EVERY // 2), EVERY // 2 + 1)]
     rows, yaws, _ = _best(small, poses, np.tile(rows, EVERY), np.concatenate(beside), within + BLUR)
-    rows, yaws, costs = _best(sighting, poses, rows, yaws, within)
+    rows, yaws, costs = _best(moment, poses, rows, yaws, within)
     if len(rows) > MOST:
         raise ValueError(
             f"within must be so little that at most {MOST:,} poses and yaws are left, got {within:g}, "
             f"which leaves {len(rows):,}"
         )
     turned = turned_to(poses[rows], yaws)
-    return States(rows, turned, sighting.placed(turned), costs)
+    return States(rows, turned, moment.placed(turned), costs)
 
 
 def turned_to(poses: Array, yaws: Rows) -> Array:
@@ -116,12 +116,12 @@ def turned_to(poses: Array, yaws: Rows) -> Array:
     return turned
 
 
-def _best(sighting: Sighting, poses: Array, rows: Rows, yaws: Rows, within: float) -> tuple[Rows, Rows, Array]:
+def _best(moment: Moment, poses: Array, rows: Rows, yaws: Rows, within: float) -> tuple[Rows, Rows, Array]:
     """Return those of some rows (n,) and yaws (n,) whose cost is at most so much above the least, and their costs."""
     costs = np.empty(len(rows))
     for start in range(0, len(rows), PART):
         part = slice(start, start + PART)
         turned = turned_to(poses[rows[part]], yaws[part])
-        costs[part] = sighting.costs(turned, sighting.placed(turned))
+        costs[part] = moment.costs(turned, moment.placed(turned))
     best = costs <= costs.min() + within
     return rows[best], yaws[best], costs[best]

@@ -24,8 +24,8 @@ def summary_of(found: Ambiguity) -> dict[str, Any]:
         "frame": found.frame,
         "within": found.within,
         "temperature": found.temperature,
-        "translation": "known" if found.sighting.known else "aligned",
-        "views": len(found.sighting.cameras),
+        "translation": "known" if found.moment.known else "aligned",
+        "views": len(found.moment.cameras),
         "library": {"clips": len(found.library.names), "poses": len(found.library), "yaws": YAWS},
         "alike": len(found.states),
         "least_cost": float(found.states.costs.min()),
@@ -46,7 +46,7 @@ def summary_of(found: Ambiguity) -> dict[str, Any]:
     }
 
 
-def lines_of(found: Ambiguity) -> str:
+def ambiguity_table(found: Ambiguity) -> str:
     """Return the lines that `posefit ambiguity` prints."""
     count, alike = len(found.library), len(found.states)
     lines = [
@@ -99,7 +99,7 @@ def _mode(found: Ambiguity, k: int) -> dict[str, Any]:
     """Return what is told of a cluster."""
     one: AlikePoses = found.clusters[k]
     row, yaw = int(found.states.rows[one.best]), float(found.states.poses[one.best, 0])
-    towards = facing(found.sighting.cameras[0], found.states.translations[one.best])
+    towards = facing(found.moment.cameras[0], found.states.translations[one.best])
     library = found.library
     return {
         "weight": one.weight,

@@ -34,7 +34,7 @@ def ambiguity(as_json: bool, out: str | None, **given: Any) -> None:
     """
     from posefit.ambiguity.outputs import written_to
     from posefit.ambiguity.run import ambiguity_of
-    from posefit.ambiguity.table import lines_of, summary_of
+    from posefit.ambiguity.table import ambiguity_table, summary_of
     from posefit.footage.source import Viewing
 
     source = given["source"] or ("walk",)
@@ -66,6 +66,6 @@ def ambiguity(as_json: bool, out: str | None, **given: Any) -> None:
     if as_json:
         click.echo(json_line(summary_of(found)))
         return
-    click.echo(lines_of(found))
+    click.echo(ambiguity_table(found))
     if out:
         click.echo(f"written to {out}: look at ambiguity.png")

@@ -8,7 +8,7 @@ import pytest
 from posefit.ambiguity.clusters import clusters_of, distance_mm, floor_mm, spread_mm, total
 from posefit.ambiguity.library import LibraryPoses
 from posefit.ambiguity.run import RIGHT_ANGLE, camera_about
-from posefit.ambiguity.search import Sighting, States, states_within
+from posefit.ambiguity.search import Moment, States, states_within
 from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -33,11 +33,11 @@ def stride() -> np.ndarray:
     return pose
 
 
-def seen_from(*azimuths: float) -> Sighting:
+def seen_from(*azimuths: float) -> Moment:
     """Return what cameras far away see of the stride."""
     cameras = [Camera.around(PLACE, azimuth, FAR, (120, 120), 2.2 / FAR) for azimuth in azimuths]
     seen = [Silhouette.of(project(BODY, camera, stride(), PLACE)) for camera in cameras]
-    return Sighting(BODY, cameras, seen, PLACE, True)
+    return Moment(BODY, cameras, seen, PLACE, True)
 
 
 def library() -> np.ndarray:
@@ -46,9 +46,9 @@ def library() -> np.ndarray:
 
 
 def test_from_its_side_a_stride_and_its_mirrored_twin_weigh_the_same() -> None:
-    sighting = seen_from(0.5 * np.pi)
-    states = states_within(sighting, library(), 1.0)
-    first, second = clusters_of(sighting, states, states.weights(2.0))
+    moment = seen_from(0.5 * np.pi)
+    states = states_within(moment, library(), 1.0)
+    first, second = clusters_of(moment, states, states.weights(2.0))
     assert first.weight == pytest.approx(0.5, abs=0.02)
     assert second.weight == pytest.approx(0.5, abs=0.02)
     assert (first.image, second.image) == ("", "mirrored")
@@ -59,22 +59,22 @@ def test_from_its_side_a_stride_and_its_mirrored_twin_weigh_the_same() -> None:
 
 
 def test_two_twins_of_equal_weight_spread_by_half_of_what_they_are_apart() -> None:
-    sighting = seen_from(0.5 * np.pi)
+    moment = seen_from(0.5 * np.pi)
     poses = np.array([stride(), mirrored_poses(SKELETON, stride()[None])[0]])
     states = States(np.arange(2), poses, np.tile(PLACE, (2, 1)), np.zeros(2))
     joints = SKELETON.joints(poses)
     half = 500.0 * np.linalg.norm(joints[0] - joints[1], axis=1)
-    np.testing.assert_allclose(floor_mm(sighting, states, states.weights(2.0)), half, atol=1e-9)
+    np.testing.assert_allclose(floor_mm(moment, states, states.weights(2.0)), half, atol=1e-9)
     moved = replace(states, translations=states.translations + [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     np.testing.assert_array_equal(
-        floor_mm(sighting, moved, moved.weights(2.0)), floor_mm(sighting, states, states.weights(2.0))
+        floor_mm(moment, moved, moved.weights(2.0)), floor_mm(moment, states, states.weights(2.0))
     )
 
 
 def test_half_way_between_front_and_side_the_twin_that_looks_alike_is_the_reflected_one() -> None:
-    sighting = seen_from(0.25 * np.pi)
-    states = states_within(sighting, library(), 1.0)
-    clusters = clusters_of(sighting, states, states.weights(2.0))
+    moment = seen_from(0.25 * np.pi)
+    states = states_within(moment, library(), 1.0)
+    clusters = clusters_of(moment, states, states.weights(2.0))
     assert [one.image for one in clusters] == ["", "reflected"]
     # who faces z, 45 degrees to the camera's left, comes; the other one goes: 2 (45) + 180 - 0 = 270 degrees
     yaws = sorted(round(float(np.degrees(states.poses[one.best, 0]))) for one in clusters)
@@ -84,9 +84,9 @@ def test_half_way_between_front_and_side_the_twin_that_looks_alike_is_the_reflec
 def test_a_second_camera_at_right_angles_tells_them_apart() -> None:
     one, both = seen_from(0.5 * np.pi), seen_from(0.5 * np.pi, np.pi)
     floors = []
-    for sighting in (one, both):
-        states = states_within(sighting, library(), 1.0)
-        floors.append(total(floor_mm(sighting, states, states.weights(2.0))))
+    for moment in (one, both):
+        states = states_within(moment, library(), 1.0)
+        floors.append(total(floor_mm(moment, states, states.weights(2.0))))
     assert floors[0] > 100.0
     assert floors[1] < 20.0
 
@@ -103,11 +103,11 @@ def test_the_spread_is_the_root_mean_square_distance_from_the_weighted_mean() ->
 
 
 def test_of_very_many_poses_some_stand_for_all() -> None:
-    sighting = seen_from(0.5 * np.pi)
+    moment = seen_from(0.5 * np.pi)
     twins = np.array([stride(), mirrored_poses(SKELETON, stride()[None])[0]])
     poses = np.tile(twins, (2500, 1))
     states = States(np.arange(5000), poses, np.tile(PLACE, (5000, 1)), np.zeros(5000))
-    first, second = clusters_of(sighting, states, states.weights(2.0))
+    first, second = clusters_of(moment, states, states.weights(2.0))
     assert (len(first.members), len(second.members)) == (2500, 2500)
     assert first.weight == pytest.approx(0.5)
     assert first.spread_mm == pytest.approx(0.0, abs=1e-6)

@@ -19,7 +19,18 @@ from posefit_experiments.people import experiment
 from posefit_experiments.people.clips import GROUPS, RUNS, WALKS, Piece
 from posefit_experiments.people.closest import closest_mm, distances_mm
 from posefit_experiments.people.design import (
-    AGAIN, BASE, CHANGES, FULL, METHODS, OTHERS, OWN, QUICK, STEPS, Extent, Planned, design,
+    AGAIN,
+    BASE,
+    CHANGES,
+    FULL,
+    METHODS,
+    OTHERS,
+    OWN,
+    QUICK,
+    STEPS,
+    Extent,
+    Planned,
+    design,
 )  # fmt: skip
 from posefit_experiments.people.recovery import AWAY, GAPS, RETURN, judged, recoveries, returned, with_gap
 from posefit_experiments.people.tables import interval, people_lines, recovery_lines, recovery_table, tables
