@@ -186,6 +186,24 @@ def test_of_masks_poses_are_aligned_and_nothing_is_told_of_the_truth(tmp_path: P
     assert [one["views"] for one in summary["floor"]] == ["one camera"]
 
 
+def test_masks_of_two_calibrated_cameras_are_seen_together_and_alone(tmp_path: Path) -> None:
+    walk = built_in.motion("walk")
+    words: list[object] = []
+    for k, azimuth in enumerate((0.3, 1.9)):
+        camera = Camera.around(walk.translations[3], azimuth, 4.0, (120, 90))
+        mask = project(Body.of(walk.skeleton), camera, walk.poses[3], walk.translations[3])
+        (tmp_path / f"{k}").mkdir()
+        cv2.imwrite(str(tmp_path / f"{k}" / "0.png"), mask.astype(np.uint8) * 255)
+        (tmp_path / f"{k}.json").write_text(camera.to_json(), "utf-8")
+        words += [tmp_path / f"{k}", "--camera", tmp_path / f"{k}.json"]
+    result = run(*words, "--train", "walk-a", "--within", 3, "--json")
+    assert result.exit_code == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert summary["views"] == 2
+    assert [one["views"] for one in summary["floor"]] == ["both cameras", "camera 1", "camera 2"]
+    assert min(one["least_cost"] for one in summary["floor"]) < 10.0
+
+
 def test_the_clip_itself_is_left_out_of_the_library() -> None:
     found = ambiguity_of("16_15", frame=5, train=["library:16"], viewing=Viewing(size=(120, 90)))
     assert "16_15" not in found.library.names
