@@ -17,6 +17,9 @@ SOURCES = {
     "AUGER2005": "Auger and Hansen, A restart CMA evolution strategy with increasing population size, 2005",
     "TOYAMA2001": "Toyama and Blake, Probabilistic tracking in a metric space, 2001",
     "RABINER1989": "Rabiner, A tutorial on hidden Markov models and selected applications in speech recognition, 1989",
+    "URSEM1999": "Ursem, Multinational evolutionary algorithms, 1999",
+    "MAREE2018": "Maree et al., Real-valued multi-modal optimization driven by hill-valley clustering, 2018",
+    "DAU2022": "Dau and Chopin, Waste-free sequential Monte Carlo, 2022",
 }
 _TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")

@@ -1,0 +1,1 @@
+"""What weighted poses say, and where they come from."""
