@@ -17,6 +17,7 @@ from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, SearchS
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
+from posefit.posterior.modes import Mode, Posterior
 from posefit.silhouette.cost import BETA, Areas
 from posefit.silhouette.mask import Silhouette
 
@@ -53,6 +54,9 @@ class Frame:
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
     # of all threads of the process, where a tracker says: unlike `seconds` it does not grow on a busy machine
     cpu_seconds: float | None = None
+    posterior: Posterior | None = field(default=None, repr=False)  # what else it may be, where a tracker says
+    modes: Sequence[Mode] = ()  # that are in the posterior, the likeliest first; a followed scene's frames have them
+    lost: float | None = None  # how likely it is that the frame is lost, where a tracker says
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,15 +243,7 @@ class SynthesisTracker:
                 yield latest
                 continue
             optimiser = self._ready(optimiser, space, rng)
-            problem = PoseProblem(
-                task.body,
-                task.cameras,
-                observation.silhouettes,
-                space,
-                beta=self.prediction.beta,
-                threads=task.threads,
-                blank=True,
-            )
+            problem = self._problem(space, observation)
             best = minimise(problem.evaluate, optimiser, task.evaluations, told=True)
             follower.commit(best.proposal)
             latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
@@ -260,19 +256,17 @@ class SynthesisTracker:
             poses, places = latest.pose[None], latest.translation[None]
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
-        problem = PoseProblem(
-            self.task.body,
-            self.task.cameras,
-            observation.silhouettes,
-            space,
-            beta=self.prediction.beta,
-            blank=True,
-        )
+        problem = self._problem(space, observation)
         counts = problem.areas(poses, places)
         areas = np.stack([one[0] for one in counts])
         return Frame(
             poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0), cpu_seconds=0.0
         )
+
+    def _problem(self, space: SearchSpace, observation: Observation) -> PoseProblem:
+        task, beta = self.task, self.prediction.beta
+        seen = observation.silhouettes
+        return PoseProblem(task.body, task.cameras, seen, space, beta=beta, threads=task.threads, blank=True)
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
         """Return the optimiser of the next frame, as `next_frame` asks."""

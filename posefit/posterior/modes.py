@@ -1,0 +1,123 @@
+"""Weighted poses of a frame, and the few of them that are really different: the modes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import ANGLES, Skeleton
+
+# ours: metres, the mean over joints, beyond which two poses are of two modes; a mirrored stride is 0.15 to 0.2 off
+APART = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """A pose that a frame may show, and how likely that is."""
+
+    weight: float
+    pose: Array = field(repr=False)  # (66,)
+    translation: Array = field(repr=False)  # (3,) metres
+
+
+@dataclass(frozen=True, eq=False)
+class TrackMode:
+    """A track that all frames may show, and how likely that is."""
+
+    weight: float
+    poses: Array = field(repr=False)  # (T, 66)
+    translations: Array = field(repr=False)  # (T, 3) metres
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """The poses that one frame may show, each with its weight; weights are divided by their sum.
+
+    Where it is `coherent`, row k of each frame is of one and the same track that may be the true one.
+    """
+
+    poses: Array = field(repr=False)  # (K, 66)
+    translations: Array = field(repr=False)  # (K, 3) metres
+    weights: Array = field(repr=False)  # (K,) which sum to 1
+    coherent: bool = False
+
+    def __post_init__(self) -> None:
+        count = len(np.atleast_1d(self.weights))
+        for name, shape in (("poses", (count, ANGLES)), ("translations", (count, 3)), ("weights", (count,))):
+            value = np.asarray(getattr(self, name), dtype=np.float64)
+            if value.shape != shape or not count:
+                raise ValueError(f"{name} of a posterior must have shape {shape}, got {value.shape}")
+            if not np.isfinite(value).all():
+                raise ValueError(
+                    f"{name} of a posterior must be finite, got {np.isfinite(value).sum()} of {value.size}"
+                )
+            object.__setattr__(self, name, value)
+        total, least = float(self.weights.sum()), float(self.weights.min())
+        if least < 0.0 or not total > 0.0:
+            raise ValueError(
+                f"weights of a posterior must be 0 or more, not all 0, got {least:g} or more, sum {total:g}"
+            )
+        object.__setattr__(self, "weights", self.weights / total)
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+
+def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> list[Mode]:
+    """Return what a frame may show, the likeliest first: poses that are alike are one mode. Weights sum to 1.
+
+    Poses are alike where their joints are at most `apart` metres from each other, the mean over joints, both roots at
+    one point. The pose of a mode is that of its medoid, which somebody can really have; a mean might be nobody's.
+    """
+    found = _clusters(_distances(skeleton.joints(posterior.poses)), posterior.weights, apart)
+    return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in found]
+
+
+def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: float = APART) -> list[TrackMode]:
+    """Return the tracks that a clip may show, the likeliest first, given what each of its frames may show.
+
+    Tracks are alike as poses are in `modes_of`, by the mean over frames. Raises ValueError where rows are no tracks.
+    """
+    if not posteriors or any(not one.coherent or len(one) != len(posteriors[0]) for one in posteriors):
+        raise ValueError("posteriors must be coherent, of one length and at least one, to be tracks")
+    distances = np.mean([_distances(skeleton.joints(one.poses)) for one in posteriors], axis=0)
+    weights = np.mean([one.weights for one in posteriors], axis=0)
+    return [
+        TrackMode(
+            weight,
+            np.array([one.poses[row] for one in posteriors]),
+            np.array([one.translations[row] for one in posteriors]),
+        )
+        for weight, row in _clusters(distances, weights, apart)
+    ]
+
+
+def _distances(joints: Array) -> Array:
+    """Return how far joints (K, 27, 3) are from each other (K, K), metres, the mean over joints."""
+    return np.array([np.linalg.norm(joints - one, axis=-1).mean(axis=-1) for one in joints])
+
+
+def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[float, int]]:
+    """Return the weight and the medoid of each cluster, the heaviest first.
+
+    A centre is the row that has most weight about it among those that no earlier centre is near; then every row goes
+    to its nearest centre.
+    """
+    near = distances <= apart
+    left = weights > 0.0
+    centres: list[int] = []
+    while left.any():
+        about = np.where(left, near @ np.where(left, weights, 0.0), -1.0)
+        centres.append(int(about.argmax()))
+        left &= ~near[centres[-1]]
+    owners = distances[:, centres].argmin(axis=1)
+    found = [(float(weights[owners == k].sum()), _medoid(distances, weights, owners == k)) for k in range(len(centres))]
+    return sorted(found, key=lambda one: -one[0])
+
+
+def _medoid(distances: Array, weights: Array, members: NDArray[np.bool_]) -> int:
+    """Return which of the members of a cluster (K,) is nearest to them all."""
+    rows = np.flatnonzero(members)
+    return int(rows[(distances[np.ix_(rows, rows)] @ weights[rows]).argmin()])

@@ -1,0 +1,87 @@
+"""Which poses of a frame are really different, on poses whose distances are known."""
+
+import numpy as np
+import pytest
+
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, angle_index
+from posefit.motion.built_in import average_skeleton
+from posefit.posterior.modes import Posterior, modes_of, track_modes
+
+SKELETON = average_skeleton()
+STILL = np.zeros(ANGLES)
+
+
+def turned(degrees: float) -> np.ndarray:
+    pose = STILL.copy()
+    pose[0] = np.radians(degrees)
+    return pose
+
+
+def posterior(poses: list[np.ndarray], weights: list[float], coherent: bool = False) -> Posterior:
+    places = np.arange(3.0 * len(poses)).reshape(-1, 3)
+    return Posterior(np.array(poses), places, np.array(weights), coherent)
+
+
+def test_weights_are_divided_by_their_sum() -> None:
+    np.testing.assert_allclose(posterior([STILL, STILL], [1.0, 3.0]).weights, [0.25, 0.75])
+
+
+def test_what_is_no_posterior_is_told_with_what_was_expected() -> None:
+    with pytest.raises(ValueError, match=r"translations of a posterior must have shape \(2, 3\), got \(1, 3\)"):
+        Posterior(np.zeros((2, ANGLES)), np.zeros((1, 3)), np.ones(2))
+    with pytest.raises(ValueError, match=r"poses of a posterior must have shape \(0, 66\)"):
+        Posterior(np.zeros((0, ANGLES)), np.zeros((0, 3)), np.ones(0))
+    with pytest.raises(ValueError, match="not all 0, got -1 or more, sum 1"):
+        posterior([STILL, STILL], [-1.0, 2.0])
+    with pytest.raises(ValueError, match="not all 0, got 0 or more, sum 0"):
+        posterior([STILL], [0.0])
+    with pytest.raises(ValueError, match="poses of a posterior must be finite, got 65 of 66"):
+        posterior([np.where(np.arange(ANGLES) == 3, np.nan, 0.0)], [1.0])
+
+
+def test_poses_that_are_alike_are_one_mode_and_one_that_is_turned_around_is_another() -> None:
+    # at rest the feet, knees and arms are beside the body: turned around they are where the others were
+    modes = modes_of(SKELETON, posterior([turned(0), turned(180), turned(1), turned(-1)], [0.2, 0.3, 0.25, 0.25]))
+    assert [mode.weight for mode in modes] == pytest.approx([0.7, 0.3])
+    # of 0, 1 and -1 degrees the one in the middle is nearest to the others: 0.25 + 0.25 against 0.2 + 0.5
+    np.testing.assert_array_equal(modes[0].pose, turned(0))
+    np.testing.assert_array_equal(modes[1].pose, turned(180))
+    np.testing.assert_array_equal(modes[1].translation, [3.0, 4.0, 5.0])
+
+
+def test_where_a_body_stands_makes_no_mode() -> None:
+    assert len(modes_of(SKELETON, posterior([STILL] * 5, [0.2] * 5))) == 1
+
+
+def test_a_pose_of_no_weight_is_no_mode() -> None:
+    modes = modes_of(SKELETON, posterior([turned(0), turned(180)], [1.0, 0.0]))
+    assert [mode.weight for mode in modes] == [1.0]
+
+
+def test_a_raised_arm_comes_apart_as_soon_as_its_joints_are_so_far_off() -> None:
+    raised = STILL.copy()
+    raised[angle_index(INNER[[JOINTS[j] for j in INNER].index("lhumerus")]) + 2] = np.pi / 2
+    off = float(np.linalg.norm(SKELETON.joints(raised) - SKELETON.joints(STILL), axis=1).mean())
+    both = posterior([STILL, raised], [0.5, 0.5])
+    assert len(modes_of(SKELETON, both, apart=1.01 * off)) == 1
+    assert len(modes_of(SKELETON, both, apart=0.99 * off)) == 2
+
+
+def test_whole_tracks_are_alike_by_the_mean_over_their_frames() -> None:
+    # the second of three tracks is turned around in one frame of four, the third in all
+    frames = [
+        posterior([turned(0), turned(180 if k == 0 else 0), turned(180)], [0.5, 0.3, 0.2], coherent=True)
+        for k in range(4)
+    ]
+    off = float(np.linalg.norm(SKELETON.joints(turned(0)) - SKELETON.joints(turned(180)), axis=1).mean())
+    modes = track_modes(SKELETON, frames, apart=0.3 * off)  # a quarter of it is less
+    assert [mode.weight for mode in modes] == pytest.approx([0.8, 0.2])
+    np.testing.assert_array_equal(modes[1].poses, np.tile(turned(180), (4, 1)))
+    assert modes[0].translations.shape == (4, 3)
+
+
+def test_rows_that_are_no_tracks_are_told() -> None:
+    with pytest.raises(ValueError, match="coherent"):
+        track_modes(SKELETON, [posterior([STILL], [1.0])])
+    with pytest.raises(ValueError, match="coherent"):
+        track_modes(SKELETON, [])
