@@ -15,7 +15,7 @@ from posefit.arrays import Array
 from posefit.posterior.hill_valley import valleys
 from posefit.posterior.landscape import Landscape
 from posefit.posterior.mixture import Mixture
-from posefit.posterior.smc import CHAIN, PARTICLES, tempered
+from posefit.posterior.smc import CHAIN, PARTICLES, reweighed, systematic_rows, tempered
 
 EACH = 12  # ours: of each search, so many of its best proposals are sorted into valleys
 PROBES = 4  # ours: of a pair, at the least, as these valleys may be narrow
@@ -39,22 +39,11 @@ class Weighed:
     mode_weights: Array  # (k,), which sum to 1
     evaluations: int  # beyond those of the searches
 
-    def thinned(self, count: int, rng: np.random.Generator) -> "Weighed":
-        """Return at most `count` of the proposals, all of one weight; a mode keeps its share as nearly as it goes."""
+    def even(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Return proposals (count, d) of equal weights (count,): each mode has its share, as nearly as it goes."""
         order = np.lexsort([self.costs, self.groups])
-        teeth = (np.arange(count) + rng.random()) / count
-        sums = self.weights[order].cumsum()
-        rows = order[np.minimum(sums.searchsorted(teeth * sums[-1], side="right"), len(order) - 1)]
-        even = np.full(count, 1.0 / count)
-        return Weighed(
-            self.proposals[rows],
-            even,
-            self.costs[rows],
-            self.groups[rows],
-            self.modes,
-            self.mode_weights,
-            self.evaluations,
-        )
+        rows = order[systematic_rows(self.weights[order], rng.random(), count)]
+        return self.proposals[rows], np.full(count, 1.0 / count)
 
 
 def weighed(
@@ -101,6 +90,14 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
     if not sum(map(len, known)):
         raise ValueError(f"searches must meet a finite cost, got none in {len(searched)} searches")
     return np.concatenate(chosen), np.concatenate(known)
+
+
+def likelihoods(costs: Array, temperature: float) -> Array:
+    """Return weights (n,) exp(-cost / temperature), which sum to 1; all weigh alike where no cost is finite."""
+    rises = np.where(np.isfinite(costs), -costs / temperature, -np.inf)
+    if rises.max() == -np.inf:
+        return np.full(len(costs), 1.0 / len(costs))
+    return reweighed(rises, 1.0)[0]
 
 
 def widths(landscape: Landscape, modes: Array, costs: Array, temperature: float) -> Array:
