@@ -40,9 +40,8 @@ def modes(
     at_least("evaluations", evaluations, 1)
     positive("temperature", temperature)
     first = searched(problem, make(problem.space, rng), evaluations)
-    return posterior_of(problem, [first, *elsewhere(problem, make, evaluations, rng, searches - 1)], temperature, rng)[
-        0
-    ]
+    others = elsewhere(problem, make, evaluations, rng, searches - 1)
+    return posterior_of(problem, [first, *others], temperature, rng)[0]
 
 
 def elsewhere(
