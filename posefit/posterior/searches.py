@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.posterior.hill_valley import valleys
 from posefit.posterior.landscape import Landscape
-from posefit.posterior.mixture import Mixture
+from posefit.posterior.mixture import WIDEST, Mixture
 from posefit.posterior.smc import CHAIN, PARTICLES, reweighed, systematic_rows, tempered
 
-EACH = 12  # ours: of each search, so many of its best proposals are sorted into valleys
-PROBES = 4  # ours: of a pair, at the least, as these valleys may be narrow
+EACH = 8  # ours: of each search, so many of its best proposals are sorted into valleys
+PROBES = 3  # ours: of a pair, at the least, as these valleys may be narrow
 MOST = 16  # ours: valleys that the sampler starts in, the deepest
 REACH = 10.0  # ours: in temperatures above the least cost: what is not as deep weighs nothing worth a start
-BROAD = 0.2  # ours: the share of particles that start anywhere, so that no valley is left out for good
+BROAD = 0.3  # ours: the share of particles that start anywhere
 WIDTHS = 0.5 ** np.arange(7, 0, -1)  # ours: how wide a valley may be, in half-ranges of the box
+WIDER = np.array([1.0, 3.0])  # ours: particles start as wide, and wider, as coordinates may change together
 
 Searched = tuple[Array, Array]  # all that one search evaluated: proposals (n, d), costs (n,)
 
@@ -65,12 +66,19 @@ def weighed(
     found = valleys(landscape, proposals, costs, tolerance=temperature, least=PROBES)
     lowest = found.lowest[costs[found.lowest] <= costs.min() + REACH * temperature][:MOST]
     modes = proposals[lowest]
-    start = Mixture(modes, widths(landscape, modes, costs[lowest], temperature), BROAD)
+    spreads = WIDER[:, None, None] * widths(landscape, modes, costs[lowest], temperature)
+    centres = np.broadcast_to(modes, spreads.shape)
+    start = Mixture(_rows(centres), np.minimum(_rows(spreads), WIDEST), BROAD)
     sample = tempered(landscape, start, temperature, rng, particles=particles, chain=chain)
-    groups = start.nearest(landscape.box, sample.proposals)
+    groups = start.nearest(landscape.box, sample.proposals) % len(modes)
     shares: Array = np.bincount(groups, sample.weights, len(modes)).astype(np.float64)
     spent = landscape.evaluations - before
     return Weighed(sample.proposals, sample.weights, sample.costs, groups, modes, shares, spent)
+
+
+def _rows(several: Array) -> Array:
+    """Return what has the shape (s, k, d) as (s k, d)."""
+    return several.reshape(-1, several.shape[-1])
 
 
 def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) -> Searched:

@@ -13,7 +13,7 @@ from posefit.arrays import Array
 from posefit.posterior.landscape import Landscape
 from posefit.posterior.mixture import Mixture
 
-PARTICLES = 512  # N, ours
+PARTICLES = 2048  # N, ours
 CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P
 SURVIVAL = 0.5  # alpha: the share of the particles that the next temperature leaves
 HALVINGS = 60  # ours: bisection steps; a double has 53 bits

@@ -180,7 +180,7 @@ def test_what_costs_infinitely_much_weighs_nothing() -> None:
     [
         ({"temperature": 0.0}, "temperature must be above 0, got 0.0"),
         ({"particles": 10}, "particles must be at least 2 chains of 2 or more, got 10 and chains of 8"),
-        ({"chain": 1}, "particles must be at least 2 chains of 2 or more, got 512 and chains of 1"),
+        ({"chain": 1}, "particles must be at least 2 chains of 2 or more, got 2048 and chains of 1"),
         ({"survival": 1.0}, "survival must lie between 0 and 1, got 1.0"),
     ],
 )
