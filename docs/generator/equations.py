@@ -20,6 +20,9 @@ SOURCES = {
     "URSEM1999": "Ursem, Multinational evolutionary algorithms, 1999",
     "MAREE2018": "Maree et al., Real-valued multi-modal optimization driven by hill-valley clustering, 2018",
     "DAU2022": "Dau and Chopin, Waste-free sequential Monte Carlo, 2022",
+    "GODSILL2004": "Godsill, Doucet and West, Monte Carlo smoothing for nonlinear time series, 2004",
+    "DUNN2023": "Dunn, Wasserman and Ramdas, Distribution-free prediction sets for two-layer hierarchical models, 2023",
+    "GUO2017": "Guo, Pleiss, Sun and Weinberger, On calibration of modern neural networks, 2017",
 }
 _TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")

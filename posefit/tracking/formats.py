@@ -12,6 +12,7 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion.motion import Motion
+from posefit.tracking.evaluation import LOST
 
 FILES = (
     "poses.npz",
@@ -51,7 +52,8 @@ def write_formats(
     write_asf(folder / "skeleton.asf", estimate.skeleton)
     write_amc(folder / "track.amc", estimate)
     write_bvh(folder / "track.bvh", estimate)
-    write_trc(folder / "track.trc", estimate)
+    blank = {k for k, row in enumerate(rows) if not row["usable"] or row["lost"] >= LOST}
+    write_trc(folder / "track.trc", estimate, blank)
     (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
     joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
     names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
@@ -59,5 +61,6 @@ def write_formats(
         writer = csv.writer(file)
         writer.writerow([*rows[0], *names])
         for row, points in zip(rows, joints, strict=True):
-            writer.writerow([*row.values(), *(f"{value:.6f}" for value in points.reshape(-1))])
+            told = ["" if np.isnan(value) else value for value in row.values()]
+            writer.writerow([*told, *(f"{value:.6f}" for value in points.reshape(-1))])
     (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
