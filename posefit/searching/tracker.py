@@ -57,11 +57,11 @@ class WeighingTracker:
         problem = self.tracker.problem(cast(SearchSpace, record.space), record.observation)
         if how.modes == 1 and self.tracker.next_frame == "carry":
             particles, costs = record.found[-1]
-            return told(problem, particles, likelihoods(costs, how.temperature)), 0
+            return told(problem, particles, likelihoods(costs, how.posterior_temperature)), 0
         # drawn from a copy, so that the track itself is what it is without
         own = np.random.default_rng(copy.deepcopy(rng).integers(0, 2**63, 4))
         others = elsewhere(problem, self.tracker.make, evaluations, own, how.modes - 1)
-        posterior, more = posterior_of(problem, [joined(record.found), *others], how.temperature, own)
+        posterior, more = posterior_of(problem, [joined(record.found), *others], how.posterior_temperature, own)
         return posterior, more + sum(len(costs) for _, costs in others)
 
 

@@ -78,7 +78,7 @@ def test_numbers_that_make_no_sense_are_refused(given: dict[str, Any], said: str
     [
         ({"modes": -1}, "modes must be 0 or more, got -1"),
         ({"modes": 2.5}, "tracker.modes must be int, got 2.5"),
-        ({"modes": 1, "temperature": -1.0}, "temperature must be above 0, got -1.0"),
+        ({"modes": 1, "posterior_temperature": -1.0}, "posterior_temperature must be above 0, got -1.0"),
     ],
 )
 def test_a_wrong_setting_of_the_tracker_is_one_clear_error(given: dict[str, Any], said: str) -> None:
