@@ -36,7 +36,7 @@ def exemplars(
     smoothing: float = 1.0,
     transitions: str = "clips",
     samples: int = 24,
-    posterior_temperature: float = 2.0,
+    posterior_temperature: float = 8.0,
 ) -> ExemplarTracker:
     """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
 

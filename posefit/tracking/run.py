@@ -131,6 +131,12 @@ def _moded(frame: Frame, skeleton: Skeleton) -> Frame:
     return frame if frame.posterior is None else replace(frame, modes=modes_of(skeleton, frame.posterior))
 
 
+def _alone(frame: Frame) -> Frame:
+    """Return a frame whose posterior is its own: a track that goes on has no rows of the one that was interrupted."""
+    posterior = frame.posterior
+    return frame if posterior is None else replace(frame, posterior=replace(posterior, coherent=False))
+
+
 def _whole(skeleton: Skeleton, found: Sequence[Frame]) -> list[TrackMode]:
     """Return the modes of a whole track; none where its frames' posteriors are no tracks."""
     each = [frame.posterior for frame in found if frame.posterior is not None and frame.posterior.coherent]
@@ -171,6 +177,7 @@ def _found(
         which = f" of track {number + 1} of {tracks}, {begun}" if tracks > 1 else ""
         if state is not None and 0 < len(frames) < scene.count:
             rng.bit_generator.state = state
+            frames = [_alone(frame) for frame in frames]
             listener.say(f"going on from frame {len(frames)} of {scene.count}{which}")
             last = frames[-1]
             mine = replace(mine, yaw=float(last.pose[0]), first_pose=last.pose[3:], before=tuple(frames))
