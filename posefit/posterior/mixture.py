@@ -17,7 +17,7 @@ _normal = np.vectorize(lambda x: 0.5 * (1.0 + math.erf(x / math.sqrt(2.0))), oty
 
 
 @dataclass(frozen=True, eq=False)
-class Mixture:
+class NormalMixture:
     """Normal distributions of equal weight around `centres`, cut off at the box, and a share `broad` that is uniform.
 
     They wrap around where a coordinate is periodic. Without centres everything is uniform.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.posterior.hill_valley import valleys
 from posefit.posterior.landscape import Landscape
-from posefit.posterior.mixture import WIDEST, Mixture
+from posefit.posterior.mixture import WIDEST, NormalMixture
 from posefit.posterior.smc import CHAIN, PARTICLES, reweighed, systematic_rows, tempered
 
 EACH = 8  # ours: of each search, so many of its best proposals are sorted into valleys
@@ -68,7 +68,7 @@ def weighed(
     modes = proposals[lowest]
     spreads = WIDER[:, None, None] * widths(landscape, modes, costs[lowest], temperature)
     centres = np.broadcast_to(modes, spreads.shape)
-    start = Mixture(_rows(centres), np.minimum(_rows(spreads), WIDEST), BROAD)
+    start = NormalMixture(_rows(centres), np.minimum(_rows(spreads), WIDEST), BROAD)
     sample = tempered(landscape, start, temperature, rng, particles=particles, chain=chain)
     groups = start.nearest(landscape.box, sample.proposals) % len(modes)
     shares: Array = np.bincount(groups, sample.weights, len(modes)).astype(np.float64)

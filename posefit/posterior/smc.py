@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.posterior.landscape import Landscape
-from posefit.posterior.mixture import Mixture
+from posefit.posterior.mixture import NormalMixture
 
 PARTICLES = 2048  # N, ours
 CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P
@@ -35,7 +35,7 @@ class Sampled:
 
 def tempered(
     landscape: Landscape,
-    start: Mixture,
+    start: NormalMixture,
     temperature: float,
     rng: np.random.Generator,
     *,
@@ -132,7 +132,7 @@ def _effective(logarithms: Array) -> float:
     return float(weights.sum() ** 2 / (weights**2).sum())
 
 
-def _walk(start: Mixture, landscape: Landscape, proposals: Array, weights: Array) -> Array:
+def _walk(start: NormalMixture, landscape: Landscape, proposals: Array, weights: Array) -> Array:
     """Return the root (d, d) of a random walk's covariance, in proportion to that of the particles.
 
     It is taken within the modes of the start, as a walk does not reach from one to the other; where there are none, of
@@ -155,7 +155,7 @@ _State = tuple[Array, Array, Array]  # proposals (m, d), costs (m,), log densiti
 
 def _moved(
     landscape: Landscape,
-    start: Mixture,
+    start: NormalMixture,
     state: _State,
     walk: Array,
     exponent: float,

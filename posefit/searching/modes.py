@@ -55,10 +55,10 @@ def elsewhere(
 def searched(problem: PoseProblem, optimiser: Optimiser, evaluations: int) -> Searched:
     """Return all proposals (n, d) that an optimiser had evaluated within a budget, and their costs (n,)."""
     found = [(np.array(one), costs) for one, costs in populations(optimiser, problem.evaluate, evaluations)]
-    return joined(found)
+    return gathered(found)
 
 
-def joined(found: list[Searched]) -> Searched:
+def gathered(found: list[Searched]) -> Searched:
     """Return the populations of a search as one."""
     return np.concatenate([one for one, _ in found]), np.concatenate([costs for _, costs in found])
 

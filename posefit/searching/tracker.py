@@ -15,7 +15,7 @@ from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
 from posefit.posterior.modes import Posterior
 from posefit.posterior.searches import Searched, likelihoods
-from posefit.searching.modes import MakeOptimiser, elsewhere, joined, posterior_of, told
+from posefit.searching.modes import MakeOptimiser, elsewhere, gathered, posterior_of, told
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class WeighingTracker:
         # drawn from a copy, so that the track itself is what it is without
         own = np.random.default_rng(copy.deepcopy(rng).integers(0, 2**63, 4))
         others = elsewhere(problem, self.tracker.make, evaluations, own, how.modes - 1)
-        posterior, more = posterior_of(problem, [joined(record.found), *others], how.posterior_temperature, own)
+        posterior, more = posterior_of(problem, [gathered(record.found), *others], how.posterior_temperature, own)
         return posterior, more + sum(len(costs) for _, costs in others)
 
 

@@ -10,7 +10,7 @@ from scipy.stats import kstest, multivariate_normal, truncnorm
 from posefit.arrays import Array
 from posefit.posterior import smc
 from posefit.posterior.landscape import Landscape
-from posefit.posterior.mixture import Mixture
+from posefit.posterior.mixture import NormalMixture
 from posefit.posterior.smc import next_step, reweighed, systematic_rows, tempered
 from posefit.testing.toy import Toy
 
@@ -52,7 +52,7 @@ def test_evidence_is_the_product_of_the_mean_weights() -> None:  # DAU2022 (norm
     assert reweighed(np.log([1.0, 4.0]), 0.5)[1] == pytest.approx(np.log(1.5))
     # the whole product: the mean of exp(-cost / 2) over the box, whose volume is 4
     found = [
-        tempered(Landscape(Toy(2), PAIR.cost), Mixture.anywhere(2), 2.0, np.random.default_rng(k), particles=1024)
+        tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), 2.0, np.random.default_rng(k), particles=1024)
         for k in range(20)
     ]
     assert np.mean(np.exp([one.log_evidence for one in found])) == pytest.approx(0.25, rel=0.1)
@@ -68,7 +68,7 @@ def test_all_states_of_the_chains_are_particles(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(smc, "reweighed", watched)
     landscape = Landscape(Toy(2), PAIR.cost)
-    found = tempered(landscape, Mixture.anywhere(2), 2.0, np.random.default_rng(0), particles=96, chain=6)
+    found = tempered(landscape, NormalMixture.anywhere(2), 2.0, np.random.default_rng(0), particles=96, chain=6)
     assert set(seen) == {96}
     assert found.proposals.shape == (96, 2)
     # a step evaluates 5 moves of 16 chains, but for those that leave the box
@@ -78,7 +78,7 @@ def test_all_states_of_the_chains_are_particles(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_walk_has_the_covariance_of_the_particles(monkeypatch: pytest.MonkeyPatch) -> None:  # DAU2022 (random walk)
     proposals = np.array([[0.1, 0.0], [-0.1, 0.0], [0.0, 0.2], [0.0, -0.2]])
-    walk = smc._walk(Mixture.anywhere(2), Landscape(Toy(2), PAIR.cost), proposals, np.array([0.3, 0.3, 0.2, 0.2]))
+    walk = smc._walk(NormalMixture.anywhere(2), Landscape(Toy(2), PAIR.cost), proposals, np.array([0.3, 0.3, 0.2, 0.2]))
     # covariance diag(0.6 x 0.01, 0.4 x 0.04), scaled by 2.38^2 / 2
     np.testing.assert_allclose(walk @ walk.T, 2.38**2 / 2.0 * np.diag([0.006, 0.016]), rtol=1e-9)
 
@@ -86,7 +86,7 @@ def test_a_walk_has_the_covariance_of_the_particles(monkeypatch: pytest.MonkeyPa
 def test_a_walk_has_the_covariance_within_the_modes() -> None:
     offsets = np.array([[0.1, 0.0], [-0.1, 0.0], [0.0, 0.1], [0.0, -0.1]])
     centres = np.array([[-0.5, -0.5], [0.5, 0.5]])
-    start = Mixture(centres, np.full((2, 2), 0.1), 0.2)
+    start = NormalMixture(centres, np.full((2, 2), 0.1), 0.2)
     proposals = (centres[:, None] + offsets).reshape(-1, 2)
     walk = smc._walk(start, Landscape(Toy(2), PAIR.cost), proposals, np.full(8, 0.125))
     np.testing.assert_allclose(walk @ walk.T, 2.38**2 / 2.0 * np.diag([0.005, 0.005]), rtol=1e-6)
@@ -99,7 +99,7 @@ def test_a_comb_keeps_each_row_as_often_as_its_weight_asks() -> None:
 
 @pytest.mark.parametrize("broad", [0.2, 0.7])
 def test_a_start_has_the_density_that_it_draws_from(broad: float) -> None:
-    start = Mixture(np.array([[-0.9, 0.2], [0.5, -0.8]]), np.array([[0.2, 0.1], [0.4, 0.3]]), broad)
+    start = NormalMixture(np.array([[-0.9, 0.2], [0.5, -0.8]]), np.array([[0.2, 0.1], [0.4, 0.3]]), broad)
     space = Toy(2, wrapping=1)
     drawn, share = start.draw(space, np.random.default_rng(0), 4000)
     assert share == 1.0
@@ -110,22 +110,24 @@ def test_a_start_has_the_density_that_it_draws_from(broad: float) -> None:
     density = np.exp(start.log_density(space, np.stack([x.ravel(), y.ravel()], axis=1)))
     assert density.mean() == pytest.approx(1.0, abs=1e-3)
     # by hand, far from where anything is cut off or wraps
-    alone = Mixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 0.5)
+    alone = NormalMixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 0.5)
     here = 0.5 + 0.5 * 4.0 * multivariate_normal([0.0, 0.0], 0.01).pdf([0.1, -0.1])
     assert np.exp(alone.log_density(space, np.array([[0.1, -0.1]])))[0] == pytest.approx(here)
 
 
 def test_a_start_is_cut_off_at_the_sides_and_wraps_around_where_they_meet() -> None:
-    start = Mixture(np.array([[0.9, 0.9]]), np.full((1, 2), 0.2), 1e-9)
+    start = NormalMixture(np.array([[0.9, 0.9]]), np.full((1, 2), 0.2), 1e-9)
     drawn, _ = start.draw(Toy(2, wrapping=1), np.random.default_rng(1), 3000)
     assert 0.25 < (drawn[:, 0] < 0.0).mean() < 0.4  # half a deviation from the side: 31 %
     assert kstest(drawn[:, 1], truncnorm(-9.5, 0.5, 0.9, 0.2).cdf).pvalue > 1e-3
 
 
 @pytest.mark.parametrize(
-    "start", [Mixture.anywhere(2), Mixture(PAIR.means, np.full((2, 2), 0.05), 0.2)], ids=["anywhere", "modes"]
+    "start",
+    [NormalMixture.anywhere(2), NormalMixture(PAIR.means, np.full((2, 2), 0.05), 0.2)],
+    ids=["anywhere", "modes"],
 )
-def test_modes_have_their_known_weights(start: Mixture) -> None:
+def test_modes_have_their_known_weights(start: NormalMixture) -> None:
     shares, moments = [], []
     for seed in range(20):
         found = tempered(Landscape(Toy(2), PAIR.cost), start, 2.0, np.random.default_rng(seed), particles=1024)
@@ -136,7 +138,7 @@ def test_modes_have_their_known_weights(start: Mixture) -> None:
 
 
 def test_a_wrong_start_does_not_bias_the_weights() -> None:
-    start = Mixture(PAIR.means[1:], np.full((1, 2), 0.05), 0.2)  # knows the lighter mode alone
+    start = NormalMixture(PAIR.means[1:], np.full((1, 2), 0.05), 0.2)  # knows the lighter mode alone
     shares = [
         PAIR.shares(found.proposals, found.weights)[0]
         for found in (
@@ -152,7 +154,7 @@ def test_a_mode_across_the_seam_of_a_turn_is_one() -> None:
         away = 1.0 - np.abs(proposals[:, 0])
         return np.asarray(0.5 * (away / 0.1) ** 2)
 
-    found = tempered(Landscape(Toy(1, wrapping=1), seam), Mixture.anywhere(1), 1.0, np.random.default_rng(0))
+    found = tempered(Landscape(Toy(1, wrapping=1), seam), NormalMixture.anywhere(1), 1.0, np.random.default_rng(0))
     assert 0.3 < found.weights @ (found.proposals[:, 0] > 0.0) < 0.7
     away = 1.0 - np.abs(found.proposals[:, 0])
     assert np.sqrt(found.weights @ away**2) == pytest.approx(0.1, rel=0.25)
@@ -162,17 +164,19 @@ def test_only_what_is_feasible_counts() -> None:
     # a flat cost of ln 2: the mean of exp(-cost) over the box is half the feasible share, which is 1 / 4
     quarter = Toy(2, lambda x: (x > 0.0).all(axis=1))
     landscape = Landscape(quarter, lambda x: np.full(len(x), np.log(2.0)))
-    found = tempered(landscape, Mixture.anywhere(2), 1.0, np.random.default_rng(0), particles=4096)
+    found = tempered(landscape, NormalMixture.anywhere(2), 1.0, np.random.default_rng(0), particles=4096)
     assert quarter.feasible(found.proposals).all()
     assert np.exp(found.log_evidence) == pytest.approx(0.125, rel=0.1)
 
 
 def test_what_costs_infinitely_much_weighs_nothing() -> None:
     landscape = Landscape(Toy(1), lambda x: np.where(x[:, 0] > 0.0, np.nan, 1.0))
-    found = tempered(landscape, Mixture.anywhere(1), 1.0, np.random.default_rng(0))
+    found = tempered(landscape, NormalMixture.anywhere(1), 1.0, np.random.default_rng(0))
     assert found.weights @ (found.proposals[:, 0] > 0.0) == 0.0
     with pytest.raises(ValueError, match="costs must be finite somewhere"):
-        tempered(Landscape(Toy(1), lambda x: x[:, 0] * np.nan), Mixture.anywhere(1), 1.0, np.random.default_rng(0))
+        tempered(
+            Landscape(Toy(1), lambda x: x[:, 0] * np.nan), NormalMixture.anywhere(1), 1.0, np.random.default_rng(0)
+        )
 
 
 @pytest.mark.parametrize(
@@ -187,15 +191,15 @@ def test_what_costs_infinitely_much_weighs_nothing() -> None:
 def test_settings_that_make_no_sense_are_refused(given: dict[str, Any], said: str) -> None:
     settings = {"temperature": 1.0, **given}
     with pytest.raises(ValueError, match=said):
-        tempered(Landscape(Toy(2), PAIR.cost), Mixture.anywhere(2), rng=np.random.default_rng(0), **settings)
+        tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), rng=np.random.default_rng(0), **settings)
     with pytest.raises(ValueError, match="spreads must be above 0 and at most 0.5"):
-        Mixture(np.zeros((1, 2)), np.zeros((1, 2)), 0.2)
+        NormalMixture(np.zeros((1, 2)), np.zeros((1, 2)), 0.2)
     with pytest.raises(ValueError, match="spreads must have shape"):
-        Mixture(np.zeros((1, 2)), np.ones((1, 1)), 0.2)
+        NormalMixture(np.zeros((1, 2)), np.ones((1, 1)), 0.2)
     with pytest.raises(ValueError, match="broad must lie between 0 and 1"):
-        Mixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 1.0)
+        NormalMixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 1.0)
     with pytest.raises(ValueError, match="the box must be feasible somewhere"):
-        Mixture.anywhere(1).draw(Toy(1, lambda x: x[:, 0] > 2.0), np.random.default_rng(0), 4)
+        NormalMixture.anywhere(1).draw(Toy(1, lambda x: x[:, 0] > 2.0), np.random.default_rng(0), 4)
 
 
 def oracle(known: Known, particles: int, chain: int) -> tuple[Array, float]:
@@ -222,7 +226,7 @@ def test_the_library_particles_finds_the_same_weights_and_evidence() -> None:
     np.random.seed(0)  # noqa: NPY002, the library draws from the one generator of the process
     theirs = [oracle(PAIR, 1024, 8) for _ in range(20)]
     mine = [
-        tempered(Landscape(Toy(2), PAIR.cost), Mixture.anywhere(2), 2.0, np.random.default_rng(k), particles=1024)
+        tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), 2.0, np.random.default_rng(k), particles=1024)
         for k in range(20)
     ]
     shares = [PAIR.shares(one.proposals, one.weights)[0] for one in mine]
