@@ -288,15 +288,5 @@ def _frame(problem: PoseProblem, best: Minimum, seconds: float, cpu_seconds: flo
     poses, translations = problem.decode(best.proposal[None])
     counts = np.stack([areas[0] for areas in problem.areas(poses, translations)])
     found = problem.space.coordinates(best.proposal)
-    return Frame(
-        poses[0],
-        translations[0],
-        best.cost,
-        counts,
-        best.evaluations,
-        seconds,
-        best.history,
-        found,
-        best.spent,
-        cpu_seconds=cpu_seconds,
-    )
+    effort = (best.evaluations, seconds, best.history)
+    return Frame(poses[0], translations[0], best.cost, counts, *effort, found, best.spent, cpu_seconds=cpu_seconds)
