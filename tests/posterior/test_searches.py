@@ -5,7 +5,9 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.posterior.landscape import Landscape
+from posefit.posterior.mixture import NormalMixture
 from posefit.posterior.searches import best_of_each, likelihoods, weighed, widths
+from posefit.posterior.smc import tempered
 from posefit.testing.toy import Toy
 
 WEIGHTS = np.array([0.6, 0.3, 0.1])
@@ -46,6 +48,16 @@ def test_the_weights_of_modes_are_known(dimensions: int, off: float) -> None:
         assert set(nearest) == {0, 1, 2}
         wrong.append(0.5 * np.abs(np.bincount(nearest, found.mode_weights, 3) - WEIGHTS).sum())
     assert np.mean(wrong) < off
+
+
+def test_a_sampler_that_starts_anywhere_does_not_know_the_weights_in_ten_dimensions() -> None:
+    wrong = []
+    for seed in range(8):
+        start = NormalMixture.anywhere(10)
+        found = tempered(Landscape(Toy(10), mixture), start, 1.0, np.random.default_rng(seed))
+        nearest = ((found.proposals[:, None] - means(10)) ** 2).sum(axis=2).argmin(axis=1)
+        wrong.append(0.5 * np.abs(np.bincount(nearest, found.weights, 3) - WEIGHTS).sum())
+    assert np.mean(wrong) > 0.3
 
 
 def test_even_rows_keep_the_shares_of_the_modes() -> None:

@@ -12,7 +12,7 @@ from posefit.geometry.alike import facing, reflected_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit.posterior.modes import modes_of
+from posefit.posterior.modes import Posterior, modes_of
 from posefit.registry import registry
 from posefit.searching.modes import modes
 from posefit.silhouette.cost import project
@@ -22,16 +22,16 @@ from posefit.testing.problem import pose_problem, walking_angles
 FEW = {"evaluations": 400, "particles": 40, "size": (160, 120)}
 
 
-def side_view() -> tuple[PoseProblem, Any, Any]:
-    """A long stride seen from its side, with the true pose and the one whose legs are the other way round."""
-    motion = built_in.motion("walk", frames=1)
-    body, place = Body.of(motion.skeleton), motion.translations[0]
+def side_view(frame: int = 0) -> tuple[PoseProblem, Any, Any]:
+    """A stride seen from its side, with the true pose and the one whose legs are the other way round."""
+    motion = built_in.motion("walk", frames=frame + 1)
+    body, place = Body.of(motion.skeleton), motion.translations[frame]
     camera = Camera.around(place, np.pi / 2.0, 3.5, (160, 120))
-    mask = project(body, camera, motion.poses[0], place)
+    mask = project(body, camera, motion.poses[frame], place)
     prior = registry().prior("pca")().fit(walking_angles())
     space = posefit.SearchSpace(prior, np.zeros(3), np.radians([45.0, 15.0, 15.0]), place)
-    other = reflected_poses(motion.skeleton, motion.poses[:1], facing(camera, place))
-    return PoseProblem(body, [camera], [Silhouette.of(mask)], space), motion.poses[0], other[0]
+    other = reflected_poses(motion.skeleton, motion.poses[frame:], facing(camera, place))
+    return PoseProblem(body, [camera], [Silhouette.of(mask)], space), motion.poses[frame], other[0]
 
 
 @pytest.mark.parametrize("name", ["sapso", "cma", "annealed", "scipy:differential_evolution"])
@@ -43,13 +43,35 @@ def test_a_planted_flip_is_found_by_any_optimiser(name: str) -> None:
     np.testing.assert_allclose(posterior.weights, 0.01)
     assert sum(mode.weight for mode in modes_of(skeleton, posterior)) == pytest.approx(1.0)
 
-    def off(pose: Any) -> Any:
-        joints = skeleton.joints(np.concatenate([pose[None], posterior.poses]))
-        joints -= joints[:, :1]
-        return np.linalg.norm(joints[1:] - joints[0], axis=-1).mean(axis=-1)
+    assert 0.1 < other_side(problem, posterior, truth, other) < 0.9
 
-    nearer_to_other = off(other) < off(truth)
-    assert 0.1 < nearer_to_other.mean() < 0.9
+
+def other_side(problem: PoseProblem, posterior: Posterior, truth: Any, other: Any) -> float:
+    """Return the weight of the poses that are nearer to the other one than to the truth."""
+    joints = problem.body.skeleton.joints(np.concatenate([truth[None], other[None], posterior.poses]))
+    joints -= joints[:, :1]
+    off = [np.linalg.norm(joints[2:] - one, axis=-1).mean(axis=-1) for one in joints[:2]]
+    return float(posterior.weights @ (off[1] < off[0]))
+
+
+def test_planted_flips_are_found_in_nine_of_ten_frames() -> None:
+    shares = []
+    for frame in range(0, 40, 4):
+        problem, truth, other = side_view(frame)
+        tell = partial(modes, problem, registry().optimiser("sapso"), searches=8, evaluations=2440)
+        shares.append(other_side(problem, tell(rng=np.random.default_rng(frame)), truth, other))
+    assert np.mean([0.1 <= share <= 0.9 for share in shares]) >= 0.9, shares
+
+
+@pytest.mark.parametrize(("temperature", "off"), [(2.0, 0.15), (1.0, 0.25)])
+def test_the_weight_of_a_flip_varies_little_between_seeds(temperature: float, off: float) -> None:
+    varied = []
+    for frame in (0, 12, 24, 36):
+        problem, truth, other = side_view(frame)
+        tell = partial(modes, problem, registry().optimiser("sapso"), evaluations=2440, temperature=temperature)
+        shares = [other_side(problem, tell(rng=np.random.default_rng(seed)), truth, other) for seed in range(5)]
+        varied.append(np.abs(np.array(shares) - np.mean(shares)).mean())
+    assert np.mean(varied) < off, varied
 
 
 def test_the_same_generator_tells_the_same() -> None:
