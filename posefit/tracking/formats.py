@@ -10,8 +10,10 @@ import numpy as np
 
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.motion.motion import Motion
+from posefit.posterior.calibration import LEVELS
+from posefit.posterior.intervals import angle_intervals, joint_intervals
 from posefit.tracking.evaluation import LOST
 
 FILES = (
@@ -31,6 +33,19 @@ Rows = Sequence[Mapping[str, float]]
 State = dict[str, Any]
 
 
+def _intervals(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Any]:
+    """Return how far joints and angles may be off, NaN in frames of which nobody says; nothing where nobody does."""
+    if all(frame.posterior is None for frame in frames):
+        return {}
+    radii = np.full((len(frames), len(LEVELS), len(JOINTS)), np.nan)
+    halves = np.full((len(frames), len(LEVELS), ANGLES), np.nan)
+    for k, frame in enumerate(frames):
+        if frame.posterior is not None:
+            radii[k] = joint_intervals(skeleton, frame.posterior, frame.pose).radii
+            halves[k] = angle_intervals(frame.posterior, frame.pose).halves
+    return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
+
+
 def write_formats(
     folder: Path, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State
 ) -> None:
@@ -48,6 +63,7 @@ def write_formats(
         joints=np.array(JOINTS),
         costs=np.array([frame.cost for frame in frames]),
         radii=scene.body.radii,
+        **_intervals(estimate.skeleton, frames),
     )
     write_asf(folder / "skeleton.asf", estimate.skeleton)
     write_amc(folder / "track.amc", estimate)

@@ -57,6 +57,7 @@ def test_clips_count_alike_and_the_one_to_come_as_infinitely_far() -> None:  # D
     assert conformal_factor(scores, 0.125) == 1.0
     assert conformal_factor(scores, 0.2) == 2.0
     assert conformal_factor(scores, 0.5) == 3.0
+    assert conformal_factor(scores, 0.6) == 4.0  # of the three that are known alone 3 would be enough
     assert conformal_factor(scores, 0.75) == 4.0
     with pytest.raises(ValueError, match=r"clips must be at least 4 for a level of 0\.8, got 3"):
         conformal_factor(scores, 0.8)

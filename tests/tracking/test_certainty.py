@@ -23,6 +23,7 @@ from posefit.tracking.evaluation import Evaluation
 from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.run import follow
 from posefit.tracking.table import table
+from tests.files import arrays
 from tests.tracking.test_evaluation import found
 
 FRAMES = 6
@@ -169,6 +170,11 @@ def test_what_is_held_or_lost_is_blank_for_other_programs_and_marked_in_the_tabl
         rows = list(csv.DictReader(file))
     assert [row["usable"] for row in rows] == ["1.0", "0.0", "1.0", "1.0", "1.0", "1.0"]
     assert [row["lost"] for row in rows] == ["0.1", "0.1", "0.1", "0.1", "0.9", "0.1"]
+    stored = arrays(tmp_path / "out" / "poses.npz")
+    assert stored["levels"].tolist() == [0.5, 0.8, 0.95]
+    assert stored["angle_halves"].shape == (FRAMES, 3, 66)
+    # nothing but the pose itself, blurred by 2 cm: Maxwell's law
+    np.testing.assert_allclose(stored["joint_radii"][0, :, 1], 0.02 * np.array([1.5382, 2.1544, 2.7955]), atol=5e-4)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["unknown_sides"] == [2, 3, 4]
     assert summary["lost_frames"] == [4]
