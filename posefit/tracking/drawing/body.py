@@ -18,7 +18,7 @@ DISTANCE = 6.0  # metres from the view from the side
 SURE, UNSURE = 0.05, 0.3  # metres: a joint's 80 % interval, up to which it is drawn solid, and from which on faintest
 FAINTEST = 0.2  # how much of a faintest limb's colour is left
 _PARENTS = np.array(PARENTS[1:])
-_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}
+SIDE_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}
 _ENDS = [JOINTS.index(side + name) for side in "lr" for name in ("wrist", "foot")]
 
 
@@ -58,7 +58,7 @@ def draw_body(
     `solid` (26,) is how much of each bone's colour is left; what lies behind shows through the rest.
     """
     for bone, pixels, radii, shade in _cones(body, camera, pose, translation):
-        colour = tuple(min(255.0, shade * c) for c in _COLOURS[SIDES[bone + 1]])
+        colour = tuple(min(255.0, shade * c) for c in SIDE_COLOURS[SIDES[bone + 1]])
         _cone(image, pixels, radii, colour, 1.0 if solid is None else float(solid[bone]))
 
 
@@ -81,7 +81,7 @@ def draw_bones(image: Image, body: Body, camera: Camera, pose: Array, translatio
             cv2.line(image, _point(points[parent]), _point(points[joint]), OTHER, thick, cv2.LINE_AA, 4)
     for joint in _ENDS:
         if depths[joint] > NEAR:
-            colour = _COLOURS[SIDES[joint]]
+            colour = SIDE_COLOURS[SIDES[joint]]
             cv2.circle(image, _point(points[joint]), 16 * (thick + 1), colour, -1, cv2.LINE_AA, 4)
 
 
