@@ -83,11 +83,9 @@ def _certainty() -> list[Column]:
     """Return coverage and width of each level's intervals; tables show those of `TOLD`."""
     found = []
     for level in NAMES:
-        covered, wide = (
-            replace(MEASURES[name], label=f"{MEASURES[name].label} {level} %") for name in ("coverage", "interval_mm")
-        )
+        covered = replace(_share("coverage"), label=f"{level} % interval holds")
+        wide = replace(MEASURES["interval_mm"], label=f"{level} % interval")
         how: dict[str, Any] = {"sometimes": True, "shown": level == TOLD}
-        covered = replace(covered, digits=covered.digits + 1)
         found.append(Column(f"coverage_{level}", covered, ("coverage", level), rising=True, share=True, **how))
         found.append(Column(f"interval_{level}", wide, ("interval_mm", level), **how))
     return found

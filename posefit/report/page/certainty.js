@@ -3,7 +3,7 @@
 // Axes from 0 on: both are {most, label, marks, show}.
 function axes(width, x, y, name) {
   const height = Math.max(240, Math.min(380, 0.72 * width));
-  const [left, bottom, top, right] = [46, 40, 8, 12];
+  const [left, bottom, top, right] = [46, 40, 8, 22];
   const at = (value) => left + ((width - left - right) * Math.min(value, x.most)) / x.most;
   const up = (value) => height - bottom - ((height - bottom - top) * Math.min(value, y.most)) / y.most;
   const svg = draw("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": name });
@@ -25,18 +25,18 @@ function axes(width, x, y, name) {
 }
 
 // A method's dots, joined: each is {x, y, size, said}.
-function joined({ svg, at, up }, m, dots) {
-  const points = dots.map((dot) => `${at(dot.x).toFixed(1)},${up(dot.y).toFixed(1)}`);
+function joined({ svg, at, up }, m, points) {
+  const corners = points.map((dot) => `${at(dot.x).toFixed(1)},${up(dot.y).toFixed(1)}`);
   svg.append(
     draw("polyline", {
-      points: points.join(" "),
+      points: corners.join(" "),
       fill: "none",
       style: `stroke: ${colour(m)}`,
       "stroke-width": 2,
       "stroke-dasharray": dash(m),
       "data-method": m,
     }),
-    ...dots.map((dot) =>
+    ...points.map((dot) =>
       draw(
         "circle",
         { cx: at(dot.x), cy: up(dot.y), r: dot.size, style: `fill: ${colour(m)}`, "fill-opacity": 0.75 },
@@ -65,13 +65,13 @@ function certainty() {
       frame.svg.append(draw("line", { class: "axis", "stroke-dasharray": "4 4", ...ends }));
       for (const [m, { reliability }] of saying()) {
         const all = reliability.reduce((sum, [count]) => sum + count, 0);
-        const dots = reliability.map(([count, told, right]) => ({
+        const points = reliability.map(([count, told, right]) => ({
           x: told,
           y: right,
           size: 3 + 8 * Math.sqrt(count / all),
           said: `${percents(told)} said, ${percents(right)} right, of ${counted(count, "frame")}`,
         }));
-        joined(frame, m, dots);
+        joined(frame, m, points);
       }
       return frame.svg;
     }),
@@ -81,7 +81,7 @@ function certainty() {
       const said = saying().filter(([, one]) => one.coverage.every(given) && one.width.every(given));
       const most = 1.08 * Math.max(10, ...said.flatMap(([, one]) => one.width));
       const x = { most, label: "radius of intervals, mm", marks: steps(0, most, width / 90), show: whole };
-      const y = { most: 1, marks: [0, 1], show: percents };
+      const y = { most: 1, marks: [0], show: percents };
       const frame = axes(width, x, y, "share of joints within their intervals, over how wide these are");
       for (const level of C.levels) {
         const ends = { x1: frame.at(0), x2: frame.at(most), y1: frame.up(level), y2: frame.up(level) };
@@ -95,13 +95,13 @@ function certainty() {
         );
       }
       for (const [m, one] of said) {
-        const dots = C.levels.map((level, k) => ({
+        const points = C.levels.map((level, k) => ({
           x: one.width[k],
           y: one.coverage[k],
           size: 4,
           said: `${percents(level)} asked, ${percents(one.coverage[k])} within ${whole(one.width[k])} mm`,
         }));
-        joined(frame, m, dots);
+        joined(frame, m, points);
       }
       return frame.svg;
     }),
@@ -109,7 +109,7 @@ function certainty() {
   table(
     $("sure"),
     [
-      { title: "method", text: true, value: ([m]) => METHODS[m], show: ([m]) => METHODS[m] },
+      { title: "method", text: true, value: ([m]) => METHODS[m], show: ([m]) => [swatch(m), METHODS[m]] },
       ...C.levels.flatMap((level, k) => [
         {
           title: `within ${percents(level)}`,
