@@ -5,6 +5,7 @@ frames have a border.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.geometry.camera import Camera
 from posefit.posterior.calibration import LEVELS
 from posefit.posterior.modes import Mode, other_mode
 from posefit.silhouette.cost import project
@@ -61,10 +63,9 @@ class Painter:
         else:
             drawn = filmed.copy()
             draw_body(drawn, body, cameras[0], frame.pose, frame.translation, solid)
-            left = np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8)
+            left = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), PANEL)
             if other is not None:
-                draw_bones(left, body, cameras[0], other.pose, other.translation)
-            left = _panel(left, PANEL)
+                draw_bones(left, body, _zoomed(cameras[0], left), other.pose, other.translation)
         width = left.shape[1]
         side = side_view(body, cameras[0], frame.pose, frame.translation, PANEL, solid)
         if other is not None:
@@ -99,16 +100,19 @@ class Painter:
 
     def _seen(self, frame: Frame, observation: Observation, solid: Array | None, other: Mode | None) -> Image:
         """Return the masks of all cameras with the body on them."""
-        body, seen = self._scene.body, []
+        body, panels = self._scene.body, []
+        columns = min(2, len(self._scene.cameras))
+        height = PANEL // -(-len(self._scene.cameras) // columns)
         for camera, silhouette in zip(self._scene.cameras, observation.silhouettes, strict=True):
             view = _overlay(silhouette.mask, project(body, camera, frame.pose, frame.translation))
             if solid is not None:
                 share = solid_map(body, camera, frame.pose, frame.translation, solid)[..., None]
                 view = np.asarray(share * view + (1.0 - share) * np.array(BACKGROUND), np.uint8)
+            panel = _panel(view, height, sharp=True)
             if other is not None:
-                draw_bones(view, body, camera, other.pose, other.translation)
-            seen.append(view)
-        return _grid(seen)
+                draw_bones(panel, body, _zoomed(camera, panel), other.pose, other.translation)
+            panels.append(panel)
+        return _grid(panels, columns)
 
     def summary(self, rows: Sequence[Mapping[str, float]], radii: Array | None = None, told: str = "") -> Image:
         """Return stills of the track above a curve of its error, or of its cost where there is no truth.
@@ -137,11 +141,15 @@ def _panel(image: Image, height: int, sharp: bool = False) -> Image:
     return np.asarray(cv2.resize(image, (width, height), interpolation=how), dtype=np.uint8)
 
 
-def _grid(views: Sequence[Image]) -> Image:
-    """Return the views of all cameras in one panel, two beside each other."""
-    columns = min(2, len(views))
-    height = PANEL // -(-len(views) // columns)
-    panels = [_panel(view, height, sharp=True) for view in views]
+def _zoomed(camera: Camera, panel: Image) -> Camera:
+    """Return a camera that sees the same in a panel."""
+    height, width = panel.shape[:2]
+    zoom = np.array([width / camera.width, height / camera.height])
+    return replace(camera, width=width, height=height, focal=zoom * camera.focal, centre=zoom * camera.centre)
+
+
+def _grid(panels: list[Image], columns: int) -> Image:
+    """Return the views of all cameras in one, so many beside each other."""
     wide = max(panel.shape[1] for panel in panels)
     panels = [np.pad(panel, ((0, 0), (0, wide - panel.shape[1]), (0, 0))) for panel in panels]
     panels += [np.zeros_like(panels[0])] * (-len(panels) % columns)

@@ -75,7 +75,7 @@ def test_a_curve_has_its_values_and_its_band():
 
 def test_a_reliability_diagram_has_its_diagonal_and_dots_as_large_as_there_are_frames():
     axes = every()["reliability"].axes[0]
-    assert axes.lines[0].get_xdata() == axes.lines[0].get_ydata() == [0, 1]
+    assert axes.lines[0].get_xdata().tolist() == axes.lines[0].get_ydata().tolist() == [0, 1]
     assert axes.lines[1].get_xdata().tolist() == [0.55, 0.95]
     assert axes.lines[1].get_ydata().tolist() == [0.4, 0.9]
     small, large = axes.collections[0].get_sizes()
