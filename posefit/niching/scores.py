@@ -48,9 +48,9 @@ def scored(instance: NicheInstance, report: Posterior) -> Scores:
 
 
 def peak_ratio(distances: Array, level: float) -> float:
-    """Return the share of known poses that a reported one speaks for; distances (n, K) in millimetres. CEC2013 (PR)."""
+    """Return the share of known poses that a reported one speaks for; distances (n, K) in millimetres."""
     found = _spoken_for(distances, level)
-    return len(set(found[found >= 0].tolist())) / np.shape(distances)[1]  # CEC2013 (PR)
+    return len(set(found[found >= 0].tolist())) / np.shape(distances)[1]  # CEC2013 (peak ratio)
 
 
 def shares(distances: Array, weights: Array, level: float) -> Array:
@@ -61,10 +61,10 @@ def shares(distances: Array, weights: Array, level: float) -> Array:
 
 
 def brier_score(weights: Array, true: int) -> float:
-    """Return the squared error of the weights (K,) near known poses, and of what is near none of them. BRIER1950 (2)."""
+    """Return the squared error of the weights (K,) near known poses, and of what is near none of them."""
     told = np.append(weights, max(1.0 - float(np.sum(weights)), 0.0))
     told[true] -= 1.0
-    return float((told**2).sum())  # BRIER1950 (2)
+    return float((told**2).sum())  # BRIER1950 (score)
 
 
 def log_score(weights: Array, true: int) -> float:
