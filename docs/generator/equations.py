@@ -17,6 +17,8 @@ SOURCES = {
     "AUGER2005": "Auger and Hansen, A restart CMA evolution strategy with increasing population size, 2005",
     "TOYAMA2001": "Toyama and Blake, Probabilistic tracking in a metric space, 2001",
     "RABINER1989": "Rabiner, A tutorial on hidden Markov models and selected applications in speech recognition, 1989",
+    "BRIER1950": "Brier, Verification of forecasts expressed in terms of probability, 1950",
+    "CEC2013": "Li, Engelbrecht and Epitropakis, Benchmark functions for CEC'2013 on niching methods, 2013",
 }
 _TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")

@@ -7,10 +7,10 @@
     observation, cost, ended, cut, info = env.step(env.action_space.sample())      # the reward is minus the cost
 
 `Fit-v0` is a search for the pose in one silhouette; `Track-v0` follows a sequence; `Configure-v0` steers a running
-swarm; `Modes-v0` asks for all poses of one silhouette. Their docstrings are their manual. Importing this package registers them; the environments themselves are
-imported when they are made. `drive` runs an optimiser against a vector environment, `track_reference` says what a
-tracker would commit in Track-v0, `to_sb3_vec_env` hands a vector environment to Stable-Baselines3, and
-`check_vector_env` compares any vector environment with single ones.
+swarm; `Modes-v0` asks for all poses of one silhouette. Their docstrings are their manual. Importing this package
+registers them; the environments themselves are imported when they are made. `drive` runs an optimiser against a vector
+environment, `track_reference` says what a tracker would commit in Track-v0, `to_sb3_vec_env` hands a vector environment
+to Stable-Baselines3, and `check_vector_env` compares any vector environment with single ones.
 
 | looking for | file |
 |---|---|

@@ -50,8 +50,8 @@ class Ribs:
         strategies: int = 2,
         capacity: int = 100,
         neighbours: int = 1,
-        populations: int = 100,
-        step: float = 0.5,
+        populations: int = 40,
+        step: float = 0.3,
     ) -> None:
         from ribs.archives import DNSArchive
         from ribs.emitters import EvolutionStrategyEmitter
@@ -119,7 +119,7 @@ class Ribs:
         return np.asarray(proposals[order][best])
 
     def _where(self, proposals: Array) -> Array:
-        """Return points (n, m) as far from each other as proposals (n, d) are: what wraps around goes round a circle."""
+        """Return points (n, m) as far apart as proposals (n, d) are: what wraps around goes round a circle."""
         turns = proposals[:, self._space.periodic] * np.pi
         return np.column_stack([proposals[:, ~self._space.periodic], np.cos(turns) / np.pi, np.sin(turns) / np.pi])
 

@@ -1,4 +1,4 @@
-"""A niching task: numbered silhouettes that two or more known poses explain nearly as well, and scores of who finds them.
+"""A niching task: numbered silhouettes that two or more known poses explain nearly as well, and its scores.
 
     from posefit.niching.instance import niche_instance
     from posefit.niching.reports import best_apart

@@ -66,7 +66,7 @@ class NicheInstance:
         return _proposals(self.problem.space, legs_and_arms(), self.known)
 
     def distances_mm(self, poses: Array) -> Array:
-        """Return how far poses (n, 66) are from the known ones (n, K): the mean over joints, both roots at one point."""
+        """Return how far poses (n, 66) are from the known ones (n, K), as `apart_mm` says."""
         return apart_mm(self.problem.body, poses, self.known)
 
 
@@ -92,7 +92,10 @@ def niche_space() -> SearchSpace:
 
 
 def apart_mm(body: Body, poses: Array, others: Array) -> Array:
-    """Return how far the joints of poses (n, 66) are from those of others (K, 66), in millimetres (n, K)."""
+    """Return how far poses (n, 66) are from others (K, 66), in millimetres (n, K).
+
+    That is the mean over joints, both roots at one point.
+    """
     joints = body.skeleton.joints(poses, np.zeros((len(poses), 3)))
     theirs = body.skeleton.joints(others, np.zeros((len(others), 3)))
     return np.array([1e3 * np.linalg.norm(one - theirs, axis=-1).mean(axis=-1) for one in joints]).reshape(

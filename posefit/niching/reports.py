@@ -21,7 +21,7 @@ def best_apart(
     apart: float = APART_MM,
     most: int = REPORTED,
 ) -> Posterior:
-    """Return the best of proposals (n, d) with costs (n,), then the best that is `apart` millimetres from it, and so on.
+    """Return the best of proposals (n, d) with costs (n,), the best that is `apart` millimetres from it, and so on.
 
     Weights go with exp(-cost / temperature). Raises ValueError where no cost is a number.
     """
@@ -36,7 +36,8 @@ def best_apart(
         raise ValueError(f"costs must be numbers, got none among {len(costs)}")
     poses, translations = problem.decode(proposals[order])
     joints = problem.body.skeleton.joints(poses, np.zeros((len(poses), 3)))
-    left, chosen = np.ones(len(order), dtype=bool), []
+    left = np.ones(len(order), dtype=bool)
+    chosen: list[int] = []
     while left.any() and len(chosen) < most:
         best = int(left.argmax())
         chosen.append(best)

@@ -11,6 +11,7 @@ level. Only the ten heaviest poses of a report count.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.niching.instance import NicheInstance
@@ -50,7 +51,7 @@ def scored(instance: NicheInstance, report: Posterior) -> Scores:
 def peak_ratio(distances: Array, level: float) -> float:
     """Return the share of known poses that a reported one speaks for; distances (n, K) in millimetres."""
     found = _spoken_for(distances, level)
-    return len(set(found[found >= 0].tolist())) / np.shape(distances)[1]  # CEC2013 (peak ratio)
+    return len(set(found[found >= 0].tolist())) / int(np.shape(distances)[1])  # CEC2013 (peak ratio)
 
 
 def shares(distances: Array, weights: Array, level: float) -> Array:
@@ -64,7 +65,7 @@ def brier_score(weights: Array, true: int) -> float:
     """Return the squared error of the weights (K,) near known poses, and of what is near none of them."""
     told = np.append(weights, max(1.0 - float(np.sum(weights)), 0.0))
     told[true] -= 1.0
-    return float((told**2).sum())  # BRIER1950 (score)
+    return float(np.sum(told**2))  # BRIER1950 (score)
 
 
 def log_score(weights: Array, true: int) -> float:
@@ -72,12 +73,12 @@ def log_score(weights: Array, true: int) -> float:
     return float(-np.log(np.clip(weights[true], LEAST, 1.0)))
 
 
-def _spoken_for(distances: Array, level: float) -> Array:
+def _spoken_for(distances: Array, level: float) -> NDArray[np.int64]:
     """Return the known pose that each reported one speaks for (n,), -1 where it speaks for none."""
     distances = np.asarray(distances, dtype=np.float64)
     if distances.ndim != 2 or not distances.shape[1]:
         raise ValueError(f"distances must have shape (n, K), at least one known pose, got {distances.shape}")
     if not len(distances):
-        return np.empty(0, dtype=np.intp)
+        return np.empty(0, dtype=np.int64)
     nearest = distances.argmin(axis=1)
     return np.where(distances.min(axis=1) <= level, nearest, -1)

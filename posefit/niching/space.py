@@ -38,7 +38,12 @@ class LegsAndArms:
     low: Array  # (m,)
     high: Array  # (m,)
 
-    def fit(self, angles: Array, skeleton: Skeleton | None = None, arms: Array | None = None) -> Self:
+    def fit(
+        self,
+        angles: Array,
+        skeleton: Skeleton | None = None,  # noqa: ARG002, as of any prior
+        arms: Array | None = None,
+    ) -> Self:
         """Learn from joint angles (T, 63), and the arms from others (n, 63) where there are any."""
         taught = (angles, angles if arms is None else arms)
         columns = (~_ARMS[3:], _ARMS[3:])

@@ -98,7 +98,9 @@ def test_legs_do_not_move_the_arms_and_rows_have_the_same_bits_in_any_company() 
     prior: LegsAndArms = legs_and_arms()
     latents = np.random.default_rng(0).uniform(prior.low, prior.high, (7, len(prior.low)))
     angles = prior.inverse_transform(latents)
-    assert all(np.array_equal(prior.inverse_transform(one[None])[0], row) for one, row in zip(latents, angles, strict=True))
+    assert all(
+        np.array_equal(prior.inverse_transform(one[None])[0], row) for one, row in zip(latents, angles, strict=True)
+    )
     moved = latents.copy()
     moved[:, :3] = 0.0
     assert np.array_equal(prior.inverse_transform(moved)[:, ARMS - 3], angles[:, ARMS - 3])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefit.niching.instance import APART_MM, niche_instance
+from posefit.niching.instance import APART_MM, apart_mm, niche_instance
 from posefit.niching.reports import REPORTED, best_apart, boltzmann
 from posefit.niching.scores import LEVELS_MM, scored
 from posefit.posterior.modes import Posterior
@@ -24,13 +24,8 @@ def test_the_best_come_first_and_are_apart() -> None:
     assert len(report) == REPORTED
     assert (np.diff(found) >= 0.0).all()
     assert found[0] == costs.min()
-    away = np.array([niche_like for niche_like in _distances(posed, report.poses)])
+    away = apart_mm(posed.problem.body, report.poses, report.poses)
     assert away[np.triu_indices(len(away), 1)].min() > APART_MM
-
-
-def _distances(posed, poses):  # type: ignore[no-untyped-def]
-    joints = posed.problem.body.skeleton.joints(poses)
-    return 1e3 * np.linalg.norm(joints[:, None] - joints[None], axis=-1).mean(axis=-1)
 
 
 def test_known_poses_reported_with_all_the_weight_on_the_true_one_are_perfect() -> None:
@@ -42,7 +37,9 @@ def test_known_poses_reported_with_all_the_weight_on_the_true_one_are_perfect() 
     sure = Posterior(report.poses[:1], report.translations[:1], np.ones(1))
     alone = scored(posed, sure)
     assert alone.peak_ratio == dict.fromkeys(LEVELS_MM, 1 / len(posed.known))
-    assert (alone.brier, alone.reported) == ((0.0, 1) if posed.distances_mm(sure.poses).argmin() == posed.true else (2.0, 1))
+    assert (alone.brier, alone.reported) == (
+        (0.0, 1) if posed.distances_mm(sure.poses).argmin() == posed.true else (2.0, 1)
+    )
 
 
 def test_only_the_ten_heaviest_poses_count() -> None:

@@ -51,6 +51,8 @@ TAGS = (
     "RABINER1989 (forward)",
     "RABINER1989 (backward)",
     "RABINER1989 (Viterbi)",
+    "CEC2013 (peak ratio)",
+    "BRIER1950 (score)",
     "VSMM 1.3",
     "VSMM 1.4",
     "VSMM 2.1",
