@@ -32,6 +32,31 @@ class Mutant:
 
 MUTANTS = (
     Mutant(
+        "a track that is drawn steps anywhere, not where the last state goes on to",
+        "plugins/posefit_exemplars/sampling.py",
+        (("likely = first.kernel[rows] * likely", "likely = 1.0 * likely"),),
+        "tests/sources/test_posterior.py::test_ways_are_drawn_as_often_as_they_are_likely",
+    ),
+    Mutant(
+        "a posterior does not look ahead",
+        "plugins/posefit_exemplars/sampling.py",
+        (("power * messages(window, power)", "power"),),
+        "tests/exemplars/test_sampling.py::test_the_truth_is_as_likely_to_have_any_rank_among_the_ways",
+    ),
+    Mutant(
+        "a clip that is to come counts for nothing in a conformal factor",
+        "posefit/posterior/calibration.py",
+        (("1.0 / (len(one) * (clips + 1))", "1.0 / (len(one) * clips)"),),
+        "tests/sources/test_posterior.py::test_clips_count_alike_and_the_one_to_come_as_infinitely_far",
+    ),
+    Mutant(
+        "joints of a frame that was held are told to other programs",
+        "posefit/tracking/formats.py",
+        (('if not row["usable"] or row["lost"]', 'if row["lost"]'),),
+        "tests/tracking/test_certainty.py::"
+        "test_what_is_held_or_lost_is_blank_for_other_programs_and_marked_in_the_table",
+    ),
+    Mutant(
         "what renders a tracker's observations counts as its evaluations",
         "posefit/fitting/guard.py",
         (("with uncounted():", "if True:"),),

@@ -17,6 +17,9 @@ SOURCES = {
     "AUGER2005": "Auger and Hansen, A restart CMA evolution strategy with increasing population size, 2005",
     "TOYAMA2001": "Toyama and Blake, Probabilistic tracking in a metric space, 2001",
     "RABINER1989": "Rabiner, A tutorial on hidden Markov models and selected applications in speech recognition, 1989",
+    "GODSILL2004": "Godsill, Doucet and West, Monte Carlo smoothing for nonlinear time series, 2004",
+    "DUNN2023": "Dunn, Wasserman and Ramdas, Distribution-free prediction sets for two-layer hierarchical models, 2023",
+    "GUO2017": "Guo, Pleiss, Sun and Weinberger, On calibration of modern neural networks, 2017",
     "BRIER1950": "Brier, Verification of forecasts expressed in terms of probability, 1950",
     "CEC2013": "Li, Engelbrecht and Epitropakis, Benchmark functions for CEC'2013 on niching methods, 2013",
 }

@@ -50,6 +50,11 @@ ROW = {
     "seconds": ("s", "wall time of the whole cell"),
     "warnings": ("", "what to look at before the result is trusted"),
 }
+SAID = {
+    "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
+    "unknown_sides": ("", "numbers of the frames whose left and right are called unknown; where a method says"),
+    "lost_frames": ("", "numbers of the frames that are called lost; where a method says"),
+}
 CELL = {
     "method": ("", "OPTIMISER@PRIOR, or a tracker"),
     "motion": ("", "a built-in motion, or a capture file"),
@@ -80,14 +85,15 @@ def page() -> str:
         "## Keys of `summary.json`",
         "`posefit track --json` prints the same object. First what was asked, then what was found.",
         _table("key", _told(ASKED)),
-        _table("key", _measured(MEASURES.values())),
+        _table("key", [*_measured(MEASURES.values()), *_told(SAID)]),
         "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, `baselines_degrees` and "
         "`baselines_mm` hold one number for each baseline:",
         _table(
             "baseline",
             [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],
         ),
-        "A figure that needs the truth is `null` where nobody knows it.",
+        "`coverage` holds a share for each of `50`, `80` and `95`. A figure that needs the truth is `null` where "
+        "nobody knows it, and one that a method has to say where it does not.",
         "## Columns of `frames.csv`",
         "One row a frame; those that need the truth are there only where it is known.",
         _table("column", [*_measured(FRAME.values()), ("JOINT_x, JOINT_y, JOINT_z", "m", _joints())]),

@@ -35,6 +35,8 @@ def exemplars(
     pull: float = 0.3,
     smoothing: float = 1.0,
     transitions: str = "clips",
+    samples: int = 24,
+    posterior_temperature: float = 8.0,
 ) -> ExemplarTracker:
     """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
 
@@ -54,11 +56,15 @@ def exemplars(
         pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         transitions: what gives the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
+        samples: tracks that are drawn from the posterior, each as likely as it is; 0 or more, 0 is none.
+        posterior_temperature: what silhouette costs are divided by in that posterior; above 0. The greater, the more
+            tracks differ.
     """
     for name, value in (
         ("spread", spread),
         ("turning_degrees", turning_degrees),
         ("temperature", temperature),
+        ("posterior_temperature", posterior_temperature),
         ("straying", straying),
         ("depth", depth),
         ("pace", pace),
@@ -70,15 +76,18 @@ def exemplars(
             raise ValueError(f"{name} must be 0 or more and finite, got {value}")
     if task.evaluations < LEAST:
         raise ValueError(f"evaluations must be at least {LEAST} for exemplars, got {task.evaluations}")
-    if lag < 0:
-        raise ValueError(f"lag must be 0 or more, got {lag}")
+    for name, count in (("lag", lag), ("samples", samples)):
+        if count < 0:
+            raise ValueError(f"{name} must be 0 or more, got {count}")
+    power = temperature / posterior_temperature
     intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
     temperature /= intervals
     slack = math.sqrt(intervals)
     steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
     states = exemplars_of(task.training, task.body.skeleton, mirrored)
     costs = partial(transition_costs, steps=steps) if transitions == "clips" else partial(_checked, _named(transitions))
-    return ExemplarTracker(task, states, steps, costs, temperature, lag, _maker(task, refiner), pull, smoothing)
+    make = _maker(task, refiner)
+    return ExemplarTracker(task, states, steps, costs, temperature, lag, make, pull, smoothing, samples, power)
 
 
 def _maker(task: Task, refiner: str) -> Make | None:

@@ -10,6 +10,7 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.geometry.rotation import wrapped
 from posefit_exemplars.look import Look
+from posefit_exemplars.sampling import Ways
 
 SMOOTHED = 3.0  # standard deviations that the filter reaches to either side
 
@@ -24,6 +25,7 @@ class Finding:
     evaluations: float
     seconds: float
     cpu_seconds: float
+    drawn: Ways | None = None  # where ways through the states are
 
 
 def smoothed(frames: Iterable[Finding], spread: float, ahead: int) -> Iterator[Frame]:
@@ -67,5 +69,7 @@ def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
     if one.look.root is not None:
         place = one.place
     cost, areas = one.look.measured(pose, place)
-    used = int(np.ceil(one.evaluations)) + 1
-    return Frame(pose, place, cost, areas, used, one.seconds, np.array([cost]), cpu_seconds=one.cpu_seconds)
+    used, history = int(np.ceil(one.evaluations)) + 1, np.array([cost])
+    posterior = None if one.drawn is None else one.drawn.about(pose, place)
+    seconds, cpu_seconds = one.seconds, one.cpu_seconds
+    return Frame(pose, place, cost, areas, used, seconds, history, cpu_seconds=cpu_seconds, posterior=posterior)

@@ -28,6 +28,7 @@ from posefit_exemplars.codes import Rows
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.look import Look
 from posefit_exemplars.refinement import Make, refined, surroundings
+from posefit_exemplars.sampling import Sampler
 from posefit_exemplars.smoothing import SMOOTHED, Finding, smoothed
 from posefit_exemplars.window import Seen, likeliest, mean_around, seen, weights
 
@@ -66,6 +67,8 @@ class ExemplarTracker:
     make: Make | None  # an optimiser that refines; None where nothing does
     pull: float
     smoothing: float  # thirtieths of a second
+    samples: int  # ways that are drawn; 0 is none
+    power: float  # of the likelihoods, in the posterior that they are drawn from
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
@@ -80,7 +83,7 @@ class ExemplarTracker:
         """Yield what is found in each frame, before it is smoothed."""
         waiting: deque[_Waiting] = deque()
         latest: Seen | None = None
-        off = np.zeros(ANGLES)
+        off, sampler = np.zeros(ANGLES), Sampler(self.exemplars, self.samples, self.power, rng)
         for observation in observations:
             began, begun = time.perf_counter(), time.process_time()
             look = Look(self.task, observation)
@@ -88,10 +91,10 @@ class ExemplarTracker:
             spent = time.perf_counter() - began, time.process_time() - begun
             waiting.append(_Waiting(latest, look, observation.usable, used, *spent))
             if len(waiting) > self.lag - self._ahead:
-                found, off = self._told(waiting, off, rng)
+                found, off = self._told(waiting, off, sampler, rng)
                 yield found
         while waiting:
-            found, off = self._told(waiting, off, rng)
+            found, off = self._told(waiting, off, sampler, rng)
             yield found
 
     def _seen(
@@ -178,7 +181,9 @@ class ExemplarTracker:
         off = strayed(places, beam.places, look.eye, self.steps)
         return replace(beam, places=places, totals=beam.totals + off)
 
-    def _told(self, waiting: deque[_Waiting], off: Array, rng: np.random.Generator) -> tuple[Finding, Array]:
+    def _told(
+        self, waiting: deque[_Waiting], off: Array, sampler: Sampler, rng: np.random.Generator
+    ) -> tuple[Finding, Array]:
         """Return the oldest frame that waits, refined around the best way to the newest; and how far off that it is.
 
         The path's pose is the mean of what is likely about it. The search begins as far off it as the frame before.
@@ -186,6 +191,7 @@ class ExemplarTracker:
         began, begun = time.perf_counter(), time.process_time()
         window = [one.seen for one in waiting]
         row, likely, oldest = likeliest(window), weights(window), waiting.popleft()
+        drawn = sampler.drawn(window, row)
         beam, look, evaluations = oldest.seen.beam, oldest.look, oldest.evaluations
         codes = self.exemplars.codes[beam.states]
         path, place, code = mean_around(row, likely, codes, self._poses(beam), beam.places)
@@ -203,4 +209,5 @@ class ExemplarTracker:
         if oldest.usable:
             place = look.placed(pose[None], place[None])[0]
         seconds = oldest.seconds + time.perf_counter() - began
-        return Finding(pose, place, look, evaluations, seconds, oldest.cpu_seconds + time.process_time() - begun), off
+        cpu_seconds = oldest.cpu_seconds + time.process_time() - begun
+        return Finding(pose, place, look, evaluations, seconds, cpu_seconds, drawn), off

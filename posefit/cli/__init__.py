@@ -1,7 +1,7 @@
 """The command line. Messages and progress go to stderr, results to stdout; a mistake is one line and exit status 2.
 
-The commands stand in `following`, `sweeping` and `plugins`; plugins add others, see `posefit.commands`. What each does
-is imported when it runs.
+The commands stand in `following`, `doubt`, `sweeping`, `motions` and `plugins`; plugins add others, see
+`posefit.commands`. What each does is imported when it runs.
 """
 
 from collections.abc import Callable
@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from posefit.cli import following, plugins, sweeping
+from posefit.cli.doubt import ambiguity
 from posefit.cli.motions import motions
 from posefit.limits import exits_told
 from posefit.version import __version__
@@ -20,6 +21,7 @@ BUILT_IN = (
     following.track,
     following.fit,
     following.extract,
+    ambiguity,
     sweeping.sweep,
     sweeping.report,
     motions,

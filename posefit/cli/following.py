@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from posefit.cli.options import EXTRACTION, TRACK, frame_range, options
+from posefit.cli.options import EXTRACT, TRACK, frame_range, options
 from posefit.cli.output import json_line, progress, results_alone, say
 
 
@@ -62,7 +62,7 @@ def fit(as_json: bool, **options: Any) -> None:
 @click.option(
     "--method", default="mixture", show_default=True, help="mixture, median, mean, or masks: the frames are masks."
 )
-@options(EXTRACTION)
+@options(EXTRACT)
 @click.option("--frames", callback=frame_range, metavar="A:B", help="Only these frames.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 def extract(video: str, out: str, as_json: bool, frames: Any, **options: Any) -> None:
@@ -89,27 +89,36 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     `--set` gives the settings of optimiser, prior and tracker, as their types ask; `tracker.` also sets the tracker
     that an optimiser and a prior are driven by.
     """
-    from posefit.footage.segmentation import Extraction
-    from posefit.footage.source import kind_of, useless_for
     from posefit.tracking.method import FOLLOWER, parse_settings, usual
 
-    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
-    given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
     options["source"] = options["source"] or ("walk",)
-    if given and (kind := kind_of(options["source"][0])) != "video":
-        name = next(iter(given))
-        raise useless_for(kind, "extraction" if name == "method" else name, given[name], "video")
-    options["extraction"] = Extraction(**given) if given else None
+    options["extraction"] = extraction_of(options, options["source"][0])
     options["view_degrees"] = options["view_degrees"] or None
     settings, named = options.pop("settings"), {name: options[name] for name in ("optimiser", "prior", "tracker")}
     searched = any(text.partition(".")[0] != FOLLOWER for text in settings)
     chosen = usual(options["source"][0], **named, train=options["train"], searched=searched)
     if left_out := options.pop("without_subject"):
-        options["train"] = _without(chosen.train, left_out)
+        options["train"] = without_subjects(chosen.train, left_out)
     return options | chosen.method | parse_settings(settings, **chosen.method)
 
 
-def _without(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:
+def extraction_of(options: dict[str, Any], source: str) -> Any:
+    """Return how the person is taken out of a video, as options say, which are taken out of them; None by default.
+
+    Raises ValueError where they say it of another kind of source.
+    """
+    from posefit.footage.segmentation import Extraction
+    from posefit.footage.source import kind_of, useless_for
+
+    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
+    given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
+    if given and (kind := kind_of(source)) != "video":
+        name = next(iter(given))
+        raise useless_for(kind, "extraction" if name == "method" else name, given[name], "video")
+    return Extraction(**given) if given else None
+
+
+def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:
     """Return what a method learns from, some people of the library left out."""
     from posefit.motion import recorded
 

@@ -38,17 +38,40 @@ def box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, 
     return tuple(map(int, parts))
 
 
-EXTRACTION = (
+EXTRACT = (
     click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
     click.option("--roi", callback=box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
     click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
     click.option("--width", type=int, help="Larger videos are scaled down to this; by default 640."),
 )
-TRACK = (
-    click.argument("source", nargs=-1),
+CAMERAS = (
     click.option("--asf", metavar="FILE", help="Skeleton of SOURCE; by default the only .asf beside an .amc."),
     click.option("--camera", multiple=True, metavar="FILE", help="Calibration, one a view; guessed where absent."),
     click.option("--up", type=click.Choice(["x", "y", "z"]), help="Axis that points up in the calibration's world."),
+)
+VIEWS = (
+    click.option(
+        "--view-degrees",
+        type=float,
+        multiple=True,
+        help="Where a camera stands: 0 in front, 90 to the side; repeatable.",
+    ),
+    click.option("--size", callback=_size, metavar="WxH", help="Image of a rendered motion, by default 320x240."),
+    click.option("--fps", type=float, help="Rate to resample a motion to, or of masks; by default 30, or theirs."),
+)
+HEIGHT = (click.option("--height", type=float, metavar="METRES", help="How tall the person in the footage stands."),)
+WITHOUT = (
+    click.option(
+        "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
+    ),
+)
+EXTRACTION = (
+    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks."),
+    *EXTRACT,
+)
+TRACK = (
+    click.argument("source", nargs=-1),
+    *CAMERAS,
     click.option("--optimiser", help="By default sapso; see `posefit plugins`."),
     click.option("--prior", help="By default pca, or loose where the truth is not known; see `posefit plugins`."),
     click.option(
@@ -64,27 +87,17 @@ TRACK = (
         help="What the method learns from: a motion, a folder, library, or library:16; may be repeated. By default "
         "library for exemplars where the truth is not known, else other styles of a built-in motion, or walks.",
     ),
-    click.option(
-        "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
-    ),
-    click.option(
-        "--view-degrees",
-        type=float,
-        multiple=True,
-        help="Where a camera stands: 0 in front, 90 to the side; repeatable.",
-    ),
-    click.option("--size", callback=_size, metavar="WxH", help="Image of a rendered motion, by default 320x240."),
-    click.option("--fps", type=float, help="Rate to resample a motion to, or of masks; by default 30, or theirs."),
+    *WITHOUT,
+    *VIEWS,
     click.option("--evaluations", type=int, help="Budget of a frame; by default N (C + 1) = 2440."),
     click.option("--particles", type=int, help="N, by default 40."),
     click.option("--iterations", type=int, help="C, by default 60."),
     click.option("--first-pose", default="searched", show_default=True, help="searched, or given (the true one)."),
     click.option("--ask-seconds", type=float, help="How long a plugin may take to propose a population."),
     click.option("--translation", help="Root translation: known, searched or aligned."),
-    click.option("--height", type=float, metavar="METRES", help="How tall the person in the footage stands."),
+    *HEIGHT,
     click.option("--restarts", type=int, help="Searches of a first pose nobody knows: 8, or 0 for exemplars."),
     click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
-    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks."),
     *EXTRACTION,
     click.option("--tracks", type=int, default=1, show_default=True, help="Tracks of other beginnings; one is kept."),
     click.option("--seed", type=int, default=0, show_default=True),

@@ -5,12 +5,10 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
-from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR, SIDES
+from posefit.geometry.skeleton import ANGLES, JOINTS
+from posefit.posterior.sides import nearer_mirrored
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
-
-_LEFT_HIP, _RIGHT_HIP = JOINTS.index("lhipjoint"), JOINTS.index("rhipjoint")
-_PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
 
 
 def pose_error_degrees(truth: Array, estimate: Array, dimensions: NDArray[np.bool_] | None = None) -> Array:
@@ -89,13 +87,8 @@ def swapped(truth: Array, joints: Array) -> NDArray[np.bool_]:
     The mirror is the plane through the root that the hips face each other across; left and right trade names. In a
     side view a pose and its mirror image have nearly one silhouette. Only joints that have a counterpart count.
     """
-    truth, joints = (_rooted(points) for points in _pair("joints", truth, joints, (len(JOINTS), 3)))
-    across = joints[:, _LEFT_HIP] - joints[:, _RIGHT_HIP]
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
-    mirrored = joints - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]
-    named = _distances(truth[:, _PAIRED], joints[:, _PAIRED]).mean(axis=1)
-    traded = _distances(truth[:, _PAIRED], mirrored[:, np.array(MIRROR)[_PAIRED]]).mean(axis=1)
-    return np.asarray(traded < named)
+    truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
+    return nearer_mirrored(truth, joints)
 
 
 def swap_rate(truth: Array, joints: Array) -> float:

@@ -56,7 +56,11 @@ class Frame:
     cpu_seconds: float | None = None
     posterior: Posterior | None = field(default=None, repr=False)  # what else it may be, where a tracker says
     modes: Sequence[Mode] = ()  # that are in the posterior, the likeliest first; a followed scene's frames have them
-    lost: float | None = None  # how likely it is that the frame is lost, where a tracker says
+    lost: float | None = None  # how likely it is that the frame is lost, 0 to 1, where a tracker says
+
+    def __post_init__(self) -> None:
+        if self.lost is not None and not 0.0 <= self.lost <= 1.0:
+            raise ValueError(f"lost of a frame must lie in 0 to 1, got {self.lost}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,17 @@
 """Joint positions as a .trc file, which OpenSim and other programs of biomechanics open."""
 
+from collections.abc import Collection
 from pathlib import Path
 
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion.motion import Motion
 
 
-def write_trc(path: str | Path, motion: Motion) -> None:
-    """Write the 27 joints of every frame as markers, in metres and y up."""
+def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
+    """Write the 27 joints of every frame as markers, in metres and y up; of `blank` frames nothing but the time.
+
+    An empty field is a marker that nobody saw, to programs that read such files.
+    """
     path, joints = Path(path), motion.skeleton.joints(motion.poses, motion.translations)
     count, fps = len(motion), f"{motion.fps:g}"
     head = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame")
@@ -20,6 +24,6 @@ def write_trc(path: str | Path, motion: Motion) -> None:
         "",
     ]
     for k, points in enumerate(joints):
-        values = "\t".join(f"{value:.6f}" for value in points.reshape(-1))
+        values = "\t".join("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))
         lines.append(f"{k + 1}\t{k / motion.fps:.6f}\t{values}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

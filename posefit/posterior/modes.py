@@ -1,16 +1,20 @@
 """Weighted poses of a frame, and the few of them that are really different: the modes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, Skeleton
+from posefit.posterior.calibration import Recalibration
 
 # ours: metres, the mean over joints, beyond which two poses are of two modes; a mirrored stride is 0.15 to 0.2 off
 APART = 0.1
+DIGITS = 6  # of radians, metres and weights in a file
+ARRAYS = ("poses", "translations", "weights")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,7 @@ class Posterior:
     translations: Array = field(repr=False)  # (K, 3) metres
     weights: Array = field(repr=False)  # (K,) which sum to 1
     coherent: bool = False
+    recalibration: Recalibration | None = field(default=None, repr=False)  # what these poses do not know of their error
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.weights))
@@ -63,6 +68,19 @@ class Posterior:
 
     def __len__(self) -> int:
         return len(self.weights)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON holds it, to a millionth."""
+        held: dict[str, Any] = {name: getattr(self, name).round(DIGITS).tolist() for name in ARRAYS}
+        learned = None if self.recalibration is None else self.recalibration.as_dict()
+        return {**held, "coherent": self.coherent, "recalibration": learned}
+
+    @classmethod
+    def from_dict(cls, held: Mapping[str, Any]) -> Self:
+        """Return what `as_dict` gave."""
+        learned = None if held["recalibration"] is None else Recalibration(**held["recalibration"])
+        poses, translations, weights = (np.array(held[name]) for name in ARRAYS)
+        return cls(poses, translations, weights, held["coherent"], learned)
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> list[Mode]:

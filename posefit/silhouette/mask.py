@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +11,8 @@ from posefit.arrays import Bits
 from posefit.silhouette.rasteriser import STRIP_PIXELS, strips_and_words
 
 Mask = NDArray[np.bool_]  # (height, width)
+
+PIECE = 0.06  # of the largest piece's pixels, ours: a smaller one has no say in where the person's borders are
 
 
 def pack(mask: Mask) -> Bits:
@@ -73,12 +76,18 @@ class Silhouette:
 
     @cached_property
     def extent(self) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom border of the person in pixels; nan where nothing or the image's edge is seen."""
-        rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))
-        if not len(rows):
+        """Left, top, right and bottom border of the person in pixels; nan where nothing or the image's edge is seen.
+
+        Small pieces that lie apart are not the person: a single stray pixel would move him by half of how far it is.
+        """
+        _, _, pieces, _ = cv2.connectedComponentsWithStats(self.mask.astype(np.uint8), connectivity=8)
+        pieces = pieces[1:]  # the first is the background
+        if not len(pieces):
             return (np.nan,) * 4
+        sizes = pieces[:, cv2.CC_STAT_AREA]
+        lefts, tops, widths, heights, _ = pieces[sizes >= PIECE * sizes.max()].T
         width, height = self.size
-        left, right, top, bottom = columns[0], columns[-1] + 1, rows[0], rows[-1] + 1
+        left, right, top, bottom = lefts.min(), (lefts + widths).max(), tops.min(), (tops + heights).max()
         return (
             float(left) if left > 0 else np.nan,
             float(top) if top > 0 else np.nan,

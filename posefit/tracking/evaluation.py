@@ -3,12 +3,16 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.posterior.calibration import LEVELS
+from posefit.posterior.intervals import joint_intervals
+from posefit.posterior.sides import unknown_sides
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.measures import Measures, Spread
@@ -18,6 +22,7 @@ STRIDE = 4  # of so many poses each is looked at in a small picture
 CLOSE = 200  # of these are looked at closely, with their neighbours in the clip
 SMALL = 60  # pixels that a side of a small picture has at least
 FACTOR = 4  # by how much it is smaller at most
+LOST = 0.5  # how likely a frame has to be lost, for it to be called so
 
 
 def nearest(scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA) -> Array:
@@ -97,10 +102,13 @@ class Evaluation:
         if self._scene.truth is not None:
             per_frame, errors = self._errors()
             columns |= per_frame
+        told, said = self._doubts(columns.get("swapped"))
+        columns |= told
         used, seconds = sum(frame.evaluations for frame in frames), sum(frame.seconds for frame in frames)
         spent = [frame.cpu_seconds for frame in frames if frame.cpu_seconds is not None]
         measures = Measures(
             **errors,
+            **said,
             iou=float(columns["iou"][usable].mean()),
             cost=float(columns["cost"][usable].mean()),
             held_frames=int(np.count_nonzero(~np.array(self._usable))),
@@ -113,6 +121,31 @@ class Evaluation:
         columns["seconds"] = np.array([frame.seconds for frame in frames])
         rows = [{"frame": k, **{name: float(v[k]) for name, v in columns.items()}} for k in range(len(frames))]
         return rows, measures
+
+    def _doubts(self, swapped: Array | None) -> tuple[dict[str, Array], dict[str, Any]]:
+        """Return the columns and the measures of what is said to be unknown; NaN in frames of which nobody says."""
+        skeleton, truth = self._scene.body.skeleton, self._scene.truth
+        sides, lost = np.full((2, len(self._frames)), np.nan)
+        inside: list[NDArray[np.bool_]] = []
+        for k, frame in enumerate(self._frames):
+            lost[k] = np.nan if frame.lost is None else frame.lost
+            if frame.posterior is None:
+                continue
+            sides[k] = unknown_sides(skeleton, frame.posterior, frame.pose)
+            if truth is not None:
+                off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)
+                within = joint_intervals(skeleton, frame.posterior, frame.pose).radii
+                inside.append((np.linalg.norm(off, axis=1) <= within)[:, 1:])
+        asked, judged = np.isfinite(sides), np.isfinite(lost)
+        known = asked & (sides == 0.0)
+        held = np.mean(inside, axis=(0, 2)) if inside else np.empty(0)
+        measures = {
+            "coverage": {f"{100 * LEVELS[k]:.0f}": float(share) for k, share in enumerate(held)} or None,
+            "unknown_rate": float(sides[asked].mean()) if asked.any() else None,
+            "swapped_known_rate": float(swapped[known].mean()) if swapped is not None and known.any() else None,
+            "lost_said_rate": float((lost[judged] >= LOST).mean()) if judged.any() else None,
+        }
+        return {"unknown_sides": sides, "lost": lost}, measures
 
     def _errors(self) -> tuple[dict[str, Array], dict[str, Any]]:
         """Return the columns and the measures that need a truth."""

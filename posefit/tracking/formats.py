@@ -10,8 +10,11 @@ import numpy as np
 
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.motion.motion import Motion
+from posefit.posterior.calibration import LEVELS
+from posefit.posterior.intervals import angle_intervals, joint_intervals
+from posefit.tracking.evaluation import LOST
 
 FILES = (
     "poses.npz",
@@ -28,6 +31,19 @@ FILES = (
 
 Rows = Sequence[Mapping[str, float]]
 State = dict[str, Any]
+
+
+def _intervals(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Any]:
+    """Return how far joints and angles may be off, NaN in frames of which nobody says; nothing where nobody does."""
+    if all(frame.posterior is None for frame in frames):
+        return {}
+    radii = np.full((len(frames), len(LEVELS), len(JOINTS)), np.nan)
+    halves = np.full((len(frames), len(LEVELS), ANGLES), np.nan)
+    for k, frame in enumerate(frames):
+        if frame.posterior is not None:
+            radii[k] = joint_intervals(skeleton, frame.posterior, frame.pose).radii
+            halves[k] = angle_intervals(frame.posterior, frame.pose).halves
+    return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
 
 
 def write_formats(
@@ -47,11 +63,13 @@ def write_formats(
         joints=np.array(JOINTS),
         costs=np.array([frame.cost for frame in frames]),
         radii=scene.body.radii,
+        **_intervals(estimate.skeleton, frames),
     )
     write_asf(folder / "skeleton.asf", estimate.skeleton)
     write_amc(folder / "track.amc", estimate)
     write_bvh(folder / "track.bvh", estimate)
-    write_trc(folder / "track.trc", estimate)
+    blank = {k for k, row in enumerate(rows) if not row["usable"] or row["lost"] >= LOST}
+    write_trc(folder / "track.trc", estimate, blank)
     (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
     joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
     names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
@@ -59,5 +77,6 @@ def write_formats(
         writer = csv.writer(file)
         writer.writerow([*rows[0], *names])
         for row, points in zip(rows, joints, strict=True):
-            writer.writerow([*row.values(), *(f"{value:.6f}" for value in points.reshape(-1))])
+            told = ["" if np.isnan(value) else value for value in row.values()]
+            writer.writerow([*told, *(f"{value:.6f}" for value in points.reshape(-1))])
     (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

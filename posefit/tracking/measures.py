@@ -97,6 +97,37 @@ class Measures:
     lost_rate: float | None = field(
         default=None, metadata=_about("lost", "%", 0, "share of frames with an MPJPE above 150 mm", 100.0)
     )
+    coverage: Mapping[str, float] | None = field(
+        default=None,
+        metadata=_about(
+            "coverage",
+            "%",
+            0,
+            "share of joints, all but the root, whose truth lies within the ball about them that is to hold 50, 80 or "
+            "95 of 100, both roots at one point; where a method says how sure it is",
+            100.0,
+        ),
+    )
+    unknown_rate: float | None = field(
+        default=None,
+        metadata=_about(
+            "said unknown",
+            "%",
+            0,
+            "share of frames whose left and right the method calls unknown, where it says",
+            100.0,
+        ),
+    )
+    swapped_known_rate: float | None = field(
+        default=None,
+        metadata=_about(
+            "swapped where known", "%", 0, "share swapped of the frames whose left and right it calls known", 100.0
+        ),
+    )
+    lost_said_rate: float | None = field(
+        default=None,
+        metadata=_about("said lost", "%", 0, "share of frames that the method calls lost, where it says", 100.0),
+    )
     held_frames: int = field(
         metadata=_about(
             "held", "frames", 0, "frames that show too little: the pose is held or carried on, not searched"
@@ -163,6 +194,8 @@ FRAME = {
         Measure("mpjpe_mm", "MPJPE", "mm", 0, "mean distance of the 27 joints, both roots at one point"),
         Measure("pa_mpjpe_mm", "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation"),
         Measure("swapped", "swapped", "", 0, "1 where the frame is nearer to the truth when mirrored"),
+        Measure("unknown_sides", "sides unknown", "", 0, "1 where left and right are unknown; blank where nobody says"),
+        Measure("lost", "lost", "", 2, "how likely the frame is lost, 0 to 1; blank where nobody says"),
         Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
         Measure("seconds", "time", "ms", 1, "wall time", 1e3),
     )

@@ -19,6 +19,7 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
 from posefit.motion.motion import Motion
+from posefit.posterior.modes import Posterior
 from posefit.reading import cut
 from posefit.tracking.formats import FILES, Rows, State, write_formats
 from posefit.tracking.identity import Told, difference
@@ -27,7 +28,7 @@ from posefit.tracking.picture import Painter
 _FOUND, _WORK = "found.jsonl", "work"
 _MINE = (*FILES, _FOUND, _WORK)  # what a track writes to its folder
 _ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
-_NUMBERS = ("cost", "evaluations", "seconds")
+_NUMBERS = ("cost", "evaluations", "seconds", "lost")
 
 
 class Output(Protocol):
@@ -157,6 +158,8 @@ class OutputFolder:
                 row = json.loads(line)
                 values = {name: row[name] for name in _NUMBERS}
                 values |= {name: None if row[name] is None else np.array(row[name]) for name in _ARRAYS}
+                posterior = row["posterior"]
+                values["posterior"] = None if posterior is None else Posterior.from_dict(posterior)
             except (ValueError, KeyError):
                 break  # the line that was being written when it ended
             frames.append(Frame(**values))
@@ -173,6 +176,7 @@ class OutputFolder:
         for name in _ARRAYS:
             value = getattr(frame, name)
             row[name] = None if value is None else np.asarray(value).tolist()
+        row["posterior"] = None if frame.posterior is None else frame.posterior.as_dict()
         with (self._building / _FOUND).open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
         self._recorded += 1

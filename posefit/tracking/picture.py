@@ -62,11 +62,11 @@ class Painter:
             + ([] if observation.usable else ["pose held"])
         )
         image[:BAND] //= 4  # so that the label is seen before a bright sky
-        _write(image, label, (12, 26))
-        _write(image, "from the camera's right", (width + 12, 26))
+        write(image, label, (12, 26))
+        write(image, "from the camera's right", (width + 12, 26))
         if filmed is None:
             for k, (name, colour) in enumerate((("both", BOTH), ("observed only", MISSED), ("body only", SPILLED))):
-                _write(image, name, (12 + 130 * k, PANEL - 14), colour)
+                write(image, name, (12 + 130 * k, PANEL - 14), colour)
         if self._count in self._wanted:
             self._stills.append(
                 np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
@@ -152,12 +152,13 @@ def curve(values: Sequence[float], name: str, width: int, height: int) -> Image:
     for level in (0.0, float(np.mean(values)), max(values)):
         row = int(height - 24 - level / top * (height - 48))
         cv2.line(image, (56, row), (width - 16, row), (70, 66, 64), 1)
-        _write(image, f"{level:.2f}", (8, row + 4), scale=0.4)
+        write(image, f"{level:.2f}", (8, row + 4), scale=0.4)
     points = np.rint(np.column_stack([x, y]) * 16).astype(np.int32)
     cv2.polylines(image, [points], False, BOTH, 2, cv2.LINE_AA, 4)
-    _write(image, f"{name}, frame by frame: 0, mean and maximum", (60, 16), scale=0.45)
+    write(image, f"{name}, frame by frame: 0, mean and maximum", (60, 16), scale=0.45)
     return image
 
 
-def _write(image: Image, text: str, at: tuple[int, int], colour: Any = TEXT, scale: float = 0.5) -> None:
+def write(image: Image, text: str, at: tuple[int, int], colour: Any = TEXT, scale: float = 0.5) -> None:
+    """Write a text into an image."""
     cv2.putText(image, text, at, _FONT, scale, colour, 1, cv2.LINE_AA)

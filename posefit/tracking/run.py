@@ -10,9 +10,11 @@ from threadpoolctl import threadpool_limits
 from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import Skeleton
 from posefit.listening import QUIET, Listener
 from posefit.motion.motion import Motion
-from posefit.tracking.evaluation import Evaluation
+from posefit.posterior.modes import TrackMode, modes_of, track_modes
+from posefit.tracking.evaluation import LOST, Evaluation
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, opened, task_of
@@ -40,6 +42,7 @@ class Track:
     frames: list[dict[str, float]] = field(repr=False)  # one row a frame: see posefit.tracking.measures.FRAME
     summary: dict[str, Any] = field(repr=False)  # what `posefit track --json` prints
     found: list[Frame] = field(repr=False)  # what the tracker yielded
+    modes: list[TrackMode] = field(default_factory=list, repr=False)  # what the whole track may be, the likeliest first
 
 
 def follow(
@@ -79,6 +82,8 @@ def follow(
         usable = [observation.usable for observation in scene.observations] if tracks > 1 else []
         each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
         found, told = _kept(scene, each, usable, training)
+        found = [_moded(frame, scene.body.skeleton) for frame in found]
+        modes = _whole(scene.body.skeleton, found)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
         for warning in method.audit.warnings:
             listener.say(f"warning: {warning}")
@@ -112,10 +117,38 @@ def follow(
             "fps": scene.fps,
             "settings": method.settings,
             "body": None if shape is None else _described(shape),
+            "modes": [round(mode.weight, 6) for mode in modes] or None,
+            "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
+            "lost_frames": _numbers(rows, "lost", LOST),
             "warnings": [*scene.warnings, *method.audit.warnings],
         }
         output.finish(scene, estimate, found, rows, summary)
-    return Track(estimate, scene.truth, measures, rows, summary, found)
+    return Track(estimate, scene.truth, measures, rows, summary, found, modes)
+
+
+def _moded(frame: Frame, skeleton: Skeleton) -> Frame:
+    """Return a frame with the modes of its posterior, where it has one."""
+    return frame if frame.posterior is None else replace(frame, modes=modes_of(skeleton, frame.posterior))
+
+
+def _alone(frame: Frame) -> Frame:
+    """Return a frame whose posterior is its own: a track that goes on has no rows of the one that was interrupted."""
+    posterior = frame.posterior
+    return frame if posterior is None else replace(frame, posterior=replace(posterior, coherent=False))
+
+
+def _whole(skeleton: Skeleton, found: Sequence[Frame]) -> list[TrackMode]:
+    """Return the modes of a whole track; none where its frames' posteriors are no tracks."""
+    each = [frame.posterior for frame in found if frame.posterior is not None and frame.posterior.coherent]
+    alike = len(each) == len(found) and len({len(one) for one in each}) == 1
+    return track_modes(skeleton, each) if alike else []
+
+
+def _numbers(rows: Sequence[Mapping[str, float]], name: str, least: float) -> list[int] | None:
+    """Return the frames that have so much in a column; None where it is blank in all."""
+    if np.isnan([row[name] for row in rows]).all():
+        return None
+    return [int(row["frame"]) for row in rows if row[name] >= least]
 
 
 def _found(
@@ -144,6 +177,7 @@ def _found(
         which = f" of track {number + 1} of {tracks}, {begun}" if tracks > 1 else ""
         if state is not None and 0 < len(frames) < scene.count:
             rng.bit_generator.state = state
+            frames = [_alone(frame) for frame in frames]
             listener.say(f"going on from frame {len(frames)} of {scene.count}{which}")
             last = frames[-1]
             mine = replace(mine, yaw=float(last.pose[0]), first_pose=last.pose[3:], before=tuple(frames))

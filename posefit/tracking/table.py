@@ -36,6 +36,11 @@ def table(summary: Mapping[str, Any]) -> str:
             f"{held} {show} too little of the person: the pose is held or carried on, not searched, and may be off "
             "the person; IoU is that of the others"
         )
+    lines += [
+        f"{what} in {len(summary[name])} of {summary['frames']} frames"
+        for name, what in (("unknown_sides", "left and right: unknown"), ("lost_frames", "the person: lost"))
+        if summary[name]
+    ]
     if summary["body"] is not None:
         body = summary["body"]
         parts = [

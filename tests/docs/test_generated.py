@@ -55,7 +55,7 @@ def test_every_key_of_summary_json_is_told(followed: Path) -> None:
     import json
 
     found = json.loads((followed / "summary.json").read_text("utf-8"))
-    told = {*figures.ASKED, *figures.MEASURES}
+    told = {*figures.ASKED, *figures.MEASURES, *figures.SAID}
     assert set(found) <= told
     assert told - set(found) <= {"history"}  # of a single frame
 

@@ -95,3 +95,15 @@ def test_nobody_has_no_extent_and_one_pixel_has_its_own() -> None:
 def test_a_mask_has_two_sides(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match=r"mask must have shape \(height, width\), got \("):
         Silhouette.of(np.zeros(shape))
+
+
+def test_small_pieces_apart_have_no_say_in_where_the_borders_are() -> None:
+    mask = np.zeros((60, 80), dtype=bool)
+    mask[10:50, 30:40] = True  # 400 pixels
+    mask[5:9, 60:65] = True  # 20, five per cent of them
+    assert Silhouette.of(mask).extent == (30.0, 10.0, 40.0, 50.0)
+    mask[20:25, 60:65] = True  # 25, more than six per cent
+    assert Silhouette.of(mask).extent == (30.0, 10.0, 65.0, 50.0)
+    mask[50, 41] = True  # a corner touches no corner of the large piece's
+    mask[50, 40] = True  # but this pixel's corner does: both are of the large piece
+    assert Silhouette.of(mask).extent == (30.0, 10.0, 65.0, 51.0)

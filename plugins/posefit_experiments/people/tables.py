@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit_experiments.columns import head_of, number
 from posefit_experiments.people.clips import GROUPS, Piece
-from posefit_experiments.people.design import BASE, CHANGES, OTHERS, OWN, Planned, Views
+from posefit_experiments.people.design import AGAIN, BASE, CHANGES, OTHERS, OWN, STEPS, Planned, Views
 
 Row = Mapping[str, Any]
 Found = Sequence[tuple[Planned, Row]]
@@ -30,9 +30,10 @@ def tables(tracks: Sequence[Planned], measured: Sequence[Row], near: Mapping[Pie
         "groups": [
             _group(name, found, near)
             for name in GROUPS
-            if (found := [one for one in base.values() if one[0].group == name])
+            if (found := [one for one in pairs if one[0].part in (BASE, AGAIN) and one[0].group == name])
         ],
-        "changes": list(_changes(pairs, base)),
+        "changes": list(_changes(CHANGES, pairs, base)),
+        "steps": list(_changes(STEPS, pairs, base)),
         "methods": list(_methods(pairs, base)),
         "own": [_own(track, row) for track, row in pairs if track.part == OWN],
     }
@@ -81,12 +82,12 @@ def interval(values: Array, names: Sequence[str]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _changes(pairs: Found, base: Mapping[Any, tuple[Planned, Row]]) -> Iterator[dict[str, Any]]:
+def _changes(names: Iterable[str], pairs: Found, base: Mapping[Any, tuple[Planned, Row]]) -> Iterator[dict[str, Any]]:
     """Yield what each change comes to, beside the same clips and views without it."""
-    same = [base[track.place] for track, _ in pairs if track.part == next(iter(CHANGES))]
+    same = [base[track.place] for track, _ in pairs if track.part == next(iter(names), None)]
     if same:
         yield {"change": BASE, **_figures(same), "more_mm": 0.0}
-    for name in CHANGES:
+    for name in names:
         mine = [(track, row) for track, row in pairs if track.part == name]
         if mine:
             more = [row["mpjpe_mm"] - base[track.place][1]["mpjpe_mm"] for track, row in mine]
@@ -138,10 +139,11 @@ def people_lines(told: Mapping[str, Any]) -> Iterator[str]:
         for view, one in rows:
             if one is not None:
                 yield _line([group["group"], view, *_cells(one), *(_mm(one[f"{name}_mm"]) for name in TRIVIAL), near])
-    if told["changes"]:
-        yield ""
-        yield from _head(["walks", *heads, "more than base, mm"], 1)
-        yield from (_line([one["change"], *_cells(one), _mm(round(one["more_mm"]) + 0.0)]) for one in told["changes"])
+    for name, head in (("changes", "walks"), ("steps", "walks and runs")):
+        if told[name]:
+            yield ""
+            yield from _head([head, *heads, "more than base, mm"], 1)
+            yield from (_line([one["change"], *_cells(one), _mm(round(one["more_mm"]) + 0.0)]) for one in told[name])
     if told["methods"]:
         yield ""
         yield from _head(["method", *heads, "ms a frame"], 1)

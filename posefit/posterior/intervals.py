@@ -1,0 +1,83 @@
+"""How far joints and angles may be off what is told: intervals of weighted poses, each blurred by the model's error."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import Skeleton
+from posefit.posterior.calibration import LEVELS, Recalibration
+from posefit.posterior.modes import Posterior
+
+HALVINGS = 12  # of where a radius may be: to a quarter of a thousandth of the widest
+NARROWEST = 1e-6  # metres or radians: the least that every pose is blurred by
+FARTHEST = 6.0  # spreads, beyond which nothing is looked for
+CLOSE = 1e-3  # spreads: what is nearer to the middle is as if it were so far off, where a difference of two is divided
+
+
+@dataclass(frozen=True, eq=False)
+class JointIntervals:
+    """Where joints are, relative to the root, and how sure that is. Metres."""
+
+    mean: Array = field(repr=False)  # (27, 3)
+    covariance: Array = field(repr=False)  # (27, 3, 3)
+    radii: Array = field(repr=False)  # (levels, 27) of the balls about the told joints that hold the true ones
+
+
+@dataclass(frozen=True, eq=False)
+class AngleIntervals:
+    """What angles are, and how sure that is. Radians."""
+
+    mean: Array = field(repr=False)  # (66,) circular
+    halves: Array = field(repr=False)  # (levels, 66): how far to either side of the told angles the true ones are
+
+
+def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> JointIntervals:
+    """Return where joints are, by weighted poses, and the balls about those of a `pose` (66,) that hold them.
+
+    A ball's radius is the quantile, at each of the `LEVELS`, of the distance to a joint of a pose drawn by weight and
+    blurred by a normal error along each axis: where two modes are likely, the wider balls reach from one to the other.
+    Then it is multiplied by its factor. The posterior's recalibration has spreads and factors.
+    """
+    model = posterior.recalibration or Recalibration()
+    joints, told = skeleton.joints(posterior.poses), skeleton.joints(pose)
+    mean = np.einsum("k,kjd->jd", posterior.weights, joints)
+    off = joints - mean
+    covariance = np.einsum("k,kjd,kje->jde", posterior.weights, off, off)
+    covariance += (model.joint_spreads**2)[:, None, None] * np.eye(3)
+    radii = _quantiles(np.linalg.norm(joints - told, axis=2), posterior.weights, model.joint_spreads, 3)
+    return JointIntervals(mean, covariance, model.joint_factors * radii)
+
+
+def angle_intervals(posterior: Posterior, pose: Array) -> AngleIntervals:
+    """Return the circular means of angles, and how far to either side of those of a `pose` (66,) the true ones are.
+
+    As for joints, but that an interval is never more than half a turn to either side.
+    """
+    model = posterior.recalibration or Recalibration()
+    turns = np.einsum("k,ka->a", posterior.weights, np.exp(1j * posterior.poses))
+    off = np.abs(wrapped(posterior.poses - pose))
+    halves = model.angle_factors * _quantiles(off, posterior.weights, model.angle_spreads, 1)
+    return AngleIntervals(np.angle(turns), np.minimum(halves, np.pi))
+
+
+def _quantiles(distances: Array, weights: Array, spreads: Array, dimensions: Literal[1, 3]) -> Array:
+    """Return the radii (levels, n) that hold such shares of normal errors about points at distances (K, n)."""
+    from scipy.special import ndtr
+
+    spread = np.maximum(spreads, NARROWEST)
+    away = np.maximum(distances, CLOSE * spread)
+    levels = np.array(LEVELS)[:, None]
+    low = np.zeros((len(LEVELS), len(spread)))
+    high = np.tile(away.max(axis=0) + FARTHEST * spread, (len(LEVELS), 1))
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        near, far = ((middle[:, None] + sign * away) / spread for sign in (-1.0, 1.0))
+        inside = ndtr(near) - ndtr(-far)
+        if dimensions == 3:  # the law of the noncentral chi with three degrees of freedom
+            inside -= spread / away * (np.exp(-0.5 * near**2) - np.exp(-0.5 * far**2)) / np.sqrt(2.0 * np.pi)
+        within = np.einsum("k,lkn->ln", weights, inside) >= levels
+        low, high = np.where(within, low, middle), np.where(within, middle, high)
+    return high
