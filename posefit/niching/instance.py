@@ -3,9 +3,9 @@
 A number is one of three kinds in turn. `strides` are seen from the side, where a stride has nearly the silhouette of
 the one half a cycle later. `turns` are seen from in front or from behind, where somebody who comes is hardly told from
 somebody who goes. `arms` are hidden: with other arms, before the trunk instead of behind it, the pose looks the same.
-The camera stands far away, so that depth does not show; the person's build is a little other than the body that is
-fitted, so that the true pose does not give itself away by costing nothing. Which of the known poses is the true one,
-whose silhouette it is, is drawn at random.
+The camera stands far away, so that depth does not show. Which of the known poses is the true one is drawn at random;
+the person's build is a little other than the body that is fitted, and every joint is about a degree off the true pose,
+so that the true one does not give itself away by being the cheapest.
 
 Every known pose is in the box that is searched, costs nearly what the true one does, is apart from the others, and
 has a hill between itself and each of them: on the straight way from one to the other the cost rises.
@@ -39,8 +39,9 @@ BOUND = 1.0  # units of silhouette cost by which a known pose differs from the t
 APART_MM = 60.0  # between two known poses at least: the mean over joints, both roots at one point
 HILL = 2.0  # units of silhouette cost above the dearer of two known poses, somewhere between them
 SIZE = (128, 96)  # pixels
-DISTANCE, FIELD_OF_VIEW = 20.0, 0.165  # metres; radians, which show as much as a common camera does from 3.5 m
+DISTANCE, FIELD_OF_VIEW = 40.0, 0.0825  # metres; radians, which show as much as a common camera does from 3.5 m
 BUILD_PERCENT = 2.0  # by which bones and radii of the person are off those of the body that is fitted, at most
+STANCE = np.radians(1.0)  # standard deviation by which the person's joint angles are off those of the true pose
 ROOT_RANGE = np.array([np.pi, *np.radians([8.0, 8.0])])  # radians: yaw is sought all round
 PLACE = np.array([0.0, 0.9, 0.0])  # metres: where the root is, and the camera aims
 VIEWS = {"strides": (70.0, 110.0), "turns": (0.0, 50.0), "arms": (0.0, 180.0)}  # degrees from where somebody faces
@@ -51,7 +52,7 @@ ATTEMPTS = 1000  # draws until one is as it should be: a few for strides and tur
 
 @dataclass(frozen=True, eq=False)
 class NicheInstance:
-    """One numbered instance. Of the known poses, row `true` is the one whose silhouette is seen."""
+    """One numbered instance. Of the known poses, row `true` is the one that the person is in."""
 
     number: int
     kind: Kind
@@ -119,7 +120,9 @@ def _tried(number: int, kind: Kind, rng: np.random.Generator) -> NicheInstance |
         poses = np.concatenate([poses, _other_arms(_seen(person, body, camera, poses[0], space), poses[0], rng)])
     poses = np.concatenate([poses, prior.held(reflected_poses(body.skeleton, poses, facing(camera, PLACE)))])
     true = int(rng.integers(len(poses)))
-    problem = _seen(person, body, camera, poses[true], space)
+    stance = poses[true].copy()
+    stance[3:] += rng.normal(0.0, STANCE, len(stance) - 3)
+    problem = _seen(person, body, camera, stance, space)
     costs = problem.cost(poses, np.tile(PLACE, (len(poses), 1)))
     order = [true, *np.flatnonzero(np.arange(len(poses)) != true)]
     kept: list[int] = []
