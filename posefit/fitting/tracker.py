@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space, Start
+from posefit.fitting.check import between, one_of, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
@@ -114,6 +115,8 @@ class Prediction:
         tilt_margin_degrees: what can be found beyond them, to either side, 0 or more. Ours.
         translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
+        modes: searches of a frame that its modes are weighed by, the track's own and others; 0 weighs none. Ours.
+        posterior_temperature: what costs are divided by where modes are weighed, above 0. Ours.
     """
 
     spread: float = SPREAD
@@ -125,26 +128,26 @@ class Prediction:
     tilt_margin_degrees: float = TILT_MARGIN_DEGREES
     translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     beta: float = BETA
+    modes: int = 0
+    posterior_temperature: float = 2.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
-        if not self.floor > 0.0:
-            raise ValueError(f"floor must be above 0, got {self.floor}")
+        positive("floor", self.floor)
+        positive("posterior_temperature", self.posterior_temperature)
+        whole("modes", self.modes, 0)
         if not self.spread >= 0.0:
             raise ValueError(f"spread must be 0 or more, got {self.spread}")
         for name in ("root_range_degrees", "translation_range"):
             if not (np.isfinite(getattr(self, name)).all() and np.min(getattr(self, name)) >= 0.0):
                 raise ValueError(f"{name} must be 0 or more to either side, got {getattr(self, name)}")
-        if self.tilt not in ("learned", "box"):
-            raise ValueError(f"tilt must be one of learned, box, got {self.tilt!r}")
+        one_of("tilt", self.tilt, ("learned", "box"))
         if not 0.0 < self.tilt_share <= 1.0:
             raise ValueError(f"tilt_share must be above 0 and at most 1, got {self.tilt_share}")
         if not 0.0 <= self.tilt_margin_degrees < np.inf:
             raise ValueError(f"tilt_margin_degrees must be 0 or more, got {self.tilt_margin_degrees}")
-        if self.prediction not in ("latest", "literal"):
-            raise ValueError(f"prediction must be one of latest, literal, got {self.prediction!r}")
-        if not 0.0 <= self.beta <= 1.0:
-            raise ValueError(f"beta must lie in 0 to 1, got {self.beta}")
+        one_of("prediction", self.prediction, ("latest", "literal"))
+        between("beta", self.beta, 0.0, 1.0)
 
     def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
         """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""
@@ -247,7 +250,7 @@ class SynthesisTracker:
                 yield latest
                 continue
             optimiser = self._ready(optimiser, space, rng)
-            problem = self._problem(space, observation)
+            problem = self.problem(space, observation)
             best = minimise(problem.evaluate, optimiser, task.evaluations, told=True)
             follower.commit(best.proposal)
             latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
@@ -260,14 +263,15 @@ class SynthesisTracker:
             poses, places = latest.pose[None], latest.translation[None]
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
-        problem = self._problem(space, observation)
+        problem = self.problem(space, observation)
         counts = problem.areas(poses, places)
         areas = np.stack([one[0] for one in counts])
         return Frame(
             poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0), cpu_seconds=0.0
         )
 
-    def _problem(self, space: SearchSpace, observation: Observation) -> PoseProblem:
+    def problem(self, space: SearchSpace, observation: Observation) -> PoseProblem:
+        """Return the problem that a frame is."""
         task, beta = self.task, self.prediction.beta
         seen = observation.silhouettes
         return PoseProblem(task.body, task.cameras, seen, space, beta=beta, threads=task.threads, blank=True)
@@ -284,15 +288,5 @@ def _frame(problem: PoseProblem, best: Minimum, seconds: float, cpu_seconds: flo
     poses, translations = problem.decode(best.proposal[None])
     counts = np.stack([areas[0] for areas in problem.areas(poses, translations)])
     found = problem.space.coordinates(best.proposal)
-    return Frame(
-        poses[0],
-        translations[0],
-        best.cost,
-        counts,
-        best.evaluations,
-        seconds,
-        best.history,
-        found,
-        best.spent,
-        cpu_seconds=cpu_seconds,
-    )
+    effort = (best.evaluations, seconds, best.history)
+    return Frame(poses[0], translations[0], best.cost, counts, *effort, found, best.spent, cpu_seconds=cpu_seconds)

@@ -27,6 +27,7 @@ from posefit.fitting.tracker import (
 from posefit.footage.source import Source, kind_of
 from posefit.motion import built_in, recorded
 from posefit.registry import Kind, Offer, registry
+from posefit.searching.tracker import WeighingTracker
 from posefit.silhouette.cost import BETA
 
 FOLLOWER = "exemplars"  # the tracker of footage, where nobody names another method and it is installed
@@ -140,10 +141,11 @@ def prepare(choice: Choice, task: Task) -> Method:
     prediction = Prediction(**{**usual, **choice.tracker_settings})
     tilt = prediction.tilted(learned, task.training)
 
-    def make(task: Task, patience: float) -> SynthesisTracker:
+    def make(task: Task, patience: float) -> Tracker:
         limit = None if choice.ask_seconds is None else choice.ask_seconds + patience
         build = partial(_guarded, offer, mine, limit, task.evaluations)
-        return SynthesisTracker(task, learned, build, offer.next_frame, prediction, tilt)
+        tracker = SynthesisTracker(task, learned, build, offer.next_frame, prediction, tilt)
+        return WeighingTracker(tracker) if prediction.modes else tracker
 
     made_of = {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)}
     return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, Audit(), make)

@@ -1,0 +1,55 @@
+"""A box and the costs in it, as far as samplers need to know of them: what is not feasible costs infinitely much."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+
+
+class Box(Protocol):
+    """The box [-1, 1]^d, of which some is feasible: what `posefit.Space` is, and less."""
+
+    @property
+    def dimensions(self) -> int:
+        """d."""
+        ...
+
+    @property
+    def periodic(self) -> NDArray[np.bool_]:
+        """Which coordinates wrap around (d,)."""
+        ...
+
+    def feasible(self, proposals: Array) -> NDArray[np.bool_]:
+        """Return which proposals (n, d) lie in the box and are allowed (n,)."""
+        ...
+
+    def wrap(self, proposals: Array) -> Array:
+        """Return proposals with their periodic coordinates brought into [-1, 1)."""
+        ...
+
+    def towards(self, origin: Array, target: Array) -> Array:
+        """Return target - origin, the short way round where a coordinate is periodic."""
+        ...
+
+
+@dataclass(eq=False)
+class Landscape:
+    """The costs of a box's proposals, and how many of them were asked for."""
+
+    box: Box
+    evaluate: Callable[[Array], Array]  # costs (n,) of feasible proposals (n, d)
+    evaluations: int = 0
+
+    def costs(self, proposals: Array) -> Array:
+        """Return the costs (n,) of proposals (n, d): infinite where one is not feasible, or its cost no number."""
+        feasible = self.box.feasible(proposals)
+        costs = np.full(len(proposals), np.inf)
+        if feasible.any():
+            self.evaluations += int(feasible.sum())
+            costs[feasible] = self.evaluate(proposals if feasible.all() else proposals[feasible])
+        costs[np.isnan(costs)] = np.inf
+        return costs

@@ -1,0 +1,99 @@
+"""Where a sampler starts: normal distributions around known modes, and some share anywhere in the box."""
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.posterior.landscape import Box
+
+REDRAWS = 100  # Reading S7
+WIDEST = 0.5  # ours: a wrapped normal of this deviation is its three nearest images to nine digits
+
+_normal = np.vectorize(lambda x: 0.5 * (1.0 + math.erf(x / math.sqrt(2.0))), otypes=[np.float64])
+
+
+@dataclass(frozen=True, eq=False)
+class NormalMixture:
+    """Normal distributions of equal weight around `centres`, cut off at the box, and a share `broad` that is uniform.
+
+    They wrap around where a coordinate is periodic. Without centres everything is uniform.
+    """
+
+    centres: Array  # (k, d)
+    spreads: Array  # (k, d) standard deviations, at most 0.5
+    broad: float  # between 0 and 1, so that no place in the box is left out; 1 without centres
+
+    @classmethod
+    def anywhere(cls, dimensions: int) -> Self:
+        """Return the uniform distribution over the box."""
+        return cls(np.empty((0, dimensions)), np.empty((0, dimensions)), 1.0)
+
+    def __post_init__(self) -> None:
+        if self.centres.shape != self.spreads.shape:
+            raise ValueError(f"spreads must have shape {self.centres.shape}, got {self.spreads.shape}")
+        if not (self.spreads > 0.0).all() or not (self.spreads <= WIDEST).all():
+            raise ValueError(f"spreads must be above 0 and at most {WIDEST}, got {self.spreads.ravel()[:3]}")
+        if not (0.0 < self.broad < 1.0 if len(self.centres) else self.broad == 1.0):
+            raise ValueError(f"broad must lie between 0 and 1, and be 1 without centres, got {self.broad}")
+
+    def draw(self, box: Box, rng: np.random.Generator, count: int) -> tuple[Array, float]:
+        """Return feasible proposals (count, d), and which share of all that were drawn was feasible.
+
+        Where too few are found in 100 attempts, those are repeated. Raises ValueError where none is.
+        """
+        found, tried, kept = [], 0, 0
+        for _ in range(REDRAWS):
+            drawn = self._drawn(box, rng, count)
+            found.append(drawn[box.feasible(drawn)])
+            tried, kept = tried + count, kept + len(found[-1])
+            if kept >= count:
+                break
+        if not kept:
+            raise ValueError(f"the box must be feasible somewhere, got nothing in {REDRAWS} x {count} draws")
+        drawn = np.concatenate(found)
+        return (drawn if kept >= count else drawn[rng.integers(0, kept, count)])[:count], kept / tried
+
+    def log_density(self, box: Box, proposals: Array) -> Array:
+        """Return the logarithm (n,) of the density of proposals (n, d), over that of the uniform distribution."""
+        if not len(self.centres):
+            return np.zeros(len(proposals))
+        parts = self._log_parts(box, proposals) + math.log((1.0 - self.broad) / len(self.centres))
+        return np.asarray(np.logaddexp(np.logaddexp.reduce(parts, axis=1), math.log(self.broad)))
+
+    def nearest(self, box: Box, proposals: Array) -> NDArray[np.int64]:
+        """Return which normal distribution is the densest (n,) at proposals (n, d); 0 where there is none."""
+        if not len(self.centres):
+            return np.zeros(len(proposals), dtype=np.int64)
+        return np.asarray(self._log_parts(box, proposals).argmax(axis=1))
+
+    def _log_parts(self, box: Box, proposals: Array) -> Array:
+        """Return the logarithms (n, k) of the densities of the normal distributions, over the uniform one."""
+        logs = np.empty((len(proposals), len(self.centres)))
+        for k, (centre, spread) in enumerate(zip(self.centres, self.spreads, strict=True)):
+            away = box.towards(centre, proposals)
+            exponents = -0.5 * (away / spread) ** 2
+            if box.periodic.any():
+                around = [np.exp(-0.5 * ((away + turn) / spread) ** 2 - exponents) for turn in (-2.0, 2.0)]
+                images = np.log1p(np.where(box.periodic, around[0] + around[1], 0.0))
+                exponents = exponents + images
+            inside = np.where(box.periodic, 1.0, _normal((1.0 - centre) / spread) - _normal((-1.0 - centre) / spread))
+            usual = np.log(spread * math.sqrt(2.0 * math.pi) * inside / 2.0)
+            logs[:, k] = (exponents - usual).sum(axis=1)
+        return logs
+
+    def _drawn(self, box: Box, rng: np.random.Generator, count: int) -> Array:
+        drawn = rng.uniform(-1.0, 1.0, (count, box.dimensions))
+        near = np.flatnonzero(rng.random(count) >= self.broad)
+        if not len(near):
+            return drawn
+        which = rng.integers(0, len(self.centres), len(near))
+        means, spreads = self.centres[which], self.spreads[which]
+        mine = box.wrap(rng.normal(means, spreads))
+        while (outside := np.abs(mine) > 1.0).any():  # of a mean in the box at least a third stays inside
+            mine[outside] = rng.normal(means[outside], spreads[outside])
+        drawn[near] = mine
+        return drawn

@@ -1,0 +1,177 @@
+"""Weighted proposals that are distributed as exp(-cost / temperature) over a box: a tempered, waste-free sampler.
+
+H.-D. Dau, N. Chopin, Waste-free sequential Monte Carlo, Journal of the Royal Statistical Society B 84(1), 2022. Where
+we choose ourselves, the constant says so.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.posterior.landscape import Landscape
+from posefit.posterior.mixture import NormalMixture
+
+PARTICLES = 2048  # N, ours
+CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P
+SURVIVAL = 0.5  # alpha: the share of the particles that the next temperature leaves
+HALVINGS = 60  # ours: bisection steps; a double has 53 bits
+WANTED = 0.234  # ours: the share of moves that is to be accepted, as is best for long random walks
+STEPS = 500  # ours: temperatures, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Weighted proposals, and what they say of the whole box."""
+
+    proposals: Array  # (n, d)
+    weights: Array  # (n,), which sum to 1
+    costs: Array  # (n,)
+    log_evidence: float  # of the mean of exp(-cost / temperature) over the box, where nothing infeasible counts
+    exponents: Array = field(repr=False)  # (t,) how much of the temperature was reached after each step; the last is 1
+    accepted: Array = field(repr=False)  # (t - 1,) share of the moves that was accepted in each
+
+
+def tempered(
+    landscape: Landscape,
+    start: NormalMixture,
+    temperature: float,
+    rng: np.random.Generator,
+    *,
+    particles: int = PARTICLES,
+    chain: int = CHAIN,
+    survival: float = SURVIVAL,
+) -> Sampled:
+    """Return weighted proposals of the density that exp(-cost / temperature) has in the feasible box.
+
+    The particles begin at `start` and go in steps to that density, on the geometric path between both: each step is as
+    long as leaves a share `survival` of them, by effective sample size. Some survive, and each becomes a chain of
+    `chain` random-walk moves, all of which are particles. Raises ValueError where a setting makes no sense, or where
+    nothing feasible is found.
+    """
+    if not temperature > 0.0:
+        raise ValueError(f"temperature must be above 0, got {temperature}")
+    if not (chain >= 2 and particles >= 2 * chain):
+        raise ValueError(f"particles must be at least 2 chains of 2 or more, got {particles} and chains of {chain}")
+    if not 0.0 < survival < 1.0:
+        raise ValueError(f"survival must lie between 0 and 1, got {survival}")
+    proposals, share = start.draw(landscape.box, rng, particles)
+    costs, begun = landscape.costs(proposals), start.log_density(landscape.box, proposals)
+    log_evidence, exponent, factor = float(np.log(share)), 0.0, 1.0
+    exponents: list[float] = []
+    accepted: list[float] = []
+    while True:
+        rises = -costs / temperature - begun
+        step = next_step(rises, 1.0 - exponent, survival)
+        if len(exponents) == STEPS - 1:
+            step = 1.0 - exponent
+        weights, mean = reweighed(rises, step)
+        log_evidence += mean  # DAU2022 (normalising constant)
+        exponent = 1.0 if step >= 1.0 - exponent else exponent + step
+        exponents.append(exponent)
+        if exponent == 1.0:
+            return Sampled(proposals, weights, costs, log_evidence, np.array(exponents), np.array(accepted))
+        rows = systematic_rows(weights, rng.random(), particles // chain)
+        walk = factor * _walk(start, landscape, proposals, weights)
+        state = (proposals[rows], costs[rows], begun[rows])
+        states = [state]
+        moves = 0.0
+        for _ in range(chain - 1):
+            state, share = _moved(landscape, start, state, walk, exponent, temperature, rng)
+            states.append(state)
+            moves += share / (chain - 1)
+        accepted.append(moves)
+        factor = float(np.clip(factor * np.exp(2.0 * (moves - WANTED)), 0.01, 1.0))
+        proposals, costs, begun = (np.concatenate(part) for part in zip(*states, strict=True))  # DAU2022 (waste-free)
+
+
+def next_step(rises: Array, left: float, survival: float) -> float:
+    """Return how far to go on a path, at most what is `left`, so that weights exp(step rise) leave a share `survival`.
+
+    The share is the effective sample size of the weights over the number of particles that have any; it falls as the
+    step grows, so bisection finds it.
+    """
+    alive = rises[rises > -np.inf]
+    if not len(alive) or _effective(left * alive) >= survival * len(alive):
+        return left
+    low, high = 0.0, left
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if _effective(middle * alive) > survival * len(alive):  # DAU2022 (exponent)
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def reweighed(rises: Array, step: float) -> tuple[Array, float]:
+    """Return weights (n,) exp(step rise), which sum to 1, and the logarithm of their mean before they did.
+
+    Raises ValueError where all weigh nothing.
+    """
+    highest = rises.max()
+    if highest == -np.inf:
+        raise ValueError(f"costs must be finite somewhere, got infinite ones for all {len(rises)} proposals")
+    weights = np.exp(step * (rises - highest))
+    return np.asarray(weights / weights.sum()), float(step * highest + np.log(weights.mean()))
+
+
+def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
+    """Return `count` rows, each as often as its weight asks: one of the two whole numbers next to count times it.
+
+    `u` in [0, 1) is where the comb of evenly spaced teeth begins.
+    """
+    rows = weights.cumsum().searchsorted((np.arange(count) + u) / count, side="right")
+    return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))
+
+
+def _effective(logarithms: Array) -> float:
+    """Return the effective sample size of weights whose logarithms (n,) are given."""
+    weights = np.exp(logarithms - logarithms.max())
+    return float(weights.sum() ** 2 / (weights**2).sum())
+
+
+def _walk(start: NormalMixture, landscape: Landscape, proposals: Array, weights: Array) -> Array:
+    """Return the root (d, d) of a random walk's covariance, in proportion to that of the particles.
+
+    It is taken within the modes of the start, as a walk does not reach from one to the other; where there are none, of
+    all particles, as they lie around the heaviest one.
+    """
+    box, dimensions = landscape.box, proposals.shape[1]
+    groups = start.nearest(box, proposals)
+    centres = start.centres if len(start.centres) else proposals[[weights.argmax()]]
+    around = box.towards(centres[groups], proposals)
+    for k in np.unique(groups[weights > 0.0]):
+        mine = groups == k
+        around[mine] -= weights[mine] @ around[mine] / weights[mine].sum()
+    covariance = (around * weights[:, None]).T @ around
+    covariance += 1e-12 * np.eye(dimensions)
+    return np.asarray(2.38 / np.sqrt(dimensions) * np.linalg.cholesky(covariance))  # DAU2022 (random walk)
+
+
+_State = tuple[Array, Array, Array]  # proposals (m, d), costs (m,), log densities of the start (m,)
+
+
+def _moved(
+    landscape: Landscape,
+    start: NormalMixture,
+    state: _State,
+    walk: Array,
+    exponent: float,
+    temperature: float,
+    rng: np.random.Generator,
+) -> tuple[_State, float]:
+    """Return a chain's next state, and the share of its moves that was accepted."""
+    proposals, costs, begun = state
+    noise = rng.standard_normal(proposals.shape)
+    tried = landscape.box.wrap(proposals + noise @ walk.T)
+    new_costs, new_begun = landscape.costs(tried), start.log_density(landscape.box, tried)
+    rise = exponent * (costs - new_costs) / temperature + (1.0 - exponent) * (new_begun - begun)
+    taken = np.log(1.0 - rng.random(len(costs))) < rise
+    found = (
+        np.where(taken[:, None], tried, proposals),
+        np.where(taken, new_costs, costs),
+        np.where(taken, new_begun, begun),
+    )
+    return found, float(taken.mean())

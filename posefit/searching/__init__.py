@@ -1,0 +1,13 @@
+"""Several searches of one problem: the poses that a silhouette leaves open, whatever optimiser looks for them.
+
+    from posefit.searching.modes import modes
+
+    posterior = modes(problem, factory, searches=8, evaluations=2440, rng=np.random.default_rng(0))
+
+`factory(space, rng)` builds any optimiser. What is told is a `posefit.posterior.modes.Posterior`.
+
+| looking for | file |
+|---|---|
+| the modes of one problem, with their weights | modes.py |
+| those of every frame that an optimiser follows | tracker.py |
+"""

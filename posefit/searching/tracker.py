@@ -1,0 +1,102 @@
+"""A tracker that searches every frame, and tells what else the frame may show."""
+
+import copy
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Self, cast
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.box import Space
+from posefit.fitting.optimiser import Filter, Optimiser
+from posefit.fitting.space import SearchSpace
+from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
+from posefit.posterior.modes import Posterior
+from posefit.posterior.searches import Searched, likelihoods
+from posefit.searching.modes import MakeOptimiser, elsewhere, gathered, posterior_of, told
+
+
+@dataclass(frozen=True, eq=False)
+class WeighingTracker:
+    """Follows as the tracker does that it is given, and adds a posterior to every frame in which somebody is seen.
+
+    The track is the same as without. Beside the tracker's own search come others, `prediction.modes` in all, that look
+    anywhere in the same space. Where that is one and the optimiser a filter, its last particles are weighed as they
+    are. All evaluations are told, those of a frame that are beyond the budget too.
+    """
+
+    tracker: SynthesisTracker
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a `Frame` for each observation."""
+        record = _Record(self.tracker.make)
+        following = replace(self.tracker, make=record.begin)
+        for frame in following.track(record.noted(observations), rng):
+            assert record.observation is not None
+            yield self._with_posterior(frame, record, rng) if record.observation.usable else frame
+
+    def _with_posterior(self, frame: Frame, record: "_Record", rng: np.random.Generator) -> Frame:
+        began, begun = time.perf_counter(), time.process_time()
+        posterior, more = self._posterior(record, rng)
+        seconds = frame.seconds + time.perf_counter() - began
+        cpu_seconds = None if frame.cpu_seconds is None else frame.cpu_seconds + time.process_time() - begun
+        return replace(
+            frame,
+            posterior=posterior,
+            evaluations=frame.evaluations + more,
+            seconds=seconds,
+            cpu_seconds=cpu_seconds,
+        )
+
+    def _posterior(self, record: "_Record", rng: np.random.Generator) -> tuple[Posterior, int]:
+        """Return what else a frame may show, and how many evaluations it took."""
+        how, evaluations = self.tracker.prediction, self.tracker.task.evaluations
+        assert record.observation is not None
+        problem = self.tracker.problem(cast(SearchSpace, record.space), record.observation)
+        if how.modes == 1 and self.tracker.next_frame == "carry":
+            particles, costs = record.found[-1]
+            return told(problem, particles, likelihoods(costs, how.posterior_temperature)), 0
+        # drawn from a copy, so that the track itself is what it is without
+        own = np.random.default_rng(copy.deepcopy(rng).integers(0, 2**63, 4))
+        others = elsewhere(problem, self.tracker.make, evaluations, own, how.modes - 1)
+        posterior, more = posterior_of(problem, [gathered(record.found), *others], how.posterior_temperature, own)
+        return posterior, more + sum(len(costs) for _, costs in others)
+
+
+class _Record:
+    """An optimiser, and what it was told: the space of its latest frame, and all that was evaluated there."""
+
+    def __init__(self, make: MakeOptimiser) -> None:
+        self._make = make
+        self.observation: Observation | None = None
+
+    def noted(self, observations: Iterable[Observation]) -> Iterator[Observation]:
+        """Yield the observations, and keep the latest."""
+        for observation in observations:
+            self.observation = observation
+            yield observation
+
+    def begin(self, space: Space, rng: np.random.Generator) -> Self:
+        """Build the optimiser of a search, and stand for it."""
+        self._open(space)
+        self._optimiser: Optimiser = self._make(space, rng)
+        return self
+
+    def advance(self, space: Space) -> None:
+        """Pass the next frame's space on."""
+        self._open(space)
+        cast(Filter, self._optimiser).advance(space)
+
+    def ask(self) -> Array:
+        """Return the optimiser's next population."""
+        return self._optimiser.ask()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Keep the costs, and pass them on."""
+        self.found.append((np.array(proposals), np.array(costs)))
+        self._optimiser.tell(proposals, costs)
+
+    def _open(self, space: Space) -> None:
+        self.space, self.found = space, list[Searched]()

@@ -1,0 +1,100 @@
+"""What several searches evaluated becomes modes with weights: on mixtures whose weights are known."""
+
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit.posterior.landscape import Landscape
+from posefit.posterior.mixture import NormalMixture
+from posefit.posterior.searches import best_of_each, likelihoods, weighed, widths
+from posefit.posterior.smc import tempered
+from posefit.testing.toy import Toy
+
+WEIGHTS = np.array([0.6, 0.3, 0.1])
+SPREADS = np.array([0.04, 0.1, 0.07])
+
+
+def means(dimensions: int) -> Array:
+    return np.stack([np.full(dimensions, 0.5), np.full(dimensions, -0.4), np.linspace(-0.6, 0.6, dimensions)])
+
+
+def mixture(proposals: Array) -> Array:
+    """Costs (n,) whose exp(-cost) is a mixture of three normal distributions."""
+    d = proposals.shape[1]
+    away = ((proposals[:, None] - means(d)) ** 2).sum(axis=2) / SPREADS**2
+    logs = -0.5 * away - d * np.log(SPREADS * np.sqrt(2.0 * np.pi)) + np.log(WEIGHTS)
+    return np.asarray(-np.logaddexp.reduce(logs, axis=1))
+
+
+def searches(dimensions: int, rng: np.random.Generator) -> list[tuple[Array, Array]]:
+    """What nine searches evaluated, each of which has come near one of the three."""
+    found = []
+    for k in range(9):
+        proposals = means(dimensions)[k % 3] + 0.5 * SPREADS[k % 3] * rng.standard_normal((60, dimensions))
+        found.append((proposals, mixture(proposals)))
+    return found
+
+
+@pytest.mark.parametrize(("dimensions", "off"), [(2, 0.05), (5, 0.08), (10, 0.15)])
+def test_the_weights_of_modes_are_known(dimensions: int, off: float) -> None:
+    wrong = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        landscape = Landscape(Toy(dimensions), mixture)
+        found = weighed(landscape, searches(dimensions, rng), 1.0, rng)
+        assert landscape.evaluations == found.evaluations
+        assert found.mode_weights.sum() == pytest.approx(1.0)
+        nearest = ((found.modes[:, None] - means(dimensions)) ** 2).sum(axis=2).argmin(axis=1)
+        assert set(nearest) == {0, 1, 2}
+        wrong.append(0.5 * np.abs(np.bincount(nearest, found.mode_weights, 3) - WEIGHTS).sum())
+    assert np.mean(wrong) < off
+
+
+def test_a_sampler_that_starts_anywhere_does_not_know_the_weights_in_ten_dimensions() -> None:
+    wrong = []
+    for seed in range(8):
+        start = NormalMixture.anywhere(10)
+        found = tempered(Landscape(Toy(10), mixture), start, 1.0, np.random.default_rng(seed))
+        nearest = ((found.proposals[:, None] - means(10)) ** 2).sum(axis=2).argmin(axis=1)
+        wrong.append(0.5 * np.abs(np.bincount(nearest, found.weights, 3) - WEIGHTS).sum())
+    assert np.mean(wrong) > 0.3
+
+
+def test_even_rows_keep_the_shares_of_the_modes() -> None:
+    rng = np.random.default_rng(1)
+    found = weighed(Landscape(Toy(3), mixture), searches(3, rng), 1.0, rng)
+    rows, weights = found.even(100, rng)
+    np.testing.assert_array_equal(weights, 0.01)
+    near = np.array([((rows - mode) ** 2).sum(axis=1) for mode in found.modes]).argmin(axis=0)
+    shares = np.bincount(near, minlength=len(found.modes)) / 100.0
+    np.testing.assert_allclose(shares, found.mode_weights, atol=0.03)
+
+
+def test_a_valley_is_as_wide_as_its_deviation() -> None:
+    # costs rise by half a temperature one deviation from the mode, or at the next of the widths 1/128, 1/64, ... 1/2
+    spread = np.array([0.1, 0.03])
+    landscape = Landscape(Toy(2), lambda x: 0.5 * ((x / spread) ** 2).sum(axis=1))
+    np.testing.assert_allclose(widths(landscape, np.zeros((1, 2)), np.zeros(1), 1.0), [[1 / 8, 1 / 32]])
+    flat = Landscape(Toy(2), lambda x: np.zeros(len(x)))
+    np.testing.assert_allclose(widths(flat, np.zeros((1, 2)), np.zeros(1), 1.0), 0.5)
+
+
+def test_the_best_of_each_search_are_different_and_feasible() -> None:
+    space = Toy(1, lambda x: x[:, 0] >= 0.0)
+    proposals = np.array([[0.3], [0.1], [0.1], [-0.2], [0.5], [0.4]])
+    costs = np.array([3.0, 1.0, 1.0, 0.0, np.nan, 4.0])
+    landscape = Landscape(space, lambda x: x[:, 0])
+    best, known = best_of_each(landscape, [(proposals, costs), (proposals[:1], costs[:1])], 2)
+    np.testing.assert_array_equal(best[:, 0], [0.1, 0.3, 0.3])
+    np.testing.assert_array_equal(known, [1.0, 3.0, 3.0])
+
+
+def test_searches_that_met_no_finite_cost_are_refused() -> None:
+    landscape = Landscape(Toy(1), lambda x: x[:, 0])
+    with pytest.raises(ValueError, match="searches must meet a finite cost, got none in 1 searches"):
+        weighed(landscape, [(np.zeros((3, 1)), np.full(3, np.inf))], 1.0, np.random.default_rng(0))
+
+
+def test_likelihoods_are_exponentials_and_what_is_not_finite_weighs_nothing() -> None:
+    np.testing.assert_allclose(likelihoods(np.array([0.0, 2.0 * np.log(3.0), np.nan]), 2.0), [0.75, 0.25, 0.0])
+    np.testing.assert_allclose(likelihoods(np.array([np.inf, np.nan]), 2.0), 0.5)

@@ -1,0 +1,235 @@
+"""One test for each step of waste-free sequential Monte Carlo: by hand, by law, and against the library particles."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, multivariate_normal, truncnorm
+
+from posefit.arrays import Array
+from posefit.posterior import smc
+from posefit.posterior.landscape import Landscape
+from posefit.posterior.mixture import NormalMixture
+from posefit.posterior.smc import next_step, reweighed, systematic_rows, tempered
+from posefit.testing.toy import Toy
+
+
+@dataclass(frozen=True)
+class Known:
+    """A mixture of normal distributions whose weights are known, as a cost at temperature 2."""
+
+    weights: Array  # (k,)
+    means: Array  # (k, d)
+    spreads: Array  # (k, d)
+
+    def cost(self, proposals: Array) -> Array:
+        away = (proposals[:, None] - self.means) / self.spreads
+        logs = -0.5 * (away**2).sum(axis=2) - np.log(self.spreads * np.sqrt(2.0 * np.pi)).sum(axis=1)
+        return np.asarray(-2.0 * np.logaddexp.reduce(logs + np.log(self.weights), axis=1))
+
+    def shares(self, proposals: Array, weights: Array) -> Array:
+        """The weights (k,) of the particles nearest to each mean."""
+        nearest = ((proposals[:, None] - self.means) ** 2).sum(axis=2).argmin(axis=1)
+        return np.bincount(nearest, weights, len(self.means))
+
+
+PAIR = Known(np.array([0.7, 0.3]), np.array([[-0.4, 0.2], [0.5, -0.3]]), np.array([[0.1, 0.06], [0.05, 0.1]]))
+
+
+def test_the_next_step_leaves_the_wanted_share() -> None:  # DAU2022 (exponent)
+    # weights 1 and e^-s: (1 + e^-s)^2 / (1 + e^-2s) = 2 x 0.9, so e^-s = 1/2, and s = ln 2
+    assert next_step(np.array([0.0, -1.0]), 5.0, 0.9) == pytest.approx(np.log(2.0))
+    assert next_step(np.array([0.0, -1.0]), 0.5, 0.9) == 0.5  # no more is left
+    # what weighs nothing at all is no part of the share
+    assert next_step(np.array([0.0, -np.inf, -1.0, -np.inf]), 5.0, 0.9) == pytest.approx(np.log(2.0))
+
+
+def test_evidence_is_the_product_of_the_mean_weights() -> None:  # DAU2022 (normalising constant)
+    weights, mean = reweighed(np.log([1.0, 2.0, 5.0]), 1.0)
+    np.testing.assert_allclose(weights, [0.125, 0.25, 0.625])
+    assert mean == pytest.approx(np.log(8.0 / 3.0))
+    assert reweighed(np.log([1.0, 4.0]), 0.5)[1] == pytest.approx(np.log(1.5))
+    # the whole product: the mean of exp(-cost / 2) over the box, whose volume is 4
+    found = [
+        tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), 2.0, np.random.default_rng(k), particles=1024)
+        for k in range(20)
+    ]
+    assert np.mean(np.exp([one.log_evidence for one in found])) == pytest.approx(0.25, rel=0.1)
+
+
+def test_all_states_of_the_chains_are_particles(monkeypatch: pytest.MonkeyPatch) -> None:  # DAU2022 (waste-free)
+    seen = []
+    kept = smc.reweighed
+
+    def watched(rises: Array, step: float) -> tuple[Array, float]:
+        seen.append(len(rises))
+        return kept(rises, step)
+
+    monkeypatch.setattr(smc, "reweighed", watched)
+    landscape = Landscape(Toy(2), PAIR.cost)
+    found = tempered(landscape, NormalMixture.anywhere(2), 2.0, np.random.default_rng(0), particles=96, chain=6)
+    assert set(seen) == {96}
+    assert found.proposals.shape == (96, 2)
+    # a step evaluates 5 moves of 16 chains, but for those that leave the box
+    steps = len(found.exponents) - 1
+    assert 96 + 0.7 * 80 * steps < landscape.evaluations <= 96 + 80 * steps
+
+
+def test_a_walk_has_the_covariance_of_the_particles(monkeypatch: pytest.MonkeyPatch) -> None:  # DAU2022 (random walk)
+    proposals = np.array([[0.1, 0.0], [-0.1, 0.0], [0.0, 0.2], [0.0, -0.2]])
+    walk = smc._walk(NormalMixture.anywhere(2), Landscape(Toy(2), PAIR.cost), proposals, np.array([0.3, 0.3, 0.2, 0.2]))
+    # covariance diag(0.6 x 0.01, 0.4 x 0.04), scaled by 2.38^2 / 2
+    np.testing.assert_allclose(walk @ walk.T, 2.38**2 / 2.0 * np.diag([0.006, 0.016]), rtol=1e-9)
+
+
+def test_a_walk_has_the_covariance_within_the_modes() -> None:
+    offsets = np.array([[0.1, 0.0], [-0.1, 0.0], [0.0, 0.1], [0.0, -0.1]])
+    centres = np.array([[-0.5, -0.5], [0.5, 0.5]])
+    start = NormalMixture(centres, np.full((2, 2), 0.1), 0.2)
+    proposals = (centres[:, None] + offsets).reshape(-1, 2)
+    walk = smc._walk(start, Landscape(Toy(2), PAIR.cost), proposals, np.full(8, 0.125))
+    np.testing.assert_allclose(walk @ walk.T, 2.38**2 / 2.0 * np.diag([0.005, 0.005]), rtol=1e-6)
+
+
+def test_a_comb_keeps_each_row_as_often_as_its_weight_asks() -> None:
+    np.testing.assert_array_equal(systematic_rows(np.array([0.5, 0.0, 0.25, 0.25]), 0.5, 4), [0, 0, 2, 3])
+    np.testing.assert_array_equal(systematic_rows(np.array([0.1, 0.9, 0.0]), 0.999, 2), [1, 1])
+
+
+@pytest.mark.parametrize("broad", [0.2, 0.7])
+def test_a_start_has_the_density_that_it_draws_from(broad: float) -> None:
+    start = NormalMixture(np.array([[-0.9, 0.2], [0.5, -0.8]]), np.array([[0.2, 0.1], [0.4, 0.3]]), broad)
+    space = Toy(2, wrapping=1)
+    drawn, share = start.draw(space, np.random.default_rng(0), 4000)
+    assert share == 1.0
+    # the mean of 1 / density over draws is the box's share, which is all of it
+    assert np.exp(-start.log_density(space, drawn)).mean() == pytest.approx(1.0, abs=0.06)
+    grid = (np.arange(200) + 0.5) / 100.0 - 1.0
+    x, y = np.meshgrid(grid, grid)
+    density = np.exp(start.log_density(space, np.stack([x.ravel(), y.ravel()], axis=1)))
+    assert density.mean() == pytest.approx(1.0, abs=1e-3)
+    # by hand, far from where anything is cut off or wraps
+    alone = NormalMixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 0.5)
+    here = 0.5 + 0.5 * 4.0 * multivariate_normal([0.0, 0.0], 0.01).pdf([0.1, -0.1])
+    assert np.exp(alone.log_density(space, np.array([[0.1, -0.1]])))[0] == pytest.approx(here)
+
+
+def test_a_start_is_cut_off_at_the_sides_and_wraps_around_where_they_meet() -> None:
+    start = NormalMixture(np.array([[0.9, 0.9]]), np.full((1, 2), 0.2), 1e-9)
+    drawn, _ = start.draw(Toy(2, wrapping=1), np.random.default_rng(1), 3000)
+    assert 0.25 < (drawn[:, 0] < 0.0).mean() < 0.4  # half a deviation from the side: 31 %
+    assert kstest(drawn[:, 1], truncnorm(-9.5, 0.5, 0.9, 0.2).cdf).pvalue > 1e-3
+
+
+@pytest.mark.parametrize(
+    "start",
+    [NormalMixture.anywhere(2), NormalMixture(PAIR.means, np.full((2, 2), 0.05), 0.2)],
+    ids=["anywhere", "modes"],
+)
+def test_modes_have_their_known_weights(start: NormalMixture) -> None:
+    shares, moments = [], []
+    for seed in range(20):
+        found = tempered(Landscape(Toy(2), PAIR.cost), start, 2.0, np.random.default_rng(seed), particles=1024)
+        shares.append(PAIR.shares(found.proposals, found.weights)[0])
+        moments.append(found.weights @ found.proposals)
+    assert np.mean(shares) == pytest.approx(0.7, abs=0.05)
+    np.testing.assert_allclose(np.mean(moments, axis=0), PAIR.weights @ PAIR.means, atol=0.05)
+
+
+def test_a_wrong_start_does_not_bias_the_weights() -> None:
+    start = NormalMixture(PAIR.means[1:], np.full((1, 2), 0.05), 0.2)  # knows the lighter mode alone
+    shares = [
+        PAIR.shares(found.proposals, found.weights)[0]
+        for found in (
+            tempered(Landscape(Toy(2), PAIR.cost), start, 2.0, np.random.default_rng(k), particles=2048)
+            for k in range(20)
+        )
+    ]
+    assert np.mean(shares) == pytest.approx(0.7, abs=0.08)
+
+
+def test_a_mode_across_the_seam_of_a_turn_is_one() -> None:
+    def seam(proposals: Array) -> Array:
+        away = 1.0 - np.abs(proposals[:, 0])
+        return np.asarray(0.5 * (away / 0.1) ** 2)
+
+    found = tempered(Landscape(Toy(1, wrapping=1), seam), NormalMixture.anywhere(1), 1.0, np.random.default_rng(0))
+    assert 0.3 < found.weights @ (found.proposals[:, 0] > 0.0) < 0.7
+    away = 1.0 - np.abs(found.proposals[:, 0])
+    assert np.sqrt(found.weights @ away**2) == pytest.approx(0.1, rel=0.25)
+
+
+def test_only_what_is_feasible_counts() -> None:
+    # a flat cost of ln 2: the mean of exp(-cost) over the box is half the feasible share, which is 1 / 4
+    quarter = Toy(2, lambda x: (x > 0.0).all(axis=1))
+    landscape = Landscape(quarter, lambda x: np.full(len(x), np.log(2.0)))
+    found = tempered(landscape, NormalMixture.anywhere(2), 1.0, np.random.default_rng(0), particles=4096)
+    assert quarter.feasible(found.proposals).all()
+    assert np.exp(found.log_evidence) == pytest.approx(0.125, rel=0.1)
+
+
+def test_what_costs_infinitely_much_weighs_nothing() -> None:
+    landscape = Landscape(Toy(1), lambda x: np.where(x[:, 0] > 0.0, np.nan, 1.0))
+    found = tempered(landscape, NormalMixture.anywhere(1), 1.0, np.random.default_rng(0))
+    assert found.weights @ (found.proposals[:, 0] > 0.0) == 0.0
+    with pytest.raises(ValueError, match="costs must be finite somewhere"):
+        tempered(
+            Landscape(Toy(1), lambda x: x[:, 0] * np.nan), NormalMixture.anywhere(1), 1.0, np.random.default_rng(0)
+        )
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"temperature": 0.0}, "temperature must be above 0, got 0.0"),
+        ({"particles": 10}, "particles must be at least 2 chains of 2 or more, got 10 and chains of 8"),
+        ({"chain": 1}, "particles must be at least 2 chains of 2 or more, got 2048 and chains of 1"),
+        ({"survival": 1.0}, "survival must lie between 0 and 1, got 1.0"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(given: dict[str, Any], said: str) -> None:
+    settings = {"temperature": 1.0, **given}
+    with pytest.raises(ValueError, match=said):
+        tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), rng=np.random.default_rng(0), **settings)
+    with pytest.raises(ValueError, match="spreads must be above 0 and at most 0.5"):
+        NormalMixture(np.zeros((1, 2)), np.zeros((1, 2)), 0.2)
+    with pytest.raises(ValueError, match="spreads must have shape"):
+        NormalMixture(np.zeros((1, 2)), np.ones((1, 1)), 0.2)
+    with pytest.raises(ValueError, match="broad must lie between 0 and 1"):
+        NormalMixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 1.0)
+    with pytest.raises(ValueError, match="the box must be feasible somewhere"):
+        NormalMixture.anywhere(1).draw(Toy(1, lambda x: x[:, 0] > 2.0), np.random.default_rng(0), 4)
+
+
+def oracle(known: Known, particles: int, chain: int) -> tuple[Array, float]:
+    """Return the modes' weights and the log evidence that the library particles finds, over the box, at temperature 2."""
+    library = pytest.importorskip(
+        "particles", reason="an oracle: python -m pip install joblib, and --no-deps particles==0.4"
+    )
+    from particles import distributions, smc_samplers  # the library's own modules
+
+    prior = distributions.StructDist({"x": distributions.Uniform(-1.0, 1.0), "y": distributions.Uniform(-1.0, 1.0)})
+
+    class Bridge(smc_samplers.StaticModel):
+        def loglik(self, theta: Any, t: int | None = None) -> Array:
+            return -known.cost(np.stack([theta["x"], theta["y"]], axis=1)) / 2.0
+
+    model = smc_samplers.AdaptiveTempering(Bridge(data=None, prior=prior), wastefree=True, len_chain=chain, ESSrmin=0.5)
+    run = library.SMC(fk=model, N=particles // chain, verbose=False)
+    run.run()
+    points = np.stack([run.X.theta["x"], run.X.theta["y"]], axis=1)
+    return known.shares(points, run.W), float(run.logLt)
+
+
+def test_the_library_particles_finds_the_same_weights_and_evidence() -> None:
+    np.random.seed(0)  # noqa: NPY002, the library draws from the one generator of the process
+    theirs = [oracle(PAIR, 1024, 8) for _ in range(20)]
+    mine = [
+        tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), 2.0, np.random.default_rng(k), particles=1024)
+        for k in range(20)
+    ]
+    shares = [PAIR.shares(one.proposals, one.weights)[0] for one in mine]
+    assert np.mean(shares) == pytest.approx(np.mean([one[0][0] for one in theirs]), abs=0.07)
+    evidence = np.mean([np.exp(one.log_evidence) for one in mine])
+    assert evidence == pytest.approx(np.mean([np.exp(one[1]) for one in theirs]), rel=0.12)
