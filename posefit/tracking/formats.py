@@ -34,7 +34,7 @@ Rows = Sequence[Mapping[str, float]]
 State = dict[str, Any]
 
 
-def intervals(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:
+def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:
     """Return how far joints and angles may be off, as poses.npz has it; nothing where nobody says.
 
     `levels` (3,), `joint_radii` (T, 3, 27) metres, `angle_halves` (T, 3, 66) radians; NaN in frames without any.
@@ -59,7 +59,7 @@ def write_formats(
     summary: State,
     sure: Mapping[str, Array],
 ) -> None:
-    """Write every file of a track to a folder but for its pictures; see `FILES`. `sure` is what `intervals` gave."""
+    """Write every file of a track to a folder but for its pictures; see `FILES`. `sure` is what `intervals_of` gave."""
     from posefit.motion.amc import write_amc
     from posefit.motion.asf import write_asf
     from posefit.motion.bvh import write_bvh

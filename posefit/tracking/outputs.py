@@ -21,7 +21,7 @@ from posefit.footage.video import VideoWriter
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import Posterior
 from posefit.reading import cut
-from posefit.tracking.formats import FILES, Rows, State, intervals, write_formats
+from posefit.tracking.formats import FILES, Rows, State, intervals_of, write_formats
 from posefit.tracking.identity import Told, difference
 from posefit.tracking.picture import Painter
 from posefit.tracking.table import undetermined
@@ -187,7 +187,7 @@ class OutputFolder:
         import cv2
 
         folder, painter = self._building, Painter(scene)
-        sure = intervals(scene.body.skeleton, frames)
+        sure = intervals_of(scene.body.skeleton, frames)
         radii = sure.get("joint_radii")
         write_formats(folder, scene, estimate, frames, rows, summary, sure)
         filmed = scene.pictures() if scene.pictures is not None else repeat(None)

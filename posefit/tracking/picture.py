@@ -19,7 +19,7 @@ from posefit.posterior.modes import Mode, other_mode
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
-from posefit.tracking.drawing.body import draw_body, draw_bones, opacities, side_camera, side_view, solid_map
+from posefit.tracking.drawing.body import draw_body, draw_stick, opacities, side_camera, side_view, solid_map
 from posefit.tracking.drawing.chart import curve, doubts, says_doubts
 from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, OTHER, SPILLED, write
 from posefit.tracking.evaluation import LOST
@@ -65,12 +65,12 @@ class Painter:
             draw_body(drawn, body, cameras[0], frame.pose, frame.translation, solid)
             left = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), PANEL)
             if other is not None:
-                draw_bones(left, body, _zoomed(cameras[0], left), other.pose, other.translation)
+                draw_stick(left, body, _zoomed(cameras[0], left), other.pose, other.translation)
         width = left.shape[1]
         side = side_view(body, cameras[0], frame.pose, frame.translation, PANEL, solid)
         if other is not None:
             camera = side_camera(body, cameras[0], frame.pose, frame.translation, PANEL)
-            draw_bones(side, body, camera, other.pose, other.translation)
+            draw_stick(side, body, camera, other.pose, other.translation)
         image = np.hstack([left, side])
         label = "   ".join(
             [f"frame {self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
@@ -110,7 +110,7 @@ class Painter:
                 view = np.asarray(share * view + (1.0 - share) * np.array(BACKGROUND), np.uint8)
             panel = _panel(view, height, sharp=True)
             if other is not None:
-                draw_bones(panel, body, _zoomed(camera, panel), other.pose, other.translation)
+                draw_stick(panel, body, _zoomed(camera, panel), other.pose, other.translation)
             panels.append(panel)
         return _grid(panels, columns)
 

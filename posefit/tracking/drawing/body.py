@@ -70,7 +70,7 @@ def solid_map(body: Body, camera: Camera, pose: Array, translation: Array, solid
     return image / 255.0
 
 
-def draw_bones(image: Image, body: Body, camera: Camera, pose: Array, translation: Array) -> None:
+def draw_stick(image: Image, body: Body, camera: Camera, pose: Array, translation: Array) -> None:
     """Draw a body's bones as thin lines; wrists and feet have the colours of their sides."""
     pixels, depths = camera.project(body.skeleton.joints(pose, translation))
     thick = max(1, round(camera.height / 240))
