@@ -3,7 +3,7 @@
 // Axes from 0 on: both are {most, label, marks, show}.
 function axes(width, x, y, name) {
   const height = Math.max(240, Math.min(380, 0.72 * width));
-  const [left, bottom, top, right] = [46, 40, 8, 22];
+  const [left, bottom, top, right] = [46, 40, 14, 22];
   const at = (value) => left + ((width - left - right) * Math.min(value, x.most)) / x.most;
   const up = (value) => height - bottom - ((height - bottom - top) * Math.min(value, y.most)) / y.most;
   const svg = draw("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": name });
