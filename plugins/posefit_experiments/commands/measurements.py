@@ -126,6 +126,21 @@ def people_command(recovery: bool, others: bool, ledger: str | None, as_json: bo
         _print(told, tables.people_lines, as_json)
 
 
+@click.command("lost")
+@click.option("--method", default="exemplars", show_default=True, help="A tracker, or OPTIMISER@PRIOR: by its cost.")
+@click.option("--quick", is_flag=True, help="Some 12 tracks: a look, not a measurement.")
+@click.option("--store", is_flag=True, help="Have exemplars judge frames by what is fitted here, from now on.")
+@click.option("--rows", metavar="FILE", help="Fit to what --out wrote, and follow nobody.")
+@click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")
+@workers(None)
+@JSON
+def lost_command(as_json: bool, **asked: Any) -> None:
+    """How well lost frames are told, of people whom neither the library nor the detector has seen."""
+    from posefit_experiments.lost import experiment, tables
+
+    _print(experiment.lost(**asked, progress=bar), tables.lost_lines, as_json)
+
+
 def _print(told: dict[str, Any], lines: Callable[[dict[str, Any]], Iterable[str]], as_json: bool) -> None:
     for line in [json_line(told)] if as_json else lines(told):
         click.echo(line)

@@ -1,0 +1,52 @@
+"""Which tracks there are: every clip of `people` a few times, each time from other sides under another condition.
+
+All views with all conditions and clips would be thousands of tracks. Here both go round, each at its own pace, so that
+all pairs of a view and a condition come about alike often, in every group.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from posefit_experiments.people.clips import GROUPS, Piece
+from posefit_experiments.people.design import CHANGES, PAIRS, SIDES, TOLD, Views
+
+CLEAN = "as they are"
+CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES}
+VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
+FRAMES = 60  # of a clip at most
+TIMES, TIMES_QUICK = 3, 1  # that each clip is followed
+QUICK_CLIPS = 2  # of a group, in a quick look, which are two people's
+
+
+class Planned(NamedTuple):
+    """One track: what of, and under which condition."""
+
+    group: str
+    clip: Piece
+    views: Views
+    condition: str
+
+    def spec(self, method: str, evaluations: int) -> dict[str, Any]:
+        """Return the cell of the track, followed by a method."""
+        return {
+            "method": method,
+            "motion": self.clip.name,
+            "train": [self.clip.library],
+            "view_degrees": self.views,
+            "frames": min(self.clip.frames, FRAMES),
+            "instance": self.clip.instance,
+            "evaluations": evaluations,
+            **TOLD,
+            **CONDITIONS[self.condition],
+        }
+
+
+def design(quick: bool) -> list[Planned]:
+    """Return the tracks, those of one person together, since they learn from one library."""
+    clips = [(group, clip) for group, found in GROUPS.items() for clip in found[: QUICK_CLIPS if quick else None]]
+    conditions, times = list(CONDITIONS), TIMES_QUICK if quick else TIMES
+    tracks = []
+    for k, (group, clip) in enumerate(one for one in clips for _ in range(times)):
+        turn = 3 * k + k // len(VIEWS)
+        tracks.append(Planned(group, clip, VIEWS[k % len(VIEWS)], conditions[turn % len(conditions)]))
+    return sorted(tracks, key=lambda track: track.clip.subject)
