@@ -14,7 +14,7 @@ CLEAN = "as they are"
 CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES}
 VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
 FRAMES = 60  # of a clip at most
-TIMES, TIMES_QUICK = 3, 1  # that each clip is followed
+TIMES, TIMES_QUICK = 2, 1  # that each clip is followed
 QUICK_CLIPS = 2  # of a group, in a quick look, which are two people's
 
 
@@ -46,7 +46,7 @@ def design(quick: bool) -> list[Planned]:
     clips = [(group, clip) for group, found in GROUPS.items() for clip in found[: QUICK_CLIPS if quick else None]]
     conditions, times = list(CONDITIONS), TIMES_QUICK if quick else TIMES
     tracks = []
-    for k, (group, clip) in enumerate(one for one in clips for _ in range(times)):
+    for k, (group, clip) in enumerate(clips * times):
         turn = 3 * k + k // len(VIEWS)
         tracks.append(Planned(group, clip, VIEWS[k % len(VIEWS)], conditions[turn % len(conditions)]))
     return sorted(tracks, key=lambda track: track.clip.subject)
