@@ -134,7 +134,16 @@ def test_tracks_of_the_posterior_say_how_far_they_are_from_what_is_told(walker: 
 
 def test_frames_count_since_when_nobody_was_seen(walker: Walk) -> None:
     pose, areas = walker.motion.poses[0], np.array([[30, 10, 70]])
-    base = Frame(pose, np.zeros(3), 4.0, areas, 1, 0.0, np.empty(0), posterior=Posterior(pose[None], np.zeros((1, 3)), np.ones(1)))
+    base = Frame(
+        pose,
+        np.zeros(3),
+        4.0,
+        areas,
+        1,
+        0.0,
+        np.empty(0),
+        posterior=Posterior(pose[None], np.zeros((1, 3)), np.ones(1)),
+    )
     each = [{"least": 1.0}, {}, {}, {"least": 1.0}]
     frames = list(judged((replace(base, details={"evidence": one}) for one in each), walker.task, EVEN))
     assert [frame.details["evidence"]["unseen"] for frame in frames] == [0.0, 1.0, 2.0, 0.0]

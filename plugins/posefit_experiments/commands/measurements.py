@@ -128,7 +128,8 @@ def people_command(recovery: bool, others: bool, ledger: str | None, as_json: bo
 
 @click.command("lost")
 @click.option("--method", default="exemplars", show_default=True, help="A tracker, or OPTIMISER@PRIOR: by its cost.")
-@click.option("--quick", is_flag=True, help="Some 12 tracks: a look, not a measurement.")
+@click.option("--times", type=int, default=2, show_default=True, help="Tracks of each clip, each of another view.")
+@click.option("--quick", is_flag=True, help="Two clips of each group: a look, not a measurement.")
 @click.option("--store", is_flag=True, help="Have exemplars judge frames by what is fitted here, from now on.")
 @click.option("--rows", metavar="FILE", help="Fit to what --out wrote, and follow nobody.")
 @click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")

@@ -14,7 +14,7 @@ CLEAN = "as they are"
 CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES}
 VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
 FRAMES = 60  # of a clip at most
-TIMES, TIMES_QUICK = 2, 1  # that each clip is followed
+TIMES = 2  # that each clip is followed
 QUICK_CLIPS = 2  # of a group, in a quick look, which are two people's
 
 
@@ -41,11 +41,15 @@ class Planned(NamedTuple):
         }
 
 
-def design(quick: bool) -> list[Planned]:
-    """Return the tracks, those of one person together, since they learn from one library."""
+def design(times: int, quick: bool) -> list[Planned]:
+    """Return the tracks, those of one person together, since they learn from one library.
+
+    What is followed once is among what is followed more times. Raises ValueError where `times` is less than 1.
+    """
+    if times < 1:
+        raise ValueError(f"times must be at least 1, got {times}")
     clips = [(group, clip) for group, found in GROUPS.items() for clip in found[: QUICK_CLIPS if quick else None]]
-    conditions, times = list(CONDITIONS), TIMES_QUICK if quick else TIMES
-    tracks = []
+    conditions, tracks = list(CONDITIONS), []
     for k, (group, clip) in enumerate(clips * times):
         turn = 3 * k + k // len(VIEWS)
         tracks.append(Planned(group, clip, VIEWS[k % len(VIEWS)], conditions[turn % len(conditions)]))

@@ -1,6 +1,7 @@
 """Tracks of people whom the library has never seen, the evidence of their frames, and the detector that is fitted."""
 
 import json
+from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 from typing import Any
@@ -28,6 +29,7 @@ NEEDED = {"subject", "group", "views_degrees", "condition", "fps", "mpjpe_mm", "
 
 def lost(
     method: str,
+    times: int,
     quick: bool,
     store: bool,
     workers: int | None,
@@ -45,7 +47,7 @@ def lost(
     if rows is not None and out is not None:
         raise ValueError("out must be given for tracks that are followed, got --out with --rows")
     with new_file(out) if out else nullcontext() as file:
-        found = _read(rows) if rows is not None else _followed(method, quick, workers, progress)
+        found = _read(rows) if rows is not None else _followed(method, design(times, quick), workers, progress)
         if file is not None:
             file.write_text("".join(f"{json.dumps(row)}\n" for row in found), encoding="utf-8")
     told = {"method": method, "tracks": len(found)}
@@ -57,8 +59,9 @@ def lost(
     return told | {"model": model} | tables(found, judge(found))
 
 
-def _followed(method: str, quick: bool, workers: int | None, progress: Progress | None) -> list[dict[str, Any]]:
-    tracks = design(quick)
+def _followed(
+    method: str, tracks: Sequence[Planned], workers: int | None, progress: Progress | None
+) -> list[dict[str, Any]]:
     # all cells are made, and so checked, before any runs
     cells = {track: cell_of(track.spec(method, EVALUATIONS)) for track in tracks}
     found = each({track: partial(_tracked, cell, track) for track, cell in cells.items()}, workers, progress)
