@@ -12,8 +12,8 @@ from posefit_exemplars.lost import NAMES, Detector, Memory
 
 Row = Mapping[str, Any]
 
-# What the model looks at: how well what is told fits, and what else may be true. With all evidence that there is it does
-# no better for people whom it has not seen, as there are few of them.
+# What the model looks at: how well what is told fits, and what else may be true. With all evidence that there is it is
+# no better with people whom it has not seen.
 LOOKED_AT = ("cost", "spilled", "samples_most", "far")
 COLUMNS = [row for row, name in enumerate(NAMES) if name.partition(",")[0] in LOOKED_AT]
 STRENGTH = 0.03  # of the weights' prior, a normal one: its variance
