@@ -170,12 +170,12 @@ class Detector:
 
 
 @cache
-def fitted() -> Detector:
+def stored_detector() -> Detector:
     """Return the model that was fitted to people whom the library has never seen."""
     return Detector.from_dict(json.loads(FITTED.read_text(encoding="utf-8")))
 
 
-def judged(frames: Iterable[Frame], task: Task, detector: Detector) -> Iterator[Frame]:
+def doubted(frames: Iterable[Frame], task: Task, detector: Detector) -> Iterator[Frame]:
     """Yield frames with how likely each is lost; their `details` tell by what evidence.
 
     Where no tracks are drawn, nobody says.

@@ -19,10 +19,10 @@ from posefit_exemplars.lost import (
     NAMES,
     Detector,
     Memory,
+    doubted,
     drawn_evidence,
     evidence,
-    fitted,
-    judged,
+    stored_detector,
 )
 from posefit_exemplars.window import Seen, seen, way
 from tests.exemplars.conftest import EMPTY, Walk
@@ -119,7 +119,7 @@ def test_what_is_stored_is_such_a_model() -> None:
     told = json.loads(FITTED.read_text(encoding="utf-8"))
     assert set(told["weights"]) <= set(NAMES)
     assert np.isfinite([told["bias"], *told["weights"].values()]).all()
-    assert fitted().bias == told["bias"]
+    assert stored_detector().bias == told["bias"]
 
 
 def test_tracks_of_the_posterior_say_how_far_they_are_from_what_is_told(walker: Walk) -> None:
@@ -145,7 +145,7 @@ def test_frames_count_since_when_nobody_was_seen(walker: Walk) -> None:
         posterior=Posterior(pose[None], np.zeros((1, 3)), np.ones(1)),
     )
     each = [{"least": 1.0}, {}, {}, {"least": 1.0}]
-    frames = list(judged((replace(base, details={"evidence": one}) for one in each), walker.task, EVEN))
+    frames = list(doubted((replace(base, details={"evidence": one}) for one in each), walker.task, EVEN))
     assert [frame.details["evidence"]["unseen"] for frame in frames] == [0.0, 1.0, 2.0, 0.0]
     assert frames[0].details["evidence"]["missed"] == pytest.approx(0.3)
     assert frames[0].details["evidence"]["spilled"] == pytest.approx(0.125)

@@ -13,13 +13,13 @@ from posefit.cli import main
 from posefit.sweep.check import cell_of
 from posefit_exemplars.lost import EVIDENCE, NAMES, Detector
 from posefit_experiments.lost import experiment
-from posefit_experiments.lost.design import CONDITIONS, TIMES, VIEWS, Planned, design
+from posefit_experiments.lost.design import CONDITIONS, TIMES, VIEWS, Turn, turns
 from posefit_experiments.lost.model import features, fit, judge
-from posefit_experiments.lost.tables import lost_lines, tables
+from posefit_experiments.lost.tables import lost_lines, lost_tables
 from posefit_experiments.people.clips import GROUPS, Piece
 
 CLIP = Piece("walk-a", 6, 0, "walks")
-TRACK = Planned("walks", CLIP, (45.0,), "as they are")
+TRACK = Turn("walks", CLIP, (45.0,), "as they are")
 
 
 def run(*words: object) -> Result:
@@ -47,7 +47,7 @@ def rows() -> list[dict[str, Any]]:
 
 
 def test_every_clip_is_followed_alike_often_and_nobody_by_what_he_taught() -> None:
-    tracks = design(TIMES, False)
+    tracks = turns(TIMES, False)
     assert Counter((track.group, track.clip) for track in tracks) == {
         (group, clip): TIMES for group, clips in GROUPS.items() for clip in clips
     }
@@ -56,12 +56,12 @@ def test_every_clip_is_followed_alike_often_and_nobody_by_what_he_taught() -> No
         assert cell.train == (f"library:-{track.clip.subject}",)
         assert cell.frames <= 60
     assert len({track.clip.subject for track in tracks}) == 10
-    assert len(design(1, True)) == 12
-    assert set(design(1, False)) < set(tracks)
+    assert len(turns(1, True)) == 12
+    assert set(turns(1, False)) < set(tracks)
 
 
 def test_views_and_conditions_go_round_in_all_pairs() -> None:
-    pairs = Counter((track.views, track.condition) for track in design(TIMES, False))
+    pairs = Counter((track.views, track.condition) for track in turns(TIMES, False))
     assert set(pairs) == {(views, condition) for views in VIEWS for condition in CONDITIONS}
     assert max(pairs.values()) - min(pairs.values()) <= 1
 
@@ -71,7 +71,7 @@ def test_a_person_is_judged_by_what_others_taught() -> None:
     found = rows()
     other = [row("49", one["evidence"][0]["far"] * np.ones(20), (320.0 - np.array(one["mpjpe_mm"])).tolist()) for one in found[:2]]  # fmt: skip
     told = judge([*found, *other])
-    figures = {one["subject"]: tables([one, two], [a, b])["lost"][0]["auroc"] for one, two, a, b in (
+    figures = {one["subject"]: lost_tables([one, two], [a, b])["lost"][0]["auroc"] for one, two, a, b in (
         (*found[:2], *told[:2]), (*other, *told[-2:]))}  # fmt: skip
     assert figures["02"] == 1.0
     assert figures["49"] == 0.0
@@ -100,7 +100,7 @@ def test_one_person_alone_judges_nobody() -> None:
 def test_tables_say_how_often_it_is_right() -> None:
     one = row("02", [0.0] * 4, [50.0, 60.0, 190.0, 300.0])
     two = row("05", [0.0] * 4, [50.0, 140.0, 160.0, 300.0], views_degrees=[0.0, 90.0], condition="damaged")
-    told = tables([one, two], [np.array([0.1, 0.2, 0.3, 0.9]), np.array([0.0, 0.8, 0.7, 0.6])])
+    told = lost_tables([one, two], [np.array([0.1, 0.2, 0.3, 0.9]), np.array([0.0, 0.8, 0.7, 0.6])])
     every, walks, single, double, clean, damaged = told["lost"]
     assert [one["name"] for one in told["lost"]] == [
         "all", "walks", "1 camera", "2 cameras", "as they are", "damaged",
@@ -123,7 +123,7 @@ def test_tables_say_how_often_it_is_right() -> None:
 
 
 def test_costs_alone_are_no_probabilities() -> None:
-    told = tables(rows()[:2], [np.array(one["cost"]) for one in rows()[:2]])["lost"][0]
+    told = lost_tables(rows()[:2], [np.array(one["cost"]) for one in rows()[:2]])["lost"][0]
     assert told["auroc"] == 1.0
     assert told["said_recall"] is told["said_false_alarms"] is told["calibration_error"] is None
 

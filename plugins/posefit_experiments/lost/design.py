@@ -18,7 +18,7 @@ TIMES = 2  # that each clip is followed
 QUICK_CLIPS = 2  # of a group, in a quick look, which are two people's
 
 
-class Planned(NamedTuple):
+class Turn(NamedTuple):
     """One track: what of, and under which condition."""
 
     group: str
@@ -41,7 +41,7 @@ class Planned(NamedTuple):
         }
 
 
-def design(times: int, quick: bool) -> list[Planned]:
+def turns(times: int, quick: bool) -> list[Turn]:
     """Return the tracks, those of one person together, since they learn from one library.
 
     What is followed once is among what is followed more times. Raises ValueError where `times` is less than 1.
@@ -52,5 +52,5 @@ def design(times: int, quick: bool) -> list[Planned]:
     conditions, tracks = list(CONDITIONS), []
     for k, (group, clip) in enumerate(clips * times):
         turn = 3 * k + k // len(VIEWS)
-        tracks.append(Planned(group, clip, VIEWS[k % len(VIEWS)], conditions[turn % len(conditions)]))
+        tracks.append(Turn(group, clip, VIEWS[k % len(VIEWS)], conditions[turn % len(conditions)]))
     return sorted(tracks, key=lambda track: track.clip.subject)

@@ -16,9 +16,9 @@ from posefit.tracking.opening import Opening
 from posefit.tracking.run import follow
 from posefit_exemplars.lost import FITTED
 from posefit_experiments.grid import Progress, each
-from posefit_experiments.lost.design import Planned, design
+from posefit_experiments.lost.design import Turn, turns
 from posefit_experiments.lost.model import fit, judge, judge_costs
-from posefit_experiments.lost.tables import tables
+from posefit_experiments.lost.tables import lost_tables
 
 METHOD = "exemplars"
 EVALUATIONS = 2440  # of a frame
@@ -47,20 +47,20 @@ def lost(
     if rows is not None and out is not None:
         raise ValueError("out must be given for tracks that are followed, got --out with --rows")
     with new_file(out) if out else nullcontext() as file:
-        found = _read(rows) if rows is not None else _followed(method, design(times, quick), workers, progress)
+        found = _read(rows) if rows is not None else _followed(method, turns(times, quick), workers, progress)
         if file is not None:
             file.write_text("".join(f"{json.dumps(row)}\n" for row in found), encoding="utf-8")
     told = {"method": method, "tracks": len(found)}
     if not all("evidence" in row for row in found):
-        return told | tables(found, judge_costs(found))
+        return told | lost_tables(found, judge_costs(found))
     model = fit(found)
     if store:
         FITTED.write_text(json.dumps(model, indent=1) + "\n", encoding="utf-8")
-    return told | {"model": model} | tables(found, judge(found))
+    return told | {"model": model} | lost_tables(found, judge(found))
 
 
 def _followed(
-    method: str, tracks: Sequence[Planned], workers: int | None, progress: Progress | None
+    method: str, tracks: Sequence[Turn], workers: int | None, progress: Progress | None
 ) -> list[dict[str, Any]]:
     # all cells are made, and so checked, before any runs
     cells = {track: cell_of(track.spec(method, EVALUATIONS)) for track in tracks}
@@ -68,7 +68,7 @@ def _followed(
     return [found[track] for track in tracks]
 
 
-def _tracked(cell: Cell, track: Planned) -> dict[str, Any]:
+def _tracked(cell: Cell, track: Turn) -> dict[str, Any]:
     """Return a row of a track: its frames' errors, costs, and evidence where the tracker tells it."""
     scene = cell_scene(cell)
     optimiser, prior, tracker = parts(cell.method)

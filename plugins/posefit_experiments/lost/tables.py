@@ -17,7 +17,7 @@ SHARES = (0.25, 0.5, 0.75, 0.9, 1.0)  # of frames that are kept, the least doubt
 NEAR_MM = (100.0, 200.0)  # frames in between are neither clearly lost nor clearly not
 
 
-def tables(rows: Sequence[Row], doubts: Sequence[Array]) -> dict[str, Any]:
+def lost_tables(rows: Sequence[Row], doubts: Sequence[Array]) -> dict[str, Any]:
     """Return the tables of rows whose frames have such doubts (T,): probabilities, or else whatever grows with them."""
     every = list(zip(rows, doubts, strict=True))
     return {
