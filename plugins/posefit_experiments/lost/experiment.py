@@ -86,7 +86,7 @@ def _tracked(cell: Cell, track: Turn) -> dict[str, Any]:
         "mpjpe_mm": [round(one["mpjpe_mm"], 2) for one in told.frames],
         "cost": [round(one["cost"], DIGITS) for one in told.frames],
     }
-    evidence = [frame.details.get("evidence") for frame in told.found]
+    evidence = [frame.details.get("evidence", {}) for frame in told.found]
     if all(evidence):
         row["evidence"] = [{name: round(value, DIGITS) for name, value in one.items()} for one in evidence]
     return row
