@@ -9,6 +9,7 @@ Toyama and Blake, Probabilistic tracking in a metric space, 2001.
 - `beam` says where the states of a frame may be in the next one and what that costs, `kernels` has its loop.
 - `look` is what a pose costs in a frame, `window` the likeliest way through the last frames, and how likely others are.
 - `refinement` searches around that way, `smoothing` filters what it found over time.
+- `lost` says how likely a frame is lost, by what speaks for it.
 - `tracker` does a frame after the other, `factory` is registered.
 
 >>> import posefit

@@ -1,8 +1,9 @@
 """A zero-phase filter over what was found: a Gaussian that looks as far ahead as back, so that nothing comes late."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ class Finding:
     seconds: float
     cpu_seconds: float
     drawn: Ways | None = None  # where ways through the states are
+    evidence: Mapping[str, float] = field(default_factory=dict, repr=False)  # for the frame to be lost, or not
 
 
 def smoothed(frames: Iterable[Finding], spread: float, ahead: int) -> Iterator[Frame]:
@@ -72,4 +74,5 @@ def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
     used, history = int(np.ceil(one.evaluations)) + 1, np.array([cost])
     posterior = None if one.drawn is None else one.drawn.about(pose, place)
     seconds, cpu_seconds = one.seconds, one.cpu_seconds
-    return Frame(pose, place, cost, areas, used, seconds, history, cpu_seconds=cpu_seconds, posterior=posterior)
+    told: dict[str, Any] = {"details": {"evidence": one.evidence}, "cpu_seconds": cpu_seconds, "posterior": posterior}
+    return Frame(pose, place, cost, areas, used, seconds, history, **told)

@@ -9,6 +9,7 @@
     posefit reproduce builds       how well a person's build is found
     posefit reproduce footage      a real video, whose truth nobody knows
     posefit reproduce people       people whom a library of motions has never seen
+    posefit reproduce lost         which frames are lost, and whether a tracker knows
     posefit bench                  how fast the loop is
 
 Each has `--help`, and `--json` for one JSON object on stdout. `--clips`, or the environment variable POSEFIT_CMU, says
@@ -26,6 +27,7 @@ Files:
     views.py, degradation.py, builds.py    jobs that no cell can carry, and why
     filmed/          `posefit reproduce footage`
     people/          `posefit reproduce people`
+    lost/            `posefit reproduce lost`
     bench/           `posefit bench`
     same.py          compares two reports, but for the times: `python -m posefit_experiments.same BEFORE AFTER`
 

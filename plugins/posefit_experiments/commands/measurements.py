@@ -126,6 +126,22 @@ def people_command(recovery: bool, others: bool, ledger: str | None, as_json: bo
         _print(told, tables.people_lines, as_json)
 
 
+@click.command("lost")
+@click.option("--method", default="exemplars", show_default=True, help="A tracker, or OPTIMISER@PRIOR: by its cost.")
+@click.option("--times", type=int, default=2, show_default=True, help="Tracks of each clip, each of another view.")
+@click.option("--quick", is_flag=True, help="Two clips of each group: a look, not a measurement.")
+@click.option("--store", is_flag=True, help="Have exemplars judge frames by what is fitted here, from now on.")
+@click.option("--rows", metavar="FILE", help="Fit to what --out wrote, and follow nobody.")
+@click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")
+@workers(None)
+@JSON
+def lost_command(as_json: bool, **asked: Any) -> None:
+    """How well lost frames are told, of people whom neither the library nor the detector has seen."""
+    from posefit_experiments.lost import experiment, tables
+
+    _print(experiment.lost(**asked, progress=bar), tables.lost_lines, as_json)
+
+
 @click.command("modes")
 @click.option("--instances", type=int, default=30, show_default=True, help="Of the niching task, held out ones.")
 @click.option("--method", "methods", multiple=True, help="An optimiser; cma*16 is 16 searches. Again for more of them.")
