@@ -45,6 +45,7 @@ class Doubt:
     joint_factors: Array = field(repr=False)  # (levels, 27)
     angle_factors: Array = field(repr=False)  # (levels, 66)
     sides: Array = field(repr=False)  # (3,) of the log-odds of exchanged sides: 1, second-side weight, log of the doubt
+    sharpness: float  # the power of modes' weights
     unknown: float  # the probability of exchanged sides from which they are unknown
 
     def log(self, seen: Array) -> float:
@@ -60,7 +61,7 @@ class Doubt:
         """Return what a frame does not know of its error, at the logarithm of its doubt."""
         doubt = math.exp(log)
         spreads = doubt * self.joint_spreads, doubt * self.angle_spreads
-        return Recalibration(*spreads, self.joint_factors, self.angle_factors, self.second_side(log))
+        return Recalibration(*spreads, self.joint_factors, self.angle_factors, self.second_side(log), self.sharpness)
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it, to four digits."""
@@ -70,11 +71,12 @@ class Doubt:
     def from_dict(cls, held: Mapping[str, Any]) -> Self:
         """Return what `as_dict` gave."""
         low, high = held["range"]
-        return cls(range=(low, high), unknown=held["unknown"], **{name: np.array(held[name]) for name in ARRAYS})
+        arrays = {name: np.array(held[name]) for name in ARRAYS}
+        return cls(range=(low, high), sharpness=held["sharpness"], unknown=held["unknown"], **arrays)
 
 
 NAMES = tuple(one.name for one in fields(Doubt))
-ARRAYS = tuple(name for name in NAMES if name not in ("range", "unknown"))
+ARRAYS = tuple(name for name in NAMES if name not in ("range", "sharpness", "unknown"))
 
 
 def _rounded(values: Array) -> Any:

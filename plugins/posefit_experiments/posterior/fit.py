@@ -11,6 +11,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS
 from posefit.posterior.calibration import LEVELS, Recalibration, conformal_factor
 from posefit.posterior.intervals import angle_intervals, joint_intervals
+from posefit.posterior.modes import modes_of
 from posefit.posterior.sides import nearer_mirrored, second_side
 from posefit_exemplars.doubt import Doubt, evidence
 from posefit_experiments.posterior.frames import Followed
@@ -32,6 +33,7 @@ TRIED = np.geomspace(0.05, 2.0, 12)  # spreads, in doubts
 EVERY = 5  # of the frames that factors are found from; neighbours say the same
 OUTSIDE = 0.025  # share of frames that are swapped among those whose sides are known: a little below what is asked for
 LEAST = 0.1  # slope of log-odds over the second side's weight
+SHARPNESSES = np.geomspace(0.05, 1.0, 24)
 TINY = 1e-12
 RIDGE = 1e-3
 STEPS = 30  # of Newton's method
@@ -46,6 +48,8 @@ class Kept:
     error: Array = field(repr=False)  # (T,) metres, the mean over joints
     swapped: NDArray[np.bool_] = field(repr=False)  # (T,)
     second: Array = field(repr=False)  # (T,) weight of the second side
+    modes: list[Array] = field(repr=False)  # weights of each frame's modes, the heaviest first
+    nearest: Array = field(repr=False)  # (T, 2) which of them is nearest to the truth, and how far the first is, metres
 
     @classmethod
     def of(cls, track: Followed) -> "Kept":
@@ -56,7 +60,14 @@ class Kept:
         seen = np.array([evidence(skeleton, one, pose, cost, cameras) for one, pose, cost in pairs])
         swapped = nearer_mirrored(skeleton.joints(track.truth), skeleton.joints(track.told))
         second = np.array([second_side(skeleton, one, pose) for one, pose, _ in pairs])
-        return cls(track, seen, track.off[:, 1:].mean(axis=1), swapped, second)
+        modes, nearest = [], []
+        for one, truth in zip(posteriors, track.truth, strict=True):
+            found = modes_of(skeleton, one)
+            joints = skeleton.joints(np.array([mode.pose for mode in found]))
+            off = np.linalg.norm(joints - skeleton.joints(truth), axis=2).mean(axis=1)
+            modes.append(np.array([mode.weight for mode in found]))
+            nearest.append((off.argmin(), off[0]))
+        return cls(track, seen, track.off[:, 1:].mean(axis=1), swapped, second, modes, np.array(nearest))
 
 
 def fitted(tracks: Sequence[Kept]) -> Doubt:
@@ -66,7 +77,23 @@ def fitted(tracks: Sequence[Kept]) -> Doubt:
     doubt = replace(doubt, joint_spreads=joints, angle_spreads=angles)
     joint_factors, angle_factors = _factors(doubt, tracks)
     doubt = replace(doubt, joint_factors=joint_factors, angle_factors=angle_factors)
+    doubt = replace(doubt, sharpness=_sharpness(tracks))
     return _sided(doubt, tracks)
+
+
+def sharpened(weights: Array, sharpness: float) -> Array:
+    """Return the weights (n,) of modes, as a recalibration makes them."""
+    powers = weights**sharpness
+    return np.asarray(powers / powers.sum())
+
+
+def _sharpness(tracks: Sequence[Kept]) -> float:
+    """Return the power of modes' weights at which the modes that are nearest to the truth are likeliest."""
+    weights, likely = shares(tracks), []
+    pairs = [(modes, int(row)) for one in tracks for modes, row in zip(one.modes, one.nearest[:, 0], strict=True)]
+    for tried in SHARPNESSES:
+        likely.append(weights @ [np.log(sharpened(modes, tried)[row]) for modes, row in pairs])
+    return float(SHARPNESSES[int(np.argmax(likely))])
 
 
 def shares(tracks: Sequence[Kept]) -> Array:
@@ -88,7 +115,7 @@ def _doubt(tracks: Sequence[Kept]) -> Doubt:
     ones = Recalibration()
     return Doubt(
         slopes, (float(low), float(high)), ones.joint_spreads, ones.angle_spreads, ones.joint_factors,
-        ones.angle_factors, np.array([0.0, 1.0, 0.0]), 0.2,
+        ones.angle_factors, np.array([0.0, 1.0, 0.0]), 1.0, 0.2,
     )  # fmt: skip
 
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept_errors, reliability
-from posefit.posterior.modes import APART, modes_of
+from posefit.posterior.modes import APART
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
-from posefit_experiments.posterior.fit import MEMBERS, Kept, intervals, shares
+from posefit_experiments.posterior.fit import MEMBERS, Kept, intervals, shares, sharpened
 
 KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
 DIGITS = 4
@@ -92,33 +92,27 @@ def sides(tracks: Sequence[Judged]) -> dict[str, Any]:
     return told
 
 
-def best_modes(tracks: Sequence[Kept]) -> dict[str, Any]:
-    """Return how far the best mode's probability is from how often it is right.
+def best_modes(tracks: Sequence[Kept], sharpnesses: Sequence[float]) -> dict[str, Any]:
+    """Return how far the best mode's probability is from how often it is right; weights of each track are sharpened.
 
-    It is right where the truth is nearer to it than to any other mode; and `within`, where it is as near as poses of
-    one mode are, too.
+    It is right where the truth is nearer to it than to any other mode, and so where there is no other; `several` are
+    the frames that have others. `within` is where the truth is as near to it as poses of one mode are.
     """
-    told, nearest, within = [], [], []
-    for kept in tracks:
-        track = kept.track
-        true = track.skeleton.joints(track.truth)
-        for k in range(len(track)):
-            modes = modes_of(track.skeleton, track.posterior(k))
-            joints = track.skeleton.joints(np.array([mode.pose for mode in modes]))
-            off = np.linalg.norm(joints - true[k], axis=2).mean(axis=1)
-            told.append(min(modes[0].weight, 1.0))
-            nearest.append(off.argmin() == 0)
-            within.append(off[0] <= APART)
-    probable, right = np.array(told), np.array(nearest)
+    pairs = list(zip(tracks, sharpnesses, strict=True))
+    probable = np.array([sharpened(modes, power)[0] for one, power in pairs for modes in one.modes])
+    several = np.array([len(modes) > 1 for one in tracks for modes in one.modes])
+    nearest = np.concatenate([one.nearest for one in tracks])
+    right, within = nearest[:, 0] == 0.0, nearest[:, 1] <= APART
     second, swapped = (np.concatenate([getattr(one, name) for one in tracks]) for name in ("second", "swapped"))
     return {
         "tracks": len(tracks),
         "mean_probability": float(probable.mean()),
         "right": float(right.mean()),
         "calibration_error": calibration_error(probable, right),
-        "within": float(np.mean(within)),
-        "calibration_error_within": calibration_error(probable, np.array(within)),
-        "second_side_error": calibration_error(second, swapped),
+        "several": float(several.mean()),
+        "calibration_error_several": calibration_error(probable[several], right[several]) if several.any() else 0.0,
+        "within": float(within.mean()),
+        "calibration_error_within": calibration_error(probable, within),
         "second_side_auroc": auroc(second, swapped),
         "reliability": reliability(probable, right),
     }
@@ -177,8 +171,9 @@ def posterior_lines(told: Mapping[str, Any]) -> Iterator[str]:
         ],
         1,
     )
-    for name, one in told["temperatures"].items():
-        each = ("mean_probability", "right", "calibration_error", "within", "calibration_error_within")
+    for name, one in told["modes"].items():
+        each = ["mean_probability", "right", "calibration_error", "several", "calibration_error_several"]
+        each += ["within", "calibration_error_within"]
         rank = one["second_side_auroc"]
         ranked = "" if rank is None else f"{rank:.2f}"
         yield _line([name, str(one["tracks"]), *(f"{100 * one[key]:.1f}" for key in each), ranked])
