@@ -17,7 +17,7 @@ OTHERS: Mapping[str, Mapping[str, Any]] = {
     "annealed@pca": {"tracker.modes": 1},  # its own particles
     "sapso@pca": {"tracker.modes": 4},  # searches of a frame, each begun elsewhere
 }
-OTHER_FRAMES, OTHER_EVERY = 30, 4  # every fourth clip is followed by other methods
+OTHER_FRAMES, OTHER_EVERY = 20, 4  # every fourth clip is followed by other methods
 DANCES, EVERYDAY = "dances", "everyday"
 # a person's clips, by group; those that other measurements have no use for
 MORE = {

@@ -31,7 +31,7 @@ MEMBERS = {name: np.array([JOINTS.index(joint) for joint in joints]) for name, j
 ALONE = {str(angle): np.array([angle]) for angle in range(ANGLES)}  # some have no freedom, and so no error
 TRIED = np.geomspace(0.05, 2.0, 12)  # spreads, in doubts
 EVERY = 5  # of the frames that factors are found from; neighbours say the same
-OUTSIDE = 0.025  # share of frames that are swapped among those whose sides are known: a little below what is asked for
+UNKNOWN = 0.1  # ours: how likely exchanged sides have to be, to be called unknown
 LEAST = 0.1  # slope of log-odds over the second side's weight
 SHARPNESSES = np.geomspace(0.05, 1.0, 24)
 TINY = 1e-12
@@ -187,19 +187,14 @@ def radii_of(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
 
 
 def _sided(doubt: Doubt, tracks: Sequence[Kept]) -> Doubt:
-    """Return the doubt with the odds of exchanged sides, and from which probability on they are unknown."""
+    """Return the doubt with the odds of exchanged sides."""
     second, swapped = (np.concatenate([getattr(one, name) for one in tracks]) for name in ("second", "swapped"))
     logs = np.array([doubt.log(seen) for one in tracks for seen in one.seen])
     weights, design = shares(tracks), np.column_stack([np.ones(len(second)), second, logs])
     sides = logistic(design, swapped, weights)
     if sides[1] < LEAST:  # too few swapped frames to say what the samples know of them
         sides = np.insert(logistic(design[:, [0, 2]], swapped, weights), 1, LEAST)
-    probable = 1.0 / (1.0 + np.exp(-design @ sides))
-    order = np.argsort(probable)
-    outside = np.cumsum((weights * swapped)[order]) / np.cumsum(weights[order])
-    below = np.flatnonzero(outside <= OUTSIDE)
-    last = below[-1] if len(below) else 0
-    return replace(doubt, sides=sides, unknown=float(np.clip(probable[order][last], 1e-4, 0.5)))
+    return replace(doubt, sides=sides, unknown=UNKNOWN)
 
 
 def logistic(design: Array, came: NDArray[np.bool_], weights: Array) -> Array:

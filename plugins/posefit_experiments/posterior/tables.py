@@ -12,10 +12,10 @@ from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept
 from posefit.posterior.modes import APART
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
-from posefit_experiments.posterior.fit import MEMBERS, Kept, intervals, shares, sharpened
+from posefit_experiments.posterior.fit import MEMBERS, TINY, Kept, intervals, shares, sharpened
 
 KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
-DIGITS = 4
+LIKELY = (0.05, 0.15, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,7 @@ class Judged:
     kept: Kept
     doubts: Array = field(repr=False)  # (T,) metres
     unknown: NDArray[np.bool_] = field(repr=False)  # (T,)
+    exchanged: Array = field(repr=False)  # (T,) probability of exchanged sides
     inside: NDArray[np.bool_] = field(repr=False)  # (T, levels, 27)
     radii: Array = field(repr=False)  # (T, levels, 27) metres
     turned: Array = field(repr=False)  # (levels,) share of angles that are inside
@@ -34,8 +35,17 @@ def judged(doubt: Doubt, kept: Kept) -> Judged:
     """Return what is said of a track."""
     logs = np.array([doubt.log(seen) for seen in kept.seen])
     unknown = kept.second >= [doubt.second_side(log) for log in logs]
+    odds = doubt.sides[0] + doubt.sides[1] * kept.second + doubt.sides[2] * logs
     radii, angles = intervals(doubt, kept)
-    return Judged(kept, np.exp(logs), unknown, kept.track.off[:, None] <= radii, radii, angles.mean(axis=(0, 2)))
+    return Judged(
+        kept,
+        np.exp(logs),
+        unknown,
+        1.0 / (1.0 + np.exp(-odds)),
+        kept.track.off[:, None] <= radii,
+        radii,
+        angles.mean(axis=(0, 2)),
+    )
 
 
 def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
@@ -78,18 +88,28 @@ def view_of(kept: Kept) -> str:
 def sides(tracks: Sequence[Judged]) -> dict[str, Any]:
     """Return how often left and right are said to be unknown, and swapped then and otherwise; by kind of motion too."""
     told = {}
+    weights = shares([one.kept for one in tracks])
+    exchanged = np.concatenate([one.exchanged for one in tracks])
+    swapped = np.concatenate([one.kept.swapped for one in tracks])
+    for least in LIKELY:
+        told[f"all, from {100 * least:g} % on"] = _sides(weights, exchanged >= least, swapped)
     for name in ("all", *sorted({one.kept.track.seen.group for one in tracks})):
         mine = [one for one in tracks if name in ("all", one.kept.track.seen.group)]
         weights = shares([one.kept for one in mine])
         unknown = np.concatenate([one.unknown for one in mine])
         swapped = np.concatenate([one.kept.swapped for one in mine])
-        told[name] = {
-            "swapped": float(weights @ swapped),
-            "unknown": float(weights @ unknown),
-            "swapped_unknown": float((weights * swapped)[unknown].sum() / max(weights[unknown].sum(), 1e-12)),
-            "swapped_known": float((weights * swapped)[~unknown].sum() / max(weights[~unknown].sum(), 1e-12)),
-        }
+        told[name] = _sides(weights, unknown, swapped)
     return told
+
+
+def _sides(weights: Array, unknown: NDArray[np.bool_], swapped: NDArray[np.bool_]) -> dict[str, float]:
+    inside, outside = (weights * some for some in (unknown, ~unknown))
+    return {
+        "swapped": float(weights @ swapped),
+        "unknown": float(inside.sum()),
+        "swapped_unknown": float(inside @ swapped / max(inside.sum(), TINY)),
+        "swapped_known": float(outside @ swapped / max(outside.sum(), TINY)),
+    }
 
 
 def best_modes(tracks: Sequence[Kept], sharpnesses: Sequence[float]) -> dict[str, Any]:
