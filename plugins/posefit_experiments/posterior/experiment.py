@@ -7,10 +7,10 @@ from typing import Any
 
 from posefit.files import new_file
 from posefit_experiments.grid import Progress, each
-from posefit_experiments.posterior.design import METHOD, OTHERS, TEMPERATURES, design
-from posefit_experiments.posterior.fit import Kept, fitted
-from posefit_experiments.posterior.frames import followed, load, save
-from posefit_experiments.posterior.tables import best_modes, coverages, judged, kept_table, sides
+from posefit_experiments.posterior.design import METHOD, OTHERS, TEMPERATURES, sightings
+from posefit_experiments.posterior.fit import Kept, doubt_of
+from posefit_experiments.posterior.frames import followed, load_tracks, save_tracks
+from posefit_experiments.posterior.tables import best_modes, coverages, judgement, kept_table, sides
 
 PEOPLE = 3  # at least, of which one is left out at a time
 
@@ -38,13 +38,13 @@ def posterior(
     with ExitStack() as stack:
         file, table = (stack.enter_context(new_file(path)) if path else None for path in (out, store))
         if again is not None:
-            tracks = load(again)
+            tracks = load_tracks(again)
         else:
-            base, more = design(temperature, quick)
+            base, more = sightings(temperature, quick)
             found = each({seen: partial(followed, seen) for seen in (*base, *more)}, workers, progress)
             tracks = list(found.values())
             if file is not None:
-                save(tracks, file)
+                save_tracks(tracks, file)
         kept = [Kept.of(one) for one in tracks]
         mine = [one for one in kept if one.track.seen.method == METHOD]
         base_kept = [one for one in mine if one.track.seen.temperature == temperature]
@@ -53,12 +53,12 @@ def posterior(
             raise ValueError(f"tracks must be of {PEOPLE} people or more at {temperature:g}, got {len(people)}")
         said, powers = [], []
         for person in people:
-            doubt = fitted([one for one in base_kept if one.track.seen.clip.subject != person])
+            doubt = doubt_of([one for one in base_kept if one.track.seen.clip.subject != person])
             his = [one for one in base_kept if one.track.seen.clip.subject == person]
-            said += [judged(doubt, one) for one in his]
+            said += [judgement(doubt, one) for one in his]
             powers += [doubt.sharpness] * len(his)
         if table is not None:
-            doubt = fitted(base_kept)
+            doubt = doubt_of(base_kept)
             table.write_text(json.dumps({"temperature": temperature, **doubt.as_dict()}) + "\n", encoding="utf-8")
     others = [one for one in kept if one.track.seen.method in OTHERS]
     return {

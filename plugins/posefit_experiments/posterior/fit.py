@@ -70,7 +70,7 @@ class Kept:
         return cls(track, seen, track.off[:, 1:].mean(axis=1), swapped, second, modes, np.array(nearest))
 
 
-def fitted(tracks: Sequence[Kept]) -> Doubt:
+def doubt_of(tracks: Sequence[Kept]) -> Doubt:
     """Return what makes the intervals and unknown sides of tracks mean what they say."""
     doubt = _doubt(tracks)
     joints, angles = _spreads(doubt, tracks)
@@ -169,7 +169,7 @@ def scores(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
     return track.off[::every, None] / np.maximum(radii, TINY), turned / np.maximum(halves, TINY)
 
 
-def intervals(doubt: Doubt, one: Kept) -> tuple[Array, NDArray[np.bool_]]:
+def intervals_of(doubt: Doubt, one: Kept) -> tuple[Array, NDArray[np.bool_]]:
     """Return the radii of joints (T, levels, 27), metres, and whether angles (T, levels, 66) are in their intervals."""
     radii, halves = radii_of(doubt, one)
     return radii, np.abs(wrapped(one.track.truth - one.track.told))[:, None] <= halves

@@ -20,14 +20,14 @@ from posefit.tracking.method import Choice, parse_settings
 from posefit.tracking.opening import Opening
 from posefit.tracking.run import follow
 from posefit_experiments.people.clips import Piece
-from posefit_experiments.posterior.design import Seen
+from posefit_experiments.posterior.design import Sighting
 
 
 @dataclass(frozen=True, eq=False)
 class Followed:
     """The frames of a track."""
 
-    seen: Seen
+    seen: Sighting
     truth: Array = field(repr=False)  # (T, 66)
     told: Array = field(repr=False)  # (T, 66)
     drawn: Array = field(repr=False)  # (T, K, 66)
@@ -58,7 +58,7 @@ def _skeleton(subject: str) -> Skeleton:
     return recorded.clips(only=(subject,))[0].skeleton
 
 
-def followed(seen: Seen) -> Followed:
+def followed(seen: Sighting) -> Followed:
     """Return a clip that was followed by a library without the person who moves in it."""
     cell = cell_of(seen.spec)
     scene = cell_scene(cell)
@@ -84,7 +84,7 @@ def followed(seen: Seen) -> Followed:
 ARRAYS = tuple(one.name for one in fields(Followed) if one.name != "seen")
 
 
-def save(tracks: Sequence[Followed], path: Path) -> None:
+def save_tracks(tracks: Sequence[Followed], path: Path) -> None:
     """Write tracks to a file .npz: angles in single precision, those of samples to a thousandth of a radian or two."""
     arrays: dict[str, Any] = {}
     for k, one in enumerate(tracks):
@@ -95,12 +95,12 @@ def save(tracks: Sequence[Followed], path: Path) -> None:
         np.savez_compressed(file, **arrays)
 
 
-def load(path: str) -> list[Followed]:
-    """Return the tracks of a file that `save` wrote. Raises ValueError where it is none."""
+def load_tracks(path: str) -> list[Followed]:
+    """Return the tracks of a file that `save_tracks` wrote. Raises ValueError where it is none."""
     try:
         with np.load(path) as held:
             seen = [
-                Seen(group, Piece(*clip), tuple(views), *rest)
+                Sighting(group, Piece(*clip), tuple(views), *rest)
                 for group, clip, views, *rest in json.loads(str(held["seen"]))
             ]
             return [

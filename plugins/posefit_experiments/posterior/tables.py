@@ -12,7 +12,7 @@ from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept
 from posefit.posterior.modes import APART
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
-from posefit_experiments.posterior.fit import MEMBERS, TINY, Kept, intervals, shares, sharpened
+from posefit_experiments.posterior.fit import MEMBERS, TINY, Kept, intervals_of, shares, sharpened
 
 KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
 LIKELY = (0.05, 0.15, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
@@ -31,12 +31,12 @@ class Judged:
     turned: Array = field(repr=False)  # (levels,) share of angles that are inside
 
 
-def judged(doubt: Doubt, kept: Kept) -> Judged:
+def judgement(doubt: Doubt, kept: Kept) -> Judged:
     """Return what is said of a track."""
     logs = np.array([doubt.log(seen) for seen in kept.seen])
     unknown = kept.second >= [doubt.second_side(log) for log in logs]
     odds = doubt.sides[0] + doubt.sides[1] * kept.second + doubt.sides[2] * logs
-    radii, angles = intervals(doubt, kept)
+    radii, angles = intervals_of(doubt, kept)
     return Judged(
         kept,
         np.exp(logs),
@@ -72,7 +72,7 @@ def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
     return {
         "overall": told(tracks),
         "joints": {name: told(tracks, members) for name, members in MEMBERS.items()},
-        "views": by(lambda one: view_of(one.kept)),
+        "views": by(lambda one: views_text(one.kept)),
         "motions": by(lambda one: one.kept.track.seen.group),
         "translations": by(lambda one: one.kept.track.seen.translation),
         "people": by(lambda one: one.kept.track.seen.clip.subject),
@@ -80,7 +80,7 @@ def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
     }
 
 
-def view_of(kept: Kept) -> str:
+def views_text(kept: Kept) -> str:
     """Return from where a track is seen, three digits a view."""
     return ", ".join(f"{view:03.0f}" for view in kept.track.seen.views)
 
