@@ -32,6 +32,24 @@ class Mutant:
 
 MUTANTS = (
     Mutant(
+        "a limb fades by the interval of 50 %, not by that of 80 %",
+        "posefit/tracking/picture.py",
+        (("LEVELS.index(0.8)", "LEVELS.index(0.5)"),),
+        "tests/tracking/test_picture.py::test_an_unsure_limb_fades_on_the_masks_and_beside_them",
+    ),
+    Mutant(
+        "the other mode is the second one, whichever the told pose is of",
+        "posefit/posterior/modes.py",
+        (("    rest = [mode for k, mode in enumerate(modes) if k != mine]", "    rest = list(modes[1:])"),),
+        "tests/posterior/test_modes.py::test_the_other_mode_is_the_likeliest_that_a_pose_is_not_of",
+    ),
+    Mutant(
+        "runs count alike in a reliability diagram, however many frames they have of a bin",
+        "posefit/report/runs.py",
+        (("+= count * np.array([1.0, told, right])", "+= np.array([1.0, told, right])"),),
+        "tests/report/test_contest.py::test_certainty_is_pooled_over_runs_frame_by_frame",
+    ),
+    Mutant(
         "a track that is drawn steps anywhere, not where the last state goes on to",
         "plugins/posefit_exemplars/sampling.py",
         (("likely = first.kernel[rows] * likely", "likely = 1.0 * likely"),),

@@ -23,6 +23,8 @@ SOURCES = {
     "GODSILL2004": "Godsill, Doucet and West, Monte Carlo smoothing for nonlinear time series, 2004",
     "DUNN2023": "Dunn, Wasserman and Ramdas, Distribution-free prediction sets for two-layer hierarchical models, 2023",
     "GUO2017": "Guo, Pleiss, Sun and Weinberger, On calibration of modern neural networks, 2017",
+    "BRIER1950": "Brier, Verification of forecasts expressed in terms of probability, 1950",
+    "CEC2013": "Li, Engelbrecht and Epitropakis, Benchmark functions for CEC'2013 on niching methods, 2013",
 }
 _TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")

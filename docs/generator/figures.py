@@ -92,8 +92,8 @@ def page() -> str:
             "baseline",
             [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],
         ),
-        "`coverage` holds a share for each of `50`, `80` and `95`. A figure that needs the truth is `null` where "
-        "nobody knows it, and one that a method has to say where it does not.",
+        "`coverage` holds a share for each of `50`, `80` and `95`, and `interval_mm` a radius. A figure that needs the "
+        "truth is `null` where nobody knows it, and one that a method has to say where it does not.",
         "## Columns of `frames.csv`",
         "One row a frame; those that need the truth are there only where it is known.",
         _table("column", [*_measured(FRAME.values()), ("JOINT_x, JOINT_y, JOINT_z", "m", _joints())]),

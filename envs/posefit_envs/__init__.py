@@ -7,16 +7,17 @@
     observation, cost, ended, cut, info = env.step(env.action_space.sample())      # the reward is minus the cost
 
 `Fit-v0` is a search for the pose in one silhouette; `Track-v0` follows a sequence; `Configure-v0` steers a running
-swarm. Their docstrings are their manual. Importing this package registers them; the environments themselves are
-imported when they are made. `drive` runs an optimiser against a vector environment, `track_reference` says what a
-tracker would commit in Track-v0, `to_sb3_vec_env` hands a vector environment to Stable-Baselines3, and
-`check_vector_env` compares any vector environment with single ones.
+swarm; `Modes-v0` asks for all poses of one silhouette. Their docstrings are their manual. Importing this package
+registers them; the environments themselves are imported when they are made. `drive` runs an optimiser against a vector
+environment, `track_reference` says what a tracker would commit in Track-v0, `to_sb3_vec_env` hands a vector environment
+to Stable-Baselines3, and `check_vector_env` compares any vector environment with single ones.
 
 | looking for | file |
 |---|---|
 | Fit-v0, Track-v0 | fit.py, track.py |
+| Modes-v0: niching | modes.py |
 | Configure-v0: dynamic algorithm configuration | configure.py |
-| each of them many at once; seeds and masks of vector environments | vector/ |
+| the first three many at once; seeds and masks of vector environments | vector/ |
 | the arguments; what an instance's number stands for (as in sweeps: `posefit.footage.instance`) | instance.py |
 | what is seen in a frame; actions that are not allowed | search.py |
 | proposals become poses, costs and pictures, in many scenes at once; compiled | stage.py, kernels.py |
@@ -54,6 +55,7 @@ register(
     entry_point="posefit_envs.configure:ConfigureEnv",
     vector_entry_point="posefit_envs.vector.configure:ConfigureVectorEnv",
 )
+register(id="posefit/Modes-v0", entry_point="posefit_envs.modes:ModesEnv")
 
 
 def __getattr__(name: str) -> Any:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.silhouette.cost import project
-from posefit.tracking.picture import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, side_view
+from posefit.tracking.drawing.body import side_view
+from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, SPILLED, TEXT
 from posefit_envs.search import Scenery
 
 MODES = ("rgb_array", "human")

@@ -102,7 +102,7 @@ class Selection:
         Raises ArgumentError where the options name one that there is not.
         """
         if options and options.get("instance") is not None:
-            return _number(options["instance"])
+            return instance_number(options["instance"])
         return self.instance if self.instance is not None else int(generator().integers(*RESERVED[self.split]))
 
 
@@ -133,7 +133,7 @@ def select(
         if not isinstance(value, str):
             raise ArgumentError(f"{name} must be a name, got {quoted(value)}")
     if instance is not None:
-        instance = _number(instance)
+        instance = instance_number(instance)
     views = _views(view_degrees)
     if translation not in TRANSLATIONS:
         raise ArgumentError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {quoted(translation)}")
@@ -201,7 +201,7 @@ def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
     return tuple(sorted((noise or {}).items()))
 
 
-def _number(number: Any) -> int:
+def instance_number(number: Any) -> int:
     """Return the number of an instance. Raises ArgumentError where there is none of it."""
     last = RESERVED["test"][1] - 1
     if isinstance(number, bool) or not isinstance(number, int | np.integer):

@@ -11,7 +11,9 @@ from posefit.ambiguity.table import by_kind
 from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.picture import BACKGROUND, BOTH, MISSED, SOLID, SPILLED, TEXT, draw_body, side_view, write
+from posefit.tracking.drawing.body import draw_body, side_view
+from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, write
+from posefit.tracking.picture import SOLID
 
 SHOWN = 5  # clusters
 FEWEST = 3  # columns that the picture is wide, for what is written on it

@@ -33,6 +33,17 @@ class Filter(Optimiser, Protocol):
         ...
 
 
+class Niching(Optimiser, Protocol):
+    """An optimiser that looks for several optima, and can tell them apart."""
+
+    def modes(self) -> Array:
+        """Return the proposals (k, d) that it takes for optima of their own, the best first.
+
+        They are among those that it was told the costs of; k is at least 1 once it was told some.
+        """
+        ...
+
+
 # Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a numpy Generator that is the
 # only source of randomness, and keyword-only settings. The driver fills in the settings `evaluations`, the budget of
 # one search, and `iterations`, the populations after the first that this budget holds, for a factory that takes them.

@@ -97,6 +97,35 @@ def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> 
     return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in found]
 
 
+def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> Mode | None:
+    """Return the likeliest mode that a pose (66,) is not of; None where there is none whose weight is above that.
+
+    A pose is of the mode that it is nearest to.
+    """
+    if len(modes) < 2:
+        return None
+    mine = _nearest(skeleton, modes, skeleton.joints(pose))[0]
+    rest = [mode for k, mode in enumerate(modes) if k != mine]
+    other = max(rest, key=lambda mode: mode.weight)
+    return other if other.weight > above else None
+
+
+def likeliest_is_right(skeleton: Skeleton, modes: Sequence[Mode], joints: Array, apart: float = APART) -> bool:
+    """Return whether true joints (27, 3) are those of the likeliest mode: nearest to it of all, and alike.
+
+    They are alike as poses are in `modes_of`: at most `apart` metres from each other, the mean over joints.
+    """
+    nearest, off = _nearest(skeleton, modes, joints)
+    return nearest == max(range(len(modes)), key=lambda k: modes[k].weight) and off <= apart
+
+
+def _nearest(skeleton: Skeleton, modes: Sequence[Mode], joints: Array) -> tuple[int, float]:
+    """Return which mode joints (27, 3) are nearest to, and how far off, metres, both roots at one point."""
+    each = skeleton.joints(np.array([mode.pose for mode in modes]))
+    off = np.linalg.norm((each - each[:, :1]) - (joints - joints[:1]), axis=-1).mean(axis=-1)
+    return int(off.argmin()), float(off.min())
+
+
 def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: float = APART) -> list[TrackMode]:
     """Return the tracks that a clip may show, the likeliest first, given what each of its frames may show.
 

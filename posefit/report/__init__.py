@@ -18,7 +18,7 @@ r"""What a ledger says: one page that any browser opens, figures and tables for 
 | the rows of a ledger as arrays; methods, instances and seeds told apart | runs.py |
 | which figures of a row are shown, under which label, with which digits | columns.py |
 | the methods held against each other on the runs that they share | contest.py |
-| cost over evaluations, targets reached, errors of joints, as numbers | curves.py |
+| cost over evaluations, targets reached, errors of joints, how sure methods are, as numbers | curves.py |
 | everything the page shows, as data; its moving pictures | content.py, gallery.py |
 | the page: its markup, style and scripts, and how they become one file | page/ |
 | figures by matplotlib; colours; all of a paper's files in one folder | figures.py, colours.py, portfolio.py |

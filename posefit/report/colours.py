@@ -6,7 +6,7 @@ without their yellow. The page has them a little darker where white would swallo
 
 from collections.abc import Mapping
 
-from posefit.tracking.picture import LEFT, RIGHT
+from posefit.tracking.drawing.colours import LEFT, OTHER, RIGHT
 
 METHODS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # on paper
 _LIGHT = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b97a00", "#3b9bd1", "#111")
@@ -34,7 +34,7 @@ DARK = _named(
         "right": _hexadecimal(RIGHT),
         "truth": "#98a5b3",
         "estimate": _DARK[1],
-        "swapped": _DARK[3],
+        "swapped": _hexadecimal(OTHER),
     },
 )
 

@@ -9,8 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from posefit.posterior.calibration import LEVELS
 from posefit.tracking.measures import BASELINES, MEASURES, Measure
 
+NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)  # of intervals, as rows have them
+TOLD = "80"  # the interval that tables tell
 _SIGNS = {"degrees": "°"}  # of units, where there is little room
 
 
@@ -25,6 +28,8 @@ class Column:
     per_frame: bool = False  # the row has it of all frames together
     rising: bool = False  # more is better
     shown: bool = True  # as a column of the page's tables
+    sometimes: bool = False  # only methods that say how sure they are have it, so it is shown where some row has it
+    share: bool = False  # of frames or joints, so that a method's is the plain mean over its runs
 
     def value(self, row: Mapping[str, Any]) -> float:
         """Return the figure of a ledger's row, nan where it has none."""
@@ -74,6 +79,18 @@ def _baseline(name: str) -> Measure:
     return replace(MEASURES["baselines_degrees"], label=BASELINES[name])
 
 
+def _certainty() -> list[Column]:
+    """Return coverage and width of each level's intervals; tables show those of `TOLD`."""
+    found = []
+    for level in NAMES:
+        covered = replace(_share("coverage"), label=f"{level} % interval holds")
+        wide = replace(MEASURES["interval_mm"], label=f"{level} % interval")
+        how: dict[str, Any] = {"sometimes": True, "shown": level == TOLD}
+        found.append(Column(f"coverage_{level}", covered, ("coverage", level), rising=True, share=True, **how))
+        found.append(Column(f"interval_{level}", wide, ("interval_mm", level), **how))
+    return found
+
+
 _TIME, _CPU = MEASURES["seconds_per_frame"], MEASURES["cpu_seconds_per_frame"]
 _SPENT = replace(MEASURES["evaluations"], unit="a frame", meaning="poses whose cost was computed, the mean over frames")
 
@@ -82,8 +99,10 @@ COLUMNS = {
     for column in (
         Column("error", MEASURES["error_degrees"], ("error_degrees", "mean")),
         *(Column(f"skill_{name}", _skill(name), ("skill", name), rising=True) for name in BASELINES),
-        Column("lost", _share("lost_rate"), ("lost_rate",)),
-        Column("swapped", _share("swap_rate"), ("swap_rate",)),
+        Column("lost", _share("lost_rate"), ("lost_rate",), share=True),
+        Column("swapped", _share("swap_rate"), ("swap_rate",), share=True),
+        Column("unknown", _share("unknown_rate"), ("unknown_rate",), sometimes=True, share=True),
+        *_certainty(),
         Column("mpjpe", MEASURES["mpjpe_mm"], ("mpjpe_mm",)),
         Column("pa_mpjpe", MEASURES["pa_mpjpe_mm"], ("pa_mpjpe_mm",), shown=False),
         Column("iou", MEASURES["iou"], ("iou",), rising=True),

@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
 from posefit.report.colours import METHODS
-from posefit.report.columns import COLUMNS, SHOWN
+from posefit.report.columns import COLUMNS
 from posefit.report.contest import (
     Contest,
     baseline_rows,
@@ -22,7 +22,7 @@ from posefit.report.contest import (
     resamples,
 )
 from posefit.report.gallery import gallery
-from posefit.report.runs import Runs
+from posefit.report.runs import Runs, shown_of
 from posefit.sweep.ledger import Ledger
 from posefit.tracking.measures import BASELINES
 
@@ -41,7 +41,7 @@ def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str,
         "parents": PARENTS,
         "sides": SIDES,
         "colours": len(METHODS),
-        "columns": {name: COLUMNS[name].about() for name in SHOWN},
+        "columns": {name: COLUMNS[name].about() for name in shown_of(runs)},
         "trivial": BASELINES,
         **(_compared(contest) if contest is not None else {}),
         "rows": _rows(runs),
@@ -105,6 +105,7 @@ def _compared(contest: Contest) -> dict[str, Any]:
         "convergence": [curves.shown(one) for one in curves.convergence(some, evaluations)],
         "reached": curves.reached(some, evaluations) if len(evaluations) else [],
         "joint_errors": [curves.shown(one) for one in curves.joint_errors(some)],
+        "certainty": curves.certainty(contest),
     }
 
 
@@ -142,6 +143,6 @@ def _by_instance(runs: Runs, figure: str) -> Array:
 def _rows(runs: Runs) -> dict[str, Any]:
     """Return the columns of all rows, short enough for a page of a hundred thousand of them."""
     columns: dict[str, Any] = {name: getattr(runs, name) for name in ("method", "instance", "head", "seed")}
-    for name in SHOWN:
+    for name in shown_of(runs):
         columns[name] = np.round(runs.figures[name], COLUMNS[name].kept)
     return {**columns, "key": [key[:8] for key in runs.keys]}

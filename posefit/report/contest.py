@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import trim_mean
 
 from posefit.arrays import Array
-from posefit.report.columns import FIGURES
+from posefit.report.columns import COLUMNS, FIGURES
 from posefit.report.runs import Runs
 from posefit.statistics.improvement import improvement_interval, probability_of_improvement
 from posefit.statistics.intervals import LEAST_RESAMPLES, RESAMPLES, TRIMMED, Intervals, iqm_intervals
@@ -123,8 +123,8 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
 
     Methods that share one of their `letters` are not told apart by Wilcoxon's signed ranks, p after Holm, at 5 %.
 
-    Methods that do not take part come last, with what their own runs say. Shares of frames are plain means, for most
-    runs lose none.
+    Methods that do not take part come last, with what their own runs say. Shares of frames or joints are plain means,
+    for most runs lose none.
     """
     found: list[dict[str, Any]] = []
     runs, ends = contest.runs, intervals(contest.of("error"))
@@ -132,7 +132,7 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
         place = contest.methods.index(m) if m in contest.methods else None
         mine = np.flatnonzero(runs.method == m) if place is None else contest.rows[place].ravel()
         row = {figure: middle(runs.figures[figure][mine]) for figure in FIGURES}
-        row |= {share: _mean(runs.figures[share][mine]) for share in ("lost", "swapped")}
+        row |= {name: mean(runs.figures[name][mine]) for name, column in COLUMNS.items() if column.share}
         low, high = (None, None) if place is None else (ends.low[place], ends.high[place])
         found.append(
             {
@@ -239,7 +239,8 @@ def middle(values: Array) -> float | None:
     return float(trim_mean(finite, TRIMMED)) if len(finite) else None
 
 
-def _mean(values: Array) -> float | None:
+def mean(values: Array) -> float | None:
+    """Return the mean of the finite values; None where there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if len(finite) else None
 

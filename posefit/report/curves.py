@@ -1,4 +1,7 @@
-"""Curves of a sweep: cost over evaluations, targets reached, errors of joints; each of the methods of a contest."""
+"""Curves of a sweep: cost over evaluations, targets reached, errors of joints, and how sure methods say they are.
+
+Each of the methods of a contest.
+"""
 
 from typing import Any
 
@@ -6,7 +9,9 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
-from posefit.report.contest import SEED, Contest, resamples
+from posefit.posterior.calibration import LEVELS
+from posefit.report.columns import NAMES
+from posefit.report.contest import SEED, Contest, mean, resamples
 from posefit.statistics.intervals import Intervals, iqm_intervals
 from posefit.statistics.profiles import Trace, attained, hits, targets
 
@@ -72,6 +77,38 @@ def joint_errors(contest: Contest) -> list[Intervals]:
     errors = np.moveaxis(contest.runs.joint_errors[contest.rows], -1, 1).astype(np.float64)  # (m, 27, instances, seeds)
     rng = np.random.default_rng(SEED)
     return [iqm_intervals(one, rng, resamples=count) for one in errors] if np.isfinite(errors).all() else []
+
+
+def certainty(contest: Contest) -> dict[str, Any] | None:
+    """Return what methods say of their own certainty, held against the truth; None where no run says anything.
+
+    `levels` are those of intervals. `methods` has an entry for each method that takes part, in their order, None where
+    its runs say nothing: at each level the `coverage` and the `width` in mm, plain means over its runs; and the
+    `reliability` of its likeliest modes, [frames, mean probability, share that is right] for each bin that has any,
+    with their expected calibration error `ece`, None where no run has modes.
+    """
+    found = [_certainty_of(contest, place) for place in range(len(contest.methods))]
+    return {"levels": list(LEVELS), "methods": found} if any(one is not None for one in found) else None
+
+
+def _certainty_of(contest: Contest, place: int) -> dict[str, Any] | None:
+    rows = contest.rows[place].ravel()
+    figures = {
+        kind: [mean(contest.runs.figures[f"{kind}_{level}"][rows]) for level in NAMES]
+        for kind in ("coverage", "interval")
+    }
+    bins = contest.runs.modes[rows].sum(axis=0, dtype=np.float64)
+    bins = bins[bins[:, 0] > 0.0]
+    shares = [[int(count), told / count, right / count] for count, told, right in bins.tolist()]
+    if not shares and None in figures["coverage"]:
+        return None
+    off = [abs(told - right) for _, told, right in bins.tolist()]
+    return {
+        "coverage": figures["coverage"],
+        "width": figures["interval"],
+        "reliability": shares,
+        "ece": float(sum(off) / bins[:, 0].sum()) if shares else None,
+    }
 
 
 def shown(curve: Intervals | None) -> dict[str, Any] | None:

@@ -106,6 +106,46 @@ def joint_errors_figure(
     return figure
 
 
+def reliability_figure(methods: Sequence[str], bins: Sequence[Sequence[Sequence[float]]]) -> "Figure":
+    """Return how often what is said is right, over how probable it is said to be.
+
+    Of each method rows of how many, their mean probability, and the share that is right; dots are as large as there are
+    many. Whose probabilities mean what they say has them on the diagonal.
+    """
+    figure, axes = _figure((5.2, 3.6))
+    axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
+    for k, one in enumerate(bins):
+        count, told, right = np.array(one, dtype=float).T
+        axes.plot(told, right, label=_plain(methods[k]), **_line(k))
+        axes.scatter(told, right, 8 + 80 * count / count.sum(), color=_line(k)["color"])
+    _finish(axes, "probability of the likeliest mode", "share of frames where it is right", methods)
+    axes.set_xlim(-0.02, 1.02)
+    axes.set_ylim(-0.02, 1.02)
+    return figure
+
+
+def coverage_figure(
+    methods: Sequence[str],
+    levels: Sequence[float],
+    widths: Sequence[Sequence[float]],
+    shares: Sequence[Sequence[float]],
+) -> "Figure":
+    """Return the share of joints within their intervals over how wide these are, a line a method, a dot a level.
+
+    Lines across are what the intervals are to hold; of two methods whose dots are there, the one to the left is better.
+    """
+    figure, axes = _figure()
+    for level in levels:
+        axes.axhline(level, color="0.8", linewidth=1)
+    for k, (wide, share) in enumerate(zip(widths, shares, strict=True)):
+        axes.plot(wide, share, marker="o", label=_plain(methods[k]), **_line(k))
+    _finish(axes, "radius of intervals, mm", "share of joints within", methods)
+    axes.set_yticks([0.0, *levels, 1.0])
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(-0.02, 1.02)
+    return figure
+
+
 def critical_difference_figure(methods: Sequence[str], ranking: Ranking) -> "Figure":
     """Return mean ranks on a line, best to the left; bars join methods that are not told apart. Demšar, 2006."""
     count, half = len(methods), (len(methods) + 1) // 2

@@ -1,5 +1,6 @@
 """A report's figures and tables as files for a paper."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,34 +9,24 @@ import numpy as np
 from posefit.files import new_folder
 from posefit.geometry.skeleton import JOINTS
 from posefit.report import figures
-from posefit.report.columns import COLUMNS, SHOWN
+from posefit.report.columns import COLUMNS
 from posefit.report.contest import contest_of, leaderboard
-from posefit.report.curves import convergence, grid, joint_errors, reached
+from posefit.report.curves import certainty, convergence, grid, joint_errors, reached
 from posefit.report.export import write_csv
 from posefit.report.latex import write_latex
-from posefit.report.runs import Runs
+from posefit.report.runs import Runs, shown_of
 from posefit.statistics.profiles import performance_profile
 from posefit.statistics.ranks import friedman
 
 KINDS = ("png", "pdf")
 LEVELS = 200  # of a performance profile
-_ERROR, *_OTHERS = SHOWN
-TABLE = {  # the heads of the leaderboard's columns, and what they hold
-    "method": "name",
-    COLUMNS[_ERROR].head: _ERROR,
-    "low": "low",
-    "high": "high",
-    "alike": "letters",
-    **{COLUMNS[name].head: name for name in _OTHERS},
-    "runs": "runs",
-}
 
 
 def write_portfolio(runs: Runs, path: str | Path) -> None:
     """Write a new folder of figures and tables; figures that the runs do not allow are left out.
 
-    They are convergence, attainment, profile, joints and critical-difference as PNG and PDF, and the leaderboard as
-    leaderboard.tex and .csv.
+    They are convergence, attainment, profile, joints, critical-difference, reliability and coverage as PNG and PDF, and
+    the leaderboard as leaderboard.tex and .csv.
 
     Raises ValueError where no run has an error, or where the folder exists or cannot be written.
     """
@@ -60,15 +51,44 @@ def write_portfolio(runs: Runs, path: str | Path) -> None:
         drawn["joints"] = figures.joint_errors_figure(names, JOINTS, joints)
     if len(names) > 1 and errors[0].size > 1:
         drawn["critical-difference"] = figures.critical_difference_figure(names, friedman(errors))
-    rows = leaderboard(contest)
+    drawn |= _certain(names, certainty(contest))
+    rows, table = leaderboard(contest), _table(runs)
     with new_folder(path) as folder:
         for name, figure in drawn.items():
             for kind in KINDS:
                 figures.save(figure, folder / f"{name}.{kind}")
         write_latex(
-            list(TABLE), [[_cell(row[key]) for key in TABLE.values()] for row in rows], folder / "leaderboard.tex"
+            list(table), [[_cell(row[key]) for key in table.values()] for row in rows], folder / "leaderboard.tex"
         )
-        write_csv(({title: row[key] for title, key in TABLE.items()} for row in rows), folder / "leaderboard.csv")
+        write_csv(({title: row[key] for title, key in table.items()} for row in rows), folder / "leaderboard.csv")
+
+
+def _table(runs: Runs) -> dict[str, str]:
+    """Return the heads of the leaderboard's columns, and what they hold."""
+    error, *others = shown_of(runs)
+    return {
+        "method": "name",
+        COLUMNS[error].head: error,
+        "low": "low",
+        "high": "high",
+        "alike": "letters",
+        **{COLUMNS[name].head: name for name in others},
+        "runs": "runs",
+    }
+
+
+def _certain(names: Sequence[str], found: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the figures of how sure methods say they are, as far as they say it."""
+    each = [] if found is None else found["methods"]
+    drawn = {}
+    bins = [(name, one["reliability"]) for name, one in zip(names, each, strict=False) if one and one["reliability"]]
+    if bins:
+        drawn["reliability"] = figures.reliability_figure([name for name, _ in bins], [one for _, one in bins])
+    told = [(name, one) for name, one in zip(names, each, strict=False) if one and None not in one["coverage"]]
+    if told and found is not None:
+        widths, shares = ([one[kind] for _, one in told] for kind in ("width", "coverage"))
+        drawn["coverage"] = figures.coverage_figure([name for name, _ in told], found["levels"], widths, shares)
+    return drawn
 
 
 def _cell(value: Any) -> Any:

@@ -10,7 +10,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
-from posefit.report.columns import COLUMNS, FIGURES
+from posefit.posterior.calibration import BINS
+from posefit.report.columns import COLUMNS, FIGURES, SHOWN
 from posefit.report.repeat import LAST, command_head
 from posefit.sweep.cell import in_full, settings_text
 
@@ -39,6 +40,7 @@ class Runs:
     keys: tuple[str, ...]
     figures: dict[str, Array] = field(repr=False)  # of each of FIGURES (n,), nan where a row has none
     joint_errors: Array = field(repr=False)  # (n, 27) mm
+    modes: Array = field(repr=False)  # (n, bins, 3) by bins of how likely a frame's likeliest mode is: see `_binned`
     traces: tuple[tuple[Array, Array], ...] = field(repr=False)  # evaluations and best costs (k,) of each row
     failures: tuple[dict[str, Any], ...] = field(repr=False)  # cells in quarantine: name, method, reasons, command
     failed: tuple[int, ...] = field(repr=False)  # how many cells of each method are in quarantine
@@ -62,6 +64,11 @@ def runs_of(ledger: "Ledger") -> Runs:
     return found.runs(ledger.version, quarantined)
 
 
+def shown_of(runs: Runs) -> list[str]:
+    """Return the figures that tables show of runs: those that only some methods have, where a row has them."""
+    return [name for name in SHOWN if not COLUMNS[name].sometimes or bool(np.isfinite(runs.figures[name]).any())]
+
+
 class _Table:
     """Collects rows."""
 
@@ -75,6 +82,7 @@ class _Table:
         self.keys: list[str] = []
         self.figures: list[list[float]] = []
         self.joints: list[Array] = []
+        self.modes: list[Array] = []
         self.traces: list[tuple[Array, Array]] = []
 
     def add(self, row: Mapping[str, Any]) -> None:
@@ -93,6 +101,7 @@ class _Table:
         self.keys.append(row["key"])
         self.figures.append([column.value(row) for column in COLUMNS.values()])
         self.joints.append(np.array(row.get("joint_errors_mm") or [np.nan] * len(JOINTS), dtype=np.float32))
+        self.modes.append(_binned(row.get("mode_reliability") or []))
         trace = row.get("trace") or {"evaluations": [], "cost": []}
         self.traces.append((np.array(trace["evaluations"], np.float32), np.array(trace["cost"], np.float32)))
 
@@ -132,11 +141,20 @@ class _Table:
             keys=tuple(self.keys[k] for k in order),
             figures=dict(zip(FIGURES, figures[order].T, strict=True)),
             joint_errors=np.asarray(np.reshape(self.joints, (-1, len(JOINTS)))[order]),
+            modes=np.asarray(np.reshape(self.modes, (-1, BINS, 3))[order]),
             traces=tuple(self.traces[k] for k in order),
             failures=tuple(_failure(one) for one in quarantined),
             failed=tuple(lost[text] for text in (list(self.variants)[m] for m in best)),
             unfinished=tuple(sorted({json.loads(text)["method"] for text in lost if text not in self.variants})),
         )
+
+
+def _binned(modes: Sequence[Sequence[float]]) -> Array:
+    """Return what a row has of its frames' likeliest modes, by bins (bins, 3): frames, sum of probabilities, right."""
+    found = np.zeros((BINS, 3), dtype=np.float32)
+    for count, told, right in modes:
+        found[min(int(told * BINS), BINS - 1)] += count * np.array([1.0, told, right])
+    return np.asarray(found)
 
 
 def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:

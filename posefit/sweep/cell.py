@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from posefit.arrays import Array
     from posefit.fitting.tracker import Frame
     from posefit.footage.scene import Scene
+    from posefit.geometry.skeleton import Skeleton
     from posefit.motion.motion import Motion
     from posefit.tracking.method import Choice
     from posefit.tracking.opening import Opening
@@ -130,6 +131,7 @@ def run_cell(cell: Cell) -> CellResult:
         "warnings": result.summary["warnings"],
         "evaluations_used": result.measures.evaluations,
         "joint_errors_mm": [round(float(error), 3) for error in errors],
+        "mode_reliability": _mode_reliability(result.found, truth, result.motion.skeleton),
         "trace": anytime_trace(result.found),
         "seconds": time.perf_counter() - began,
     }
@@ -255,6 +257,21 @@ def _joint_errors_mm(truth: "Array", estimate: "Array") -> "Array":
 
     difference = (truth - truth[:, :1]) - (estimate - estimate[:, :1])
     return np.asarray(1e3 * np.linalg.norm(difference, axis=-1).mean(axis=0))
+
+
+def _mode_reliability(found: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:
+    """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
+    import numpy as np
+
+    from posefit.posterior.calibration import reliability
+    from posefit.posterior.modes import likeliest_is_right
+
+    told = [(frame.modes, joints) for frame, joints in zip(found, truth, strict=True) if frame.modes]
+    if not told:
+        return []
+    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in told])
+    likely = np.array([max(mode.weight for mode in modes) for modes, _ in told])
+    return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]
 
 
 def packed_joints(**arrays: "Array") -> bytes:

@@ -58,7 +58,7 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     flat["view_degrees"] = ", ".join(f"{view:g}" for view in spec["view_degrees"])
     flat["size"] = "x".join(map(str, spec["size"]))
     for name, value in row.items():
-        if name in ("key", "spec", "status", "reasons", "trace", "joints"):
+        if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability", "joints"):
             continue
         if name == "joint_errors_mm":
             flat |= {f"{name}.{joint}": error for joint, error in zip(JOINTS, value, strict=True)}

@@ -7,11 +7,11 @@ from typing import cast
 import numpy as np
 
 from posefit.fitting.box import Space, Start
-from posefit.fitting.optimiser import Filter, Optimiser
+from posefit.fitting.optimiser import Filter, Niching, Optimiser
 from posefit.testing.case import Evaluate, OptimiserCase, check_population, checklist
 from posefit.testing.problem import pose_problem
 from posefit.testing.results import SkippedError, expect
-from posefit.testing.toy import Toy, sphere
+from posefit.testing.toy import Toy, ball, sphere
 
 BUDGET = 800
 SEEDS = range(5)
@@ -59,6 +59,27 @@ def _frame(optimiser: Optimiser) -> Iterator[None]:
     while len(proposals := optimiser.ask()):
         optimiser.tell(proposals, sphere(proposals))
         yield
+
+
+@checklist
+def modes(case: OptimiserCase) -> str:
+    """What modes returns are proposals that were told, the best first."""
+    space = Toy(3, ball)
+    optimiser = case.build(space)
+    if not hasattr(optimiser, "modes"):
+        raise SkippedError("it has no modes")
+    seen = np.concatenate([proposals for proposals, _ in case.steps(optimiser, space, sphere, 12)])
+    found = cast(Niching, optimiser).modes()
+    check_population(found, space)
+    expect(len(found), "after twelve populations, modes must return at least one proposal, got (0, 3)")
+    known = {row.tobytes() for row in seen}
+    strangers = sum(row.tobytes() not in known for row in np.asarray(found))
+    expect(not strangers, f"modes must return proposals that were told, got {strangers} others")
+    costs = sphere(found)
+    expect((np.diff(costs) >= 0.0).all(), "modes must return the best first, got a dearer one before a cheaper")
+    lowest = float(sphere(seen).min())
+    expect(costs[0] <= lowest, f"modes must begin with the best there was, cost {lowest:.4g}, got {costs[0]:.4g}")
+    return f"{len(found)} modes"
 
 
 @checklist

@@ -25,5 +25,6 @@
 | what every figure is called, its unit and meaning | measures.py |
 | the folder that appears whole, and goes on where it ended; its files | outputs.py, formats.py |
 | whether two tracks are the same | identity.py |
-| pictures, a recording for the Rerun viewer, the table that is printed | picture.py, recording.py, table.py |
+| pictures, what they are made of, a recording for the Rerun viewer | picture.py, drawing/, recording.py |
+| the table that is printed, with the sentence that says what was not determined | table.py |
 """

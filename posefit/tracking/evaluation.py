@@ -1,5 +1,6 @@
 """What a track is worth: its errors, beside baselines that anybody can reach."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,12 @@ def _costs(scene: Scene, training: Array, k: int, observation: Observation, beta
             camera, silhouette = coarser_camera(camera, factor), coarser_silhouette(silhouette, factor)
         costs += mismatch(areas(scene.body, camera, silhouette, poses, translations), beta)
     return costs
+
+
+def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:
+    """Return the mean at each level of values (levels, joints) of frames, by the level's name; None where none has."""
+    means = np.mean(frames, axis=(0, 2)) if frames else np.empty(0)
+    return {f"{100 * LEVELS[k]:.0f}": float(mean) for k, mean in enumerate(means)} or None
 
 
 class Evaluation:
@@ -127,20 +134,22 @@ class Evaluation:
         skeleton, truth = self._scene.body.skeleton, self._scene.truth
         sides, lost = np.full((2, len(self._frames)), np.nan)
         inside: list[NDArray[np.bool_]] = []
+        wide: list[Array] = []
         for k, frame in enumerate(self._frames):
             lost[k] = np.nan if frame.lost is None else frame.lost
             if frame.posterior is None:
                 continue
             sides[k] = unknown_sides(skeleton, frame.posterior, frame.pose)
+            within = joint_intervals(skeleton, frame.posterior, frame.pose).radii[:, 1:]
+            wide.append(within)
             if truth is not None:
                 off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)
-                within = joint_intervals(skeleton, frame.posterior, frame.pose).radii
-                inside.append((np.linalg.norm(off, axis=1) <= within)[:, 1:])
+                inside.append(np.linalg.norm(off, axis=1)[1:] <= within)
         asked, judged = np.isfinite(sides), np.isfinite(lost)
         known = asked & (sides == 0.0)
-        held = np.mean(inside, axis=(0, 2)) if inside else np.empty(0)
         measures = {
-            "coverage": {f"{100 * LEVELS[k]:.0f}": float(share) for k, share in enumerate(held)} or None,
+            "coverage": _by_level(inside),
+            "interval_mm": _by_level([1e3 * one for one in wide]),
             "unknown_rate": float(sides[asked].mean()) if asked.any() else None,
             "swapped_known_rate": float(swapped[known].mean()) if swapped is not None and known.any() else None,
             "lost_said_rate": float((lost[judged] >= LOST).mean()) if judged.any() else None,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
@@ -33,8 +34,11 @@ Rows = Sequence[Mapping[str, float]]
 State = dict[str, Any]
 
 
-def _intervals(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Any]:
-    """Return how far joints and angles may be off, NaN in frames of which nobody says; nothing where nobody does."""
+def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:
+    """Return how far joints and angles may be off, as poses.npz has it; nothing where nobody says.
+
+    `levels` (3,), `joint_radii` (T, 3, 27) metres, `angle_halves` (T, 3, 66) radians; NaN in frames without any.
+    """
     if all(frame.posterior is None for frame in frames):
         return {}
     radii = np.full((len(frames), len(LEVELS), len(JOINTS)), np.nan)
@@ -47,9 +51,15 @@ def _intervals(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Any]:
 
 
 def write_formats(
-    folder: Path, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State
+    folder: Path,
+    scene: Scene,
+    estimate: Motion,
+    frames: Sequence[Frame],
+    rows: Rows,
+    summary: State,
+    sure: Mapping[str, Array],
 ) -> None:
-    """Write every file of a track to a folder but for its pictures; see `FILES`."""
+    """Write every file of a track to a folder but for its pictures; see `FILES`. `sure` is what `intervals_of` gave."""
     from posefit.motion.amc import write_amc
     from posefit.motion.asf import write_asf
     from posefit.motion.bvh import write_bvh
@@ -63,7 +73,7 @@ def write_formats(
         joints=np.array(JOINTS),
         costs=np.array([frame.cost for frame in frames]),
         radii=scene.body.radii,
-        **_intervals(estimate.skeleton, frames),
+        **dict[str, Any](sure),
     )
     write_asf(folder / "skeleton.asf", estimate.skeleton)
     write_amc(folder / "track.amc", estimate)

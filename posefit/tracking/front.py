@@ -192,7 +192,7 @@ def track(
         if rerun is not None:
             from posefit.tracking.recording import record
 
-            record(rerun, scene, result.motion)
+            record(rerun, scene, result.motion, result.found)
     return result
 
 

@@ -108,6 +108,16 @@ class Measures:
             100.0,
         ),
     )
+    interval_mm: Mapping[str, float] | None = field(
+        default=None,
+        metadata=_about(
+            "interval",
+            "mm",
+            0,
+            "radius of the ball about a joint that is to hold it in 50, 80 or 95 of 100 cases, the mean over all "
+            "joints but the root and over the frames; where a method says how sure it is",
+        ),
+    )
     unknown_rate: float | None = field(
         default=None,
         metadata=_about(

@@ -21,9 +21,10 @@ from posefit.footage.video import VideoWriter
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import Posterior
 from posefit.reading import cut
-from posefit.tracking.formats import FILES, Rows, State, write_formats
+from posefit.tracking.formats import FILES, Rows, State, intervals_of, write_formats
 from posefit.tracking.identity import Told, difference
 from posefit.tracking.picture import Painter
+from posefit.tracking.table import undetermined
 
 _FOUND, _WORK = "found.jsonl", "work"
 _MINE = (*FILES, _FOUND, _WORK)  # what a track writes to its folder
@@ -186,15 +187,18 @@ class OutputFolder:
         import cv2
 
         folder, painter = self._building, Painter(scene)
-        write_formats(folder, scene, estimate, frames, rows, summary)
+        sure = intervals_of(scene.body.skeleton, frames)
+        radii = sure.get("joint_radii")
+        write_formats(folder, scene, estimate, frames, rows, summary, sure)
         filmed = scene.pictures() if scene.pictures is not None else repeat(None)
         writer: VideoWriter | None = None
-        for frame, observation, row, picture in zip(frames, scene.observations, rows, filmed, strict=False):
-            image = painter.add(frame, observation, row, picture)
+        told = repeat(None) if radii is None else radii
+        for frame, observation, row, picture, one in zip(frames, scene.observations, rows, filmed, told, strict=False):
+            image = painter.add(frame, observation, row, picture, one)
             if writer is None:
                 writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))
             writer.write(image)
         assert writer is not None
         writer.close()
-        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows)):
+        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, radii, undetermined(summary))):
             raise OSError("no room for summary.png")

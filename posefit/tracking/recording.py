@@ -1,14 +1,28 @@
-"""A recording for the Rerun viewer, through the optional library rerun-sdk: the body, what was filmed, the camera."""
+"""A recording for the Rerun viewer, through the optional library rerun-sdk: the body, what was filmed, the camera.
+
+Limbs that are unsure are dark, as the viewer's ground is, and another mode is drawn in thin lines, as in the overlay.
+"""
 
 import importlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
+from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import BONES, PARENTS
+from posefit.geometry.skeleton import BONES, PARENTS, SIDES, Skeleton
 from posefit.motion.motion import Motion
+from posefit.posterior.intervals import joint_intervals
+from posefit.posterior.modes import other_mode
+from posefit.tracking.drawing.body import SIDE_COLOURS, opacities
+from posefit.tracking.drawing.colours import OTHER
+from posefit.tracking.evaluation import LOST
+from posefit.tracking.picture import DRAWN, LIKELY
+
+THIN = 0.006  # metres: how thick the lines are of what else it may be
 
 
 def _library() -> Any:
@@ -27,8 +41,11 @@ def check_recording(path: str | Path) -> None:
         raise ValueError(f"{path}: expected a folder to write the recording to, got none of that name")
 
 
-def record(path: str | Path, scene: Scene, estimate: Motion) -> None:
-    """Write a recording (.rrd) of the motion in 3D, with the cameras and the masks they saw."""
+def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Frame]) -> None:
+    """Write a recording (.rrd) of the motion in 3D, with the cameras and the masks they saw.
+
+    `frames` are what a tracker found; they say how sure each is, and whether it is lost.
+    """
     rerun = _library()
     recording = rerun.RecordingStream("posefit")
     recording.save(str(path))
@@ -43,11 +60,34 @@ def record(path: str | Path, scene: Scene, estimate: Motion) -> None:
     joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
     parents = np.array(PARENTS[1:])
     radii = scene.body.radii.mean(axis=1)
-    for k, (points, observation) in enumerate(zip(joints, scene.observations, strict=True)):
+    for k, (points, observation, frame) in enumerate(zip(joints, scene.observations, frames, strict=True)):
         recording.set_time("frame", sequence=k)
         recording.set_time("time", duration=k / estimate.fps)
         bones = np.stack([points[parents], points[1:]], axis=1)
-        recording.log("world/body", rerun.LineStrips3D(bones, radii=radii, labels=list(BONES), show_labels=False))
+        look = {"radii": radii, "colors": _colours(estimate.skeleton, frame)}
+        recording.log("world/body", rerun.LineStrips3D(bones, **look, labels=list(BONES), show_labels=False))
+        recording.log("world/other", _other(rerun, estimate.skeleton, frame))
+        if frame.lost is not None and frame.lost >= LOST:
+            recording.log("lost", rerun.TextLog(f"frame {k} is lost", level=rerun.TextLogLevel.WARN))
         for v, silhouette in enumerate(observation.silhouettes):
             recording.log(f"world/camera-{v}/seen", rerun.SegmentationImage(silhouette.mask.astype(np.uint8)))
     recording.flush()
+
+
+def _colours(skeleton: Skeleton, frame: Frame) -> Array:
+    """Return the colour of each bone (26, 3): of its side, the darker the less sure it is."""
+    colours = np.array([SIDE_COLOURS[side][::-1] for side in SIDES[1:]], dtype=np.float64)
+    if frame.posterior is not None:
+        radii = joint_intervals(skeleton, frame.posterior, frame.pose).radii[DRAWN]
+        colours *= opacities(radii)[:, None]
+    return np.asarray(colours.round(), np.uint8)
+
+
+def _other(rerun: Any, skeleton: Skeleton, frame: Frame) -> Any:
+    """Return what the frame may show as well, in thin lines; what clears it where that is nothing."""
+    other = other_mode(skeleton, frame.modes, frame.pose, LIKELY)
+    if other is None:
+        return rerun.Clear(recursive=False)
+    points = skeleton.joints(other.pose, other.translation)
+    bones = np.stack([points[np.array(PARENTS[1:])], points[1:]], axis=1)
+    return rerun.LineStrips3D(bones, radii=THIN, colors=[OTHER[::-1]] * len(bones))

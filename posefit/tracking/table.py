@@ -36,11 +36,7 @@ def table(summary: Mapping[str, Any]) -> str:
             f"{held} {show} too little of the person: the pose is held or carried on, not searched, and may be off "
             "the person; IoU is that of the others"
         )
-    lines += [
-        f"{what} in {len(summary[name])} of {summary['frames']} frames"
-        for name, what in (("unknown_sides", "left and right: unknown"), ("lost_frames", "the person: lost"))
-        if summary[name]
-    ]
+    lines += [said] if (said := undetermined(summary)) else []
     if summary["body"] is not None:
         body = summary["body"]
         parts = [
@@ -64,6 +60,19 @@ def table(summary: Mapping[str, Any]) -> str:
         f"{MEASURES['evaluations_per_second'].number(summary['evaluations_per_second'])} poses a second"
     )
     return "\n".join(lines)
+
+
+def undetermined(summary: Mapping[str, Any]) -> str:
+    """Return in one sentence what the method says it did not determine; empty where that is nothing."""
+    sides, lost = (len(summary[name] or ()) for name in ("unknown_sides", "lost_frames"))
+    of = f" of {summary['frames']}"
+    parts = [f"left and right: unknown in {_frames(sides, of)}"] if sides else []
+    parts += [f"{_frames(lost, '' if sides else of)} lost"] if lost else []
+    return "; ".join(parts)
+
+
+def _frames(count: int, of: str) -> str:
+    return f"{count}{of} frame{'' if count == 1 and not of else 's'}"
 
 
 def _shown(summary: Mapping[str, Any], name: str) -> str:

@@ -111,6 +111,7 @@ def test_every_environment_is_told() -> None:
         "posefit/Fit-v0",
         "posefit/Track-v0",
         "posefit/Configure-v0",
+        "posefit/Modes-v0",
     ]
 
 

@@ -14,7 +14,8 @@ import posefit
 from posefit.cli import main
 from posefit_experiments import accuracy, builds, degradation, methods, views
 
-NAMES = ("sapso", "vsmm", "accuracy", "methods", "views", "degradation", "builds", "footage")
+NAMES = ("sapso", "vsmm", "accuracy", "methods", "views", "degradation", "builds", "footage", "modes")
+METHODS_OF_MODES = [word for name in ("known", "library", "cma*2", "annealed", "ribs") for word in ("--method", name)]
 
 
 def run(*words: object, cmu: str = "") -> Result:
@@ -63,6 +64,11 @@ def test_describing_the_commands_imports_none_of_the_experiments() -> None:
         (("degradation", "--optimiser", "spaso"), "did you mean 'sapso'"),
         (("footage", "no.mp4", "--roi", "0,0,9,9", "--frames", "5"), "expected A:B"),
         (("vsmm", "--workers", "0"), "workers must be at least 1, got 0"),
+        (("modes", "--instances", "0"), "instances must lie in 1 to 10000, got 0"),
+        (("modes", "--evaluations", "0"), "evaluations must be at least 1, got 0"),
+        (("modes", "--method", "cma*0"), "a method must be an optimiser such as cma, or cma*16"),
+        (("modes", "--method", "known*2"), "a method must be an optimiser to be made several times"),
+        (("modes", "--method", "spaso"), "did you mean 'sapso'"),
     ],
 )
 def test_a_mistake_is_one_line_and_status_2(words: tuple[str, ...], said: str) -> None:
@@ -177,3 +183,15 @@ def test_builds_say_how_far_parts_are_off(monkeypatch: pytest.MonkeyPatch) -> No
     assert all(one["mean"] == one["most"] for one in parts["average"].values())
     lines = list(builds.builds_lines(found))
     assert [line[:31] for line in lines] == ["1 view, stature given  fitted  ", "1 view, stature given  average "]
+
+
+def test_modes_are_scored_by_method_and_the_known_ones_are_all_found() -> None:
+    found = told("modes", "--instances", 2, "--evaluations", 400, "--workers", 1, *METHODS_OF_MODES)
+    rows = {one["method"]: one for one in found["methods"]}
+    assert list(rows) == ["known", "library", "cma*2", "annealed", "ribs"]
+    assert rows["known"]["peak_ratio"] == [1.0, 1.0, 1.0]
+    assert all(0.0 <= ratio <= 1.0 for one in rows.values() for ratio in one["peak_ratio"])
+    assert all(one["reported"] <= 10.0 for one in rows.values())
+    assert {row["instance"] for row in found["rows"]} == {10_000, 10_001}
+    again = told("modes", "--instances", 2, "--evaluations", 400, "--workers", 1, *METHODS_OF_MODES)
+    assert again == found

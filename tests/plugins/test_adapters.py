@@ -14,7 +14,7 @@ import posefit
 from posefit.registry import Registry, registry, registry_of
 from posefit.testing.toy import Toy
 
-EXTRAS = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna"}
+EXTRAS = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna", "ribs": "ribs"}
 
 
 @pytest.mark.parametrize("name", EXTRAS)
@@ -30,13 +30,13 @@ def test_an_absent_library_is_named_with_the_extra_to_install(name: str) -> None
 def test_listing_the_adapters_imports_none_of_their_libraries() -> None:
     script = (
         "import sys; from posefit.registry import registry; registry();"
-        "print([m for m in ('cma', 'nevergrad', 'pymoo', 'optuna', 'scipy.optimize', 'sklearn') if m in sys.modules])"
+        "print([m for m in ('cma', 'nevergrad', 'pymoo', 'optuna', 'ribs', 'scipy.optimize', 'sklearn') if m in sys.modules])"
     )
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert ran.stdout.splitlines()[-1] == "[]"
 
 
-@pytest.mark.parametrize("name", ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna"])
+@pytest.mark.parametrize("name", ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna", "ribs"])
 def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
     threads = threading.active_count()
     with warnings.catch_warnings():
@@ -61,6 +61,20 @@ def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
 def test_an_unknown_variant_is_named(name: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         posefit.track("walk", optimiser=name, frames=(0, 1), size=(60, 45), evaluations=100)
+
+
+def test_ribs_tells_the_two_hills_of_a_landscape_apart() -> None:
+    space, centres = Toy(2), np.array([[-0.5, -0.5], [0.5, 0.4]])
+    optimiser = registry().optimiser("ribs")(space, np.random.default_rng(0))
+
+    def costs(proposals: np.ndarray) -> np.ndarray:
+        return 50.0 * ((proposals[:, None] - centres) ** 2).sum(axis=-1).min(axis=1)
+
+    for _ in range(150):
+        proposals = optimiser.ask()
+        optimiser.tell(proposals, costs(proposals))
+    found = optimiser.modes()
+    assert np.linalg.norm(found[:, None] - centres, axis=-1).min(axis=0).max() < 0.1
 
 
 def test_a_variant_is_a_setting_too() -> None:

@@ -8,7 +8,7 @@ import pytest
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, angle_index
 from posefit.motion.built_in import average_skeleton
 from posefit.posterior.calibration import Recalibration
-from posefit.posterior.modes import Posterior, modes_of, track_modes
+from posefit.posterior.modes import Mode, Posterior, likeliest_is_right, modes_of, other_mode, track_modes
 
 SKELETON = average_skeleton()
 STILL = np.zeros(ANGLES)
@@ -50,6 +50,26 @@ def test_poses_that_are_alike_are_one_mode_and_one_that_is_turned_around_is_anot
     np.testing.assert_array_equal(modes[0].pose, turned(0))
     np.testing.assert_array_equal(modes[1].pose, turned(180))
     np.testing.assert_array_equal(modes[1].translation, [3.0, 4.0, 5.0])
+
+
+def test_the_other_mode_is_the_likeliest_that_a_pose_is_not_of() -> None:
+    modes = [Mode(weight, turned(degrees), np.zeros(3)) for weight, degrees in ((0.5, 0), (0.3, 180), (0.2, 90))]
+    assert other_mode(SKELETON, modes, turned(5)) is modes[1]
+    assert other_mode(SKELETON, modes, turned(170)) is modes[0]
+    assert other_mode(SKELETON, modes, turned(95), 0.4) is modes[0]
+    assert other_mode(SKELETON, modes, turned(5), 0.3) is None  # above, not at least
+    assert other_mode(SKELETON, modes[:1], turned(5)) is None
+    assert other_mode(SKELETON, [], turned(5)) is None
+
+
+def test_the_likeliest_mode_is_right_where_the_truth_is_alike_and_no_other_is_nearer() -> None:
+    modes = [Mode(weight, turned(degrees), np.zeros(3)) for weight, degrees in ((0.3, 180), (0.7, 0))]
+    away = np.array([3.0, 1.0, -2.0])
+    assert likeliest_is_right(SKELETON, modes, SKELETON.joints(turned(5), away))
+    assert not likeliest_is_right(SKELETON, modes, SKELETON.joints(turned(178), away))
+    quarter = SKELETON.joints(turned(80), away)  # nearer to the likeliest, but nowhere near
+    assert not likeliest_is_right(SKELETON, modes, quarter)
+    assert likeliest_is_right(SKELETON, modes, quarter, apart=1.0)
 
 
 def test_where_a_body_stands_makes_no_mode() -> None:

@@ -86,6 +86,16 @@ def row_of(cell: Cell, error: float, **more: Any) -> dict[str, Any]:
     } | more
 
 
+def sure(coverage: float, width: float, modes: list[list[float]], unknown: float = 0.0) -> dict[str, Any]:
+    """Return what a row says of how sure its method is: about its 80 % intervals, narrower and wider ones in step."""
+    return {
+        "coverage": {"50": coverage - 0.3, "80": coverage, "95": coverage + 0.15},
+        "interval_mm": {"50": 0.5 * width, "80": width, "95": 2.0 * width},
+        "unknown_rate": unknown,
+        "mode_reliability": modes,
+    }
+
+
 def ledger(path: Path, results: Iterable[CellResult], failures: list[tuple[Cell, list[str]]] | None = None) -> Path:
     """Write a ledger of results and of cells in quarantine with their reasons."""
     with Driver(path):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from posefit.report.contest import CLAIM, Contest, baseline_rows, claim, contest_of, leaderboard, paired_tests
-from posefit.report.curves import convergence, grid, joint_errors, reached
+from posefit.report.curves import certainty, convergence, grid, joint_errors, reached
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
-from tests.report.browser import ledger, result
+from tests.report.browser import ledger, result, sure
 from tests.sweep.fake import cells
 
 FIRST = cells(1)[0]
@@ -133,6 +133,35 @@ def test_a_method_without_traces_has_no_curve_and_reaches_nothing(tmp_path: Path
     assert found is not None
     assert [one is None for one in convergence(found, grid(found))] == [False, True]
     assert reached(found, grid(found))[1].max() == 0.0
+
+
+def test_certainty_is_pooled_over_runs_frame_by_frame(tmp_path: Path) -> None:
+    first, second = [[10, 0.55, 0.5], [30, 1.0, 0.9]], [[30, 0.55, 0.3]]
+    made = [
+        result(replace(FIRST, method="a", seed=0), 1.0, **sure(0.7, 50.0, first, 0.1), swap_rate=0.2),
+        result(replace(FIRST, method="a", seed=1), 1.0, **sure(0.8, 70.0, second, 0.5)),
+        *(result(replace(FIRST, method="b", seed=s), 2.0) for s in (0, 1)),
+    ]
+    found = contest_of(runs_of(Ledger(ledger(tmp_path / "results", made))))
+    assert found is not None
+    told = certainty(found)
+    assert told is not None
+    assert told["levels"] == [0.5, 0.8, 0.95]
+    a, b = told["methods"]
+    assert b is None
+    assert a["coverage"] == pytest.approx([0.45, 0.75, 0.9])
+    assert a["width"] == pytest.approx([30.0, 60.0, 120.0])
+    # of 40 frames near 0.55 are 5 + 9 right, of 30 at 1 are 27
+    assert [one[0] for one in a["reliability"]] == [40, 30]
+    np.testing.assert_allclose([one[1:] for one in a["reliability"]], [[0.55, 0.35], [1.0, 0.9]], rtol=1e-5)
+    assert a["ece"] == pytest.approx((40 * 0.2 + 30 * 0.1) / 70, rel=1e-5)
+    row = leaderboard(found)[0]
+    assert (row["unknown"], row["swapped"], row["coverage_80"]) == pytest.approx((0.3, 0.1, 0.75))
+    assert leaderboard(found)[1]["coverage_80"] is None
+
+
+def test_where_nobody_says_how_sure_he_is_there_is_no_certainty(tmp_path: Path) -> None:
+    assert certainty(contest(tmp_path, full({"a": 1.0, "b": 2.0}))) is None
 
 
 def test_without_errors_nobody_is_compared(tmp_path: Path) -> None:

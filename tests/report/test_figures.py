@@ -13,6 +13,8 @@ from posefit.statistics.ranks import Ranking, friedman
 pytest.importorskip("matplotlib")
 
 METHODS = ("sapso@pca", "cma_$x$@full", "vsmm")
+BINS = [[30, 0.55, 0.4], [90, 0.95, 0.9]]
+WIDTHS = [[20.0, 40.0, 80.0], [10.0, 20.0, 30.0], [50.0, 90.0, 160.0]]
 GRID = np.array([40.0, 400.0, 2440.0])
 
 
@@ -39,6 +41,8 @@ def every():
         "joint_errors": figures.joint_errors_figure(
             METHODS, ["head", "l_foot"], [band([30, 60]), band([40, 50]), band([9, 9])]
         ),
+        "reliability": figures.reliability_figure(METHODS, [BINS, BINS[:1], BINS[1:]]),
+        "coverage": figures.coverage_figure(METHODS, (0.5, 0.8, 0.95), WIDTHS, shares),
         "critical_difference": figures.critical_difference_figure(METHODS, ranking([1.2, 1.8, 3.0], ((0, 1),))),
     }
 
@@ -67,6 +71,22 @@ def test_a_curve_has_its_values_and_its_band():
     assert axes.lines[0].get_ydata().tolist() == [9, 5, 3]
     reach = axes.collections[0].get_paths()[0].vertices
     assert (reach[:, 1].min(), reach[:, 1].max()) == (2.5, 10.0)
+
+
+def test_a_reliability_diagram_has_its_diagonal_and_dots_as_large_as_there_are_frames():
+    axes = every()["reliability"].axes[0]
+    assert axes.lines[0].get_xdata().tolist() == axes.lines[0].get_ydata().tolist() == [0, 1]
+    assert axes.lines[1].get_xdata().tolist() == [0.55, 0.95]
+    assert axes.lines[1].get_ydata().tolist() == [0.4, 0.9]
+    small, large = axes.collections[0].get_sizes()
+    assert (small, large) == pytest.approx((8 + 20, 8 + 60))
+
+
+def test_coverage_stands_over_width_among_the_levels():
+    axes = every()["coverage"].axes[0]
+    assert [line.get_ydata()[0] for line in axes.lines[:3]] == [0.5, 0.8, 0.95]
+    assert axes.lines[4].get_xdata().tolist() == WIDTHS[1]
+    assert axes.lines[4].get_ydata().tolist() == [0.0, 0.3, 0.9]
 
 
 def test_bars_have_their_intervals_and_one_seed_has_none():

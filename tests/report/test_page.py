@@ -11,7 +11,7 @@ import pytest
 from posefit.report.repeat import repeat_command
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import run
-from tests.report.browser import browser, ledger, opened, result
+from tests.report.browser import browser, ledger, opened, result, sure
 from tests.sweep.fake import cells
 
 PLAN = """
@@ -197,6 +197,49 @@ def test_the_paper_is_tested(chromium: Any, swept: Path) -> None:
         said = seen.page.locator("#paper").inner_text()
         assert "particle@full" in said
         assert said.count("paired Wilcoxon with Holm over both, 6 pairs: p ") == 2
+
+
+@pytest.fixture(scope="module")
+def certain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("certain")
+    first = replace(cells(1)[0], frames=4)
+    modes = {"a": [[8, 0.55, 0.5], [32, 0.98, 0.9]], "b": [[40, 0.7, 0.2]]}
+    made = [
+        result(replace(first, method=m, seed=s), 1.0 + s, **(sure(0.8, 60.0, modes[m], 0.25) if m in modes else {}))
+        for m in ("a", "b", "silent")
+        for s in (0, 1, 2)
+    ]
+    assert run("report", ledger(folder / "results", made), "--out", folder / "report.html").exit_code == 0
+    return folder / "report.html"
+
+
+@pytest.mark.parametrize("width", [320, 390, 1280])
+def test_the_page_shows_how_sure_methods_are(chromium: Any, certain: Path, width: int) -> None:
+    with opened(chromium, certain, width) as seen:
+        page = seen.page
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        said = [re.sub(r"\s+", " ", text) for text in page.locator("#reliability title").all_text_contents()]
+        assert said == [
+            "a: 55 % said, 50 % right, of 24 frames",
+            "a: 98 % said, 90 % right, of 96 frames",
+            "b: 70 % said, 20 % right, of 120 frames",
+        ]
+        assert page.locator("#coverage circle").count() == 6
+        assert page.locator("#sure tbody tr").count() == 2
+        assert shown(page, "#sure", 4) == ["80.0 %"] * 2
+        page.locator("#toggles button[data-method='0']").click()
+        assert [page.locator(f"#{chart} polyline").count() for chart in ("reliability", "coverage")] == [1, 1]
+        heads = [" ".join(text.split()) for text in page.locator("#leaders th").all_inner_texts()]
+        place = next(k for k, head in enumerate(heads, 1) if head.startswith("said unknown"))
+        assert shown(page, "#leaders", place)[:3] == ["25.0", "25.0", "–"]
+        assert heads[place - 2].startswith("left/right swapped")
+        assert seen.complaints == []
+
+
+def test_where_nobody_says_how_sure_he_is_the_page_has_no_such_section(chromium: Any, swept: Path) -> None:
+    with opened(chromium, swept / "report.html") as seen:
+        assert seen.page.locator("#certainty, #to-certainty").count() == 0
+        assert "said unknown" not in seen.page.inner_text("#leaders")
 
 
 def test_hostile_names_are_shown_as_they_are_and_do_nothing(chromium: Any, hostile: Path) -> None:

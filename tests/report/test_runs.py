@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.report.runs import FIGURES, Runs, runs_of
+from posefit.report.runs import FIGURES, Runs, runs_of, shown_of
 from posefit.sweep.cell import Cell
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
@@ -80,12 +80,29 @@ def test_a_row_without_a_figure_has_none(tmp_path: Path) -> None:
     )
     found = runs_of(Ledger(ledger(tmp_path / "results", [bare])))
     assert {name for name in FIGURES if np.isnan(found.figures[name][0])} == {
-        "error", "skill_mean_pose", "baseline_mean_pose", "baseline_persistence", "baseline_nearest",
+        "error", "skill_mean_pose", "baseline_mean_pose", "baseline_persistence", "baseline_nearest", "unknown",
+        *(f"{kind}_{level}" for kind in ("coverage", "interval") for level in (50, 80, 95)),
     }  # fmt: skip
     assert found.figures["skill_nearest"].tolist() == [0.25]
     assert found.figures["evaluations"].tolist() == [FIRST.evaluations]
     assert found.figures["ms"].tolist() == [10.0]
     assert len(found.traces[0][0]) == 0
+
+
+def test_what_only_some_methods_say_is_shown_where_one_does(tmp_path: Path) -> None:
+    said = {"unknown_rate": 0.25, "coverage": {"50": 0.4, "80": 0.7, "95": 0.9}, "interval_mm": None}
+    silent = result(replace(FIRST, seed=1), 1.0)  # of a ledger from before there were posteriors
+    older = runs_of(Ledger(ledger(tmp_path / "older", [silent])))
+    newer = runs_of(Ledger(ledger(tmp_path / "newer", [silent, result(FIRST, 1.0, **said)])))
+    assert [name for name in shown_of(newer) if name not in shown_of(older)] == ["unknown", "coverage_80"]
+    assert newer.figures["coverage_80"][newer.seed == 0].tolist() == [0.7]
+
+
+def test_modes_are_counted_by_how_likely_they_are(tmp_path: Path) -> None:
+    made = result(FIRST, 1.0, mode_reliability=[[4, 0.55, 0.25], [2, 1.0, 0.5]])
+    (bins,) = runs_of(Ledger(ledger(tmp_path / "results", [made]))).modes
+    np.testing.assert_allclose(bins[[5, 9]], [[4, 2.2, 1], [2, 2, 1]], rtol=1e-6)
+    assert not np.delete(bins, [5, 9], axis=0).any()
 
 
 def test_seeds_of_any_size_keep_every_digit(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import csv
 import html.parser
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -17,7 +18,7 @@ from posefit.report.page.webpage import MARK, embedded, plain
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import fails, run
-from tests.report.browser import ledger, result
+from tests.report.browser import ledger, result, sure
 from tests.sweep.fake import cells
 
 FIRST = cells(1)[0]
@@ -148,6 +149,35 @@ def test_figures_tables_rows_and_iohprofiler_on_demand(results: Path, tmp_path: 
     assert len(rows) == 8 + 1
     assert {row["status"] for row in rows} == {"done", "quarantined"}
     assert sorted(path.name for path in places["iohprofiler"].iterdir()) == ["random@pca", "sapso@pca"]
+
+
+def test_methods_that_say_how_sure_they_are_have_figures_of_it(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    says = sure(0.8, 60.0, [[4, 0.9, 0.5]])
+    made = [result(replace(FIRST, method=m, seed=s), 1.0 + s, **says) for m in "ab" for s in (0, 1)]
+    made += [result(replace(FIRST, method="silent", seed=s), 3.0) for s in (0, 1)]
+    words = ["--figures", tmp_path / "figures", "--csv", tmp_path / "rows.csv"]
+    done = run("report", ledger(tmp_path / "results", made), "--out", tmp_path / "report.html", *words)
+    assert done.exit_code == 0, done.stderr
+    drawn = {path.name for path in (tmp_path / "figures").iterdir()}
+    assert drawn >= {f"{name}.{kind}" for name in ("reliability", "coverage") for kind in ("png", "pdf")}
+    head, *rows = (tmp_path / "figures" / "leaderboard.csv").read_text().splitlines()
+    assert "said unknown,80 % interval holds,80 % interval (mm)" in head
+    assert ",0.8,60.0," in rows[0]
+    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
+        first = next(csv.DictReader(file))
+    assert (first["interval_mm.80"], first["coverage.80"]) == ("60.0", "0.8")
+    assert "mode_reliability" not in first
+    data = Page(tmp_path / "report.html").data
+    assert [one is None for one in data["certainty"]["methods"]] == [False, False, True]
+    assert data["rows"]["coverage_80"] == [0.8] * 4 + [None] * 2
+
+
+def test_a_ledger_from_before_there_were_posteriors_has_no_such_columns(results: Path, tmp_path: Path) -> None:
+    assert run("report", results, "--out", tmp_path / "report.html").exit_code == 0
+    data = Page(tmp_path / "report.html").data
+    assert data["certainty"] is None
+    assert not [name for name in (*data["columns"], *data["rows"]) if re.match("coverage|interval|unknown", name)]
 
 
 @pytest.mark.parametrize(

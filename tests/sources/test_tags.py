@@ -63,6 +63,8 @@ TAGS = (
     "GODSILL2004 (step)",
     "DUNN2023 (pooled CDF)",
     "GUO2017 (3)",
+    "CEC2013 (peak ratio)",
+    "BRIER1950 (score)",
     "VSMM 1.3",
     "VSMM 1.4",
     "VSMM 2.1",

@@ -318,6 +318,24 @@ class IgnoresTheStart(Sound):
         self.population = allowed if len(allowed) == 40 else self.population
 
 
+class InventsModes(Sound):
+    def modes(self) -> Array:
+        return self.space.draw(np.random.default_rng(0), 3)
+
+
+class BackwardModes(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, rng)
+        self.told: list[tuple[float, Array]] = []
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        self.told += list(zip(costs.tolist(), np.array(proposals), strict=True))
+        super().tell(proposals, costs)
+
+    def modes(self) -> Array:
+        return np.array([row for _, row in sorted(self.told, key=lambda one: -one[0])])
+
+
 class Slow(Sound):
     def ask(self) -> Array:
         time.sleep(0.06 * len(self.population))
@@ -525,6 +543,8 @@ OPTIMISERS: dict[type, tuple[str, ...]] = {
     SharesItsGenerator: ("deep_copy", "pickled"),
     LeavesThreads: ("nothing_left",),
     IgnoresTheStart: ("start",),
+    InventsModes: ("modes",),
+    BackwardModes: ("modes",),
     Slow: ("speed",),
     HangsOnNonsense: ("nonsense_settings",),
     WrongSignature: ("construction", "shape"),

@@ -22,7 +22,7 @@ from tests.testing import planted
 
 QUICK = ("sapso", "random", "cma")
 SLOW = ("pso", "particle", "annealed", "scipy", "scipy:dual_annealing")
-ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna")
+ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna", "ribs")
 
 
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW + ADAPTERS)])

@@ -22,7 +22,7 @@ from posefit.posterior.modes import Posterior
 from posefit.tracking.evaluation import Evaluation
 from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.run import follow
-from posefit.tracking.table import table
+from posefit.tracking.table import table, undetermined
 from tests.files import arrays
 from tests.tracking.test_evaluation import found
 
@@ -60,9 +60,8 @@ def evaluated(scene: Scene, frames: Iterable[Frame]) -> tuple[list[dict[str, flo
 def test_where_nobody_says_anything_nothing_is_said() -> None:
     scene = walk()
     rows, measures = evaluated(scene, [replace(frame, posterior=None) for frame in doubtful(scene, np.zeros(FRAMES))])
-    assert (measures.coverage, measures.unknown_rate, measures.swapped_known_rate, measures.lost_said_rate) == (
-        None,
-    ) * 4
+    said = ("coverage", "interval_mm", "unknown_rate", "swapped_known_rate", "lost_said_rate")
+    assert [getattr(measures, name) for name in said] == [None] * 5
     assert np.isnan([[row["unknown_sides"], row["lost"]] for row in rows]).all()
 
 
@@ -104,6 +103,40 @@ def test_coverage_is_the_share_of_joints_that_are_near_enough() -> None:
     within = {"50": 1.5382, "80": 2.1544, "95": 2.7955}  # quantiles of Maxwell's law
     found_within = evaluated(scene, lost)[1].coverage
     assert found_within == {name: pytest.approx((off[:, 1:] <= 0.02 * r).mean()) for name, r in within.items()}
+
+
+def test_the_width_is_the_mean_radius_of_the_frames_that_say_one() -> None:
+    scene = walk()
+    frames = doubtful(scene, np.zeros(FRAMES))
+    frames[2] = replace(frames[2], posterior=None)
+    _, measures = evaluated(scene, frames)
+    # nothing but the pose itself, blurred by 2 cm: Maxwell's law
+    assert measures.interval_mm == {
+        name: pytest.approx(20.0 * r, abs=0.5) for name, r in {"50": 1.5382, "80": 2.1544, "95": 2.7955}.items()
+    }
+    unknown_truth = replace(scene, truth=None)
+    collected = Evaluation(unknown_truth, None, np.zeros((1, 63)), 0.5)
+    for frame, seen in zip(frames, scene.observations, strict=True):
+        collected.add(frame, seen)
+    without = collected.close()[1]
+    assert without.interval_mm == measures.interval_mm
+    assert without.coverage is None
+
+
+@pytest.mark.parametrize(
+    ("sides", "lost", "said"),
+    [
+        (41, 3, "left and right: unknown in 41 of 60 frames; 3 frames lost"),
+        (41, 0, "left and right: unknown in 41 of 60 frames"),
+        (1, 1, "left and right: unknown in 1 of 60 frames; 1 frame lost"),
+        (0, 3, "3 of 60 frames lost"),
+        (0, 0, ""),
+        (None, None, ""),
+    ],
+)
+def test_one_sentence_says_what_was_not_determined(sides: int | None, lost: int | None, said: str) -> None:
+    numbers = {name: None if count is None else list(range(count)) for name, count in (("s", sides), ("l", lost))}
+    assert undetermined({"frames": 60, "unknown_sides": numbers["s"], "lost_frames": numbers["l"]}) == said
 
 
 def test_frames_are_said_lost_from_a_half_on() -> None:
@@ -180,7 +213,7 @@ def test_what_is_held_or_lost_is_blank_for_other_programs_and_marked_in_the_tabl
     assert summary["lost_frames"] == [4]
     assert summary["lost_said_rate"] == pytest.approx(1 / 6)
     text = table(result.summary)
-    assert "\nleft and right: unknown in 3 of 6 frames\nthe person: lost in 1 of 6 frames\n" in text
+    assert "\nleft and right: unknown in 3 of 6 frames; 1 frame lost\n" in text
 
 
 def test_frames_and_tracks_have_modes(told: Any) -> None:
@@ -194,7 +227,7 @@ def test_frames_and_tracks_have_modes(told: Any) -> None:
     assert result.modes[0].poses.shape == (FRAMES, 66)
     # whose body faces the other way has his left where his right was
     assert "left and right: unknown in 6 of 6 frames" in table(result.summary)
-    assert "lost in" not in table(result.summary)
+    assert "frames lost" not in table(result.summary)
 
 
 def test_rows_that_are_no_tracks_make_no_modes_of_the_whole(told: Any) -> None:

@@ -2,7 +2,7 @@
 
     papers.py        sapso, vsmm
     measurements.py  accuracy, methods, views, degradation, builds, footage, people,
-                     posterior
+                     posterior, modes
     benchmark.py     posefit bench
     options.py       options that several of them have
 
@@ -29,6 +29,7 @@ REPRODUCED = (
     measurements.footage_command,
     measurements.people_command,
     measurements.posterior_command,
+    measurements.modes_command,
 )
 
 

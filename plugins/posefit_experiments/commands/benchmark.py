@@ -118,5 +118,7 @@ def _follow(as_json: bool, frames: int) -> None:
     say(f"following somebody for {frames:,} frames; a thousand take one or two minutes ...")
     figures = follow_figures(frames)
     click.echo(
-        json_line(figures) if as_json else "\n".join(f"{name:12} {value:.4g}" for name, value in figures.items())
+        json_line(figures)
+        if as_json
+        else "\n".join(f"{name:12} {round(value, 3):,g}" for name, value in figures.items())
     )

@@ -141,6 +141,19 @@ def posterior_command(as_json: bool, **asked: Any) -> None:
     _print(experiment.posterior(**asked, progress=bar), tables.posterior_lines, as_json)
 
 
+@click.command("modes")
+@click.option("--instances", type=int, default=30, show_default=True, help="Of the niching task, held out ones.")
+@click.option("--method", "methods", multiple=True, help="An optimiser; cma*16 is 16 searches. Again for more of them.")
+@click.option("--evaluations", type=int, default=19520, show_default=True, help="Of every method, on each instance.")
+@workers(None)
+@JSON
+def modes_command(as_json: bool, **asked: Any) -> None:
+    """Who finds all poses of nearly one silhouette: peak ratio and calibration, by method, on the niching task."""
+    from posefit_experiments.niches import niches, niches_lines
+
+    _print(niches(**asked, progress=bar), niches_lines, as_json)
+
+
 def _print(told: dict[str, Any], lines: Callable[[dict[str, Any]], Iterable[str]], as_json: bool) -> None:
     for line in [json_line(told)] if as_json else lines(told):
         click.echo(line)

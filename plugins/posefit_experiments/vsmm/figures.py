@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.geometry.skeleton import PARENTS
 from posefit.silhouette.foreground import Image
-from posefit.tracking.picture import draw_body, side_view
+from posefit.tracking.drawing.body import draw_body, side_view
 from posefit_experiments.vsmm.activities import ACTIVITIES, FPS, Film
 from posefit_experiments.vsmm.experiment import ELBOW, HAND, both_joints, projected_cm
 from posefit_experiments.vsmm.told import ModelsTold, told_by

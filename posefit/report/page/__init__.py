@@ -8,6 +8,7 @@
 | what every part uses: elements, numbers in words, the command that runs a row again | base.js |
 | tables that any column sorts: leaderboard, all runs, failures | tables.js |
 | curves and joints, and the buttons that show and hide methods | charts.js |
+| how sure methods say they are, and whether that is so | certainty.js |
 | mean ranks with the critical difference, paired tests, the paper's claim | ranks.js |
 | bodies on a canvas; cards and the window that plays a track | body.js, gallery.js |
 | one method against all others | author.js |

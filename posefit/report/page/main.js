@@ -88,7 +88,8 @@ if (D.leaderboard) {
   comparison();
   curves();
   jointErrors();
-} else ["leaderboard", "comparison", "curves", "joints"].forEach((id) => $(id).remove());
+  certainty();
+} else ["leaderboard", "comparison", "curves", "joints", "certainty", "to-certainty"].forEach((id) => $(id).remove());
 if (METHODS.length) runs();
 else ["gallery", "author", "rows"].forEach((id) => $(id).remove());
 failures();

@@ -8,7 +8,7 @@ import numpy as np
 
 from posefit.report import colours
 
-SCRIPTS = ("base", "tables", "charts", "ranks", "body", "gallery", "author", "main")  # in this order
+SCRIPTS = ("base", "tables", "charts", "certainty", "ranks", "body", "gallery", "author", "main")  # in this order
 PART = "<!--part-->"  # where style, data and scripts go
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
 _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}

@@ -1,0 +1,211 @@
+"""Modes-v0: one silhouette that several poses explain, an episode of proposals and reports."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import error, spaces
+
+from posefit import Observation, SearchSpace, Task
+from posefit.arrays import Array
+from posefit.fitting.check import whole
+from posefit.niching.instance import SIZE, niche_instance, niche_space
+from posefit.niching.scores import LEAST, LEVELS_MM, scored
+from posefit.posterior.modes import Posterior
+from posefit.silhouette.cost import project
+from posefit_envs.drawing import MODES, Screen, check_mode, portray
+from posefit_envs.instance import RESERVED, ArgumentError, Selection, World, approved, instance_number
+from posefit_envs.search import Doorkeeper, Image, Scenery
+
+MAX_EVALUATIONS = 2000
+MAX_REPORTS = 10
+NOTHING = 2.0  # the Brier score of a report of nothing: as of one whose weight is all in the wrong place
+
+
+class ModesEnv(gym.Env[Image, Any]):
+    """
+    ## Description
+    A person was seen as a silhouette that two or more known poses have, or nearly have: a stride and the one half a
+    cycle later, somebody who comes and somebody who goes, an arm before the trunk or behind it. The episode is a search
+    for all of them, and for how likely each is. Each step proposes a pose, and may report it.
+
+    ## Action Space
+    `Box(-1, 1, (9,), float32)`:
+
+    | Num | Meaning | Min and max stand for |
+    |---|---|---|
+    | 0 | root yaw | all round |
+    | 1, 2 | root pitch, roll | 8 degrees to either side |
+    | 3, 4, 5 | legs and trunk | the range of recorded walks and runs |
+    | 6, 7 | arms | the range of all recorded motions |
+    | 8 | the report: above 0, the pose is reported, with this weight among all that are reported | |
+
+    Actions outside are clipped, with one warning. float64 is taken as it is, and not rounded.
+
+    ## Observation Space
+    `Box(0, 255, (96, 128, 2), uint8)`:
+
+    | Channel | Meaning |
+    |---|---|
+    | 0 | the observed silhouette: 255 is the person |
+    | 1 | the silhouette of the last proposal; empty before the first |
+
+    ## Rewards
+    What a report adds to the peak ratio, which is the share of the known poses that are found, the mean of the levels
+    15, 30 and 60 mm. With the last step, minus the Brier score of all reports: 0 where all the weight is near the pose
+    whose silhouette it is, 2 where none is or nothing was reported.
+
+    ## Starting State
+    An instance of the niching task, see `posefit.niching`. Without `instance` each reset draws a number of the `split`;
+    `reset(options={"instance": 17})` chooses one.
+
+    ## Episode End
+    Terminates when `max_reports` poses are reported; truncated after `max_evaluations` proposals.
+
+    ## Information
+    `cost` of the proposal, 0 to 100, `evaluations`, `reports`, `instance`; with the last step `peak_ratio` (3,) at the
+    three levels, `brier` and `log_score`. A reset gives `instance` alone.
+
+    ## Arguments
+    - `instance=None`: 0 to 19,999. `split="train"` draws of 0 to 9,999, `"test"` of the others, which are held out.
+    - `max_reports=10`: 1 to 10, `max_evaluations=2000`.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
+
+    def __init__(
+        self,
+        *,
+        instance: int | None = None,
+        split: str = "train",
+        max_reports: int = MAX_REPORTS,
+        max_evaluations: int = MAX_EVALUATIONS,
+        render_mode: str | None = None,
+    ) -> None:
+        if split not in RESERVED:
+            raise ArgumentError(f"split must be one of {', '.join(RESERVED)}, got {split!r}")
+        if approved(whole, "max_reports", max_reports, 1) > MAX_REPORTS:
+            raise ArgumentError(f"max_reports must be at most {MAX_REPORTS}, got {max_reports}")
+        approved(whole, "max_evaluations", max_evaluations, 2)
+        check_mode(render_mode)
+        self.render_mode = render_mode
+        number = None if instance is None else instance_number(instance)
+        self._selection = Selection(World(), number, split, errors=True)
+        self._reports, self._most = int(max_reports), int(max_evaluations)
+        self._shape = (niche_space().dimensions + 1,)
+        self.action_space = spaces.Box(-1.0, 1.0, self._shape, np.float32)
+        self.observation_space = spaces.Box(0, 255, (SIZE[1], SIZE[0], 2), np.uint8)  # type: ignore[assignment]
+        self._door = Doorkeeper(self._shape[0])
+        self._quest: Quest | None = None
+        self._screen = Screen(self.metadata["render_fps"])
+
+    @property
+    def search_space(self) -> SearchSpace:
+        """The space of proposals, an action without its last number."""
+        return niche_space()
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Image, dict[str, Any]]:
+        """Begin with an instance; `options={"instance": 17}` chooses it."""
+        super().reset(seed=seed)
+        number = self._selection.number(options, lambda: self.np_random)
+        self._quest = Quest(number)
+        if self.render_mode == "human":
+            self.render()
+        return self._quest.scenery.picture, {"instance": number}
+
+    def step(self, action: Any) -> tuple[Image, float, bool, bool, dict[str, Any]]:
+        """Propose a pose, and report it where the last number is above 0."""
+        quest = self._current()
+        if quest.ended:
+            raise error.ResetNeeded("the episode has ended: reset before the next step")
+        proposal = self._door.proposals(action, self._shape)
+        before = quest.peak_ratio
+        quest.look(proposal[:-1], float(proposal[-1]))
+        reward = float(np.mean(quest.peak_ratio) - np.mean(before))
+        terminated = len(quest.weights) >= self._reports
+        truncated = not terminated and quest.evaluations >= self._most
+        quest.ended = terminated or truncated
+        info: dict[str, Any] = {
+            "cost": quest.cost,
+            "evaluations": quest.evaluations,
+            "reports": len(quest.weights),
+            "instance": quest.posed.number,
+        }
+        if quest.ended:
+            reward -= quest.brier
+            info |= {"peak_ratio": quest.peak_ratio, "brier": quest.brier, "log_score": quest.log_score}
+        if self.render_mode == "human":
+            self.render()
+        return quest.picture, reward, terminated, truncated, info
+
+    def render(self) -> Any:
+        """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
+        if self.render_mode is None:
+            return None
+        quest = self._current()
+        picture = portray(quest.scenery, quest.pose, quest.posed.problem.space.anchor, quest.label)
+        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._screen.close()
+
+    def _current(self) -> "Quest":
+        if self._quest is None:
+            raise error.ResetNeeded("reset must come before anything else")
+        return self._quest
+
+
+class Quest:
+    """The state of one search for several poses."""
+
+    def __init__(self, number: int) -> None:
+        self.posed = niche_instance(number)
+        problem = self.posed.problem
+        self.scenery = Scenery(
+            Task(problem.body, problem.cameras, MAX_EVALUATIONS, None, problem.space.anchor.copy()),
+            Observation(problem.silhouettes, problem.space.anchor.copy()),
+        )
+        self.cost, self.evaluations, self.ended = np.inf, 0, False
+        self.pose: Array | None = None
+        self.weights: list[float] = []
+        self._poses: list[Array] = []
+        self.peak_ratio, self.brier, self.log_score = np.zeros(len(LEVELS_MM)), NOTHING, -float(np.log(LEAST))
+
+    def look(self, proposal: Array, weight: float) -> None:
+        """Evaluate a proposal (d,), and report it where its weight is above 0."""
+        problem = self.posed.problem
+        poses, translations = problem.decode(proposal[None])
+        self.cost, self.pose = float(problem.cost(poses, translations)[0]), poses[0]
+        self.evaluations += 1
+        if weight > 0.0:
+            self._poses.append(poses[0])
+            self.weights.append(weight)
+            self._report()
+
+    def _report(self) -> None:
+        """Judge all that was reported so far."""
+        if self.weights:
+            places = np.tile(self.posed.problem.space.anchor, (len(self._poses), 1))
+            told = scored(self.posed, Posterior(np.array(self._poses), places, np.array(self.weights)))
+            self.peak_ratio = np.array([told.peak_ratio[level] for level in LEVELS_MM])
+            self.brier, self.log_score = told.brier, told.log_score
+
+    @property
+    def picture(self) -> Image:
+        """The picture (height, width, 2): what was observed, and the last proposal."""
+        picture = self.scenery.picture
+        if self.pose is not None:
+            problem = self.posed.problem
+            picture[..., 1] = 255 * project(problem.body, problem.cameras[0], self.pose, problem.space.anchor)
+        return picture
+
+    @property
+    def label(self) -> str:
+        """What is written into the picture."""
+        if self.pose is None:
+            return f"instance {self.posed.number}, {self.posed.kind}"
+        return f"cost {self.cost:.1f}, {len(self.weights)} reported, {self.evaluations} evaluations"

@@ -1,0 +1,130 @@
+"""Niching by pyribs for posefit: `ribs`, evolution strategies on an archive of dominated novelty search.
+
+B. Tjanaka et al., pyribs: a bare-bones Python library for quality diversity optimization, GECCO 2023; R. Bahlous-Boldi,
+M. Faldor et al., Dominated novelty search: rethinking local competition in quality-diversity, arXiv:2502.00593, 2025;
+`pip install posefit[ribs]`.
+
+>>> import posefit
+>>> track = posefit.track("walk", optimiser="ribs", frames=(0, 3))
+>>> track.summary["iou"] > 0.5
+True
+"""
+
+from typing import Any, final
+
+import numpy as np
+
+from posefit import hookimpl
+from posefit.arrays import Array
+from posefit.fitting.box import Space
+from posefit.fitting.bridge import bearable
+from posefit.fitting.check import at_least, positive
+from posefit.hooks import RegisterOptimiser
+
+LEAST = 4  # proposals of a strategy: half of them are its parents
+
+
+@final
+class Ribs:
+    """CMA-ES that restarts from an archive of dominated novelty search: from whoever is far from all that are better.
+
+    An archive of `capacity` proposals keeps those that are farthest from their nearest better ones. Several evolution
+    strategies search at a time, and each starts again, after so many populations, from a random one of them. `modes`
+    are the proposals of the archive that are better than all their neighbours.
+
+    Settings:
+        particles: proposals at a time, those of all strategies together, 4 or more.
+        strategies: that search at a time, 1 or more, with at least 4 proposals each.
+        capacity: proposals that the archive holds, 2 or more.
+        neighbours: better ones whose distance counts, and neighbours that a mode is better than, 1 or more.
+        populations: of a strategy until it starts again, 1 or more.
+        step: first standard deviation of a strategy, in half-ranges of the box, above 0; at most that of the start.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        particles: int = 24,
+        strategies: int = 2,
+        capacity: int = 100,
+        neighbours: int = 1,
+        populations: int = 40,
+        step: float = 0.3,
+    ) -> None:
+        from ribs.archives import DNSArchive
+        from ribs.emitters import EvolutionStrategyEmitter
+
+        at_least("particles", particles, LEAST)
+        at_least("strategies", strategies, 1)
+        at_least("capacity", capacity, 2)
+        at_least("neighbours", neighbours, 1)
+        at_least("populations", populations, 1)
+        positive("step", step)
+        self._first, self._asked = space.draw(rng, particles), False
+        self._space, self._home, self._neighbours = space, self._first[0], neighbours
+        self._archive: Any = DNSArchive(
+            solution_dim=space.dimensions,
+            measure_dim=self._where(self._first).shape[1],
+            capacity=capacity,
+            k_neighbors=neighbours,
+            seed=int(rng.integers(2**31)),
+        )
+        if space.start is not None:
+            step = min(step, max(float(np.mean(space.start.spread)), 1e-6))
+        strategies = min(strategies, particles // LEAST)
+        self._strategies: list[Any] = [
+            EvolutionStrategyEmitter(
+                self._archive,
+                x0=self._first[k],
+                sigma0=step,
+                ranker="obj",
+                selection_rule="mu",
+                restart_rule=populations,
+                batch_size=particles // strategies + (k < particles % strategies),
+                seed=int(rng.integers(2**31)),
+            )
+            for k in range(strategies)
+        ]
+
+    def ask(self) -> Array:
+        """Return the next population (n, d)."""
+        if self._archive.empty:
+            return self._first.copy()
+        self._asked = True
+        asked = np.concatenate([one.ask() for one in self._strategies])
+        return self._space.repair(asked, self._home)
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Let the archive choose among its proposals and these, and every strategy learn from its own."""
+        values, where = -bearable(costs), self._where(proposals)
+        added = self._archive.add(proposals, values, where)
+        if self._asked:
+            stops = np.cumsum([one.batch_size for one in self._strategies])
+            for one, stop in zip(self._strategies, stops.tolist(), strict=True):
+                mine = slice(stop - one.batch_size, stop)
+                about = {name: value[mine] for name, value in added.items()}
+                one.tell(proposals[mine], values[mine], where[mine], about)
+
+    def modes(self) -> Array:
+        """Return the proposals (k, d) that are better than all their neighbours, the best first."""
+        kept = self._archive.data()
+        proposals, costs = np.asarray(kept["solution"]), -np.asarray(kept["objective"])
+        order = np.argsort(costs, kind="stable")
+        where = np.asarray(kept["measures"])[order]
+        away = np.linalg.norm(where[:, None] - where[None], axis=-1)
+        near = np.argsort(away, axis=1, kind="stable")[:, 1 : self._neighbours + 1]
+        best = (near > np.arange(len(order))[:, None]).all(axis=1)
+        return np.asarray(proposals[order][best])
+
+    def _where(self, proposals: Array) -> Array:
+        """Return points (n, m) as far apart as proposals (n, d) are: what wraps around goes round a circle."""
+        turns = proposals[:, self._space.periodic] * np.pi
+        return np.column_stack([proposals[:, ~self._space.periodic], np.cos(turns) / np.pi, np.sin(turns) / np.pi])
+
+
+@hookimpl
+def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `ribs`."""
+    register("ribs", Ribs, needs=("ribs", "posefit[ribs]"))

@@ -1,0 +1,121 @@
+"""A body in a picture, and the thin bones of what else it may be: what is unsure is faint."""
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
+from posefit.silhouette.foreground import Image
+from posefit.silhouette.rasteriser import NEAR
+from posefit.tracking.drawing.colours import BACKGROUND, LEFT, MIDDLE, OTHER, RIGHT
+
+DISTANCE = 6.0  # metres from the view from the side
+SURE, UNSURE = 0.05, 0.3  # metres: a joint's 80 % interval, up to which it is drawn solid, and from which on faintest
+FAINTEST = 0.2  # how much of a faintest limb's colour is left
+_PARENTS = np.array(PARENTS[1:])
+SIDE_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}
+_ENDS = [JOINTS.index(side + name) for side in "lr" for name in ("wrist", "foot")]
+
+
+def opacities(radii: Array) -> Array:
+    """Return how solid each bone (26,) is drawn, 0 to 1, given how far its joints (27,) may be off in metres.
+
+    A bone is as sure as the less sure of its two ends. Where nobody says, which is NaN, it is solid.
+    """
+    solid = np.clip((UNSURE - np.nan_to_num(radii)) / (UNSURE - SURE), FAINTEST, 1.0)
+    return np.asarray(np.minimum(solid[_PARENTS], solid[1:]))
+
+
+def side_camera(body: Body, camera: Camera, pose: Array, translation: Array, side: int) -> Camera:
+    """Return a camera that sees the whole body from the right of another one."""
+    joints = body.skeleton.joints(pose, translation)
+    middle = 0.5 * (joints.min(axis=0) + joints.max(axis=0))
+    back = -camera.rotation[2]
+    azimuth = math.atan2(back[0], back[2]) + 0.5 * math.pi
+    tall = 1.25 * (float(np.ptp(joints[:, 1])) + 2.0 * float(body.radii.max()))
+    return Camera.around(middle, azimuth, DISTANCE, (side, side), 2.0 * math.atan(0.5 * tall / DISTANCE))
+
+
+def side_view(
+    body: Body, camera: Camera, pose: Array, translation: Array, side: int, solid: Array | None = None
+) -> Image:
+    """Return the body (side, side, 3) seen from the camera's right: left limbs orange, right ones blue."""
+    image = np.full((side, side, 3), BACKGROUND, dtype=np.uint8)
+    draw_body(image, body, side_camera(body, camera, pose, translation, side), pose, translation, solid)
+    return image
+
+
+def draw_body(
+    image: Image, body: Body, camera: Camera, pose: Array, translation: Array, solid: Array | None = None
+) -> None:
+    """Draw the body into an image of a camera's size, far bones first: left limbs orange, right ones blue.
+
+    `solid` (26,) is how much of each bone's colour is left; what lies behind shows through the rest.
+    """
+    for bone, pixels, radii, shade in _cones(body, camera, pose, translation):
+        colour = tuple(min(255.0, shade * c) for c in SIDE_COLOURS[SIDES[bone + 1]])
+        _cone(image, pixels, radii, colour, 1.0 if solid is None else float(solid[bone]))
+
+
+def solid_map(body: Body, camera: Camera, pose: Array, translation: Array, solid: Array) -> Array:
+    """Return how solid a body is at each pixel (height, width) of a camera, 0 to 1; 1 where there is none."""
+    image = np.full((camera.height, camera.width), 255, dtype=np.uint8)
+    for bone, pixels, radii, _ in _cones(body, camera, pose, translation):
+        cv2.fillConvexPoly(image, _hull(pixels, radii), round(255.0 * float(solid[bone])), cv2.LINE_8, 4)
+    return image / 255.0
+
+
+def draw_stick(image: Image, body: Body, camera: Camera, pose: Array, translation: Array) -> None:
+    """Draw a body's bones as thin lines; wrists and feet have the colours of their sides."""
+    pixels, depths = camera.project(body.skeleton.joints(pose, translation))
+    thick = max(1, round(camera.height / 240))
+    # pixel centres are at +0.5 here, and at whole numbers in OpenCV
+    points = np.rint((np.nan_to_num(pixels) - 0.5) * 16).astype(np.int64)
+    for joint, parent in enumerate(PARENTS[1:], 1):
+        if min(depths[joint], depths[parent]) > NEAR:
+            cv2.line(image, _point(points[parent]), _point(points[joint]), OTHER, thick, cv2.LINE_AA, 4)
+    for joint in _ENDS:
+        if depths[joint] > NEAR:
+            colour = SIDE_COLOURS[SIDES[joint]]
+            cv2.circle(image, _point(points[joint]), 16 * (thick + 1), colour, -1, cv2.LINE_AA, 4)
+
+
+def _point(point: Array) -> tuple[int, int]:
+    return int(point[0]), int(point[1])
+
+
+def _cones(body: Body, camera: Camera, pose: Array, translation: Array) -> Any:
+    """Yield bones before a camera, far ones first: number, pixels of both ends, radii there, and shade."""
+    pixels, depths = camera.project(body.skeleton.joints(pose, translation))
+    scale = np.sqrt(camera.focal.prod()) / depths  # as in the cost, where the two focal lengths differ
+    for bone in np.argsort(-(depths[_PARENTS] + depths[1:])):
+        ends = [int(_PARENTS[bone]), int(bone) + 1]
+        if depths[ends].min() <= NEAR:
+            continue
+        shade = 1.0 - 0.25 * float(np.clip(depths[ends].mean() - depths[0], -0.4, 0.4)) / 0.4
+        yield int(bone), pixels[ends], body.radii[bone] * scale[ends], shade
+
+
+def _hull(centres: Array, radii: Array) -> Any:
+    outline: list[Array] = []
+    for centre, radius in zip(centres, radii, strict=True):
+        angles = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+        outline.append(centre + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+    return cv2.convexHull(np.rint(np.vstack(outline) * 16).astype(np.int32))
+
+
+def _cone(image: Image, centres: Array, radii: Array, colour: Any, solid: float) -> None:
+    hull = _hull(centres, radii)
+    # what is behind it, where it is not solid: no more of the picture than it can touch
+    left, top, wide, high = cv2.boundingRect(hull // 16)
+    part = image[max(top - 2, 0) : max(top + high + 3, 0), max(left - 2, 0) : max(left + wide + 3, 0)]
+    behind = part.copy() if solid < 1.0 else None
+    cv2.fillConvexPoly(image, hull, colour, cv2.LINE_AA, 4)
+    cv2.polylines(image, [hull], True, BACKGROUND, 1, cv2.LINE_AA, 4)
+    if behind is not None and behind.size:
+        part[:] = cv2.addWeighted(part, solid, behind, 1.0 - solid, 0.0)
