@@ -17,9 +17,9 @@ from posefit.sweep.check import cell_of
 from posefit_exemplars.doubt import Doubt
 from posefit_exemplars.factory import exemplars
 from posefit_experiments.people.clips import Piece
-from posefit_experiments.posterior.design import OTHERS, TEMPERATURES, Viewing, pieces, viewings
+from posefit_experiments.posterior.design import OTHERS, TEMPERATURES, OneTrack, pieces, planned_tracks
 from posefit_experiments.posterior.experiment import posterior
-from posefit_experiments.posterior.fit import MEMBERS, Kept, clip_shares, doubt_of, logistic
+from posefit_experiments.posterior.fit import MEMBERS, Kept, doubt_of, frame_weights, logistic
 from posefit_experiments.posterior.frames import Followed, load_tracks, save_tracks
 from posefit_experiments.posterior.tables import coverages, judgement, posterior_lines, sides
 
@@ -38,7 +38,7 @@ def made(person: str, instance: int, off: float, method: str = "exemplars", temp
     rng = np.random.default_rng([int(person), instance, len(method)])
     told = 0.3 * rng.standard_normal((20, 66))
     drawn, noise = (off * rng.standard_normal(shape) for shape in ((20, 12, 66), (20, 66)))
-    seen = Viewing("walks", Piece(f"{person}_01", 20, instance, "walks"), (45.0,), "known", 20, method, temperature)
+    seen = OneTrack("walks", Piece(f"{person}_01", 20, instance, "walks"), (45.0,), "known", 20, method, temperature)
     return Followed(
         seen, wrapped(told + noise), told, told[:, None] + drawn, np.full((20, 12), 1 / 12), 100 * off + told[:, 0] ** 2
     )
@@ -64,7 +64,7 @@ def test_everybody_is_followed_in_three_or_four_clips_from_every_side() -> None:
     people = Counter(clip.subject for _, clip in pieces())
     assert set(people) == {clip.subject for clip in recorded.clips()}
     assert set(people.values()) <= {3, 4}
-    base, others = viewings(8.0, False)
+    base, others = planned_tracks(8.0, False)
     assert {view for one in base if len(one.views) == 1 for view in one.views} == {0.0, 45.0, 90.0, 135.0, 180.0}
     assert {len(one.views) for one in base} == {1, 2}
     assert {one.translation for one in base} == {"known", "aligned"}
@@ -74,7 +74,7 @@ def test_everybody_is_followed_in_three_or_four_clips_from_every_side() -> None:
 
 
 def test_whoever_moves_is_left_out_of_the_library_and_every_track_can_be_followed() -> None:
-    base, others = viewings(8.0, True)
+    base, others = planned_tracks(8.0, True)
     for one in (*base, *others):
         cell = cell_of(one.spec)
         assert cell.train == (f"library:-{one.clip.subject}",)
@@ -86,7 +86,7 @@ def test_every_joint_but_the_root_is_of_one_group() -> None:
 
 
 def test_clips_count_alike_however_many_tracks_they_have(kept: list[Kept]) -> None:
-    weights = clip_shares([kept[0], kept[0], kept[1]])
+    weights = frame_weights([kept[0], kept[0], kept[1]])
     assert weights[:40].sum() == pytest.approx(0.5)
     assert weights.sum() == pytest.approx(1.0)
 

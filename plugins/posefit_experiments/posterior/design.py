@@ -35,7 +35,7 @@ MORE = {
 LEFT_OUT = 4  # of one person's clips, no more than so many are followed
 
 
-class Viewing(NamedTuple):
+class OneTrack(NamedTuple):
     """One track: a clip, from where, and how."""
 
     group: str
@@ -77,17 +77,17 @@ def pieces() -> list[tuple[str, Piece]]:
     return sorted(found, key=lambda one: one[1].subject)  # whose library is made once
 
 
-def viewings(temperature: float, quick: bool) -> tuple[list[Viewing], list[Viewing]]:
+def planned_tracks(temperature: float, quick: bool) -> tuple[list[OneTrack], list[OneTrack]]:
     """Return the tracks at a temperature, and those with which temperatures and methods are compared."""
-    base: list[Viewing] = []
-    others: list[Viewing] = []
+    base: list[OneTrack] = []
+    others: list[OneTrack] = []
     for k, (group, clip) in enumerate(pieces()):
         sides = [SIDES[(2 * k + turn) % len(SIDES)] for turn in ((0,) if quick else (0, 1, 3))]
         frames = QUICK_FRAMES if quick else FRAMES
-        tracks = [Viewing(group, clip, side, "known", frames, METHOD, temperature) for side in sides]
+        tracks = [OneTrack(group, clip, side, "known", frames, METHOD, temperature) for side in sides]
         if not quick:
             last = (PAIRS[k // 2 % len(PAIRS)], "known") if k % 2 else (sides[0], "aligned")
-            tracks.append(Viewing(group, clip, *last, frames, METHOD, temperature))
+            tracks.append(OneTrack(group, clip, *last, frames, METHOD, temperature))
         base += tracks
         if not quick:
             others += [tracks[0]._replace(temperature=other) for other in TEMPERATURES if other != temperature]

@@ -7,7 +7,7 @@ from typing import Any
 
 from posefit.files import new_file
 from posefit_experiments.grid import Progress, each
-from posefit_experiments.posterior.design import METHOD, OTHERS, TEMPERATURES, viewings
+from posefit_experiments.posterior.design import METHOD, OTHERS, TEMPERATURES, planned_tracks
 from posefit_experiments.posterior.fit import Kept, doubt_of
 from posefit_experiments.posterior.frames import followed, load_tracks, save_tracks
 from posefit_experiments.posterior.tables import best_modes, coverages, judgement, kept_table, sides
@@ -40,7 +40,7 @@ def posterior(
         if again is not None:
             tracks = load_tracks(again)
         else:
-            base, more = viewings(temperature, quick)
+            base, more = planned_tracks(temperature, quick)
             found = each({seen: partial(followed, seen) for seen in (*base, *more)}, workers, progress)
             tracks = list(found.values())
             if file is not None:

@@ -89,14 +89,14 @@ def sharpened(weights: Array, sharpness: float) -> Array:
 
 def _sharpness(tracks: Sequence[Kept]) -> float:
     """Return the power of modes' weights at which the modes that are nearest to the truth are likeliest."""
-    weights, likely = clip_shares(tracks), []
+    weights, likely = frame_weights(tracks), []
     pairs = [(modes, int(row)) for one in tracks for modes, row in zip(one.modes, one.nearest[:, 0], strict=True)]
     for tried in SHARPNESSES:
         likely.append(weights @ [np.log(sharpened(modes, tried)[row]) for modes, row in pairs])
     return float(SHARPNESSES[int(np.argmax(likely))])
 
 
-def clip_shares(tracks: Sequence[Kept]) -> Array:
+def frame_weights(tracks: Sequence[Kept]) -> Array:
     """Return the weights of all frames, which sum to 1: every clip counts alike, and so does every frame of one."""
     names = [one.track.seen.clip for one in tracks]
     frames = {name: sum(len(one.track) for one in tracks if one.track.seen.clip == name) for name in names}
@@ -107,7 +107,7 @@ def clip_shares(tracks: Sequence[Kept]) -> Array:
 def _doubt(tracks: Sequence[Kept]) -> Doubt:
     """Return how the logarithm of the error follows from what is seen, by weighted least squares."""
     seen, error = np.concatenate([one.seen for one in tracks]), np.concatenate([one.error for one in tracks])
-    weights = clip_shares(tracks)
+    weights = frame_weights(tracks)
     slopes = np.linalg.solve(
         (seen.T * weights) @ seen + RIDGE * np.eye(seen.shape[1]), (seen.T * weights) @ np.log(error)
     )
@@ -122,7 +122,7 @@ def _doubt(tracks: Sequence[Kept]) -> Doubt:
 def _spreads(doubt: Doubt, tracks: Sequence[Kept]) -> tuple[Array, Array]:
     """Return the spreads of joints (27,) and angles (66,), in doubts, at which the truth is likeliest."""
     joints, angles = np.zeros((len(TRIED), len(JOINTS))), np.zeros((len(TRIED), ANGLES))
-    weights, begin = clip_shares(tracks), 0
+    weights, begin = frame_weights(tracks), 0
     for one in tracks:
         track, rows = one.track, np.arange(0, len(one.track), EVERY)
         here = weights[begin + rows]
@@ -169,7 +169,7 @@ def scores(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
     return track.off[::every, None] / np.maximum(radii, TINY), turned / np.maximum(halves, TINY)
 
 
-def interval_radii(doubt: Doubt, one: Kept) -> tuple[Array, NDArray[np.bool_]]:
+def radii_and_angles_held(doubt: Doubt, one: Kept) -> tuple[Array, NDArray[np.bool_]]:
     """Return the radii of joints (T, levels, 27), metres, and whether angles (T, levels, 66) are in their intervals."""
     radii, halves = radii_of(doubt, one)
     return radii, np.abs(wrapped(one.track.truth - one.track.told))[:, None] <= halves
@@ -190,7 +190,7 @@ def _sided(doubt: Doubt, tracks: Sequence[Kept]) -> Doubt:
     """Return the doubt with the odds of exchanged sides."""
     second, swapped = (np.concatenate([getattr(one, name) for one in tracks]) for name in ("second", "swapped"))
     logs = np.array([doubt.log(seen) for one in tracks for seen in one.seen])
-    weights, design = clip_shares(tracks), np.column_stack([np.ones(len(second)), second, logs])
+    weights, design = frame_weights(tracks), np.column_stack([np.ones(len(second)), second, logs])
     sides = logistic(design, swapped, weights)
     if sides[1] < LEAST:  # too few swapped frames to say what the samples know of them
         sides = np.insert(logistic(design[:, [0, 2]], swapped, weights), 1, LEAST)

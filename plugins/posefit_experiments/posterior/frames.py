@@ -20,14 +20,14 @@ from posefit.tracking.method import Choice, parse_settings
 from posefit.tracking.opening import Opening
 from posefit.tracking.run import follow
 from posefit_experiments.people.clips import Piece
-from posefit_experiments.posterior.design import Viewing
+from posefit_experiments.posterior.design import OneTrack
 
 
 @dataclass(frozen=True, eq=False)
 class Followed:
     """The frames of a track."""
 
-    seen: Viewing
+    seen: OneTrack
     truth: Array = field(repr=False)  # (T, 66)
     told: Array = field(repr=False)  # (T, 66)
     drawn: Array = field(repr=False)  # (T, K, 66)
@@ -58,7 +58,7 @@ def _skeleton(subject: str) -> Skeleton:
     return recorded.clips(only=(subject,))[0].skeleton
 
 
-def followed(seen: Viewing) -> Followed:
+def followed(seen: OneTrack) -> Followed:
     """Return a clip that was followed by a library without the person who moves in it."""
     cell = cell_of(seen.spec)
     scene = cell_scene(cell)
@@ -100,7 +100,7 @@ def load_tracks(path: str) -> list[Followed]:
     try:
         with np.load(path) as held:
             seen = [
-                Viewing(group, Piece(*clip), tuple(views), *rest)
+                OneTrack(group, Piece(*clip), tuple(views), *rest)
                 for group, clip, views, *rest in json.loads(str(held["seen"]))
             ]
             return [

@@ -12,7 +12,7 @@ from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept
 from posefit.posterior.modes import APART
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
-from posefit_experiments.posterior.fit import MEMBERS, TINY, Kept, clip_shares, interval_radii, sharpened
+from posefit_experiments.posterior.fit import MEMBERS, TINY, Kept, frame_weights, radii_and_angles_held, sharpened
 
 KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
 LIKELY = (0.05, 0.15, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
@@ -36,7 +36,7 @@ def judgement(doubt: Doubt, kept: Kept) -> Judged:
     logs = np.array([doubt.log(seen) for seen in kept.seen])
     unknown = kept.second >= [doubt.second_side(log) for log in logs]
     odds = doubt.sides[0] + doubt.sides[1] * kept.second + doubt.sides[2] * logs
-    radii, angles = interval_radii(doubt, kept)
+    radii, angles = radii_and_angles_held(doubt, kept)
     return Judged(
         kept,
         np.exp(logs),
@@ -52,7 +52,7 @@ def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
     """Return the coverage of left-out people: overall, by group of joints, by view and by kind of motion."""
 
     def told(mine: Sequence[Judged], joints: Any = slice(1, None)) -> dict[str, Any]:
-        weights = clip_shares([one.kept for one in mine])
+        weights = frame_weights([one.kept for one in mine])
         inside, radii = (
             weights @ np.concatenate([getattr(one, name)[:, :, joints].mean(axis=2) for one in mine])
             for name in ("inside", "radii")
@@ -72,7 +72,7 @@ def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
     return {
         "overall": told(tracks),
         "joints": {name: told(tracks, members) for name, members in MEMBERS.items()},
-        "views": by(lambda one: views_text(one.kept)),
+        "views": by(lambda one: seen_from(one.kept)),
         "motions": by(lambda one: one.kept.track.seen.group),
         "translations": by(lambda one: one.kept.track.seen.translation),
         "people": by(lambda one: one.kept.track.seen.clip.subject),
@@ -80,7 +80,7 @@ def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
     }
 
 
-def views_text(kept: Kept) -> str:
+def seen_from(kept: Kept) -> str:
     """Return from where a track is seen, three digits a view."""
     return ", ".join(f"{view:03.0f}" for view in kept.track.seen.views)
 
@@ -88,14 +88,14 @@ def views_text(kept: Kept) -> str:
 def sides(tracks: Sequence[Judged]) -> dict[str, Any]:
     """Return how often left and right are said to be unknown, and swapped then and otherwise; by kind of motion too."""
     told = {}
-    weights = clip_shares([one.kept for one in tracks])
+    weights = frame_weights([one.kept for one in tracks])
     exchanged = np.concatenate([one.exchanged for one in tracks])
     swapped = np.concatenate([one.kept.swapped for one in tracks])
     for least in LIKELY:
         told[f"all, from {100 * least:g} % on"] = _sides(weights, exchanged >= least, swapped)
     for name in ("all", *sorted({one.kept.track.seen.group for one in tracks})):
         mine = [one for one in tracks if name in ("all", one.kept.track.seen.group)]
-        weights = clip_shares([one.kept for one in mine])
+        weights = frame_weights([one.kept for one in mine])
         unknown = np.concatenate([one.unknown for one in mine])
         swapped = np.concatenate([one.kept.swapped for one in mine])
         told[name] = _sides(weights, unknown, swapped)
