@@ -8,6 +8,7 @@ Toyama and Blake, Probabilistic tracking in a metric space, 2001.
 - `codes` compares poses by a few numbers each, `exemplars` are the poses and what came after each.
 - `beam` says where the states of a frame may be in the next one and what that costs, `kernels` has its loop.
 - `look` is what a pose costs in a frame, `window` the likeliest way through the last frames, and how likely others are.
+- `sampling` draws ways as likely as they are, `doubt` says what they do not know of their own error.
 - `refinement` searches around that way, `smoothing` filters what it found over time.
 - `lost` says how likely a frame is lost, by what speaks for it.
 - `tracker` does a frame after the other, `factory` is registered.

@@ -7,6 +7,7 @@ from posefit.fitting.alignment import align
 from posefit.fitting.problem import over_views
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import Skeleton
 from posefit.silhouette.cost import Areas, areas
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
@@ -43,6 +44,21 @@ class Look:
         """Where the only camera stands (3,); None where there are several, which see from all sides how far it is."""
         cameras = self._task.cameras
         return cameras[0].position if len(cameras) == 1 else None
+
+    @property
+    def cameras(self) -> int:
+        """How many see the person."""
+        return len(self._task.cameras)
+
+    @property
+    def usable(self) -> bool:
+        """Whether enough is seen to learn from."""
+        return self._observation.usable
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The person's bones."""
+        return self._task.body.skeleton
 
     @property
     def share(self) -> float:

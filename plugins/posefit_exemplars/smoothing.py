@@ -10,6 +10,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.geometry.rotation import wrapped
+from posefit_exemplars.doubt import recalibrated
 from posefit_exemplars.look import Look
 from posefit_exemplars.sampling import Ways
 
@@ -72,7 +73,7 @@ def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
         place = one.place
     cost, areas = one.look.measured(pose, place)
     used, history = int(np.ceil(one.evaluations)) + 1, np.array([cost])
-    posterior = None if one.drawn is None else one.drawn.about(pose, place)
+    posterior = None if one.drawn is None else recalibrated(one.drawn.about(pose, place), pose, cost, one.look)
     seconds, cpu_seconds = one.seconds, one.cpu_seconds
     told: dict[str, Any] = {"details": {"evidence": one.evidence}, "cpu_seconds": cpu_seconds, "posterior": posterior}
     return Frame(pose, place, cost, areas, used, seconds, history, **told)

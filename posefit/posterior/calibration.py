@@ -17,6 +17,7 @@ from posefit.geometry.skeleton import ANGLES, JOINTS
 
 LEVELS = (0.5, 0.8, 0.95)  # of intervals
 SECOND_SIDE = 0.2  # ours: how likely it has to be that left and right are exchanged, for them to be called unknown
+DIGITS = 6  # of what a file holds
 BINS = 10  # of probabilities
 
 
@@ -31,6 +32,7 @@ class Recalibration:
     joint_factors: Array = field(default_factory=lambda: np.ones((len(LEVELS), len(JOINTS))), repr=False)
     angle_factors: Array = field(default_factory=lambda: np.ones((len(LEVELS), ANGLES)), repr=False)
     second_side: float = SECOND_SIDE
+    sharpness: float = 1.0  # the power of modes' weights: below 1, modes are less sure than their share of samples
 
     def __post_init__(self) -> None:
         for name in ("joint_spreads", "angle_spreads", "joint_factors", "angle_factors"):
@@ -44,10 +46,12 @@ class Recalibration:
             object.__setattr__(self, name, value)
         if not 0.0 <= self.second_side <= 1.0:
             raise ValueError(f"second_side must lie in 0 to 1, got {self.second_side}")
+        if not 0.0 < self.sharpness < np.inf:
+            raise ValueError(f"sharpness must be above 0 and finite, got {self.sharpness}")
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it; its names are those that it is made from."""
-        return {name: np.asarray(value).tolist() for name, value in vars(self).items()}
+        return {name: np.round(value, DIGITS).tolist() for name, value in vars(self).items()}
 
 
 def coverage(distances: Array, radii: Array) -> float:

@@ -88,8 +88,12 @@ def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> 
 
     Poses are alike where their joints are at most `apart` metres from each other, the mean over joints, both roots at
     one point. The pose of a mode is that of its medoid, which somebody can really have; a mean might be nobody's.
+    Weights are shares of the poses' weight, raised to the sharpness of the posterior's recalibration.
     """
     found = _clusters(_distances(skeleton.joints(posterior.poses)), posterior.weights, apart)
+    if posterior.recalibration is not None:
+        powers = [weight**posterior.recalibration.sharpness for weight, _ in found]  # temperature scaling
+        found = [(power / sum(powers), row) for power, (_, row) in zip(powers, found, strict=True)]
     return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in found]
 
 

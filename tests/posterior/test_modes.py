@@ -1,10 +1,13 @@
 """Which poses of a frame are really different, on poses whose distances are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, angle_index
 from posefit.motion.built_in import average_skeleton
+from posefit.posterior.calibration import Recalibration
 from posefit.posterior.modes import Mode, Posterior, likeliest_is_right, modes_of, other_mode, track_modes
 
 SKELETON = average_skeleton()
@@ -105,3 +108,14 @@ def test_rows_that_are_no_tracks_are_told() -> None:
         track_modes(SKELETON, [posterior([STILL], [1.0])])
     with pytest.raises(ValueError, match="coherent"):
         track_modes(SKELETON, [])
+
+
+def test_modes_are_as_sure_as_their_recalibration_says() -> None:
+    skeleton = average_skeleton()
+    poses = np.zeros((10, 66))
+    poses[8:, 3:] = 0.5
+    plain = Posterior(poses, np.zeros((10, 3)), np.ones(10))
+    np.testing.assert_allclose([mode.weight for mode in modes_of(skeleton, plain)], [0.8, 0.2])
+    softer = replace(plain, recalibration=Recalibration(sharpness=0.5))
+    # the roots of 0.8 and 0.2 are as two to one
+    np.testing.assert_allclose([mode.weight for mode in modes_of(skeleton, softer)], [2 / 3, 1 / 3])

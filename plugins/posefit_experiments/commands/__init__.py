@@ -1,7 +1,8 @@
 """`posefit reproduce` and `posefit bench`: one file a group of commands.
 
     papers.py        sapso, vsmm
-    measurements.py  accuracy, methods, views, degradation, builds, footage, people, modes, lost
+    measurements.py  accuracy, methods, views, degradation, builds, footage, people,
+                     posterior, lost, modes
     benchmark.py     posefit bench
     options.py       options that several of them have
 
@@ -27,6 +28,7 @@ REPRODUCED = (
     measurements.builds_command,
     measurements.footage_command,
     measurements.people_command,
+    measurements.posterior_command,
     measurements.lost_command,
     measurements.modes_command,
 )

@@ -126,6 +126,21 @@ def people_command(recovery: bool, others: bool, ledger: str | None, as_json: bo
         _print(told, tables.people_lines, as_json)
 
 
+@click.command("posterior")
+@click.option("--temperature", type=float, default=8.0, show_default=True, help="Of the posterior: 4, 8, 16 or 32.")
+@click.option("--quick", is_flag=True, help="A few frames of every clip from one side: a look, not a measurement.")
+@click.option("--again", metavar="FILE", help="Tracks that --out wrote, in place of following.")
+@click.option("--out", metavar="FILE.npz", help="New file for the frames of all tracks.")
+@click.option("--store", metavar="FILE.json", help="New file for what is learned of all people, for exemplars to read.")
+@workers(None)
+@JSON
+def posterior_command(as_json: bool, **asked: Any) -> None:
+    """How sure exemplars is of people whom it has never seen: intervals, unknown sides and modes."""
+    from posefit_experiments.posterior import experiment, tables
+
+    _print(experiment.posterior(**asked, progress=bar), tables.posterior_lines, as_json)
+
+
 @click.command("lost")
 @click.option("--method", default="exemplars", show_default=True, help="A tracker, or OPTIMISER@PRIOR: by its cost.")
 @click.option("--times", type=int, default=2, show_default=True, help="Tracks of each clip, each of another view.")

@@ -1,0 +1,213 @@
+"""What left-out people say: coverage, widths, sides, modes, and errors over the frames that are kept; and its print."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept_errors, reliability
+from posefit.posterior.modes import APART
+from posefit_exemplars.doubt import Doubt
+from posefit_experiments.posterior.design import METHOD
+from posefit_experiments.posterior.fit import MEMBERS, TINY, Kept, frame_weights, radii_and_angles_held, sharpened
+
+KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
+LIKELY = (0.05, 0.15, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A track of somebody who was left out of the fit, and what was said of it."""
+
+    kept: Kept
+    doubts: Array = field(repr=False)  # (T,) metres
+    unknown: NDArray[np.bool_] = field(repr=False)  # (T,)
+    exchanged: Array = field(repr=False)  # (T,) probability of exchanged sides
+    inside: NDArray[np.bool_] = field(repr=False)  # (T, levels, 27)
+    radii: Array = field(repr=False)  # (T, levels, 27) metres
+    turned: Array = field(repr=False)  # (levels,) share of angles that are inside
+
+
+def judgement(doubt: Doubt, kept: Kept) -> Judged:
+    """Return what is said of a track."""
+    logs = np.array([doubt.log(seen) for seen in kept.seen])
+    unknown = kept.second >= [doubt.second_side(log) for log in logs]
+    odds = doubt.sides[0] + doubt.sides[1] * kept.second + doubt.sides[2] * logs
+    radii, angles = radii_and_angles_held(doubt, kept)
+    return Judged(
+        kept,
+        np.exp(logs),
+        unknown,
+        1.0 / (1.0 + np.exp(-odds)),
+        kept.track.off[:, None] <= radii,
+        radii,
+        angles.mean(axis=(0, 2)),
+    )
+
+
+def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
+    """Return the coverage of left-out people: overall, by group of joints, by view and by kind of motion."""
+
+    def told(mine: Sequence[Judged], joints: Any = slice(1, None)) -> dict[str, Any]:
+        weights = frame_weights([one.kept for one in mine])
+        inside, radii = (
+            weights @ np.concatenate([getattr(one, name)[:, :, joints].mean(axis=2) for one in mine])
+            for name in ("inside", "radii")
+        )
+        radius = np.concatenate([one.radii[:, 1, joints].mean(axis=1) for one in mine])
+        return {
+            "tracks": len(mine),
+            "coverage": {f"{100 * level:.0f}": float(inside[k]) for k, level in enumerate(LEVELS)},
+            "radius_mm": {f"{100 * level:.0f}": float(1e3 * radii[k]) for k, level in enumerate(LEVELS)},
+            "median_radius_mm": float(1e3 * np.median(radius)),
+        }
+
+    def by(name: Callable[[Judged], str]) -> dict[str, Any]:
+        names = sorted({name(one) for one in tracks})
+        return {each: told([one for one in tracks if name(one) == each]) for each in names}
+
+    return {
+        "overall": told(tracks),
+        "joints": {name: told(tracks, members) for name, members in MEMBERS.items()},
+        "views": by(lambda one: seen_from(one.kept)),
+        "motions": by(lambda one: one.kept.track.seen.group),
+        "translations": by(lambda one: one.kept.track.seen.translation),
+        "people": by(lambda one: one.kept.track.seen.clip.subject),
+        "angles": dict(zip(("50", "80", "95"), np.mean([one.turned for one in tracks], axis=0).tolist(), strict=True)),
+    }
+
+
+def seen_from(kept: Kept) -> str:
+    """Return from where a track is seen, three digits a view."""
+    return ", ".join(f"{view:03.0f}" for view in kept.track.seen.views)
+
+
+def sides(tracks: Sequence[Judged]) -> dict[str, Any]:
+    """Return how often left and right are said to be unknown, and swapped then and otherwise; by kind of motion too."""
+    told = {}
+    weights = frame_weights([one.kept for one in tracks])
+    exchanged = np.concatenate([one.exchanged for one in tracks])
+    swapped = np.concatenate([one.kept.swapped for one in tracks])
+    for least in LIKELY:
+        told[f"all, from {100 * least:g} % on"] = _sides(weights, exchanged >= least, swapped)
+    for name in ("all", *sorted({one.kept.track.seen.group for one in tracks})):
+        mine = [one for one in tracks if name in ("all", one.kept.track.seen.group)]
+        weights = frame_weights([one.kept for one in mine])
+        unknown = np.concatenate([one.unknown for one in mine])
+        swapped = np.concatenate([one.kept.swapped for one in mine])
+        told[name] = _sides(weights, unknown, swapped)
+    return told
+
+
+def _sides(weights: Array, unknown: NDArray[np.bool_], swapped: NDArray[np.bool_]) -> dict[str, float]:
+    inside, outside = (weights * some for some in (unknown, ~unknown))
+    return {
+        "swapped": float(weights @ swapped),
+        "unknown": float(inside.sum()),
+        "swapped_unknown": float(inside @ swapped / max(inside.sum(), TINY)),
+        "swapped_known": float(outside @ swapped / max(outside.sum(), TINY)),
+    }
+
+
+def best_modes(tracks: Sequence[Kept], sharpnesses: Sequence[float]) -> dict[str, Any]:
+    """Return how far the best mode's probability is from how often it is right; weights of each track are sharpened.
+
+    It is right where the truth is nearer to it than to any other mode, and so where there is no other; `several` are
+    the frames that have others. `within` is where the truth is as near to it as poses of one mode are.
+    """
+    pairs = list(zip(tracks, sharpnesses, strict=True))
+    probable = np.array([sharpened(modes, power)[0] for one, power in pairs for modes in one.modes])
+    several = np.array([len(modes) > 1 for one in tracks for modes in one.modes])
+    nearest = np.concatenate([one.nearest for one in tracks])
+    right, within = nearest[:, 0] == 0.0, nearest[:, 1] <= APART
+    second, swapped = (np.concatenate([getattr(one, name) for one in tracks]) for name in ("second", "swapped"))
+    return {
+        "tracks": len(tracks),
+        "mean_probability": float(probable.mean()),
+        "right": float(right.mean()),
+        "calibration_error": calibration_error(probable, right),
+        "several": float(several.mean()),
+        "calibration_error_several": calibration_error(probable[several], right[several]) if several.any() else 0.0,
+        "within": float(within.mean()),
+        "calibration_error_within": calibration_error(probable, within),
+        "second_side_auroc": auroc(second, swapped),
+        "reliability": reliability(probable, right),
+    }
+
+
+def kept_table(tracks: Sequence[Judged], others: Sequence[Kept]) -> dict[str, Any]:
+    """Return the mean error in millimetres of the frames that are least doubted, on the tracks that all methods have.
+
+    Of `exemplars` by its doubt, of others by the spread of their posteriors.
+    """
+    places = {(one.track.seen.clip, one.track.seen.views): len(one.track) for one in others}
+    mine = [one for one in tracks if one.kept.track.seen.translation == "known"]
+    pairs = [(one, places.get((one.kept.track.seen.clip, one.kept.track.seen.views), 0)) for one in mine]
+    found = {METHOD: _curve([one.kept.error[:n] for one, n in pairs if n], [one.doubts[:n] for one, n in pairs if n])}
+    for method in dict.fromkeys(one.track.seen.method for one in others):
+        some = [one for one in others if one.track.seen.method == method]
+        found[method] = _curve([one.error for one in some], [one.seen[:, 2] for one in some])
+    return found
+
+
+def _curve(errors: Sequence[Array], doubts: Sequence[Array]) -> dict[str, float]:
+    means = 1e3 * kept_errors(np.concatenate(errors), np.concatenate(doubts), KEPT)
+    return {f"{100 * share:.0f}": float(mean) for share, mean in zip(KEPT, means, strict=True)}
+
+
+def posterior_lines(told: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the tables as they are printed."""
+    levels = [f"{100 * level:.0f}" for level in LEVELS]
+    held = told["coverage"]
+    yield from _head(
+        ["of", "which", "tracks", *(f"{level} % hold %" for level in levels), "80 % radius mm", "median mm"], 2
+    )
+    for part in ("overall", "joints", "views", "motions", "translations", "people"):
+        rows = {"": held[part]} if part == "overall" else held[part]
+        for name, one in rows.items():
+            shown = [f"{100 * one['coverage'][level]:.1f}" for level in levels]
+            widths = [f"{one['radius_mm']['80']:.0f}", f"{one['median_radius_mm']:.0f}"]
+            yield _line([part, name, str(one["tracks"]), *shown, *widths])
+    yield _line(["angles", "", "", *(f"{100 * held['angles'][level]:.1f}" for level in levels), "", ""])
+    yield ""
+    names = ("swapped", "unknown", "swapped_unknown", "swapped_known")
+    yield from _head(["frames of", "swapped %", "said unknown %", "swapped inside %", "swapped outside %"], 1)
+    for name, one in told["sides"].items():
+        yield _line([name, *(f"{100 * one[each]:.1f}" for each in names)])
+    yield ""
+    yield from _head(
+        [
+            "temperature",
+            "tracks",
+            "best mode, mean %",
+            "right %",
+            "error %",
+            "within 10 cm %",
+            "error %",
+            "second side AUROC",
+        ],
+        1,
+    )
+    for name, one in told["modes"].items():
+        each = ["mean_probability", "right", "calibration_error", "several", "calibration_error_several"]
+        each += ["within", "calibration_error_within"]
+        rank = one["second_side_auroc"]
+        ranked = "" if rank is None else f"{rank:.2f}"
+        yield _line([name, str(one["tracks"]), *(f"{100 * one[key]:.1f}" for key in each), ranked])
+    if told["kept"]:
+        yield ""
+        yield from _head(["frames kept %", *next(iter(told["kept"].values()))], 1)
+        for method, curve in told["kept"].items():
+            yield _line([method, *(f"{value:.0f}" for value in curve.values())])
+
+
+def _head(heads: Sequence[str], words: int) -> Iterator[str]:
+    yield _line(heads)
+    yield "|" + "---|" * words + "---:|" * (len(heads) - words)
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
