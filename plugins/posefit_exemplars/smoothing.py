@@ -1,7 +1,7 @@
 """A zero-phase filter over what was found: a Gaussian that looks as far ahead as back, so that nothing comes late."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,7 +28,6 @@ class Finding:
     seconds: float
     cpu_seconds: float
     drawn: Ways | None = None  # where ways through the states are
-    evidence: Mapping[str, float] = field(default_factory=dict, repr=False)  # for the frame to be lost, or not
 
 
 def smoothed(frames: Iterable[Finding], spread: float, ahead: int) -> Iterator[Frame]:
@@ -75,5 +74,5 @@ def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
     used, history = int(np.ceil(one.evaluations)) + 1, np.array([cost])
     posterior = None if one.drawn is None else recalibrated(one.drawn.about(pose, place), pose, cost, one.look)
     seconds, cpu_seconds = one.seconds, one.cpu_seconds
-    told: dict[str, Any] = {"details": {"evidence": one.evidence}, "cpu_seconds": cpu_seconds, "posterior": posterior}
+    told: dict[str, Any] = {"details": {"usable": one.look.usable}, "cpu_seconds": cpu_seconds, "posterior": posterior}
     return Frame(pose, place, cost, areas, used, seconds, history, **told)

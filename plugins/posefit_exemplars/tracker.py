@@ -27,7 +27,7 @@ from posefit_exemplars.beam import (
 from posefit_exemplars.codes import Rows
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.look import Look
-from posefit_exemplars.lost import doubted, evidence, stored_detector
+from posefit_exemplars.lost import doubted, stored_detector
 from posefit_exemplars.refinement import Make, refined, surroundings
 from posefit_exemplars.sampling import Sampler
 from posefit_exemplars.smoothing import SMOOTHED, Finding, smoothed
@@ -191,7 +191,7 @@ class ExemplarTracker:
         The path's pose is the mean of what is likely about it. The search begins as far off it as the frame before.
         """
         began, begun = time.perf_counter(), time.process_time()
-        window, usable = [one.seen for one in waiting], [one.usable for one in waiting]
+        window = [one.seen for one in waiting]
         row, likely, oldest = likeliest(window), weights(window), waiting.popleft()
         drawn = sampler.drawn(window, row)
         beam, look, evaluations = oldest.seen.beam, oldest.look, oldest.evaluations
@@ -212,5 +212,4 @@ class ExemplarTracker:
             place = look.placed(pose[None], place[None])[0]
         seconds = oldest.seconds + time.perf_counter() - began
         cpu_seconds = oldest.cpu_seconds + time.process_time() - begun
-        told = evidence(window, usable, likely, self.exemplars, pose, self.temperature)
-        return Finding(pose, place, look, evaluations, seconds, cpu_seconds, drawn, told), off
+        return Finding(pose, place, look, evaluations, seconds, cpu_seconds, drawn), off

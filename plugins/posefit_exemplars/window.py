@@ -30,8 +30,6 @@ class Seen:
     likelihoods: Array = field(repr=False)  # (n,) of the silhouettes, the greatest 1
     kernel: Kernel | None = field(repr=False)  # (m, n) likelihoods of steps from the frame before
     forward: Array = field(repr=False)  # (n,) weights by all frames so far, which sum to 1
-    least: float = 0.0  # cost of fit of the best state
-    surprise: float = 0.0  # minus the logarithm of how likely the silhouettes were, by the frames before: 0 or more
 
 
 def seen(beam: Beam, fits: Array, before: Seen | None, steps: Array | None) -> Seen:
@@ -40,29 +38,22 @@ def seen(beam: Beam, fits: Array, before: Seen | None, steps: Array | None) -> S
     if before is None or steps is None:
         totals = fits - fits.min()
         beam = replace(beam, totals=totals, parents=np.full(len(beam), -1))
-        return Seen(beam, likelihoods, None, likelihoods / likelihoods.sum(), float(fits.min()))
+        return Seen(beam, likelihoods, None, likelihoods / likelihoods.sum())
     ways = before.beam.totals[:, None] + steps
     parents = ways.argmin(axis=0)
     totals = ways[parents, np.arange(len(beam))] + fits  # RABINER1989 (Viterbi)
     kernel = np.exp(-np.minimum(steps, HIGHEST)).astype(np.float32)
-    expected = before.forward @ kernel
-    forward = expected * likelihoods  # RABINER1989 (forward)
+    forward = (before.forward @ kernel) * likelihoods  # RABINER1989 (forward)
     beam = replace(beam, totals=totals - totals.min(), parents=parents)
-    surprise = float(np.log(expected.sum() / forward.sum()))
-    return Seen(beam, likelihoods, kernel, forward / forward.sum(), float(fits.min()), surprise)
-
-
-def way(window: Sequence[Seen]) -> list[int]:
-    """Return the state of each frame that the likeliest way to the last one has."""
-    rows = [int(window[-1].beam.totals.argmin())]
-    for one in window[:0:-1]:
-        rows.append(int(one.beam.parents[rows[-1]]))
-    return rows[::-1]
+    return Seen(beam, likelihoods, kernel, forward / forward.sum())
 
 
 def likeliest(window: Sequence[Seen]) -> int:
     """Return the state of the first frame from which the likeliest way to the last one goes."""
-    return way(window)[0]
+    row = int(window[-1].beam.totals.argmin())
+    for one in window[:0:-1]:
+        row = int(one.beam.parents[row])
+    return row
 
 
 def weights(window: Sequence[Seen]) -> Array:

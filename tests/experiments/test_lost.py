@@ -31,12 +31,12 @@ def row(subject: str, far: list[float], mpjpe: list[float], **told: Any) -> dict
     return {
         "subject": subject, "group": "walks", "clip": f"{subject}_01", "views_degrees": [45.0],
         "condition": "as they are", "fps": 30.0, "mpjpe_mm": mpjpe, "cost": [100.0 * one for one in far],
-        "evidence": [{"far": one} for one in far], **told,
+        "evidence": [{"farthest": one} for one in far], **told,
     }  # fmt: skip
 
 
 def rows() -> list[dict[str, Any]]:
-    """Return rows of three people, whose frames are lost where most of the weight is far."""
+    """Return rows of three people, whose frames are lost where a track is far."""
     rng = np.random.default_rng(3)
     found = []
     for subject in ("02", "05", "16"):
@@ -69,7 +69,7 @@ def test_views_and_conditions_go_round_in_all_pairs() -> None:
 def test_a_person_is_judged_by_what_others_taught() -> None:
     # of one person the very opposite is true: a detector that knew him would do better than one that does not
     found = rows()
-    other = [row("49", one["evidence"][0]["far"] * np.ones(20), (320.0 - np.array(one["mpjpe_mm"])).tolist()) for one in found[:2]]  # fmt: skip
+    other = [row("49", one["evidence"][0]["farthest"] * np.ones(20), (320.0 - np.array(one["mpjpe_mm"])).tolist()) for one in found[:2]]  # fmt: skip
     told = judge([*found, *other])
     figures = {one["subject"]: lost_tables([one, two], [a, b])["lost"][0]["auroc"] for one, two, a, b in (
         (*found[:2], *told[:2]), (*other, *told[-2:]))}  # fmt: skip
@@ -79,7 +79,7 @@ def test_a_person_is_judged_by_what_others_taught() -> None:
 
 def test_the_model_that_is_fitted_is_one_that_the_tracker_reads() -> None:
     told = fit(rows())
-    assert set(told["weights"]) == {"far", "far, so far"}  # nothing else differs
+    assert set(told["weights"]) == {"farthest", "farthest, so far"}  # nothing else differs
     detector, known = Detector.from_dict(told), features(rows()[1])
     assert known.shape == (20, len(NAMES)) == (20, 2 * len(EVIDENCE))
     assert all(detector.probability(one) > 0.5 for one in known)

@@ -12,10 +12,6 @@ from posefit_exemplars.lost import NAMES, Detector, Memory
 
 Row = Mapping[str, Any]
 
-# What the model looks at: how well what is told fits, and what else may be true. With all evidence that there is it is
-# no better with people whom it has not seen.
-LOOKED_AT = ("cost", "spilled", "samples_most", "far")
-COLUMNS = [row for row, name in enumerate(NAMES) if name.partition(",")[0] in LOOKED_AT]
 STRENGTH = 0.03  # of the weights' prior, a normal one: its variance
 DIGITS = 6
 
@@ -64,7 +60,7 @@ def _fitted(known: Array, lost: NDArray[np.bool_]) -> dict[str, Any]:
     if lost.all() or not lost.any():
         raise ValueError(f"frames must be lost and not lost, to be told apart, got {int(lost.sum())} of {len(lost)}")
     mean, spread = known.mean(axis=0), known.std(axis=0)
-    used = [row for row in COLUMNS if spread[row] > 1e-9]
+    used = np.flatnonzero(spread > 1e-9)
     model = LogisticRegression(C=STRENGTH, max_iter=2000)
     model.fit((known[:, used] - mean[used]) / spread[used], lost)
     weights = model.coef_[0] / spread[used]
