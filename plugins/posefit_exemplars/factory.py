@@ -56,10 +56,8 @@ def exemplars(
         pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         transitions: what gives the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
-        samples: tracks that are drawn from the posterior, each as likely as it is; 0 or more. With 0 there are none,
-            and no frame says how likely it is lost.
-        posterior_temperature: what silhouette costs are divided by in that posterior; above 0. The greater, the more
-            tracks differ.
+        samples: tracks that are drawn from the posterior, 0 or more; with 0 no frame says how likely it is lost.
+        posterior_temperature: what silhouette costs are divided by in that posterior; above 0.
     """
     for name, value in (
         ("spread", spread),

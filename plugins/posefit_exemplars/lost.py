@@ -19,7 +19,7 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.skeleton import Skeleton
 from posefit.posterior.modes import Posterior
 
-FITTED = Path(__file__).with_name("lost.json")  # what `posefit reproduce lost --store` writes
+FITTED = Path(__file__).with_name("lost.json")  # made by `posefit reproduce lost --store`
 MEMORY = 0.2  # seconds that the mean over the frames before reaches back
 
 # What is known of a frame, and what is added to it before its logarithm is taken; None is taken as it is.

@@ -145,14 +145,13 @@ def written(folder: Path, found: list[dict[str, Any]]) -> Path:
     return path
 
 
-def test_a_detector_is_fitted_to_rows_and_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_detector_is_fitted_to_rows_and_stored(tmp_path: Path) -> None:
     path, stored = written(tmp_path, rows()), tmp_path / "lost.json"
-    monkeypatch.setattr(experiment, "FITTED", stored)
     result = run("--rows", path)
     assert result.exit_code == 0, result.output
     assert "| all | 6 | 120 | 50.0 | 1.000 |" in result.stdout
     assert not stored.exists()
-    result = run("--rows", path, "--store", "--json")
+    result = run("--rows", path, "--store", stored, "--json")
     assert result.exit_code == 0, result.output
     assert json.loads(stored.read_text()) == json.loads(result.stdout)["model"]
 
@@ -161,16 +160,21 @@ def test_without_evidence_it_is_the_cost_that_judges(tmp_path: Path) -> None:
     found = rows()
     for one in found:
         del one["evidence"]
-    told = json.loads(run("--rows", written(tmp_path, found), "--json").stdout)
+    path, stored = written(tmp_path, found), tmp_path / "lost.json"
+    told = json.loads(run("--rows", path, "--json").stdout)
     assert told["lost"][0]["auroc"] == 1.0
     assert "model" not in told
+    result = run("--rows", path, "--store", stored)
+    assert result.exit_code == 2
+    assert "rows must have evidence to be fitted" in result.stderr
+    assert not stored.exists()
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--store", "--quick"), "store must be asked for with all tracks of exemplars"),
-        (("--store", "--method", "sapso@pca"), "store must be asked for with all tracks of exemplars"),
+        (("--store", "FOLDER/out", "--quick"), "store must be asked for with all tracks of exemplars"),
+        (("--store", "FOLDER/out", "--method", "sapso@pca"), "store must be asked for with all tracks of exemplars"),
         (("--rows", "FOLDER/rows.jsonl", "--out", "FOLDER/out"), "out must be given for tracks that are followed"),
         (("--rows", "FOLDER/nothing"), "nothing"),
         (("--rows", "FOLDER/none.jsonl"), "expected a row a track, got an empty file"),

@@ -145,7 +145,7 @@ def posterior_command(as_json: bool, **asked: Any) -> None:
 @click.option("--method", default="exemplars", show_default=True, help="A tracker, or OPTIMISER@PRIOR: by its cost.")
 @click.option("--times", type=int, default=2, show_default=True, help="Tracks of each clip, each of another view.")
 @click.option("--quick", is_flag=True, help="Two clips of each group: a look, not a measurement.")
-@click.option("--store", is_flag=True, help="Have exemplars judge frames by what is fitted here, from now on.")
+@click.option("--store", metavar="FILE.json", help="New file for the detector that is fitted, for exemplars to read.")
 @click.option("--rows", metavar="FILE", help="Fit to what --out wrote, and follow nobody.")
 @click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")
 @workers(None)

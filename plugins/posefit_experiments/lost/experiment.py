@@ -14,7 +14,6 @@ from posefit.sweep.check import cell_of
 from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
 from posefit.tracking.run import follow
-from posefit_exemplars.lost import FITTED
 from posefit_experiments.grid import Progress, each
 from posefit_experiments.lost.design import Turn, turns
 from posefit_experiments.lost.model import fit, judge, judge_costs
@@ -31,7 +30,7 @@ def lost(
     method: str,
     times: int,
     quick: bool,
-    store: bool,
+    store: str | None,
     workers: int | None,
     rows: str | None,
     out: str | None,
@@ -40,22 +39,24 @@ def lost(
     """Return how well a detector tells which frames are lost, of people whom neither it nor the library has seen.
 
     `out` is a new file for a row a track, and `rows` such a file, from which the detector is fitted without following
-    anybody again. With `store` the detector that is fitted to all of them becomes that of `exemplars`.
+    anybody again. `store` is a new file for the detector that is fitted to all of them, for `exemplars` to read.
     """
     if store and (method != METHOD or quick):
         raise ValueError(f"store must be asked for with all tracks of {METHOD}, got --store with a look at others")
     if rows is not None and out is not None:
         raise ValueError("out must be given for tracks that are followed, got --out with --rows")
-    with new_file(out) if out else nullcontext() as file:
+    with new_file(out) if out else nullcontext() as file, new_file(store) if store else nullcontext() as kept:
         found = _read(rows) if rows is not None else _followed(method, turns(times, quick), workers, progress)
         if file is not None:
             file.write_text("".join(f"{json.dumps(row)}\n" for row in found), encoding="utf-8")
-    told = {"method": method, "tracks": len(found)}
-    if not all("evidence" in row for row in found):
-        return told | lost_tables(found, judge_costs(found))
-    model = fit(found)
-    if store:
-        FITTED.write_text(json.dumps(model, indent=1) + "\n", encoding="utf-8")
+        told = {"method": method, "tracks": len(found)}
+        if not all("evidence" in row for row in found):
+            if store:
+                raise ValueError(f"rows must have evidence to be fitted, got some of {rows or method} without")
+            return told | lost_tables(found, judge_costs(found))
+        model = fit(found)
+        if kept is not None:
+            kept.write_text(json.dumps(model, indent=1) + "\n", encoding="utf-8")
     return told | {"model": model} | lost_tables(found, judge(found))
 
 
