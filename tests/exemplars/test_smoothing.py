@@ -16,6 +16,7 @@ class Blind:
     """A look that costs nothing."""
 
     root: np.ndarray | None = None
+    usable = True
 
     def measured(self, pose: np.ndarray, place: np.ndarray) -> tuple[float, np.ndarray]:
         return float(place[0]), np.zeros((1, 3), dtype=np.int64)
@@ -84,7 +85,7 @@ def test_with_nothing_ahead_everything_stays_as_it_is() -> None:
 
 
 def test_a_root_that_is_known_is_where_it_is_known_to_be() -> None:
-    known = SimpleNamespace(root=np.zeros(3), measured=Blind().measured)
+    known = SimpleNamespace(root=np.zeros(3), usable=True, measured=Blind().measured)
     rng = np.random.default_rng(0)
     rough = [Finding(np.zeros(66), rng.normal(size=3), known, 1.0, 0.0, 0.0) for _ in range(6)]  # type: ignore[arg-type]
     for one, frame in zip(rough, smoothed(rough, 2.0, 2), strict=True):
