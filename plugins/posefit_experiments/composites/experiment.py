@@ -1,0 +1,167 @@
+"""Footage made from the truth is tracked as any footage: which situations, how many cameras, and how it is extracted."""
+
+import json
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from posefit.footage.extract import extract
+from posefit.footage.masks import existing
+from posefit.footage.segmentation import Extraction
+from posefit.motion import recorded
+from posefit.reading import parsed_json, read_text
+from posefit.tracking.front import track
+from posefit_experiments.composites.figures import extraction_figures, track_figures
+from posefit_experiments.composites.filming import BEFORE, film
+from posefit_experiments.composites.situations import MADE, PLACES, situation
+from posefit_experiments.composites.stills import stills
+from posefit_experiments.grid import Progress, check_seeds, each
+
+LARGEST = 50_000_000  # bytes of a file of rows
+EXTRACTIONS = ("mixture", "median", "mean")
+GIVEN = "mean"  # the extraction that is given pictures without anybody
+QUICK = (("through", 1), ("stands", 1))  # situations and numbers of cameras of a quick look
+
+
+class Shot(NamedTuple):
+    """One row: what happens, before how many cameras, how the person is taken out, and which people it is."""
+
+    situation: str
+    views: int
+    extraction: str
+    seed: int
+
+
+def composites(
+    video: str,
+    situations: Sequence[str],
+    views: Sequence[int],
+    extractions: Sequence[str],
+    seeds: int,
+    quick: bool,
+    rows: str | None,
+    pictures: str | None,
+    workers: int | None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Return a row of figures for each situation, number of cameras, extraction and seed.
+
+    `rows` is a file for a row a line as they come; what it holds already is not measured again. `pictures` is a folder
+    for a picture a row. Raises ValueError where something asked for is not there.
+    """
+    shots = asked(situations, views, extractions, seeds, quick)
+    existing(Path(video))
+    done = earlier(rows)
+    todo = [shot for shot in shots if shot not in done]
+    jobs = {shot: partial(measured, video, shot, pictures) for shot in todo}
+    if pictures is not None:
+        Path(pictures).mkdir(parents=True, exist_ok=True)
+    done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
+    return {"rows": [done[shot] for shot in shots]}
+
+
+def asked(
+    situations: Sequence[str], views: Sequence[int], extractions: Sequence[str], seeds: int, quick: bool
+) -> list[Shot]:
+    """Return the rows that are asked for; nothing named is all. Raises ValueError where a name or number is none."""
+    check_seeds(seeds)
+    for name in situations:
+        if name not in MADE:
+            raise ValueError(f"situation must be one of {', '.join(MADE)}, got {name!r}")
+    for count in views:
+        if count not in PLACES:
+            raise ValueError(f"views must be one of {', '.join(map(str, PLACES))}, got {count}")
+    for method in extractions:
+        _extraction(method)
+    grid = product(situations or MADE, views or PLACES)
+    places = [place for place in grid if not quick or place in QUICK]
+    return [Shot(*place, method, seed) for seed in range(seeds) for method in extractions for place in places]
+
+
+def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
+    """Return the row of a shot: it is filmed, taken out and tracked; what was refused is said in the tool's words."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        scene = situation(shot.situation, shot.views, shot.seed)
+        made = film(scene, video, shot.seed, shot.extraction == GIVEN, folder)
+        how, frames = _extraction(shot.extraction), (made.first, None)
+        row: dict[str, Any] = {**shot._asdict(), "people": scene.people, "frames": len(scene)}
+        try:
+            masks, usable = _taken_out(made.videos, how, frames, folder)
+            row |= extraction_figures(masks, usable, made.masks)
+        except ValueError as error:
+            return row | {"refused": str(error).replace(f"{folder}/", "")}
+        began = time.perf_counter()
+        try:
+            result = track(
+                made.videos,
+                camera=made.calibration,
+                up="y",
+                extraction=how,
+                frames=frames,
+                height=scene.actors[0].body.stature,
+                train=[recorded.leaving_out(recorded.LIBRARY, scene.people)],
+                out=folder / "track",
+                say=(said := []).append,
+            )
+        except ValueError as error:
+            return row | {"refused": str(error).replace(f"{folder}/", "")}
+        row["minutes"] = (time.perf_counter() - began) / 60.0
+        with np.load(folder / "track" / "poses.npz") as stored:
+            radii = stored["radii"]
+        row |= track_figures(result, radii, scene, made.masks)
+        row["warnings"] = [str(one).replace(f"{folder}/", "") for one in said if str(one).startswith("warning")]
+        if pictures is not None:
+            stills(Path(pictures) / f"{_named(shot)}.jpg", made, scene, masks, result, radii)
+        return row
+
+
+def earlier(path: str | None) -> dict[Shot, dict[str, Any]]:
+    """Return the rows of a file, where there is one. Raises ValueError where a line is none."""
+    if path is None or not Path(path).exists():
+        return {}
+    found = {}
+    for number, line in enumerate(read_text(path, LARGEST).splitlines(), 1):
+        try:
+            row = parsed_json(line)
+            found[Shot(*(row[name] for name in Shot._fields))] = row
+        except (ValueError, TypeError, KeyError):
+            wanted = ", ".join(Shot._fields)
+            raise ValueError(f"{path}: line {number} must be a row with {wanted}, got another text") from None
+    return found
+
+
+def _kept(
+    path: str | None, progress: Progress | None, ended: Iterator[tuple[Shot, dict[str, Any]]], count: int
+) -> Iterator[tuple[Shot, dict[str, Any]]]:
+    """Yield rows as they come, each written to a file at once where one is named."""
+    for shot, row in progress(ended, count) if progress else ended:
+        if path is not None:
+            with Path(path).open("a", encoding="utf-8") as file:
+                file.write(f"{json.dumps(row)}\n")
+        yield shot, row
+
+
+def _extraction(method: str) -> Extraction:
+    return Extraction(method=method, background=f"0:{BEFORE}" if method == GIVEN else None)  # type: ignore[arg-type]
+
+
+def _taken_out(videos: Sequence[Path], how: Extraction, frames: Any, folder: Path) -> tuple[Any, Any]:
+    """Return masks (views, T, height, width) that are taken out of videos, and whether they are usable (views, T)."""
+    masks, usable = [], []
+    for number, video in enumerate(videos):
+        extract(video, folder / f"masks-{number}", how, frames=frames)
+        with np.load(folder / f"masks-{number}" / "masks.npz") as stored:
+            masks.append(stored["masks"] > 0)
+            usable.append(stored["usable"])
+    return np.stack(masks), np.stack(usable)
+
+
+def _named(shot: Shot) -> str:
+    return "-".join(str(part).replace(" ", "-") for part in shot)
