@@ -11,6 +11,7 @@ from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.posterior.calibration import LEVELS
 from posefit.posterior.intervals import joint_intervals
 from posefit.posterior.sides import unknown_sides
@@ -67,6 +68,12 @@ def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:
     return {f"{100 * LEVELS[k]:.0f}": float(mean) for k, mean in enumerate(means)} or None
 
 
+def _mean(values: Array) -> float | None:
+    """Return the mean of what is known of values (T,); None where nothing is."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else None
+
+
 class Evaluation:
     """Collects a row a frame. Baselines have the true root and translation, which a tracker has not.
 
@@ -116,6 +123,7 @@ class Evaluation:
         measures = Measures(
             **errors,
             **said,
+            **self._steadiness(),
             iou=float(columns["iou"][usable].mean()),
             cost=float(columns["cost"][usable].mean()),
             held_frames=int(np.count_nonzero(~np.array(self._usable))),
@@ -155,6 +163,24 @@ class Evaluation:
             "lost_said_rate": float((lost[judged] >= LOST).mean()) if judged.any() else None,
         }
         return {"unknown_sides": sides, "lost": lost}, measures
+
+    def _steadiness(self) -> dict[str, Any]:
+        """Return the measures of how joints accelerate and standing feet slide."""
+        poses = np.array([frame.pose for frame in self._frames])
+        places = np.array([frame.translation for frame in self._frames])
+        joints, fps = self._scene.body.skeleton.joints(poses, places), self._scene.fps
+        found, ratio, stands = _mean(acceleration(joints, fps)), None, standing(joints, fps)
+        if self._scene.truth is not None:
+            truth = self._scene.truth.frames(0, len(self._frames))
+            true_joints = truth.skeleton.joints(truth.poses, truth.translations)
+            true, stands = _mean(acceleration(true_joints, fps)), standing(true_joints, fps)
+            ratio = found / true if found is not None and true else None
+        slid = slides(joints, stands)
+        return {
+            "acceleration": found,
+            "acceleration_ratio": ratio,
+            "foot_slide_mm": 1e3 * float(slid.mean()) if len(slid) else None,
+        }
 
     def _errors(self) -> tuple[dict[str, Array], dict[str, Any]]:
         """Return the columns and the measures that need a truth."""

@@ -138,6 +138,29 @@ class Measures:
         default=None,
         metadata=_about("said lost", "%", 0, "share of frames that the method calls lost, where it says", 100.0),
     )
+    acceleration: float | None = field(
+        default=None,
+        metadata=_about(
+            "acceleration",
+            "m/s2",
+            1,
+            "how fast the joints accelerate, the mean over joints and frames: a walk has about 6; more is jitter",
+        ),
+    )
+    acceleration_ratio: float | None = field(
+        default=None, metadata=_about("acceleration ratio", "", 1, "the same, over that of the true joints")
+    )
+    foot_slide_mm: float | None = field(
+        default=None,
+        metadata=_about(
+            "foot slide",
+            "mm a step",
+            0,
+            "how far a foot gets along the ground from where it first stood, the mean over steps; a foot stands where "
+            "the true one does, or, where nobody knows, where it is low and slow; about 20 of motion capture; none "
+            "where no foot stands",
+        ),
+    )
     held_frames: int = field(
         metadata=_about(
             "held", "frames", 0, "frames that show too little: the pose is held or carried on, not searched"

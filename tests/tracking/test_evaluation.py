@@ -15,6 +15,7 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import areas
 from posefit.tracking import evaluation
 from posefit.tracking.evaluation import Evaluation, nearest
+from posefit.tracking.measures import Measures
 
 FRAMES = 4
 
@@ -76,3 +77,35 @@ def test_the_truth_has_its_own_bones_whatever_body_was_told() -> None:
     assert measures.mpjpe_mm > 1.0
     assert measures.error_degrees is not None
     assert measures.error_degrees.mean == 0.0
+
+
+def tracked(scene: Scene, shaken_mm: float = 0.0) -> Measures:
+    """Return what the true track of a walk is worth, whose root goes up and down by so much from frame to frame."""
+    truth = scene.truth
+    assert truth is not None
+    collected = Evaluation(scene, None, truth.poses[:, 3:], 0.5)
+    for k in range(len(truth)):
+        place = truth.translations[k] + [0.0, 0.5e-3 * shaken_mm * (-1) ** k, 0.0]
+        collected.add(found(scene, truth.poses[k], place, scene.observations[k]), scene.observations[k])
+    return collected.close()[1]
+
+
+def test_a_track_tells_how_joints_accelerate_and_feet_slide_beside_the_truths_own() -> None:
+    scene = synthetic(built_in.motion("walk", frames=40), [45.0], (64, 48), [], (None, None))
+    exact, shaken = tracked(scene), tracked(scene, shaken_mm=10.0)
+    assert exact.acceleration_ratio == 1.0
+    assert exact.acceleration is not None
+    assert shaken.acceleration is not None
+    # to go up and down by 10 mm thirty times a second is a second difference of 20 mm
+    assert shaken.acceleration == pytest.approx(0.02 * 900.0, rel=0.2)
+    assert shaken.acceleration_ratio == pytest.approx(shaken.acceleration / exact.acceleration)
+    assert exact.foot_slide_mm is not None
+    assert shaken.foot_slide_mm == pytest.approx(exact.foot_slide_mm)  # up and down is along no ground
+
+
+def test_a_track_of_one_frame_has_neither_acceleration_nor_step() -> None:
+    scene = synthetic(built_in.motion("walk", frames=1), [45.0], (64, 48), [], (None, None))
+    told = tracked(scene)
+    assert told.acceleration is None
+    assert told.acceleration_ratio is None
+    assert told.foot_slide_mm is None

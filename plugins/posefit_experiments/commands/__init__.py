@@ -1,8 +1,8 @@
 """`posefit reproduce` and `posefit bench`: one file a group of commands.
 
     papers.py        sapso, vsmm
-    measurements.py  accuracy, methods, views, degradation, builds, footage, people,
-                     posterior, lost, modes
+    measurements.py  accuracy, methods, views, degradation, builds, footage,
+                     composites, people, posterior, lost, modes
     benchmark.py     posefit bench
     options.py       options that several of them have
 
@@ -27,6 +27,7 @@ REPRODUCED = (
     measurements.degradation_command,
     measurements.builds_command,
     measurements.footage_command,
+    measurements.composites_command,
     measurements.people_command,
     measurements.posterior_command,
     measurements.lost_command,

@@ -103,6 +103,32 @@ def footage_command(as_json: bool, **asked: Any) -> None:
     _print(filmed(**asked, progress=bar), filmed_lines, as_json)
 
 
+@click.command("composites")
+@click.argument("video")
+@click.option("--situation", "situations", multiple=True, help="One alone, such as stands. Again for more of them.")
+@click.option("--views", type=int, multiple=True, help="Cameras, 1, 2 or 4. Again for more of them.")
+@click.option(
+    "--extraction",
+    "extractions",
+    multiple=True,
+    default=("mixture", "median", "mean"),
+    show_default=True,
+    help="How people are taken out, as in `posefit track`. Again for more of them.",
+)
+@seeds(1, "Tracks of each, of other people in other clothes.")
+@click.option("--quick", is_flag=True, help="One camera, somebody who passes and somebody who stands: a look.")
+@click.option("--rows", metavar="FILE", help="A file for a row a line as they come; the same command goes on there.")
+@click.option("--pictures", metavar="DIR", help="A folder for a picture a row.")
+@workers(1)
+@JSON
+def composites_command(as_json: bool, **asked: Any) -> None:
+    """Videos made from the truth, before the empty pictures of VIDEO, tracked as any footage."""
+    from posefit_experiments.composites.experiment import composites
+    from posefit_experiments.composites.tables import composites_lines
+
+    _print(composites(**asked, progress=bar), composites_lines, as_json)
+
+
 @click.command("people")
 @click.option("--method", default="exemplars", show_default=True, help="A tracker, or OPTIMISER@PRIOR.")
 @click.option("--evaluations", type=int, default=2440, show_default=True, help="Budget of a frame, of every method.")

@@ -1,4 +1,4 @@
-"""Footage made from the truth is tracked as any footage: which situations, how many cameras, and how it is extracted."""
+"""Footage made from the truth is tracked as any footage: row by row, each kept as it comes."""
 
 import json
 import tempfile
@@ -19,8 +19,9 @@ from posefit.reading import parsed_json, read_text
 from posefit.tracking.front import track
 from posefit_experiments.composites.figures import extraction_figures, track_figures
 from posefit_experiments.composites.filming import BEFORE, film
-from posefit_experiments.composites.situations import MADE, PLACES, situation
+from posefit_experiments.composites.situations import PLACES, SHOWS, check, situation
 from posefit_experiments.composites.stills import stills
+from posefit_experiments.composites.tables import groups
 from posefit_experiments.grid import Progress, check_seeds, each
 
 LARGEST = 50_000_000  # bytes of a file of rows
@@ -63,7 +64,8 @@ def composites(
     if pictures is not None:
         Path(pictures).mkdir(parents=True, exist_ok=True)
     done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
-    return {"rows": [done[shot] for shot in shots]}
+    found = [done[shot] for shot in shots]
+    return {"rows": found, "groups": groups(found)}
 
 
 def asked(
@@ -71,15 +73,11 @@ def asked(
 ) -> list[Shot]:
     """Return the rows that are asked for; nothing named is all. Raises ValueError where a name or number is none."""
     check_seeds(seeds)
-    for name in situations:
-        if name not in MADE:
-            raise ValueError(f"situation must be one of {', '.join(MADE)}, got {name!r}")
-    for count in views:
-        if count not in PLACES:
-            raise ValueError(f"views must be one of {', '.join(map(str, PLACES))}, got {count}")
+    grid = list(product(situations or SHOWS, views or PLACES))
+    for place in grid:
+        check(*place)
     for method in extractions:
         _extraction(method)
-    grid = product(situations or MADE, views or PLACES)
     places = [place for place in grid if not quick or place in QUICK]
     return [Shot(*place, method, seed) for seed in range(seeds) for method in extractions for place in places]
 
@@ -97,7 +95,7 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
             row |= extraction_figures(masks, usable, made.masks)
         except ValueError as error:
             return row | {"refused": str(error).replace(f"{folder}/", "")}
-        began = time.perf_counter()
+        began, said = time.perf_counter(), list[str]()
         try:
             result = track(
                 made.videos,
@@ -108,7 +106,7 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
                 height=scene.actors[0].body.stature,
                 train=[recorded.leaving_out(recorded.LIBRARY, scene.people)],
                 out=folder / "track",
-                say=(said := []).append,
+                say=said.append,
             )
         except ValueError as error:
             return row | {"refused": str(error).replace(f"{folder}/", "")}
@@ -116,7 +114,7 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
         with np.load(folder / "track" / "poses.npz") as stored:
             radii = stored["radii"]
         row |= track_figures(result, radii, scene, made.masks)
-        row["warnings"] = [str(one).replace(f"{folder}/", "") for one in said if str(one).startswith("warning")]
+        row["warnings"] = [one.replace(f"{folder}/", "") for one in said if one.startswith("warning")]
         if pictures is not None:
             stills(Path(pictures) / f"{_named(shot)}.jpg", made, scene, masks, result, radii)
         return row

@@ -40,7 +40,7 @@ def extraction_figures(masks: Masks, usable: NDArray[np.bool_], truth: Masks) ->
 def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks) -> dict[str, Any]:
     """Return what a track is worth in the frames in which a camera sees all of the person."""
     actor = situation.actors[0]
-    seen = whole(truth).any(axis=0)
+    seen = np.asarray(whole(truth).any(axis=0))
     estimate, body = track.motion, Body(track.motion.skeleton, radii)
     true_joints = actor.motion.skeleton.joints(actor.motion.poses, actor.motion.translations)
     joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
@@ -72,9 +72,10 @@ def steadiness(true_joints: Array, joints: Array, seen: NDArray[np.bool_], fps: 
     inner = seen & np.roll(seen, 1) & np.roll(seen, -1) & np.isfinite(felt)
     stands = standing(true_joints, fps) & seen[:, None]
     steps, true_steps = (100.0 * slides(one, stands) for one in (joints, true_joints))
+    mean, true_mean = (float(one[inner].mean()) for one in (felt, true_felt))
     return {
-        "acceleration": float(felt[inner].mean()),
-        "true_acceleration": float(true_felt[inner].mean()),
+        "acceleration": mean,
+        "acceleration_ratio": mean / true_mean,
         "slide_cm": float(steps.mean()) if len(steps) else None,
         "true_slide_cm": float(true_steps.mean()) if len(steps) else None,
     }

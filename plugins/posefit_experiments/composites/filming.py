@@ -1,6 +1,6 @@
 """A situation is filmed: a video a camera, their calibration, and what is truly seen of whom."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -33,7 +33,6 @@ class Film:
 def film(situation: Situation, video: str, seed: int, empty_first: bool, folder: Path) -> Film:
     """Return what is written to a folder: a video a camera, with the empty place first if asked for, and the truth."""
     rng = np.random.default_rng([seed, 4])
-    cv2.setRNGSeed(seed)
     first = BEFORE if empty_first else 0
     videos, masks = [], []
     fps = situation.actors[0].motion.fps
@@ -68,7 +67,7 @@ def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tup
         yield people, masks[0] if there else np.zeros((camera.height, camera.width), dtype=bool)
 
 
-def calibrated(cameras: list[Camera]) -> str:
+def calibrated(cameras: Sequence[Camera]) -> str:
     """Return the text of a calibration file, as Pose2Sim and Sports2D write it."""
     told = []
     for number, camera in enumerate(cameras, 1):

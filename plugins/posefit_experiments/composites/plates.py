@@ -36,7 +36,7 @@ class Plate:
     def frame(self, k: int) -> NDArray[np.float32]:
         """Return the picture of frame k, without flicker or noise: to and fro through what lives."""
         last = len(self.living) - 1
-        return self.still + self.living[last - abs(k % (2 * last) - last)]
+        return np.asarray(self.still + self.living[last - abs(k % (2 * last) - last)])
 
 
 def plate(video: str | Path, camera: int, size: tuple[int, int]) -> Plate:
@@ -55,7 +55,7 @@ def plate(video: str | Path, camera: int, size: tuple[int, int]) -> Plate:
 def filmed(image: NDArray[np.float32], k: int, rng: np.random.Generator) -> Image:
     """Return what a sensor makes of the picture of frame k."""
     gain = 1.0 + FLICKER * (np.sin(0.21 * k) + rng.normal() / 3.0)
-    noise = cv2.randn(np.empty(image.shape, dtype=np.float32), 0.0, NOISE)
+    noise = NOISE * rng.standard_normal(image.shape, dtype=np.float32)
     return np.asarray(np.clip(gain * image + noise, 0.0, 255.0).astype(np.uint8))
 
 

@@ -1,6 +1,6 @@
 """What happens before the cameras, and where they stand: each situation a few times, with other people."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,11 +23,14 @@ MIRRORED = [joint - 1 for joint in MIRROR[1:]]  # of each bone, the one on the o
 GIRTH = 10.0  # percent that a part of the body may be thicker or thinner than the library's
 LONGEST = 240  # frames of somebody who is always there
 
-# Who goes through (clips of one cycle at least), stands, waves, and walks to and fro: other people in each try.
+# Who goes through (clips of one cycle at least), and who is always there (from which frame on, to which): others in
+# each try.
 WALKS = ("16_47", "02_01", "49_01")
-STANDS = (("49_15", 0, 150), ("14_04", 0, 150), ("29_02", 100, 250))
-WAVES = (("29_05", 60, 240), ("14_05", 40, 212), ("02_06", 0, 180))
-ROUNDS = (("29_01", 0, LONGEST), ("09_12", 0, LONGEST), ("09_12", 200, 200 + LONGEST))
+STAYING: Mapping[str, Sequence[tuple[str, int, int]]] = {
+    "stands": (("49_15", 0, 150), ("14_04", 0, 150), ("29_02", 100, 250)),
+    "waves": (("29_05", 60, 240), ("14_05", 40, 212), ("02_06", 0, 180)),
+    "to and fro": (("29_01", 0, LONGEST), ("09_12", 0, LONGEST), ("09_12", 200, 200 + LONGEST)),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,49 +51,6 @@ class Situation:
         return sorted({actor.motion.name.partition("_")[0] for actor in self.actors})
 
 
-def _through(views: int, seed: int) -> Sequence[Actor]:
-    return [_walker(WALKS[seed % len(WALKS)], views, seed)]
-
-
-def _again(views: int, seed: int) -> Sequence[Actor]:
-    return [_returning(views, seed, back=False)]
-
-
-def _back(views: int, seed: int) -> Sequence[Actor]:
-    return [_returning(views, seed, back=True)]
-
-
-def _stands(views: int, seed: int) -> Sequence[Actor]:
-    return [_staying(STANDS[seed % len(STANDS)], seed)]
-
-
-def _waves(views: int, seed: int) -> Sequence[Actor]:
-    return [_staying(WAVES[seed % len(WAVES)], seed)]
-
-
-def _to_and_fro(views: int, seed: int) -> Sequence[Actor]:
-    motion, body = _dressed(clip(*ROUNDS[seed % len(ROUNDS)]), seed)
-    along = ways.grounded(ways.turned(motion, ways.ALONG - ways.longest(motion)), body)
-    along = ways.moved(along, -ways.middle(along))
-    return [Actor(body, along, np.ones(len(along), dtype=bool), seed)]
-
-
-def _two(views: int, seed: int) -> Sequence[Actor]:
-    near = _walker(WALKS[seed % len(WALKS)], views, seed, aside=NEARER)
-    far = _walker(WALKS[(seed + 1) % len(WALKS)], views, seed + 1, back=True, aside=-NEARER)
-    count = max(len(near.motion), len(far.motion))
-    return [_lasting(actor, count) for actor in (near, far)]
-
-
-MADE: Mapping[str, Callable[[int, int], Sequence[Actor]]] = {
-    "through": _through,
-    "again": _again,
-    "back": _back,
-    "two": _two,
-    "to and fro": _to_and_fro,
-    "stands": _stands,
-    "waves": _waves,
-}
 SHOWS = {
     "through": "somebody walks through",
     "again": "the same, who comes again the same way",
@@ -104,19 +64,36 @@ PASSING = ("through", "again", "back")  # one person, who is not always there
 ALWAYS = ("to and fro", "stands", "waves")
 
 
-def situation(name: str, views: int, seed: int) -> Situation:
-    """Return a situation before so many cameras. Raises ValueError where there is none of that name or number."""
-    if name not in MADE:
-        raise ValueError(f"situation must be one of {', '.join(MADE)}, got {name!r}")
+def check(name: str, views: int) -> None:
+    """Return nothing. Raises ValueError where there is no situation of that name, or none for so many cameras."""
+    if name not in SHOWS:
+        raise ValueError(f"situation must be one of {', '.join(SHOWS)}, got {name!r}")
     if views not in PLACES:
         raise ValueError(f"views must be one of {', '.join(map(str, PLACES))}, got {views}")
+
+
+def situation(name: str, views: int, seed: int) -> Situation:
+    """Return a situation before so many cameras. Raises ValueError where there is none of that name or number."""
+    check(name, views)
     rng = np.random.default_rng([seed, views])
     turned = rng.uniform(-8.0, 8.0)  # degrees, so that no side view is exactly one
     target = np.array([0.0, HEIGHT, 0.0])
-    cameras = [
-        Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS) for degrees in PLACES[views]
-    ]
-    return Situation(name, views, MADE[name](views, seed), cameras)
+    cameras = [Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS) for degrees in PLACES[views]]
+    return Situation(name, views, _actors(name, views, seed), cameras)
+
+
+def _actors(name: str, views: int, seed: int) -> Sequence[Actor]:
+    walk = WALKS[seed % len(WALKS)]
+    if name in STAYING:
+        return [_staying(STAYING[name][seed % len(STAYING[name])], seed, along=name == "to and fro")]
+    if name == "through":
+        return [_walker(walk, views, seed)]
+    if name == "two":
+        near = _walker(walk, views, seed, aside=NEARER)
+        far = _walker(WALKS[(seed + 1) % len(WALKS)], views, seed + 1, back=True, aside=-NEARER)
+        count = max(len(near.motion), len(far.motion))
+        return [_lasting(actor, count) for actor in (near, far)]
+    return [_returning(walk, views, seed, back=name == "back")]
 
 
 def _dressed(motion: Motion, seed: int) -> tuple[Motion, Body]:
@@ -133,17 +110,21 @@ def _walker(name: str, views: int, seed: int, *, back: bool = False, aside: floa
     return Actor(body, whole, present, seed)
 
 
-def _returning(views: int, seed: int, *, back: bool) -> Actor:
-    motion, body = _dressed(clip(WALKS[seed % len(WALKS)]), seed)
+def _returning(name: str, views: int, seed: int, *, back: bool) -> Actor:
+    motion, body = _dressed(clip(name), seed)
     first, second = (ways.through(motion, body, REACH[views], back=way) for way in (False, back))
     whole, present = ways.joined([EMPTY, first, AWAY, second, EMPTY])
     return Actor(body, whole, present, seed)
 
 
-def _staying(frames: tuple[str, int, int], seed: int) -> Actor:
+def _staying(frames: tuple[str, int, int], seed: int, *, along: bool) -> Actor:
+    """Return somebody who is always there: he walks along x, or faces the first camera about."""
     motion, body = _dressed(clip(*frames), seed)
-    faced = np.random.default_rng([seed, 2]).uniform(-0.8, 0.8) - motion.poses[0, 0]  # 0 is towards the first camera
-    there = ways.grounded(ways.turned(motion, faced), body)
+    if along:
+        turn = ways.ALONG - ways.longest(motion)
+    else:
+        turn = np.random.default_rng([seed, 2]).uniform(-0.8, 0.8) - motion.poses[0, 0]
+    there = ways.grounded(ways.turned(motion, turn), body)
     there = ways.moved(there, -ways.middle(there))
     return Actor(body, there, np.ones(len(there), dtype=bool), seed)
 

@@ -1,4 +1,4 @@
-"""A picture of a row: frames of the first two cameras, with the mask that was taken out and the body that was fitted."""
+"""A picture of a row: frames of its first two cameras, with the mask that was taken out and the fitted body."""
 
 from pathlib import Path
 
@@ -16,19 +16,18 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
 from posefit.tracking.drawing.body import draw_stick, side_camera
 from posefit.tracking.run import Track
-from posefit_experiments.composites.filming import Film
 from posefit_experiments.composites.figures import whole
+from posefit_experiments.composites.filming import Film
 from posefit_experiments.composites.situations import Situation
 
 SHARES = (0.15, 0.38, 0.62, 0.85)  # of the frames in which the person is whole: those that are shown
 CAMERAS = 2  # that are shown at most
 TAKEN, FITTED, TRUE = (60, 220, 60), (40, 140, 255), (255, 255, 255)  # outlines: mask, fitted body, true mask
-SIDE = 150  # pixels of the view from the camera's right
+WIDE = 300  # pixels of a frame that are shown, about the person
+SIDE = 100  # pixels of the view from the camera's right
 
 
-def stills(
-    path: Path, made: Film, scene: Situation, masks: NDArray[np.bool_], result: Track, radii: Array
-) -> None:
+def stills(path: Path, made: Film, scene: Situation, masks: NDArray[np.bool_], result: Track, radii: Array) -> None:
     """Write a picture: green is the mask that was taken out, orange the fitted body, white the true mask.
 
     In the corner are the true bones, white, and the fitted ones, seen from the first camera's right.
@@ -44,8 +43,9 @@ def stills(
             fitted = project(body, camera, result.motion.poses[k], result.motion.translations[k])
             for mask, colour in ((made.masks[number, k], TRUE), (masks[number, k], TAKEN), (fitted, FITTED)):
                 _outline(image, mask, colour)
+            image = _about(image, made.masks[number, k])
             if number == 0:
-                image[-SIDE:, :SIDE] = _aside(scene, camera, body, result.motion, k)
+                image[:SIDE, :SIDE] = _aside(scene, camera, body, result.motion, k)
             images.append(image)
         rows.append(np.hstack(images))
     cv2.imwrite(str(path), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 88])
@@ -59,6 +59,14 @@ def _frame(made: Film, camera: int, k: int) -> Image:
 def _outline(image: Image, mask: Mask, colour: tuple[int, int, int]) -> None:
     outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(image, outlines, -1, colour, 1, cv2.LINE_AA)
+
+
+def _about(image: Image, mask: Mask) -> Image:
+    """Return the part of an image, as high as it is, that has a mask in its middle."""
+    columns = np.flatnonzero(mask.any(axis=0))
+    middle = int(columns.mean()) if len(columns) else image.shape[1] // 2
+    left = int(np.clip(middle - WIDE // 2, 0, image.shape[1] - WIDE))
+    return image[:, left : left + WIDE].copy()
 
 
 def _aside(scene: Situation, camera: Camera, body: Body, motion: Motion, k: int) -> Image:

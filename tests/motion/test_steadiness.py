@@ -1,0 +1,84 @@
+"""How joints accelerate and feet slide: motions whose figures are known."""
+
+import numpy as np
+import pytest
+
+from posefit.geometry.skeleton import JOINTS
+from posefit.motion import recorded
+from posefit.motion.steadiness import acceleration, slides, standing
+
+LEFT, RIGHT = JOINTS.index("lfoot"), JOINTS.index("rfoot")
+
+
+def still(frames: int) -> np.ndarray:
+    """Return joints (T, 27, 3) of somebody whose joints all stay 1 m above the ground, but for the feet, on it."""
+    joints = np.ones((frames, len(JOINTS), 3))
+    joints[:, [LEFT, RIGHT], 1] = 0.0
+    return joints
+
+
+@pytest.mark.parametrize(("fps", "left_out"), [(30.0, 1), (120.0, 4), (25.0, 1)])
+def test_what_falls_accelerates_as_it_does_at_any_rate(fps: float, left_out: int) -> None:
+    times = np.arange(40) / fps
+    joints = still(40)
+    joints[..., 1] -= 0.5 * 9.81 * times[:, None] ** 2
+    found = acceleration(joints, fps)
+    np.testing.assert_allclose(found[left_out:-left_out], 9.81)
+    assert np.isnan(found[:left_out]).all()
+    assert np.isnan(found[-left_out:]).all()
+
+
+def test_an_even_way_has_no_acceleration_and_two_frames_have_none_that_is_known() -> None:
+    joints = still(10) + np.arange(10)[:, None, None] * [0.1, 0.0, 0.2]
+    np.testing.assert_allclose(acceleration(joints, 30.0)[1:-1], 0.0, atol=1e-9)
+    assert np.isnan(acceleration(joints[:2], 30.0)).all()
+
+
+def test_feet_that_stay_stand_and_do_not_slide() -> None:
+    stands = standing(still(30), 30.0)
+    assert stands.all()
+    assert slides(still(30), stands).tolist() == [0.0, 0.0]
+
+
+def test_a_foot_that_is_lifted_or_goes_fast_does_not_stand() -> None:
+    joints = still(60)
+    joints[20:40, LEFT, 1] = 0.2
+    joints[:, RIGHT, 0] += np.arange(60) / 30.0  # a metre a second
+    stands = standing(joints, 30.0)
+    assert stands[:19, 0].all()
+    assert not stands[20:40, 0].any()
+    assert not stands[:, 1].any()
+
+
+def test_a_step_is_as_long_as_a_foot_creeps_along_the_ground() -> None:
+    joints = still(60)
+    joints[20:40, LEFT, 1] = 0.2  # two steps of the left foot, one of the right
+    joints[40:, LEFT] += np.arange(20)[:, None] * [0.003, 0.0, 0.004]  # 5 mm a frame, 15 cm a second
+    stands = standing(joints, 30.0)
+    found = slides(joints, stands)
+    assert len(found) == 3
+    assert found[0] == found[2] == 0.0
+    assert found[1] == pytest.approx(0.005 * (stands[40:, 0].sum() - 1))
+
+
+def test_the_lowest_place_of_the_feet_is_the_ground_wherever_that_is() -> None:
+    rising = still(300)
+    rising[..., 1] += 0.03 * np.arange(300)[:, None] / 30.0  # 30 cm in ten seconds: a track that drifts
+    assert standing(rising, 30.0).all()
+
+
+def test_a_motion_of_one_frame_has_no_step() -> None:
+    stands = standing(still(1), 30.0)
+    assert not stands.any()
+    assert slides(still(1), stands).size == 0
+
+
+def test_recorded_walkers_stand_half_of_the_time_and_slide_by_about_two_centimetres() -> None:
+    motion = recorded.clip("02_01").motion()
+    joints = motion.skeleton.joints(motion.poses, motion.translations)
+    stands = standing(joints, motion.fps)
+    assert 0.3 < stands.mean() < 0.7
+    found = slides(joints, stands)
+    assert 4 <= len(found) <= 8
+    assert found.mean() < 0.025
+    assert 3.0 < np.nanmean(acceleration(joints, motion.fps)) < 9.0
