@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from posefit.footage.extract import extract
-from posefit.footage.masks import existing
 from posefit.footage.segmentation import Extraction
 from posefit.motion import recorded
 from posefit.reading import parsed_json, read_text
 from posefit.tracking.front import track
 from posefit_experiments.composites.figures import extraction_figures, track_figures
 from posefit_experiments.composites.filming import BEFORE, film
-from posefit_experiments.composites.situations import PLACES, SHOWS, check, situation
+from posefit_experiments.composites.plates import check_video, plate
+from posefit_experiments.composites.situations import PLACES, SHOWS, SIZE, check, situation
 from posefit_experiments.composites.stills import stills
 from posefit_experiments.composites.tables import groups
 from posefit_experiments.grid import Progress, check_seeds, each
@@ -57,12 +57,11 @@ def composites(
     for a picture a row. Raises ValueError where something asked for is not there.
     """
     shots = asked(situations, views, extractions, seeds, quick)
-    existing(Path(video))
+    check_video(video)
     done = earlier(rows)
-    todo = [shot for shot in shots if shot not in done]
-    jobs = {shot: partial(measured, video, shot, pictures) for shot in todo}
     if pictures is not None:
-        Path(pictures).mkdir(parents=True, exist_ok=True)
+        _check_folder(Path(pictures))
+    jobs = {shot: partial(measured, video, shot, pictures) for shot in shots if shot not in done}
     done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
     found = [done[shot] for shot in shots]
     return {"rows": found, "groups": groups(found)}
@@ -87,7 +86,8 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         scene = situation(shot.situation, shot.views, shot.seed)
-        made = film(scene, video, shot.seed, shot.extraction == GIVEN, folder)
+        plates = [plate(video, number, SIZE) for number in range(shot.views)]
+        made = film(scene, plates, shot.seed, shot.extraction == GIVEN, folder)
         how, frames = _extraction(shot.extraction), (made.first, None)
         row: dict[str, Any] = {**shot._asdict(), "people": scene.people, "frames": len(scene)}
         try:
@@ -121,9 +121,16 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
 
 
 def earlier(path: str | None) -> dict[Shot, dict[str, Any]]:
-    """Return the rows of a file, where there is one. Raises ValueError where a line is none."""
-    if path is None or not Path(path).exists():
+    """Return the rows of a file, which is made where there is none.
+
+    Raises ValueError where it cannot be written to, or a line is no row.
+    """
+    if path is None:
         return {}
+    try:
+        Path(path).touch()
+    except OSError as error:
+        raise ValueError(f"{path}: expected a file for rows, got {error.strerror}") from None
     found = {}
     for number, line in enumerate(read_text(path, LARGEST).splitlines(), 1):
         try:
@@ -133,6 +140,14 @@ def earlier(path: str | None) -> dict[Shot, dict[str, Any]]:
             wanted = ", ".join(Shot._fields)
             raise ValueError(f"{path}: line {number} must be a row with {wanted}, got another text") from None
     return found
+
+
+def _check_folder(path: Path) -> None:
+    """Return nothing. Raises ValueError where a path is no folder and none can be made."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"{path}: expected a folder for pictures, got {error.strerror}") from None
 
 
 def _kept(

@@ -13,7 +13,7 @@ from posefit.geometry.calibration import HALF
 from posefit.geometry.camera import Camera
 from posefit.silhouette.mask import Mask
 from posefit_experiments.composites.clothes import outfit
-from posefit_experiments.composites.plates import Plate, filmed, plate
+from posefit_experiments.composites.plates import Plate, filmed
 from posefit_experiments.composites.rendering import Posed, composited, true_masks
 from posefit_experiments.composites.situations import Situation
 
@@ -30,14 +30,16 @@ class Film:
     masks: NDArray[np.bool_] = field(repr=False)  # (views, T, height, width): what is seen of the first actor
 
 
-def film(situation: Situation, video: str, seed: int, empty_first: bool, folder: Path) -> Film:
-    """Return what is written to a folder: a video a camera, with the empty place first if asked for, and the truth."""
+def film(situation: Situation, plates: Sequence[Plate], seed: int, empty_first: bool, folder: Path) -> Film:
+    """Return what is written to a folder: a video a camera, with the empty place first if asked for, and the truth.
+
+    `plates` are the empty pictures of each camera.
+    """
     rng = np.random.default_rng([seed, 4])
     first = BEFORE if empty_first else 0
     videos, masks = [], []
     fps = situation.actors[0].motion.fps
-    for number, camera in enumerate(situation.cameras):
-        behind = plate(video, number, (camera.width, camera.height))
+    for number, (camera, behind) in enumerate(zip(situation.cameras, plates, strict=True)):
         path = folder / f"camera-{number + 1}.mp4"
         seen: list[Mask] = []
         with VideoWriter(path, fps, (camera.width, camera.height)) as writer:

@@ -40,7 +40,7 @@ class Plate:
 
 
 def plate(video: str | Path, camera: int, size: tuple[int, int]) -> Plate:
-    """Return the empty pictures of a camera by its number. Raises ValueError where it is another video."""
+    """Return the empty pictures of a camera by its number."""
     still, living = _empty(str(video))
     left, top = CORNERS[camera % len(CORNERS)]
     part = np.s_[top : top + SEEN[1], left : left + SEEN[0]]
@@ -59,13 +59,21 @@ def filmed(image: NDArray[np.float32], k: int, rng: np.random.Generator) -> Imag
     return np.asarray(np.clip(gain * image + noise, 0.0, 255.0).astype(np.uint8))
 
 
+def check_video(path: str) -> Video:
+    """Return the video of empty pictures. Raises ValueError where it is another one."""
+    video, frames = Video.of(path), max(EMPTY) + 1
+    count = video.count() if video.size == FILMED else 0
+    if count != frames:
+        wanted, came = (f"{width}x{height}" for width, height in (FILMED, video.size))
+        wanted, came = f"{wanted} pixels and {frames} frames", f"{came} and {count} frames" if count else f"{came}"
+        raise ValueError(f"{path}: expected the demonstration video of Sports2D, {wanted}, got {came}")
+    return video
+
+
 @lru_cache(maxsize=1)
 def _empty(path: str) -> tuple[NDArray[np.float32], list[NDArray[np.float32]]]:
     """Return the whole empty picture, and what the first frames differ from it by where nobody is."""
-    video = Video.of(path)
-    if video.size != FILMED or video.count() <= max(EMPTY):
-        wanted = f"{FILMED[0]}x{FILMED[1]} pixels with {max(EMPTY) + 1} frames"
-        raise ValueError(f"{path}: expected the demonstration video of Sports2D, {wanted}, got another one")
+    video = check_video(path)
     frames = {k: image for k, image in enumerate(video.frames(0, None, FILMED)) if k in EMPTY or k < LIVING}
     still = np.median([frames[k] for k in EMPTY], axis=0).astype(np.float32)
     away = [frames[k].astype(np.float32) - still for k in range(LIVING)]

@@ -16,8 +16,9 @@ SIZE = (640, 360)  # pixels of a frame
 DISTANCE, HEIGHT = 8.0, 0.95  # metres of a camera from the middle, and above the ground
 ACROSS = np.radians(36.0)  # that a camera sees
 PLACES: Mapping[int, Sequence[float]] = {1: (0.0,), 2: (-30.0, 30.0), 4: (-30.0, 30.0, 150.0, 210.0)}  # degrees
-REACH = {1: 3.4, 2: 4.8, 4: 4.8}  # metres to either side, where nobody is seen any more
+REACH = {1: 3.4, 2: 5.2, 4: 5.2}  # metres to either side, where nobody is seen any more
 EMPTY, AWAY = 10, 20  # frames without anybody: before and after, and until somebody comes back
+FARTHER = 1.5  # that whoever passes aside goes to either side, for each metre aside
 NEARER = 0.7  # metres from the middle, of each of two who pass
 MIRRORED = [joint - 1 for joint in MIRROR[1:]]  # of each bone, the one on the other side
 GIRTH = 10.0  # percent that a part of the body may be thicker or thinner than the library's
@@ -105,7 +106,7 @@ def _dressed(motion: Motion, seed: int) -> tuple[Motion, Body]:
 
 def _walker(name: str, views: int, seed: int, *, back: bool = False, aside: float = 0.0) -> Actor:
     motion, body = _dressed(clip(name), seed)
-    walk = ways.through(motion, body, REACH[views], back=back, aside=aside)
+    walk = ways.through(motion, body, REACH[views] + FARTHER * abs(aside), back=back, aside=aside)
     whole, present = ways.joined([EMPTY, walk, EMPTY])
     return Actor(body, whole, present, seed)
 
