@@ -22,12 +22,12 @@ from posefit.tracking.run import Track
 from posefit_experiments.composites import experiment, ways
 from posefit_experiments.composites.clothes import TROUSERS, outfit
 from posefit_experiments.composites.experiment import Shot, asked, earlier
-from posefit_experiments.composites.figures import extraction_figures, steadiness, track_figures, whole
+from posefit_experiments.composites.figures import extraction_figures, steadiness, track_figures, uncut
 from posefit_experiments.composites.filming import BEFORE, film
 from posefit_experiments.composites.plates import Plate, check_video, plate
 from posefit_experiments.composites.rendering import Posed, composited, true_masks
 from posefit_experiments.composites.situations import ALWAYS, SHOWS, SIZE, Situation, situation
-from posefit_experiments.composites.tables import composites_lines, groups
+from posefit_experiments.composites.tables import by_presence, composites_lines
 
 VIDEO = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
 SMALL = (160, 120)
@@ -134,7 +134,7 @@ def test_a_quick_look_is_two_rows_of_each_extraction_and_all_is_every_one() -> N
 
 
 def test_a_walk_goes_on_without_a_jump() -> None:
-    clip = ways.clip("16_47")
+    clip = ways.frames_of("16_47")
     long = ways.walked(clip, 12.0)
     assert np.linalg.norm(long.translations[-1] - long.translations[0]) == pytest.approx(12.0, abs=0.1)
     most = [np.nanmax(acceleration(one.skeleton.joints(one.poses, one.translations), 30.0)) for one in (clip, long)]
@@ -142,8 +142,8 @@ def test_a_walk_goes_on_without_a_jump() -> None:
 
 
 def test_to_turn_a_motion_turns_its_joints_about_the_vertical() -> None:
-    clip = ways.clip("16_47", 0, 20)
-    turned = ways.turned(clip, 0.7)
+    clip = ways.frames_of("16_47", 0, 20)
+    turned = ways.facing_elsewhere(clip, 0.7)
     sine, cosine = np.sin(0.7), np.cos(0.7)
     turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
     joints = [one.skeleton.joints(one.poses, one.translations) for one in (clip, turned)]
@@ -165,7 +165,7 @@ def test_who_passes_is_seen_by_nobody_at_first_and_last_and_who_stays_is_seen_wh
                     [project(actor.body, camera, actor.motion.poses[k], actor.motion.translations[k]) for k in frames]
                 )
                 if name in ALWAYS:
-                    assert whole(masks[None]).all(), (name, views, seed)
+                    assert uncut(masks[None]).all(), (name, views, seed)
                 else:
                     assert not masks.any(), (name, views, seed)
 
@@ -272,7 +272,7 @@ def test_whoever_follows_the_other_of_two_is_told_so() -> None:
 
 
 def test_steadiness_counts_seen_frames_alone() -> None:
-    motion = ways.clip("16_47", 0, 60)
+    motion = ways.frames_of("16_47", 0, 60)
     joints = motion.skeleton.joints(motion.poses, motion.translations)
     seen = np.ones(60, dtype=bool)
     seen[30:] = False
@@ -288,11 +288,11 @@ def test_tables_tell_what_was_refused_and_compare_who_passes_with_who_stays() ->
         {"situation": "back", **place, "mask_iou": 0.8, "mpjpe_mm": 60.0, "slide_cm": 3.0},
         {"situation": "stands", **place, "refused": "nobody moves"},
     ]
-    passing, always = groups(rows)
+    passing, always = by_presence(rows)
     assert passing["mask_iou"] == pytest.approx(0.85)
     assert passing["slide_cm"] == 3.0
     assert (always["rows"], always["refused"], always["mask_iou"]) == (1, 1, None)
-    lines = list(composites_lines({"rows": rows, "groups": groups(rows)}))
+    lines = list(composites_lines({"rows": rows, "groups": by_presence(rows)}))
     assert any("refused: nobody moves" in line for line in lines)
     assert any(line.startswith("passing") and "0.85" in line for line in lines)
 

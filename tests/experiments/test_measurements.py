@@ -14,7 +14,7 @@ import posefit
 from posefit.cli import main
 from posefit_experiments import accuracy, builds, degradation, methods, views
 
-NAMES = ("sapso", "vsmm", "accuracy", "methods", "views", "degradation", "builds", "footage", "modes")
+NAMES = ("sapso", "vsmm", "accuracy", "methods", "views", "degradation", "builds", "footage", "composites", "modes")
 METHODS_OF_MODES = [word for name in ("known", "library", "cma*2", "annealed", "ribs") for word in ("--method", name)]
 
 

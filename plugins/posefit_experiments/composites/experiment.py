@@ -19,9 +19,9 @@ from posefit.tracking.front import track
 from posefit_experiments.composites.figures import extraction_figures, track_figures
 from posefit_experiments.composites.filming import BEFORE, film
 from posefit_experiments.composites.plates import check_video, plate
-from posefit_experiments.composites.situations import PLACES, SHOWS, SIZE, check, situation
+from posefit_experiments.composites.situations import PLACES, SHOWS, SIZE, check_situation, situation
 from posefit_experiments.composites.stills import stills
-from posefit_experiments.composites.tables import groups
+from posefit_experiments.composites.tables import by_presence
 from posefit_experiments.grid import Progress, check_seeds, each
 
 LARGEST = 50_000_000  # bytes of a file of rows
@@ -64,7 +64,7 @@ def composites(
     jobs = {shot: partial(measured, video, shot, pictures) for shot in shots if shot not in done}
     done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
     found = [done[shot] for shot in shots]
-    return {"rows": found, "groups": groups(found)}
+    return {"rows": found, "groups": by_presence(found)}
 
 
 def asked(
@@ -74,7 +74,7 @@ def asked(
     check_seeds(seeds)
     grid = list(product(situations or SHOWS, views or PLACES))
     for place in grid:
-        check(*place)
+        check_situation(*place)
     for method in extractions:
         _extraction(method)
     places = [place for place in grid if not quick or place in QUICK]

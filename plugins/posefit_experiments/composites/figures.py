@@ -19,7 +19,7 @@ from posefit_experiments.composites.situations import Situation
 Masks = NDArray[np.bool_]  # (views, T, height, width)
 
 
-def whole(masks: Masks) -> NDArray[np.bool_]:
+def uncut(masks: Masks) -> NDArray[np.bool_]:
     """Return in which frames of each view (views, T) somebody is seen and nowhere cut by the picture's border."""
     edges = (masks[:, :, 0], masks[:, :, -1], masks[..., 0], masks[..., -1])
     return np.asarray(masks.any(axis=(2, 3)) & ~np.any([edge.any(axis=2) for edge in edges], axis=0))
@@ -27,7 +27,7 @@ def whole(masks: Masks) -> NDArray[np.bool_]:
 
 def extraction_figures(masks: Masks, usable: NDArray[np.bool_], truth: Masks) -> dict[str, Any]:
     """Return how well masks (views, T) that were taken out agree with the true ones, where somebody is whole."""
-    seen = whole(truth)
+    seen = uncut(truth)
     overlaps = _overlaps(masks, truth)
     return {
         "mask_iou": float(overlaps[seen].mean()),
@@ -40,7 +40,7 @@ def extraction_figures(masks: Masks, usable: NDArray[np.bool_], truth: Masks) ->
 def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks) -> dict[str, Any]:
     """Return what a track is worth in the frames in which a camera sees all of the person."""
     actor = situation.actors[0]
-    seen = np.asarray(whole(truth).any(axis=0))
+    seen = np.asarray(uncut(truth).any(axis=0))
     estimate, body = track.motion, Body(track.motion.skeleton, radii)
     true_joints = actor.motion.skeleton.joints(actor.motion.poses, actor.motion.translations)
     joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
@@ -95,7 +95,7 @@ def _others(situation: Situation, joints: Array, seen: NDArray[np.bool_]) -> dic
 def _body_iou(estimate: Motion, body: Body, situation: Situation, truth: Masks) -> float:
     """Return the overlap of the fitted body with the whole true one, seen by the cameras that see all of it."""
     actor, found = situation.actors[0], []
-    for camera, seen in zip(situation.cameras, whole(truth), strict=True):
+    for camera, seen in zip(situation.cameras, uncut(truth), strict=True):
         for k in np.flatnonzero(seen):
             true = project(actor.body, camera, actor.motion.poses[k], actor.motion.translations[k])
             fitted = project(body, camera, estimate.poses[k], estimate.translations[k])

@@ -13,7 +13,7 @@ from posefit.geometry.calibration import HALF
 from posefit.geometry.camera import Camera
 from posefit.silhouette.mask import Mask
 from posefit_experiments.composites.clothes import outfit
-from posefit_experiments.composites.plates import Plate, filmed
+from posefit_experiments.composites.plates import Plate, sensed
 from posefit_experiments.composites.rendering import Posed, composited, true_masks
 from posefit_experiments.composites.situations import Situation
 
@@ -21,7 +21,7 @@ BEFORE = 20  # frames of the empty place that a background is learned from, wher
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
+class Filmed:
     """What was written of a situation, and the truth of it."""
 
     videos: list[Path]
@@ -30,7 +30,7 @@ class Film:
     masks: NDArray[np.bool_] = field(repr=False)  # (views, T, height, width): what is seen of the first actor
 
 
-def film(situation: Situation, plates: Sequence[Plate], seed: int, empty_first: bool, folder: Path) -> Film:
+def film(situation: Situation, plates: Sequence[Plate], seed: int, empty_first: bool, folder: Path) -> Filmed:
     """Return what is written to a folder: a video a camera, with the empty place first if asked for, and the truth.
 
     `plates` are the empty pictures of each camera.
@@ -44,15 +44,15 @@ def film(situation: Situation, plates: Sequence[Plate], seed: int, empty_first: 
         seen: list[Mask] = []
         with VideoWriter(path, fps, (camera.width, camera.height)) as writer:
             for k in range(first):
-                writer.write(filmed(behind.frame(k), k, rng))
+                writer.write(sensed(behind.frame(k), k, rng))
             for k, (people, mask) in enumerate(_frames(situation, camera, behind)):
-                writer.write(filmed(composited(behind.frame(first + k), camera, people), first + k, rng))
+                writer.write(sensed(composited(behind.frame(first + k), camera, people), first + k, rng))
                 seen.append(mask)
         videos.append(path)
         masks.append(np.stack(seen))
     calibration = folder / "cameras.toml"
-    calibration.write_text(calibrated(situation.cameras), encoding="utf-8")
-    return Film(videos, calibration, first, np.stack(masks))
+    calibration.write_text(calibration_text(situation.cameras), encoding="utf-8")
+    return Filmed(videos, calibration, first, np.stack(masks))
 
 
 def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tuple[list[Posed], Mask]]:
@@ -69,7 +69,7 @@ def _frames(situation: Situation, camera: Camera, behind: Plate) -> Iterator[tup
         yield people, masks[0] if there else np.zeros((camera.height, camera.width), dtype=bool)
 
 
-def calibrated(cameras: Sequence[Camera]) -> str:
+def calibration_text(cameras: Sequence[Camera]) -> str:
     """Return the text of a calibration file, as Pose2Sim and Sports2D write it."""
     told = []
     for number, camera in enumerate(cameras, 1):

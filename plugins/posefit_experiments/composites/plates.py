@@ -52,7 +52,7 @@ def plate(video: str | Path, camera: int, size: tuple[int, int]) -> Plate:
     return Plate(scaled(still).astype(np.float32), np.stack([scaled(one).astype(np.int8) for one in living]))
 
 
-def filmed(image: NDArray[np.float32], k: int, rng: np.random.Generator) -> Image:
+def sensed(image: NDArray[np.float32], k: int, rng: np.random.Generator) -> Image:
     """Return what a sensor makes of the picture of frame k."""
     gain = 1.0 + FLICKER * (np.sin(0.21 * k) + rng.normal() / 3.0)
     noise = NOISE * rng.standard_normal(image.shape, dtype=np.float32)

@@ -10,7 +10,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import MIRROR
 from posefit.motion.motion import Motion
 from posefit_experiments.composites import ways
-from posefit_experiments.composites.ways import Actor, clip
+from posefit_experiments.composites.ways import Actor, frames_of
 
 SIZE = (640, 360)  # pixels of a frame
 DISTANCE, HEIGHT = 8.0, 0.95  # metres of a camera from the middle, and above the ground
@@ -65,7 +65,7 @@ PASSING = ("through", "again", "back")  # one person, who is not always there
 ALWAYS = ("to and fro", "stands", "waves")
 
 
-def check(name: str, views: int) -> None:
+def check_situation(name: str, views: int) -> None:
     """Return nothing. Raises ValueError where there is no situation of that name, or none for so many cameras."""
     if name not in SHOWS:
         raise ValueError(f"situation must be one of {', '.join(SHOWS)}, got {name!r}")
@@ -75,7 +75,7 @@ def check(name: str, views: int) -> None:
 
 def situation(name: str, views: int, seed: int) -> Situation:
     """Return a situation before so many cameras. Raises ValueError where there is none of that name or number."""
-    check(name, views)
+    check_situation(name, views)
     rng = np.random.default_rng([seed, views])
     turned = rng.uniform(-8.0, 8.0)  # degrees, so that no side view is exactly one
     target = np.array([0.0, HEIGHT, 0.0])
@@ -105,28 +105,28 @@ def _dressed(motion: Motion, seed: int) -> tuple[Motion, Body]:
 
 
 def _walker(name: str, views: int, seed: int, *, back: bool = False, aside: float = 0.0) -> Actor:
-    motion, body = _dressed(clip(name), seed)
+    motion, body = _dressed(frames_of(name), seed)
     walk = ways.through(motion, body, REACH[views] + FARTHER * abs(aside), back=back, aside=aside)
-    whole, present = ways.joined([EMPTY, walk, EMPTY])
+    whole, present = ways.one_after_other([EMPTY, walk, EMPTY])
     return Actor(body, whole, present, seed)
 
 
 def _returning(name: str, views: int, seed: int, *, back: bool) -> Actor:
-    motion, body = _dressed(clip(name), seed)
+    motion, body = _dressed(frames_of(name), seed)
     first, second = (ways.through(motion, body, REACH[views], back=way) for way in (False, back))
-    whole, present = ways.joined([EMPTY, first, AWAY, second, EMPTY])
+    whole, present = ways.one_after_other([EMPTY, first, AWAY, second, EMPTY])
     return Actor(body, whole, present, seed)
 
 
 def _staying(frames: tuple[str, int, int], seed: int, *, along: bool) -> Actor:
     """Return somebody who is always there: he walks along x, or faces the first camera about."""
-    motion, body = _dressed(clip(*frames), seed)
+    motion, body = _dressed(frames_of(*frames), seed)
     if along:
         turn = ways.ALONG - ways.longest(motion)
     else:
         turn = np.random.default_rng([seed, 2]).uniform(-0.8, 0.8) - motion.poses[0, 0]
-    there = ways.grounded(ways.turned(motion, turn), body)
-    there = ways.moved(there, -ways.middle(there))
+    there = ways.on_ground(ways.facing_elsewhere(motion, turn), body)
+    there = ways.moved(there, -ways.middle_of(there))
     return Actor(body, there, np.ones(len(there), dtype=bool), seed)
 
 
@@ -134,6 +134,6 @@ def _lasting(actor: Actor, count: int) -> Actor:
     missing = count - len(actor.motion)
     if not missing:
         return actor
-    whole, present = ways.joined([actor.motion, missing])
+    whole, present = ways.one_after_other([actor.motion, missing])
     present[: len(actor.present)] = actor.present
     return replace(actor, motion=whole, present=present)

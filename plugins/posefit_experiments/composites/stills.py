@@ -16,8 +16,8 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
 from posefit.tracking.drawing.body import draw_stick, side_camera
 from posefit.tracking.run import Track
-from posefit_experiments.composites.figures import whole
-from posefit_experiments.composites.filming import Film
+from posefit_experiments.composites.figures import uncut
+from posefit_experiments.composites.filming import Filmed
 from posefit_experiments.composites.situations import Situation
 
 SHARES = (0.15, 0.38, 0.62, 0.85)  # of the frames in which the person is whole: those that are shown
@@ -27,12 +27,12 @@ WIDE = 300  # pixels of a frame that are shown, about the person
 SIDE = 100  # pixels of the view from the camera's right
 
 
-def stills(path: Path, made: Film, scene: Situation, masks: NDArray[np.bool_], result: Track, radii: Array) -> None:
+def stills(path: Path, made: Filmed, scene: Situation, masks: NDArray[np.bool_], result: Track, radii: Array) -> None:
     """Write a picture: green is the mask that was taken out, orange the fitted body, white the true mask.
 
     In the corner are the true bones, white, and the fitted ones, seen from the first camera's right.
     """
-    seen = np.flatnonzero(whole(made.masks)[0])
+    seen = np.flatnonzero(uncut(made.masks)[0])
     frames = [int(seen[int(share * len(seen))]) for share in SHARES]
     body = Body(result.motion.skeleton, radii)
     rows = []
@@ -51,7 +51,7 @@ def stills(path: Path, made: Film, scene: Situation, masks: NDArray[np.bool_], r
     cv2.imwrite(str(path), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 88])
 
 
-def _frame(made: Film, camera: int, k: int) -> Image:
+def _frame(made: Filmed, camera: int, k: int) -> Image:
     video = Video.of(made.videos[camera])
     return next(iter(video.frames(made.first + k, made.first + k + 1, video.size)))
 

@@ -29,7 +29,7 @@ GROUPS = {"passing": PASSING, "always there": ALWAYS}
 COMPARED = ("mask_iou", "body_iou", "mpjpe_mm", "facing_right", "lost", "swapped", "acceleration_ratio", "slide_cm")
 
 
-def groups(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def by_presence(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Return the means over rows of those who pass and of those who are always there, by extraction and cameras.
 
     Of what was refused there are no figures; `refused` is how many rows that are.

@@ -29,7 +29,7 @@ class Actor:
     outfit: int
 
 
-def clip(name: str, start: int = 0, stop: int | None = None) -> Motion:
+def frames_of(name: str, start: int = 0, stop: int | None = None) -> Motion:
     """Return frames of a recorded clip."""
     motion = recorded.clip(name).motion()
     return motion.frames(start, len(motion) if stop is None else min(stop, len(motion)))
@@ -66,7 +66,7 @@ def cycle(motion: Motion) -> tuple[int, int]:
     return best[1], best[2]
 
 
-def turned(motion: Motion, angle: float) -> Motion:
+def facing_elsewhere(motion: Motion, angle: float) -> Motion:
     """Return a motion turned about the vertical."""
     poses, (x, y, z) = motion.poses.copy(), motion.translations.T
     poses[:, 0] += angle
@@ -75,7 +75,7 @@ def turned(motion: Motion, angle: float) -> Motion:
     return Motion(motion.name, motion.skeleton, poses, places, motion.fps)
 
 
-def grounded(motion: Motion, body: Body) -> Motion:
+def on_ground(motion: Motion, body: Body) -> Motion:
     """Return a motion whose lowest point touches the ground."""
     joints = motion.skeleton.joints(motion.poses, motion.translations)
     low = float((joints[..., 1] - body.joint_radii()).min(axis=1).min())
@@ -93,7 +93,7 @@ def heading(motion: Motion) -> float:
     return float(np.arctan2(way[0], way[2]))
 
 
-def middle(motion: Motion) -> Array:
+def middle_of(motion: Motion) -> Array:
     """Return the middle of the ground that a motion covers, a point (3,) with y = 0."""
     low, high = motion.translations.min(axis=0), motion.translations.max(axis=0)
     return np.asarray(0.5 * (low + high) * [1.0, 0.0, 1.0])
@@ -109,11 +109,11 @@ def longest(motion: Motion) -> float:
 def through(motion: Motion, body: Body, reach: float, *, back: bool = False, aside: float = 0.0) -> Motion:
     """Return a walk from x = -reach to x = reach, or back, `aside` metres nearer to z."""
     long = walked(motion, 2.0 * reach)
-    ahead = grounded(turned(long, (-ALONG if back else ALONG) - heading(long)), body)
-    return moved(ahead, [0.0, 0.0, aside] - middle(ahead))
+    ahead = on_ground(facing_elsewhere(long, (-ALONG if back else ALONG) - heading(long)), body)
+    return moved(ahead, [0.0, 0.0, aside] - middle_of(ahead))
 
 
-def joined(parts: Sequence[Motion | int]) -> tuple[Motion, NDArray[np.bool_]]:
+def one_after_other(parts: Sequence[Motion | int]) -> tuple[Motion, NDArray[np.bool_]]:
     """Return motions one after the other, and in which frames somebody is there; a number is frames without anybody."""
     first = next(part for part in parts if isinstance(part, Motion))
     poses, places, present = [], [], []
