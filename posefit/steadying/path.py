@@ -1,0 +1,131 @@
+"""The likeliest way of a root and two legs, by least squares over all frames at once.
+
+Each frame pulls the root to where it was found, as hard as it could be seen there; nothing accelerates without need;
+and feet that stand do not move. The legs give way a little, so that they do not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
+from posefit.motion.motion import Motion
+from posefit.motion.steadiness import BALLS
+from posefit.steadying.squares import Squares
+from posefit.steadying.stance import stances
+
+ACROSS = 0.006  # metres that a root may be off where it was found: standard deviation, as all that follow
+DEPTH = 0.004  # of the distance, towards or away from a single camera
+UNSEEN = 1.0  # metres, in frames that show too little
+ACCELERATION = 3.0  # metres a second squared, of the root on each axis
+TURNING = np.radians(3.0)  # that an angle of a leg may be off what was found
+SHAKING = np.radians(400.0)  # a second squared, of that difference
+STANDING = 0.004  # metres that a foot which stands may move in a thirtieth of a second
+STRANGE = 4.0  # standard deviations from which on a place that was found is believed the less, the farther it is off
+ROUNDS = 4  # of Gauss and Newton
+STEP = 1e-4  # radians: of a difference quotient
+WINDOW, OVERLAP = 900, 60  # frames that are solved for at once, and those that two windows share
+
+LEGS = tuple(
+    angle_index(JOINTS.index(side + bone)) + axis
+    for side in "lr"
+    for bone in ("femur", "tibia", "foot")
+    for axis in range(3)
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """How well each frame of a motion was seen."""
+
+    usable: NDArray[np.bool_]  # (T,)
+    eye: Array | None  # (3,) metres: where the only camera stands; None where there are several
+
+
+def steadied(motion: Motion, seen: Seen) -> Motion:
+    """Return a motion whose root goes smoothly and whose feet do not slide where they stand.
+
+    Only the root's way and the angles of the legs change. A motion of fewer than 3 frames is returned as it is.
+    """
+    if len(motion) < 3:
+        return motion
+    whole = np.arange(len(motion))
+    motion = replace(motion, translations=_bridged(motion.translations, seen.usable))
+    poses, places = motion.poses.copy(), motion.translations.copy()
+    for start in range(0, len(motion), WINDOW):
+        rows = whole[max(start - OVERLAP, 0) : start + WINDOW + OVERLAP]
+        part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
+        found = _window(part, replace(seen, usable=seen.usable[rows]))
+        kept = (rows >= start) & (rows < start + WINDOW)
+        poses[rows[kept]], places[rows[kept]] = found.poses[kept], found.translations[kept]
+    return replace(motion, poses=poses, translations=places)
+
+
+def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
+    """Return places (T, 3) that go straight on where frames show too little, and stay where they were at both ends."""
+    known = np.flatnonzero(usable)
+    if not len(known):
+        return places
+    return np.column_stack([np.interp(np.arange(len(places)), known, line) for line in places[known].T])
+
+
+def _window(motion: Motion, seen: Seen) -> Motion:
+    """Return a motion steadied: first its root alone, which tells who stands, then the legs as well."""
+    if len(motion) < 3:
+        return motion
+    smooth = _solved(motion, seen, np.zeros((len(motion), 2), dtype=bool))
+    stands = stances(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, seen.eye)
+    return _solved(motion, seen, stands)
+
+
+def _solved(motion: Motion, seen: Seen, stands: NDArray[np.bool_]) -> Motion:
+    """Return the motion of the least sum of squares, with what stands told."""
+    skeleton, fps, count = motion.skeleton, motion.fps, len(motion)
+    angles = [angle for angle in LEGS if skeleton.free[angle]]
+    root, legs = slice(0, 3), slice(3, 3 + len(angles))
+    precision = _precisions(motion, seen)
+    change = np.zeros((count, 3 + len(angles)))  # of the root, and of the angles
+    poses, places = motion.poses.copy(), motion.translations.copy()
+    for _ in range(ROUNDS):
+        squares = Squares.of(*change.shape)
+        off = np.einsum("ti,tij,tj->t", change[:, root], precision, change[:, root])
+        precise = precision / (1.0 + off / STRANGE**2)[:, None, None]
+        squares.add(root, precise, np.einsum("tij,tj->ti", precise, change[:, root]))
+        squares.add_bends(root, places, fps**2 / ACCELERATION)
+        squares.add(legs, np.eye(len(angles)) / TURNING**2, change[:, legs] / TURNING**2)
+        squares.add_bends(legs, change[:, legs], fps**2 / SHAKING)
+        for side, ball in enumerate(BALLS):
+            both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
+            feet, slopes = _feet(skeleton, poses, places, ball, angles)
+            squares.add_steps(both, feet, slopes, fps / (30.0 * STANDING))
+        change = change - squares.least()
+        poses[:, angles] = motion.poses[:, angles] + change[:, 3:]
+        places = motion.translations + change[:, root]
+    return Motion(motion.name, skeleton, poses, places, fps)
+
+
+def _precisions(motion: Motion, seen: Seen) -> Array:
+    """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance."""
+    across = np.where(seen.usable, ACROSS, UNSEEN)
+    precise = np.eye(3) / across[:, None, None] ** 2
+    if seen.eye is not None:
+        sights = motion.translations - seen.eye
+        far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
+        sights = sights / far[:, None]
+        along = np.maximum(DEPTH * far, across)
+        precise += (1.0 / along**2 - 1.0 / across**2)[:, None, None] * sights[:, :, None] * sights[:, None, :]
+    return np.asarray(precise)
+
+
+def _feet(skeleton: Skeleton, poses: Array, places: Array, ball: int, angles: Sequence[int]) -> tuple[Array, Array]:
+    """Return where a foot is (T, 3), and how that changes with the root and the angles (T, 3, 3 + angles)."""
+    feet = skeleton.joints(poses, places)[:, ball]
+    turned = np.repeat(poses[None], len(angles), axis=0)
+    for row, angle in enumerate(angles):
+        turned[row, :, angle] += STEP
+    slopes = (skeleton.joints(turned, np.repeat(places[None], len(angles), axis=0))[:, :, ball] - feet) / STEP
+    root = np.repeat(np.eye(3)[None], len(poses), axis=0)
+    return feet, np.concatenate([root, np.moveaxis(slopes, 0, 2)], axis=2)
