@@ -13,7 +13,7 @@ from posefit.posterior.calibration import LEVELS, Recalibration, conformal_facto
 from posefit.posterior.intervals import angle_intervals, joint_intervals
 from posefit.posterior.modes import modes_of
 from posefit.posterior.sides import nearer_mirrored, second_side
-from posefit_exemplars.doubt import Doubt, evidence
+from posefit_exemplars.doubt import Doubt, evidence, side_signs
 from posefit_experiments.posterior.frames import Followed
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -31,7 +31,8 @@ MEMBERS = {name: np.array([JOINTS.index(joint) for joint in joints]) for name, j
 ALONE = {str(angle): np.array([angle]) for angle in range(ANGLES)}  # some have no freedom, and so no error
 TRIED = np.geomspace(0.05, 2.0, 12)  # spreads, in doubts
 EVERY = 5  # of the frames that factors are found from; neighbours say the same
-UNKNOWN = 0.1  # ours: how likely exchanged sides have to be, to be called unknown
+SWAPPED = 0.03  # of the frames whose sides are not called unknown, at most
+BOUNDS = (0.01, 0.5)  # of how likely exchanged sides have to be for that; from a half on they are likelier than not
 LEAST = 0.1  # slope of log-odds over the second side's weight
 SHARPNESSES = np.geomspace(0.05, 1.0, 24)
 TINY = 1e-12
@@ -115,7 +116,7 @@ def _doubt(tracks: Sequence[Kept]) -> Doubt:
     ones = Recalibration()
     return Doubt(
         slopes, (float(low), float(high)), ones.joint_spreads, ones.angle_spreads, ones.joint_factors,
-        ones.angle_factors, np.array([0.0, 1.0, 0.0]), 1.0, 0.2,
+        ones.angle_factors, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), 1.0, 0.2,
     )  # fmt: skip
 
 
@@ -179,22 +180,54 @@ def radii_of(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
     """Return the radii of joints (T, levels, 27) and the half intervals of angles (T, levels, 66)."""
     joints, angles, track = [], [], one.track
     for k in range(0, len(track), every):
-        recalibration = doubt.recalibration(doubt.log(one.seen[k]))
+        recalibration = doubt.recalibration(doubt.log(one.seen[k]), track.twins[k])
         posterior = replace(track.posterior(k), recalibration=recalibration)
         joints.append(joint_intervals(track.skeleton, posterior, track.told[k]).radii)
         angles.append(angle_intervals(posterior, track.told[k]).halves)
     return np.array(joints), np.array(angles)
 
 
+def signs_of(doubt: Doubt, one: Kept) -> Array:
+    """Return what exchanged sides of a track's frames follow from (T, 5)."""
+    each = zip(one.second, one.seen, one.track.twins, strict=True)
+    return np.array([side_signs(second, doubt.log(seen), twins) for second, seen, twins in each])
+
+
+def exchanged(sides: Array, signs: Array) -> Array:
+    """Return how likely left and right are exchanged (T,), by signs (T, 5)."""
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(signs @ sides, -30.0, 30.0))))
+
+
 def _sided(doubt: Doubt, tracks: Sequence[Kept]) -> Doubt:
-    """Return the doubt with the odds of exchanged sides."""
-    second, swapped = (np.concatenate([getattr(one, name) for one in tracks]) for name in ("second", "swapped"))
-    logs = np.array([doubt.log(seen) for one in tracks for seen in one.seen])
-    weights, design = frame_weights(tracks), np.column_stack([np.ones(len(second)), second, logs])
-    sides = logistic(design, swapped, weights)
+    """Return the doubt with the odds of exchanged sides, and with how likely they have to be to be called unknown.
+
+    That is judged on each person by the odds of the others, as whoever is followed is none of those it was found on.
+    """
+    signs = np.concatenate([signs_of(doubt, one) for one in tracks])
+    swapped, weights = np.concatenate([one.swapped for one in tracks]), frame_weights(tracks)
+    of = np.concatenate([[one.track.seen.clip.subject] * len(one.track) for one in tracks])
+    probable = np.zeros(len(signs))
+    for person in np.unique(of):
+        mine = of == person
+        probable[mine] = exchanged(_odds(signs[~mine], swapped[~mine], weights[~mine]), signs[mine])
+    return replace(doubt, sides=_odds(signs, swapped, weights), unknown=_unknown(probable, swapped, weights))
+
+
+def _odds(signs: Array, swapped: NDArray[np.bool_], weights: Array) -> Array:
+    """Return the coefficients (5,) of the log-odds of exchanged sides."""
+    weights = weights / max(weights.sum(), TINY)
+    sides = logistic(signs, swapped, weights)
     if sides[1] < LEAST:  # too few swapped frames to say what the samples know of them
-        sides = np.insert(logistic(design[:, [0, 2]], swapped, weights), 1, LEAST)
-    return replace(doubt, sides=sides, unknown=UNKNOWN)
+        sides = np.insert(logistic(np.delete(signs, 1, axis=1), swapped, weights), 1, LEAST)
+    return sides
+
+
+def _unknown(probable: Array, swapped: NDArray[np.bool_], weights: Array) -> float:
+    """Return from which probability of exchanged sides on they are unknown: few of the other frames are swapped."""
+    order = np.argsort(probable, kind="stable")
+    shares = np.cumsum((weights * swapped)[order]) / np.maximum(np.cumsum(weights[order]), TINY)
+    few = np.flatnonzero(shares <= SWAPPED)
+    return float(np.clip(probable[order][few[-1]] if len(few) else 0.0, *BOUNDS))
 
 
 def logistic(design: Array, came: NDArray[np.bool_], weights: Array) -> Array:

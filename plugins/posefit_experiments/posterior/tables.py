@@ -12,10 +12,19 @@ from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept
 from posefit.posterior.modes import APART
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
-from posefit_experiments.posterior.fit import MEMBERS, TINY, Kept, frame_weights, radii_and_angles_held, sharpened
+from posefit_experiments.posterior.fit import (
+    MEMBERS,
+    TINY,
+    Kept,
+    exchanged,
+    frame_weights,
+    radii_and_angles_held,
+    sharpened,
+    signs_of,
+)
 
 KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
-LIKELY = (0.05, 0.15, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
+LIKELY = (0.05, 0.1, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +43,13 @@ class Judged:
 def judgement(doubt: Doubt, kept: Kept) -> Judged:
     """Return what is said of a track."""
     logs = np.array([doubt.log(seen) for seen in kept.seen])
-    unknown = kept.second >= [doubt.second_side(log) for log in logs]
-    odds = doubt.sides[0] + doubt.sides[1] * kept.second + doubt.sides[2] * logs
+    least = [doubt.second_side(log, twins) for log, twins in zip(logs, kept.track.twins, strict=True)]
     radii, angles = radii_and_angles_held(doubt, kept)
     return Judged(
         kept,
         np.exp(logs),
-        unknown,
-        1.0 / (1.0 + np.exp(-odds)),
+        kept.second >= least,
+        exchanged(doubt.sides, signs_of(doubt, kept)),
         kept.track.off[:, None] <= radii,
         radii,
         angles.mean(axis=(0, 2)),
@@ -73,8 +81,8 @@ def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
         "overall": told(tracks),
         "joints": {name: told(tracks, members) for name, members in MEMBERS.items()},
         "views": by(lambda one: seen_from(one.kept)),
-        "motions": by(lambda one: one.kept.track.seen.group),
-        "translations": by(lambda one: one.kept.track.seen.translation),
+        "motions": by(_group),
+        "translations": by(_translation),
         "people": by(lambda one: one.kept.track.seen.clip.subject),
         "angles": dict(zip(("50", "80", "95"), np.mean([one.turned for one in tracks], axis=0).tolist(), strict=True)),
     }
@@ -86,20 +94,38 @@ def seen_from(kept: Kept) -> str:
 
 
 def sides(tracks: Sequence[Judged]) -> dict[str, Any]:
-    """Return how often left and right are said to be unknown, and swapped then and otherwise; by kind of motion too."""
+    """Return how often left and right are said to be unknown, and swapped then and otherwise.
+
+    Of all tracks, at other probabilities too, by kind of motion, by how many cameras, and by translation.
+    """
     told = {}
     weights = frame_weights([one.kept for one in tracks])
-    exchanged = np.concatenate([one.exchanged for one in tracks])
+    probable = np.concatenate([one.exchanged for one in tracks])
     swapped = np.concatenate([one.kept.swapped for one in tracks])
     for least in LIKELY:
-        told[f"all, from {100 * least:g} % on"] = _sides(weights, exchanged >= least, swapped)
-    for name in ("all", *sorted({one.kept.track.seen.group for one in tracks})):
-        mine = [one for one in tracks if name in ("all", one.kept.track.seen.group)]
+        told[f"all, from {100 * least:g} % on"] = _sides(weights, probable >= least, swapped)
+    parts: dict[str, list[Judged]] = {"all": list(tracks)}
+    for name_of in (_group, _cameras, _translation):
+        for name in sorted({name_of(one) for one in tracks}):
+            parts[name] = [one for one in tracks if name_of(one) == name]
+    for name, mine in parts.items():
         weights = frame_weights([one.kept for one in mine])
         unknown = np.concatenate([one.unknown for one in mine])
         swapped = np.concatenate([one.kept.swapped for one in mine])
         told[name] = _sides(weights, unknown, swapped)
     return told
+
+
+def _group(one: Judged) -> str:
+    return one.kept.track.seen.group
+
+
+def _cameras(one: Judged) -> str:
+    return {1: "one camera"}.get(len(one.kept.track.seen.views), "two cameras")
+
+
+def _translation(one: Judged) -> str:
+    return one.kept.track.seen.translation
 
 
 def _sides(weights: Array, unknown: NDArray[np.bool_], swapped: NDArray[np.bool_]) -> dict[str, float]:
