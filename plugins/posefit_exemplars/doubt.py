@@ -54,6 +54,11 @@ def side_signs(second: float, log: float, twins: Array) -> Array:
     return np.array([1.0, second, log, *twins])
 
 
+def none_signs(log: float) -> Array:
+    """Return what it follows from that no mode is right (3,): 1, the logarithm of the doubt, and its square."""
+    return np.array([1.0, log, log * log])
+
+
 @dataclass(frozen=True, eq=False)
 class Doubt:
     """What makes intervals and unknown sides of a frame mean what they say."""
@@ -66,6 +71,7 @@ class Doubt:
     angle_factors: Array = field(repr=False)  # (levels, 66)
     sides: Array = field(repr=False)  # (5,) of the log-odds of exchanged sides, over `side_signs`
     sharpness: float  # the power of modes' weights
+    none: Array = field(repr=False)  # (3,) of the log-odds that no mode is right, over powers of the doubt's logarithm
     unknown: float  # the probability of exchanged sides from which they are unknown
 
     def log(self, seen: Array) -> float:
@@ -77,12 +83,17 @@ class Doubt:
         odds = math.log(self.unknown / (1.0 - self.unknown))
         return float(np.clip((odds - self.sides @ side_signs(0.0, log, twins)) / self.sides[1], 0.0, 1.0))
 
+    def none_right(self, log: float) -> float:
+        """Return how likely no mode is right, at the logarithm of a doubt."""
+        odds = self.none @ none_signs(log)
+        return 1.0 / (1.0 + math.exp(-min(max(float(odds), -30.0), 30.0)))
+
     def recalibration(self, log: float, twins: Array) -> Recalibration:
         """Return what a frame does not know of its error, by the logarithm of its doubt and by its twins (2,)."""
         doubt = math.exp(log)
         spreads = doubt * self.joint_spreads, doubt * self.angle_spreads
         factors = self.joint_factors, self.angle_factors
-        return Recalibration(*spreads, *factors, self.second_side(log, twins), self.sharpness)
+        return Recalibration(*spreads, *factors, self.second_side(log, twins), self.sharpness, self.none_right(log))
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it, to four digits."""

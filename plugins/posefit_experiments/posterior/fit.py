@@ -11,9 +11,9 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS
 from posefit.posterior.calibration import LEVELS, Recalibration, conformal_factor
 from posefit.posterior.intervals import angle_intervals, joint_intervals
-from posefit.posterior.modes import modes_of
+from posefit.posterior.modes import APART, modes_of
 from posefit.posterior.sides import nearer_mirrored, second_side
-from posefit_exemplars.doubt import Doubt, evidence, side_signs
+from posefit_exemplars.doubt import Doubt, evidence, none_signs, side_signs
 from posefit_experiments.posterior.frames import Followed
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -50,7 +50,7 @@ class Kept:
     swapped: NDArray[np.bool_] = field(repr=False)  # (T,)
     second: Array = field(repr=False)  # (T,) weight of the second side
     modes: list[Array] = field(repr=False)  # weights of each frame's modes, the heaviest first
-    nearest: Array = field(repr=False)  # (T, 2) which of them is nearest to the truth, and how far the first is, metres
+    nearest: Array = field(repr=False)  # (T, 2) which of them is nearest to the truth, and how far that is, metres
 
     @classmethod
     def of(cls, track: Followed) -> "Kept":
@@ -67,7 +67,7 @@ class Kept:
             joints = skeleton.joints(np.array([mode.pose for mode in found]))
             off = np.linalg.norm(joints - skeleton.joints(truth), axis=2).mean(axis=1)
             modes.append(np.array([mode.weight for mode in found]))
-            nearest.append((off.argmin(), off[0]))
+            nearest.append((off.argmin(), off.min()))
         return cls(track, seen, track.off[:, 1:].mean(axis=1), swapped, second, modes, np.array(nearest))
 
 
@@ -78,7 +78,7 @@ def doubt_of(tracks: Sequence[Kept]) -> Doubt:
     doubt = replace(doubt, joint_spreads=joints, angle_spreads=angles)
     joint_factors, angle_factors = _factors(doubt, tracks)
     doubt = replace(doubt, joint_factors=joint_factors, angle_factors=angle_factors)
-    doubt = replace(doubt, sharpness=_sharpness(tracks))
+    doubt = replace(doubt, sharpness=_sharpness(tracks), none=_none(doubt, tracks))
     return _sided(doubt, tracks)
 
 
@@ -95,6 +95,12 @@ def _sharpness(tracks: Sequence[Kept]) -> float:
     for tried in SHARPNESSES:
         likely.append(weights @ [np.log(sharpened(modes, tried)[row]) for modes, row in pairs])
     return float(SHARPNESSES[int(np.argmax(likely))])
+
+
+def _none(doubt: Doubt, tracks: Sequence[Kept]) -> Array:
+    """Return the coefficients (3,) of the log-odds that no mode is right: the truth is far from the nearest one."""
+    signs = np.array([none_signs(doubt.log(seen)) for one in tracks for seen in one.seen])
+    return logistic(signs, np.concatenate([one.nearest[:, 1] > APART for one in tracks]), frame_weights(tracks))
 
 
 def frame_weights(tracks: Sequence[Kept]) -> Array:
@@ -116,7 +122,7 @@ def _doubt(tracks: Sequence[Kept]) -> Doubt:
     ones = Recalibration()
     return Doubt(
         slopes, (float(low), float(high)), ones.joint_spreads, ones.angle_spreads, ones.joint_factors,
-        ones.angle_factors, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), 1.0, 0.2,
+        ones.angle_factors, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), 1.0, np.zeros(3), 0.2,
     )  # fmt: skip
 
 

@@ -33,6 +33,8 @@ class Judged:
 
     kept: Kept
     doubts: Array = field(repr=False)  # (T,) metres
+    sharpness: float
+    none: Array = field(repr=False)  # (T,) probability that no mode is right
     unknown: NDArray[np.bool_] = field(repr=False)  # (T,)
     exchanged: Array = field(repr=False)  # (T,) probability of exchanged sides
     inside: NDArray[np.bool_] = field(repr=False)  # (T, levels, 27)
@@ -48,6 +50,8 @@ def judgement(doubt: Doubt, kept: Kept) -> Judged:
     return Judged(
         kept,
         np.exp(logs),
+        doubt.sharpness,
+        np.array([doubt.none_right(log) for log in logs]),
         kept.second >= least,
         exchanged(doubt.sides, signs_of(doubt, kept)),
         kept.track.off[:, None] <= radii,
@@ -138,17 +142,21 @@ def _sides(weights: Array, unknown: NDArray[np.bool_], swapped: NDArray[np.bool_
     }
 
 
-def best_modes(tracks: Sequence[Kept], sharpnesses: Sequence[float]) -> dict[str, Any]:
-    """Return how far the best mode's probability is from how often it is right; weights of each track are sharpened.
+def best_modes(tracks: Sequence[Kept], said: Sequence[Judged] = ()) -> dict[str, Any]:
+    """Return how far the best mode's probability is from how often it is right.
 
-    It is right where the truth is nearer to it than to any other mode, and so where there is no other; `several` are
-    the frames that have others. `within` is where the truth is as near to it as poses of one mode are.
+    It is right where the truth is nearer to it than to any other mode, and as near as poses of one mode are; `several`
+    are the frames that have others, `none` those in which no mode is right. Modes' weights are those that `said` makes
+    of them, in the order of the tracks; without it they are as they were drawn.
     """
-    pairs = list(zip(tracks, sharpnesses, strict=True))
-    probable = np.array([sharpened(modes, power)[0] for one, power in pairs for modes in one.modes])
+    powers = [one.sharpness for one in said] or [1.0] * len(tracks)
+    none = np.concatenate([one.none for one in said] or [np.zeros(len(one.track)) for one in tracks])
+    pairs = zip(tracks, powers, strict=True)
+    probable = (1.0 - none) * [sharpened(modes, power)[0] for one, power in pairs for modes in one.modes]
     several = np.array([len(modes) > 1 for one in tracks for modes in one.modes])
     nearest = np.concatenate([one.nearest for one in tracks])
-    right, within = nearest[:, 0] == 0.0, nearest[:, 1] <= APART
+    far = nearest[:, 1] > APART
+    right = (nearest[:, 0] == 0.0) & ~far
     second, swapped = (np.concatenate([getattr(one, name) for one in tracks]) for name in ("second", "swapped"))
     return {
         "tracks": len(tracks),
@@ -157,8 +165,9 @@ def best_modes(tracks: Sequence[Kept], sharpnesses: Sequence[float]) -> dict[str
         "calibration_error": calibration_error(probable, right),
         "several": float(several.mean()),
         "calibration_error_several": calibration_error(probable[several], right[several]) if several.any() else 0.0,
-        "within": float(within.mean()),
-        "calibration_error_within": calibration_error(probable, within),
+        "none": float(far.mean()),
+        "calibration_error_none": calibration_error(none, far),
+        "auroc": auroc(probable, right),
         "second_side_auroc": auroc(second, swapped),
         "reliability": reliability(probable, right),
     }
@@ -204,25 +213,13 @@ def posterior_lines(told: Mapping[str, Any]) -> Iterator[str]:
     for name, one in told["sides"].items():
         yield _line([name, *(f"{100 * one[each]:.1f}" for each in names)])
     yield ""
-    yield from _head(
-        [
-            "temperature",
-            "tracks",
-            "best mode, mean %",
-            "right %",
-            "error %",
-            "within 10 cm %",
-            "error %",
-            "second side AUROC",
-        ],
-        1,
-    )
+    heads = ["best mode %", "right %", "error %", "several modes %", "error %", "none right %", "error %"]
+    yield from _head(["modes", "tracks", *heads, "AUROC", "second side AUROC"], 1)
     for name, one in told["modes"].items():
         each = ["mean_probability", "right", "calibration_error", "several", "calibration_error_several"]
-        each += ["within", "calibration_error_within"]
-        rank = one["second_side_auroc"]
-        ranked = "" if rank is None else f"{rank:.2f}"
-        yield _line([name, str(one["tracks"]), *(f"{100 * one[key]:.1f}" for key in each), ranked])
+        each += ["none", "calibration_error_none"]
+        ranks = ["" if one[key] is None else f"{one[key]:.2f}" for key in ("auroc", "second_side_auroc")]
+        yield _line([name, str(one["tracks"]), *(f"{100 * one[key]:.1f}" for key in each), *ranks])
     if told["kept"]:
         yield ""
         yield from _head(["frames kept %", *next(iter(told["kept"].values()))], 1)
