@@ -85,6 +85,14 @@ def test_sides_are_unknown_from_the_probability_on_that_is_held(log: float, twin
         assert probable == pytest.approx(doubt.unknown)
 
 
+def test_the_greater_the_doubt_the_likelier_no_mode_is_right() -> None:
+    none = [learned().none_right(log) for log in np.linspace(learned().range[0], -1.0, 20)]
+    assert np.all(np.diff(none) > 0.0)
+    assert none[0] < 0.05
+    assert none[-1] > 0.5
+    assert recalibrated(drawn(0.1), np.zeros(66), 5.0, Shown(), SIGNS).recalibration.none > 0.0  # type: ignore[arg-type, union-attr]
+
+
 def test_a_twin_that_costs_more_says_that_sides_are_known() -> None:
     assert (learned().sides[3:] < 0.0).all()
     alike, dear = (learned().second_side(-3.0, np.full(2, sign)) for sign in (0.0, 2.0))

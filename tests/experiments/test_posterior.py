@@ -23,7 +23,7 @@ from posefit_experiments.posterior.design import OTHERS, TEMPERATURES, OneTrack,
 from posefit_experiments.posterior.experiment import posterior
 from posefit_experiments.posterior.fit import MEMBERS, SWAPPED, Kept, doubt_of, frame_weights, logistic, signs_of
 from posefit_experiments.posterior.frames import Followed, load_tracks, save_tracks
-from posefit_experiments.posterior.tables import coverages, judgement, posterior_lines, sides
+from posefit_experiments.posterior.tables import best_modes, coverages, judgement, posterior_lines, sides
 
 PEOPLE = ("02", "16", "49")
 
@@ -138,6 +138,24 @@ def test_where_nothing_tells_swapped_frames_all_are_unknown(kept: list[Kept]) ->
     doubt = doubt_of(tracks)
     said = sides([judgement(doubt, one) for one in tracks])["all"]
     assert said["unknown"] > 0.9
+
+
+def test_best_modes_are_right_where_they_are_nearest_and_as_near_as_one_mode_is(kept: list[Kept]) -> None:
+    one = replace(kept[0], modes=[np.array([0.8, 0.2])] * 20, nearest=np.zeros((20, 2)))
+    one.nearest[:] = [0.0, 0.05]
+    one.nearest[:5] = [0.0, 0.15]  # of whom none is right
+    one.nearest[5:8] = [1.0, 0.05]
+    told = best_modes([one])
+    assert (told["right"], told["none"], told["mean_probability"]) == pytest.approx((12 / 20, 5 / 20, 0.8))
+    assert told["calibration_error"] == pytest.approx(0.2)
+    assert told["calibration_error_none"] == pytest.approx(5 / 20)  # nobody says so
+
+
+def test_where_no_mode_is_right_is_learned(kept: list[Kept], doubt: Doubt) -> None:
+    said = [judgement(doubt, one) for one in kept]
+    told = best_modes(kept, said)
+    assert told["calibration_error_none"] < 0.05
+    assert told["calibration_error"] < best_modes(kept)["calibration_error"]
 
 
 def test_signs_are_of_each_frame(kept: list[Kept], doubt: Doubt) -> None:
