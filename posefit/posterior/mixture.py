@@ -1,13 +1,14 @@
 """Where a sampler starts: normal distributions around known modes, and some share anywhere in the box."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
+from posefit.posterior.kernels import log_parts, log_sums
 from posefit.posterior.landscape import Box
 
 REDRAWS = 100  # Reading S7
@@ -26,6 +27,7 @@ class NormalMixture:
     centres: Array  # (k, d)
     spreads: Array  # (k, d) standard deviations, at most 0.5
     broad: float  # between 0 and 1, so that no place in the box is left out; 1 without centres
+    _known: dict[tuple[bool, ...], Array] = field(init=False, repr=False, default_factory=dict)
 
     @classmethod
     def anywhere(cls, dimensions: int) -> Self:
@@ -35,6 +37,8 @@ class NormalMixture:
     def __post_init__(self) -> None:
         if self.centres.shape != self.spreads.shape:
             raise ValueError(f"spreads must have shape {self.centres.shape}, got {self.spreads.shape}")
+        for name in ("centres", "spreads"):
+            object.__setattr__(self, name, writeable(getattr(self, name)))
         if not (self.spreads > 0.0).all() or not (self.spreads <= WIDEST).all():
             raise ValueError(f"spreads must be above 0 and at most {WIDEST}, got {self.spreads.ravel()[:3]}")
         if not (0.0 < self.broad < 1.0 if len(self.centres) else self.broad == 1.0):
@@ -62,7 +66,9 @@ class NormalMixture:
         if not len(self.centres):
             return np.zeros(len(proposals))
         parts = self._log_parts(box, proposals) + math.log((1.0 - self.broad) / len(self.centres))
-        return np.asarray(np.logaddexp(np.logaddexp.reduce(parts, axis=1), math.log(self.broad)))
+        densities = np.empty(len(proposals))
+        log_sums(parts, math.log(self.broad), densities)
+        return densities
 
     def nearest(self, box: Box, proposals: Array) -> NDArray[np.int64]:
         """Return which normal distribution is the densest (n,) at proposals (n, d); 0 where there is none."""
@@ -73,17 +79,18 @@ class NormalMixture:
     def _log_parts(self, box: Box, proposals: Array) -> Array:
         """Return the logarithms (n, k) of the densities of the normal distributions, over the uniform one."""
         logs = np.empty((len(proposals), len(self.centres)))
-        for k, (centre, spread) in enumerate(zip(self.centres, self.spreads, strict=True)):
-            away = box.towards(centre, proposals)
-            exponents = -0.5 * (away / spread) ** 2
-            if box.periodic.any():
-                around = [np.exp(-0.5 * ((away + turn) / spread) ** 2 - exponents) for turn in (-2.0, 2.0)]
-                images = np.log1p(np.where(box.periodic, around[0] + around[1], 0.0))
-                exponents = exponents + images
-            inside = np.where(box.periodic, 1.0, _normal((1.0 - centre) / spread) - _normal((-1.0 - centre) / spread))
-            usual = np.log(spread * math.sqrt(2.0 * math.pi) * inside / 2.0)
-            logs[:, k] = (exponents - usual).sum(axis=1)
+        constants = self._constants(tuple(box.periodic.tolist()))
+        log_parts(writeable(proposals), self.centres, self.spreads, constants, box.periodic, logs)
         return logs
+
+    def _constants(self, periodic: tuple[bool, ...]) -> Array:
+        """Return the logarithms (k,) of what each normal distribution is divided by, over the uniform one's density."""
+        if periodic not in self._known:
+            above, below = (_normal((side - self.centres) / self.spreads) for side in (1.0, -1.0))
+            inside = np.where(periodic, 1.0, above - below)
+            usual = np.log(self.spreads * math.sqrt(2.0 * math.pi) * inside / 2.0)
+            self._known[periodic] = usual.sum(axis=1)
+        return self._known[periodic]
 
     def _drawn(self, box: Box, rng: np.random.Generator, count: int) -> Array:
         drawn = rng.uniform(-1.0, 1.0, (count, box.dimensions))
