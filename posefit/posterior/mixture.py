@@ -99,8 +99,12 @@ class NormalMixture:
             return drawn
         which = rng.integers(0, len(self.centres), len(near))
         means, spreads = self.centres[which], self.spreads[which]
-        mine = box.wrap(rng.normal(means, spreads))
-        while (outside := np.abs(mine) > 1.0).any():  # of a mean in the box at least a third stays inside
-            mine[outside] = rng.normal(means[outside], spreads[outside])
+        mine = box.wrap(means + spreads * rng.standard_normal(means.shape))
+        rows, columns = np.nonzero(np.abs(mine) > 1.0)
+        while len(rows):  # of a mean in the box at least a third stays inside
+            again = means[rows, columns] + spreads[rows, columns] * rng.standard_normal(len(rows))
+            mine[rows, columns] = again
+            out = np.abs(again) > 1.0
+            rows, columns = rows[out], columns[out]
         drawn[near] = mine
         return drawn
