@@ -70,6 +70,35 @@ def longest_step(rises, left, wanted, halvings):
 
 
 @jit
+def walked(proposals, noise, walk, periodic):
+    """Return proposals (n, d) moved by standard normal noise (n, d) times a walk (d, d), wrapped where periodic."""
+    n, d = proposals.shape
+    tried = np.empty((n, d))
+    for i in range(n):
+        for j in range(d):
+            moved = proposals[i, j]
+            for k in range(j + 1):  # the walk is a lower triangle
+                moved += walk[j, k] * noise[i, k]
+            tried[i, j] = (moved + 1.0) % 2.0 - 1.0 if periodic[j] else moved
+    return tried
+
+
+@jit
+def taken(proposals, costs, begun, tried, new_costs, new_begun, draws, exponent, temperature):
+    """Put what is accepted of moves tried (n, d) in the place of proposals (n, d); return the share that is.
+
+    `costs` and `begun` (n,), the log density of the start, go along; `draws` (n,) in [0, 1) decide.
+    """
+    count = 0
+    for i in range(costs.size):
+        rise = exponent * (costs[i] - new_costs[i]) / temperature + (1.0 - exponent) * (new_begun[i] - begun[i])
+        if math.log(1.0 - draws[i]) < rise:
+            proposals[i], costs[i], begun[i] = tried[i], new_costs[i], new_begun[i]
+            count += 1
+    return count / costs.size
+
+
+@jit
 def covariance_within(proposals, weights, groups, centres, periodic):
     """Return the covariance (d, d) of weighted proposals (n, d) about the means of their groups (n,).
 

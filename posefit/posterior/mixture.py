@@ -12,6 +12,7 @@ from posefit.posterior.kernels import log_parts, log_sums
 from posefit.posterior.landscape import Box
 
 REDRAWS = 100  # Reading S7
+SPARE = 8  # ours: proposals that are drawn beyond those that are expected to be enough
 WIDEST = 0.5  # ours: a wrapped normal of this deviation is its three nearest images to nine digits
 
 _normal = np.vectorize(lambda x: 0.5 * (1.0 + math.erf(x / math.sqrt(2.0))), otypes=[np.float64])
@@ -49,13 +50,14 @@ class NormalMixture:
 
         Where too few are found in 100 attempts, those are repeated. Raises ValueError where none is.
         """
-        found, tried, kept = [], 0, 0
+        found, tried, kept, more = [], 0, 0, count
         for _ in range(REDRAWS):
-            drawn = self._drawn(box, rng, count)
+            drawn = self._drawn(box, rng, more)
             found.append(drawn[box.feasible(drawn)])
-            tried, kept = tried + count, kept + len(found[-1])
+            tried, kept = tried + more, kept + len(found[-1])
             if kept >= count:
                 break
+            more = min(count, (count - kept) * tried // max(kept, 1) + SPARE)
         if not kept:
             raise ValueError(f"the box must be feasible somewhere, got nothing in {REDRAWS} x {count} draws")
         drawn = np.concatenate(found)

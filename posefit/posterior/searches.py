@@ -25,12 +25,12 @@ REACH = 20.0  # ours: in temperatures above the least cost: what is not as deep 
 BROAD = 0.3  # ours: the share of particles that start anywhere
 NARROWEST = 2.0**-7  # ours: how narrow a valley may be, in half-ranges of the box
 ENOUGH = 3  # ours: proposals a coordinate from which a valley's own width is found
-LOOKED_AT = 500  # ours: of those, about so many, evenly over the searches
+LOOKED_AT = 300  # ours: of those, about so many, evenly over the searches
 RIDGE = 1e-3  # of how fast costs rise, as a share of what is known of them
 WIDER = np.array([1.0, 3.0])  # ours: particles start as wide, and wider, as coordinates may change together
 EVALUATIONS = 10_000  # ours
-CHAIN = 3  # P, ours: each survivor becomes so many particles
-ROUNDS = 2  # ours: of moves, that a budget holds
+CHAIN = 4  # P, ours: each survivor becomes so many particles
+ROUNDS = 1  # ours: of moves, that a budget holds
 
 Searched = tuple[Array, Array]  # all that one search evaluated: proposals (n, d), costs (n,)
 
@@ -101,8 +101,10 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
     """
     chosen, known = [], []
     for proposals, costs in searched:
-        usable = np.flatnonzero(np.isfinite(costs))
-        order = usable[np.argsort(costs[usable], kind="stable")][: 4 * each]
+        order = np.flatnonzero(np.isfinite(costs))
+        if len(order) > 4 * each:
+            order = order[costs[order] <= np.partition(costs[order], 4 * each)[4 * each]]
+        order = order[np.argsort(costs[order], kind="stable")][: 4 * each]
         order = order[landscape.box.feasible(proposals[order])] if len(order) else order
         different: dict[bytes, int] = {}
         for row in order:
@@ -137,10 +139,12 @@ def widths(box: Box, searched: Sequence[Searched], modes: Array, costs: Array, t
     away = np.array([box.towards(mode, proposals) ** 2 for mode in modes])  # (k, n, d)
     owners = away.sum(axis=2).argmin(axis=0)
     away, rises = away[owners, np.arange(len(known))], known - costs[owners]
-    pooled = _width(away, rises, temperature)
-    mine = [owners == k for k in range(len(modes))]
-    enough = ENOUGH * modes.shape[1]
-    return np.array([_width(away[m], rises[m], temperature) if m.sum() >= enough else pooled for m in mine])
+    if len(modes) == 1:
+        return _width(away, rises, temperature)[None]
+    found = np.tile(_width(away, rises, temperature), (len(modes), 1))
+    for k in np.flatnonzero(np.bincount(owners, minlength=len(modes)) >= ENOUGH * modes.shape[1]):
+        found[k] = _width(away[owners == k], rises[owners == k], temperature)
+    return found
 
 
 def _width(squares: Array, rises: Array, temperature: float) -> Array:

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.posterior.kernels import covariance_within, effective, longest_step
+from posefit.posterior.kernels import covariance_within, effective, longest_step, taken, walked
 from posefit.posterior.landscape import Landscape
 from posefit.posterior.mixture import NormalMixture
 
 PARTICLES = 2048  # N, ours
 CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P
 SURVIVAL = 0.5  # alpha: the share of the particles that the next temperature leaves
-HALVINGS = 30  # ours: bisection steps, to a billionth of the whole way
+HALVINGS = 20  # ours: bisection steps, to a millionth of what is left
 WANTED = 0.234  # ours: the share of moves that is to be accepted, as is best for long random walks
 STEPS = 500  # ours: temperatures, at most
 
@@ -80,8 +80,7 @@ def tempered(
         rows = systematic_rows(weights, rng.random(), particles // chain)
         walk = factor * _walk(start, landscape, proposals, weights)
         state = (proposals[rows], costs[rows], begun[rows])
-        states = [state]
-        moves = 0.0
+        states, moves = [state], 0.0
         for _ in range(chain - 1):
             state, share = _moved(landscape, start, state, walk, exponent, temperature, rng)
             states.append(state)
@@ -156,15 +155,8 @@ def _moved(
     rng: np.random.Generator,
 ) -> tuple[_State, float]:
     """Return a chain's next state, and the share of its moves that was accepted."""
-    proposals, costs, begun = state
-    noise = rng.standard_normal(proposals.shape)
-    tried = landscape.box.wrap(proposals + noise @ walk.T)
-    new_costs, new_begun = landscape.costs(tried), start.log_density(landscape.box, tried)
-    rise = exponent * (costs - new_costs) / temperature + (1.0 - exponent) * (new_begun - begun)
-    taken = np.log(1.0 - rng.random(len(costs))) < rise
-    found = (
-        np.where(taken[:, None], tried, proposals),
-        np.where(taken, new_costs, costs),
-        np.where(taken, new_begun, begun),
-    )
-    return found, float(taken.mean())
+    tried = walked(state[0], rng.standard_normal(state[0].shape), walk, landscape.box.periodic)
+    new = (tried, landscape.costs(tried), start.log_density(landscape.box, tried))
+    found = (state[0].copy(), state[1].copy(), state[2].copy())
+    share = taken(*found, *new, rng.random(len(tried)), exponent, temperature)
+    return found, float(share)

@@ -17,7 +17,7 @@ from posefit.posterior.searches import Searched, weighed
 from posefit.searching.twins import twins
 
 SEARCHES = 8  # ours
-SHARE = 0.5  # ours: of the evaluations of the first search, what all else has
+SHARE = 0.25  # ours: of the evaluations of the first search, what all else has
 TEMPERATURE = 2.0  # ours: what silhouette costs, which err together, are divided by
 KEPT = 100  # ours: poses of a posterior
 
@@ -61,7 +61,7 @@ def further(
 
     That is about as many as are given.
     """
-    others = elsewhere(problem, make, evaluations // 2, rng, searches) if searches else []
+    others = elsewhere(problem, make, evaluations // 4, rng, searches) if searches else []
     used = sum(len(costs) for _, costs in others)
     landscape = Landscape(problem.space, problem.evaluate)
     alike = twins(problem, first[0][np.nanargmin(first[1])])

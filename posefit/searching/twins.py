@@ -5,19 +5,19 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.geometry.alike import facing, mirrored_poses, reflected_poses, turned_poses
+from posefit.geometry.alike import facing, reflected_poses, turned_poses
 from posefit.geometry.rotation import wrapped
 
 
 def twins(problem: PoseProblem, proposal: Array) -> Array:
-    """Return the proposals (k, d) of a pose that is reflected as a camera sees it, mirrored, or turned.
+    """Return the proposals (k, d) of a pose that is reflected as a camera sees it, or turned.
 
     They are as near as the prior comes to those. Whoever would face out of the box is none of them, so k may be 0.
     """
     poses, translations = problem.decode(proposal[None])
     skeleton, place = problem.body.skeleton, translations[0]
     reflected = [reflected_poses(skeleton, poses, facing(camera, place)) for camera in problem.cameras]
-    found = np.concatenate([*reflected, mirrored_poses(skeleton, poses), turned_poses(poses)])
+    found = np.concatenate([*reflected, turned_poses(poses)])
     space = problem.space
     within = np.abs(wrapped(found[:, 0] - space.centre[0])) <= space.half[0]
     return proposals_of(space, found[within], np.repeat(translations, within.sum(), axis=0))
