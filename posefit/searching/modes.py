@@ -17,7 +17,9 @@ from posefit.posterior.searches import Searched, weighed
 from posefit.searching.twins import twins
 
 SEARCHES = 8  # ours
-SHARE = 0.25  # ours: of the evaluations of the first search, what all else has
+SHARE = 8.0  # ours: evaluations of all else, over those of the first search
+OTHERS = 0.25  # ours: the share of those that other searches have
+LEAST = 200  # ours: evaluations of another search, without which it is better not begun
 TEMPERATURE = 2.0  # ours: what silhouette costs, which err together, are divided by
 KEPT = 100  # ours: poses of a posterior
 
@@ -37,8 +39,9 @@ def modes(
     """Return what silhouettes leave open: 100 poses of equal weight, distributed as exp(-cost / temperature).
 
     `make(space, rng)` builds the optimiser of each search. The first one has so many `evaluations`, and starts where
-    the problem's space says; the others start anywhere in it. They have half of a `share` of as many, and the other
-    half weighs what was found; all of it where no other search is made. Raises ValueError where a number makes no sense.
+    the problem's space says; the others start anywhere in it. All else has `share` times as many: a quarter is the
+    other searches', as far as each has 200, and with the rest what was found is weighed. Raises ValueError where a
+    number makes no sense.
     """
     whole("searches", searches, 1)
     at_least("evaluations", evaluations, 1)
@@ -61,7 +64,8 @@ def further(
 
     That is about as many as are given.
     """
-    others = elsewhere(problem, make, evaluations // 4, rng, searches) if searches else []
+    spared = int(OTHERS * evaluations)
+    others = elsewhere(problem, make, spared, rng, min(searches, spared // LEAST))
     used = sum(len(costs) for _, costs in others)
     landscape = Landscape(problem.space, problem.evaluate)
     alike = twins(problem, first[0][np.nanargmin(first[1])])
