@@ -130,7 +130,7 @@ class Prediction:
     translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     beta: float = BETA
     modes: int = 0
-    modes_share: float = 0.25
+    modes_share: float = 0.2
     posterior_temperature: float = 2.0
 
     def __post_init__(self) -> None:

@@ -8,17 +8,29 @@ from posefit.arrays import jit
 
 
 @jit
-def log_parts(proposals, centres, spreads, constants, periodic, logs):
-    """Write the logarithms (n, k) of normal densities at proposals (n, d), each less what its constant (k,) says."""
-    for i in range(proposals.shape[0]):
-        for k in range(centres.shape[0]):
-            total = -constants[k]
-            for j in range(proposals.shape[1]):
+def log_parts(proposals, centres, spreads, periodic):
+    """Return the logarithms (n, k) of normal densities at proposals (n, d), over that of the uniform distribution.
+
+    They are cut off at the sides of the box [-1, 1]^d, and wrap around where a coordinate is periodic.
+    """
+    count, d = centres.shape
+    logs = np.empty((proposals.shape[0], count))
+    for k in range(count):
+        constant = 0.0
+        for j in range(d):
+            usual = 0.5 * spreads[k, j] * math.sqrt(2.0 * math.pi)
+            if not periodic[j]:
+                above = (1.0 - centres[k, j]) / spreads[k, j] / math.sqrt(2.0)
+                below = (-1.0 - centres[k, j]) / spreads[k, j] / math.sqrt(2.0)
+                usual *= 0.5 * (math.erf(above) - math.erf(below))
+            constant += math.log(usual)
+        for i in range(proposals.shape[0]):
+            total = -constant
+            for j in range(d):
                 away = proposals[i, j] - centres[k, j]
                 if periodic[j]:
                     away = (away + 1.0) % 2.0 - 1.0
-                    scaled = away / spreads[k, j]
-                    images = 0.0
+                    scaled, images = away / spreads[k, j], 0.0
                     for turn in (-2.0, 2.0):
                         other = (away + turn) / spreads[k, j]
                         images += math.exp(-0.5 * (other * other - scaled * scaled))
@@ -27,19 +39,22 @@ def log_parts(proposals, centres, spreads, constants, periodic, logs):
                     scaled = away / spreads[k, j]
                     total -= 0.5 * scaled * scaled
             logs[i, k] = total
+    return logs
 
 
 @jit
-def log_sums(logs, least, sums):
-    """Write the logarithms (n,) of the sums of exp of a row (n, k) and of exp(least)."""
+def log_sums(logs, each, least):
+    """Return the logarithms (n,) of the sums of exp(each + a row's (n, k)) and of exp(least)."""
+    sums = np.empty(logs.shape[0])
     for i in range(logs.shape[0]):
         top = least
         for k in range(logs.shape[1]):
-            top = max(top, logs[i, k])
+            top = max(top, each + logs[i, k])
         total = math.exp(least - top)
         for k in range(logs.shape[1]):
-            total += math.exp(logs[i, k] - top)
+            total += math.exp(each + logs[i, k] - top)
         sums[i] = top + math.log(total)
+    return sums
 
 
 @jit

@@ -1,7 +1,7 @@
 """Where a sampler starts: normal distributions around known modes, and some share anywhere in the box."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -15,8 +15,6 @@ REDRAWS = 100  # Reading S7
 SPARE = 8  # ours: proposals that are drawn beyond those that are expected to be enough
 WIDEST = 0.5  # ours: a wrapped normal of this deviation is its three nearest images to nine digits
 
-_normal = np.vectorize(lambda x: 0.5 * (1.0 + math.erf(x / math.sqrt(2.0))), otypes=[np.float64])
-
 
 @dataclass(frozen=True, eq=False)
 class NormalMixture:
@@ -28,7 +26,6 @@ class NormalMixture:
     centres: Array  # (k, d)
     spreads: Array  # (k, d) standard deviations, at most 0.5
     broad: float  # between 0 and 1, so that no place in the box is left out; 1 without centres
-    _known: dict[tuple[bool, ...], Array] = field(init=False, repr=False, default_factory=dict)
 
     @classmethod
     def anywhere(cls, dimensions: int) -> Self:
@@ -67,10 +64,8 @@ class NormalMixture:
         """Return the logarithm (n,) of the density of proposals (n, d), over that of the uniform distribution."""
         if not len(self.centres):
             return np.zeros(len(proposals))
-        parts = self._log_parts(box, proposals) + math.log((1.0 - self.broad) / len(self.centres))
-        densities = np.empty(len(proposals))
-        log_sums(parts, math.log(self.broad), densities)
-        return densities
+        each = math.log((1.0 - self.broad) / len(self.centres))
+        return np.asarray(log_sums(self._log_parts(box, proposals), each, math.log(self.broad)))
 
     def nearest(self, box: Box, proposals: Array) -> NDArray[np.int64]:
         """Return which normal distribution is the densest (n,) at proposals (n, d); 0 where there is none."""
@@ -80,19 +75,7 @@ class NormalMixture:
 
     def _log_parts(self, box: Box, proposals: Array) -> Array:
         """Return the logarithms (n, k) of the densities of the normal distributions, over the uniform one."""
-        logs = np.empty((len(proposals), len(self.centres)))
-        constants = self._constants(tuple(box.periodic.tolist()))
-        log_parts(writeable(proposals), self.centres, self.spreads, constants, box.periodic, logs)
-        return logs
-
-    def _constants(self, periodic: tuple[bool, ...]) -> Array:
-        """Return the logarithms (k,) of what each normal distribution is divided by, over the uniform one's density."""
-        if periodic not in self._known:
-            above, below = (_normal((side - self.centres) / self.spreads) for side in (1.0, -1.0))
-            inside = np.where(periodic, 1.0, above - below)
-            usual = np.log(self.spreads * math.sqrt(2.0 * math.pi) * inside / 2.0)
-            self._known[periodic] = usual.sum(axis=1)
-        return self._known[periodic]
+        return np.asarray(log_parts(writeable(proposals), self.centres, self.spreads, box.periodic))
 
     def _drawn(self, box: Box, rng: np.random.Generator, count: int) -> Array:
         drawn = rng.uniform(-1.0, 1.0, (count, box.dimensions))

@@ -29,7 +29,7 @@ LOOKED_AT = 300  # ours: of those, about so many, evenly over the searches
 RIDGE = 1e-3  # of how fast costs rise, as a share of what is known of them
 WIDER = np.array([1.0, 3.0])  # ours: particles start as wide, and wider, as coordinates may change together
 EVALUATIONS = 10_000  # ours
-CHAIN = 4  # P, ours: each survivor becomes so many particles
+CHAIN = 3  # P, ours: each survivor becomes so many particles
 ROUNDS = 1  # ours: of moves, that a budget holds
 
 Searched = tuple[Array, Array]  # all that one search evaluated: proposals (n, d), costs (n,)

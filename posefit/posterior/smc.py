@@ -17,7 +17,7 @@ from posefit.posterior.mixture import NormalMixture
 PARTICLES = 2048  # N, ours
 CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P
 SURVIVAL = 0.5  # alpha: the share of the particles that the next temperature leaves
-HALVINGS = 20  # ours: bisection steps, to a millionth of what is left
+HALVINGS = 24  # ours: bisection steps, to a ten millionth of what is left
 WANTED = 0.234  # ours: the share of moves that is to be accepted, as is best for long random walks
 STEPS = 500  # ours: temperatures, at most
 
@@ -67,13 +67,13 @@ def tempered(
     accepted: list[float] = []
     while True:
         rises = -costs / temperature - begun
-        step = next_step(rises, 1.0 - exponent, survival)
-        step = max(step, (1.0 - exponent) / (1 + _rounds(evaluations, landscape.evaluations - before, moved)))
-        if len(exponents) == STEPS - 1:
-            step = 1.0 - exponent
+        rounds = _rounds(evaluations, landscape.evaluations - before, moved)
+        step = left = 1.0 - exponent
+        if rounds and len(exponents) < STEPS - 1:
+            step = max(next_step(rises, left, survival), left / (1 + rounds))
         weights, mean = reweighed(rises, step)
         log_evidence += mean  # DAU2022 (normalising constant)
-        exponent = 1.0 if step >= 1.0 - exponent else exponent + step
+        exponent = 1.0 if step >= left else exponent + step
         exponents.append(exponent)
         if exponent == 1.0:
             return Sampled(proposals, weights, costs, log_evidence, np.array(exponents), np.array(accepted))

@@ -92,8 +92,7 @@ def elsewhere(
 
 def searched(problem: PoseProblem, optimiser: Optimiser, evaluations: int) -> Searched:
     """Return all proposals (n, d) that an optimiser had evaluated within a budget, and their costs (n,)."""
-    found = [(np.array(one), costs) for one, costs in populations(optimiser, problem.evaluate, evaluations)]
-    return gathered(found)
+    return gathered([(np.array(one), costs) for one, costs in populations(optimiser, problem.evaluate, evaluations)])
 
 
 def gathered(found: list[Searched]) -> Searched:
