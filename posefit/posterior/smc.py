@@ -50,8 +50,8 @@ def tempered(
     The particles begin at `start` and go in steps to that density, on the geometric path between both: each step is as
     long as leaves a share `survival` of them, by effective sample size. Some survive, and each becomes a chain of
     `chain` random-walk moves, all of which are particles. With a budget of so many `evaluations`, steps are as long as
-    it takes to arrive within it, and the last particles are weighed by what is left. Raises ValueError where a setting makes no sense, or where
-    nothing feasible is found.
+    it takes to arrive within it, and the last particles are weighed by what is left. Raises ValueError where a setting
+    makes no sense, or where nothing feasible is found.
     """
     if not temperature > 0.0:
         raise ValueError(f"temperature must be above 0, got {temperature}")

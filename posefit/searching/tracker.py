@@ -15,6 +15,7 @@ from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
 from posefit.posterior.modes import Posterior
 from posefit.posterior.searches import Searched, likelihoods
 from posefit.posterior.smc import systematic_rows
+from posefit.searching.doubt import lost
 from posefit.searching.modes import KEPT, MakeOptimiser, further, gathered, told
 
 
@@ -23,8 +24,9 @@ class WeighingTracker:
     """Follows as the tracker does that it is given, and adds a posterior to every frame in which somebody is seen.
 
     The track is the same as without. Beside the tracker's own search come others, `prediction.modes` in all, that look
-    anywhere in the same space; they and the weighing have a share of its evaluations, `prediction.modes_share`. Where that is one and the optimiser a filter, its last particles are weighed as they
-    are. All evaluations are told, those of a frame that are beyond the budget too.
+    anywhere in the same space; they and the weighing have `prediction.modes_share` of its evaluations. Where `modes` is
+    1 and the optimiser a filter, its last particles are weighed as they are. All evaluations are told, those of a
+    frame that are beyond the budget too. Each frame says how likely it is lost.
     """
 
     tracker: SynthesisTracker
@@ -45,6 +47,7 @@ class WeighingTracker:
         return replace(
             frame,
             posterior=posterior,
+            lost=float(lost(np.array(frame.cost))),
             evaluations=frame.evaluations + more,
             seconds=seconds,
             cpu_seconds=cpu_seconds,

@@ -15,7 +15,7 @@ METHOD, EVALUATIONS = "exemplars", 2440
 TEMPERATURES = (4.0, 8.0, 16.0, 32.0)  # of the posterior, one of which is chosen
 OTHERS: Mapping[str, Mapping[str, Any]] = {
     "annealed@pca": {"tracker.modes": 1},  # its own particles
-    "sapso@pca": {"tracker.modes": 4},  # searches of a frame, each begun elsewhere
+    "sapso@pca": {"tracker.modes": 4, "tracker.modes_share": 2.0},  # searches of a frame, each begun elsewhere
 }
 OTHER_FRAMES, OTHER_EVERY = 20, 4  # every fourth clip is followed by other methods
 DANCES, EVERYDAY = "dances", "everyday"
