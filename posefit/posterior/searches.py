@@ -107,7 +107,7 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
         order = order[np.argsort(costs[order], kind="stable")][: 4 * each]
         order = order[landscape.box.feasible(proposals[order])] if len(order) else order
         different: dict[bytes, int] = {}
-        for row in order:
+        for row in order.tolist():
             different.setdefault(proposals[row].tobytes(), row)
         rows = np.array(list(different.values())[:each], dtype=np.int64)
         chosen.append(proposals[rows])
