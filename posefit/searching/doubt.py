@@ -14,6 +14,6 @@ STEEPNESS = 2.5  # by how much the log-odds rise with the logarithm of the cost
 LEAST_COST = 0.1  # below it the cost of a pose says nothing
 
 
-def lost(costs: Array) -> Array:
+def lost_at(costs: Array) -> Array:
     """Return how likely frames are lost whose poses cost so much: 0 to 1, of the same shape."""
     return np.asarray(1.0 / (1.0 + (EVEN / np.maximum(costs, LEAST_COST)) ** STEEPNESS))

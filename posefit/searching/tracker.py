@@ -15,7 +15,7 @@ from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
 from posefit.posterior.modes import Posterior
 from posefit.posterior.searches import Searched, likelihoods
 from posefit.posterior.smc import systematic_rows
-from posefit.searching.doubt import lost
+from posefit.searching.doubt import lost_at
 from posefit.searching.modes import KEPT, MakeOptimiser, further, gathered, told
 
 
@@ -47,7 +47,7 @@ class WeighingTracker:
         return replace(
             frame,
             posterior=posterior,
-            lost=float(lost(np.array(frame.cost))),
+            lost=float(lost_at(np.array(frame.cost))),
             evaluations=frame.evaluations + more,
             seconds=seconds,
             cpu_seconds=cpu_seconds,

@@ -11,7 +11,7 @@ from posefit.arrays import Array
 from posefit.fitting.metrics import LOST_MM
 from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept_errors, reliability
 from posefit.posterior.modes import APART
-from posefit.searching.doubt import LEAST_COST, lost
+from posefit.searching.doubt import LEAST_COST, lost_at
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
 from posefit_experiments.posterior.fit import (
@@ -160,7 +160,7 @@ def kept_table(tracks: Sequence[Judged], others: Sequence[Kept]) -> dict[str, An
     found = {METHOD: _curve([one.kept.error[:n] for one, n in pairs if n], [one.doubts[:n] for one, n in pairs if n])}
     for method in dict.fromkeys(one.track.seen.method for one in others):
         some = [one for one in others if one.track.seen.method == method]
-        found[method] = _curve([one.error for one in some], [lost(one.track.costs) for one in some])
+        found[method] = _curve([one.error for one in some], [lost_at(one.track.costs) for one in some])
     return found
 
 
