@@ -69,7 +69,7 @@ MUTANTS = (
     ),
     Mutant(
         "joints of a frame that was held are told to other programs",
-        "posefit/tracking/formats.py",
+        "posefit/tracking/evaluation.py",
         (('if not row["usable"] or row["lost"]', 'if row["lost"]'),),
         "tests/tracking/test_certainty.py::"
         "test_what_is_held_or_lost_is_blank_for_other_programs_and_marked_in_the_table",

@@ -1,8 +1,8 @@
 """Clinical joint angles, in degrees: of hip, knee and ankle, of shoulder and elbow.
 
-Each is counted from the anatomical position, where it is zero, and has one sign for both sides of the body. The axes are
-those of `posefit.measuring.segments`. The shoulder's plane and rotation mean nothing where the arm hangs straight down,
-as longitudes do at a pole; near it they are left out.
+Each is counted from the anatomical position, where it is zero, and has one sign for both sides of the body. The axes
+are those of `posefit.measuring.segments`. The shoulder's plane and rotation mean nothing where the arm hangs straight
+down, as longitudes do at a pole; near it they are left out.
 """
 
 import numpy as np

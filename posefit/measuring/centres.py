@@ -1,7 +1,7 @@
 """What the 27 joints of the skeleton are on a person, in the words of anatomy.
 
-The skeleton calls a joint after the bone that ends in it, so that `lfemur` is the left knee. Tables and markers have the
-names below; poses and motion capture files keep the skeleton's own.
+The skeleton calls a joint after the bone that ends in it, so that `lfemur` is the left knee. Tables and markers have
+the names below; poses and motion capture files keep the skeleton's own.
 """
 
 from posefit.arrays import Array

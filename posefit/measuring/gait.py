@@ -5,20 +5,24 @@ count whose feet strike in turn, in which the person moves on the way that he fa
 """
 
 from collections.abc import Collection, Iterator
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.geometry.skeleton import BONES, both
 from posefit.measuring.events import SLOWEST, GaitEvents, at_frames, gait_events
 from posefit.measuring.segments import SIDES
 from posefit.motion.motion import Motion
 
-STEP_SECONDS = (0.25, 1.5)  # a step outside of which is no step of a walk: 40 to 240 a minute
+STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps a minute
 LEAST_SPEED = 0.2  # metres a second
 LEAST_STEPS = 2  # of a walk
-WALK = 0.5  # share of a stride that a foot stands at least: with less, there are moments when neither does
+LEAST_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
+RUNS = 0.5  # the Froude number from which people run rather than walk
+STANDS = 0.57  # share of a stride; a runner's foot stands shorter, as told by toes that are farthest behind
+GRAVITY = 9.81  # metres a second squared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +36,7 @@ class Step:
     strike_seconds: float
     toe_off_seconds: float | None = None
     step_seconds: float | None = None
-    step_length: float | None = None  # metres along the way that the person faces, from ankle to ankle
+    step_length: float | None = None  # metres along the way that the person faces, from the other ankle at its strike
     step_width: float | None = None  # metres across it
     stride_seconds: float | None = None
     stride_length: float | None = None  # metres
@@ -54,19 +58,9 @@ class Gait:
 
     def as_dict(self) -> dict[str, object]:
         """Return what summary.json says of it."""
-        counted = sum(one.step_seconds is not None for one in self.steps)
+        counted = len(_values(self.steps, "step_seconds"))
         told = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("steps", "why")}
         return {"walk": not self.why, "why": self.why or None, "steps": counted, **told}
-
-    def __str__(self) -> str:
-        if self.why:
-            return f"no figures of gait: {self.why}"
-        shown = (self.cadence, self.step_length, self.speed, self.stance_share)
-        cadence, length, speed, stance = (0.0 if one is None else one for one in shown)
-        return (
-            f"walk: {cadence:.0f} steps a minute, step {length:.2f} m, {speed:.2f} m/s, "
-            f"stance {100.0 * stance:.0f} % of a stride"
-        )
 
 
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
@@ -74,21 +68,25 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     if motion.fps < SLOWEST:
         return Gait(why=f"it has fewer than {SLOWEST:g} frames a second")
     events = gait_events(motion)
-    steps = list(_steps(events, motion.fps, sorted(unknown)))
-    if sum(one.step_seconds is not None for one in steps) < LEAST_STEPS:
+    steps = list(_steps(events, motion.fps, set(unknown)))
+    walked = _total(steps, "step_seconds")
+    stance, stride_seconds, stride_length = (
+        _mean(steps, name) for name in ("stance_share", "stride_seconds", "stride_length")
+    )
+    known = (len(motion) - len(unknown)) / motion.fps
+    if len(_values(steps, "step_seconds")) < LEAST_STEPS:
         return Gait(steps=steps, why=_why_not(events, motion.fps))
-    stance = _mean(steps, "stance_share")
-    if stance is None:
-        return Gait(steps=steps, why="it has no whole stride")
-    if stance < WALK:
-        return Gait(steps=steps, why="both feet leave the ground, as in a run")
-    step_seconds, stride_seconds = _mean(steps, "step_seconds"), _mean(steps, "stride_seconds")
-    stride_length = _mean(steps, "stride_length")
-    assert step_seconds is not None and stride_seconds is not None and stride_length is not None
+    if walked < LEAST_SHARE * known:
+        return Gait(steps=steps, why=f"steps of a walk in {walked:.1f} of {known:.1f} s")
+    if stance is None or stride_seconds is None or stride_length is None:
+        return Gait(steps=steps, why="no whole stride found")
+    speed = stride_length / stride_seconds
+    if stance < STANDS or froude_number(speed, _leg(motion)) > RUNS:
+        return Gait(steps=steps, why=f"the person runs, at {speed:.1f} m/s")
     return Gait(
         steps=steps,
-        cadence=cadence(step_seconds),
-        speed=stride_length / stride_seconds,
+        cadence=cadence(walked / len(_values(steps, "step_seconds"))),
+        speed=speed,
         step_length=_mean(steps, "step_length"),
         stride_length=stride_length,
         step_width=_mean(steps, "step_width"),
@@ -98,25 +96,34 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
 
 def cadence(step_seconds: float) -> float:
     """Return how many steps there are in a minute."""
-    return 60.0 / step_seconds
+    return 60.0 / step_seconds  # WHITTLE2007 (cadence)
 
 
 def stance_share(strike: float, toe_off: float, next_strike: float) -> float:
     """Return for which share of its stride a foot is on the ground."""
-    return (toe_off - strike) / (next_strike - strike)
+    return (toe_off - strike) / (next_strike - strike)  # WHITTLE2007 (stance)
 
 
-def _steps(events: GaitEvents, fps: float, unknown: list[int]) -> Iterator[Step]:
+def froude_number(speed: float, leg: float) -> float:
+    """Return the Froude number of a speed in metres a second and a leg's length in metres: people run above a half."""
+    return speed**2 / (GRAVITY * leg)  # ALEXANDER1989 (Froude number)
+
+
+def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
     """Yield every strike in the order of time, with what is known of its step and its stride."""
-    strikes = sorted((float(time), side) for side in SIDES for time in events.strikes[side])
+    strikes = sorted((time, side) for side in SIDES for time in _known(events.strikes[side], unknown))
     for k, (time, foot) in enumerate(strikes):
         told: dict[str, float] = {}
+        again = next((one for one, side in strikes[k + 1 :] if side == foot), np.inf)
+        offs = [one for one in _known(events.offs[foot], unknown) if time < one < again]
+        if offs:
+            told["toe_off_seconds"] = offs[0] / fps
         if k and strikes[k - 1][1] != foot and _walked(events, fps, strikes[k - 1][0], time, unknown):
             other = next(side for side in SIDES if side != foot)
-            apart = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], time)
+            apart = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], strikes[k - 1][0])
             x, z = at_frames(events.heading, time)
             told["step_seconds"] = (time - strikes[k - 1][0]) / fps
-            told["step_length"] = float(apart @ (x, z))
+            told["step_length"] = float(apart @ (x, z))  # WHITTLE2007 (step length)
             told["step_width"] = abs(float(apart @ (z, -x)))
         following = strikes[k + 1 : k + 3]
         in_turn = [side for _, side in following] == [side for side in SIDES if side != foot] + [foot]
@@ -126,17 +133,20 @@ def _steps(events: GaitEvents, fps: float, unknown: list[int]) -> Iterator[Step]
             moved = at_frames(events.ankles[foot], end) - at_frames(events.ankles[foot], time)
             told["stride_seconds"] = (end - time) / fps
             told["stride_length"] = float(np.linalg.norm(moved))
-            offs = [one for one in events.offs[foot] if time < one < end]
-            if len(offs) == 1:
-                told["toe_off_seconds"] = offs[0] / fps
+            if offs:
                 told["stance_share"] = stance_share(time, offs[0], end)
         yield Step(foot=foot, strike_seconds=time / fps, **told)
 
 
-def _walked(events: GaitEvents, fps: float, start: float, end: float, unknown: list[int]) -> bool:
+def _known(times: Array, unknown: set[int]) -> list[float]:
+    """Return the times that do not lie beside a frame of which nothing is known."""
+    return [float(time) for time in times if not {int(time), int(np.ceil(time))} & unknown]
+
+
+def _walked(events: GaitEvents, fps: float, start: float, end: float, unknown: set[int]) -> bool:
     """Return whether somebody walked on from one strike to the next, and whether every frame of it is known."""
     seconds = (end - start) / fps
-    if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or any(start - 1.0 < k < end + 1.0 for k in unknown):
+    if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or unknown & set(range(int(start), int(end) + 2)):
         return False
     return _forwards(events, start, end) >= LEAST_SPEED * seconds
 
@@ -155,7 +165,7 @@ def _why_not(events: GaitEvents, fps: float) -> str:
     speed = _speed(events, fps, last)
     if speed < LEAST_SPEED:
         return f"the person moves forwards at {speed:.2f} m/s"
-    return "the feet do not strike in turn, or too little of it is known"
+    return "the feet do not strike in turn at the pace of a walk, or too little is known"
 
 
 def _speed(events: GaitEvents, fps: float, last: float) -> float:
@@ -163,6 +173,19 @@ def _speed(events: GaitEvents, fps: float, last: float) -> float:
     return float(moved * fps / last)
 
 
+def _leg(motion: Motion) -> float:
+    """Return how long a leg is from hip to ankle, the mean of both."""
+    bones = [BONES.index(bone) for kind in ("femur", "tibia") for bone in both(kind)]
+    return float(motion.skeleton.lengths[bones].sum()) / 2.0
+
+
+def _values(steps: list[Step], name: str) -> list[float]:
+    return [value for one in steps if (value := getattr(one, name)) is not None]
+
+
+def _total(steps: list[Step], name: str) -> float:
+    return float(sum(_values(steps, name)))
+
+
 def _mean(steps: list[Step], name: str) -> float | None:
-    values = [value for one in steps if (value := asdict(one)[name]) is not None]
-    return float(np.mean(values)) if values else None
+    return float(np.mean(values)) if (values := _values(steps, name)) else None
