@@ -20,7 +20,7 @@ CUTOFF = 6.0  # hertz: of a walk nothing to speak of is faster. Winter, Biomecha
 SLOWEST = 2.0 * CUTOFF  # frames a second, with fewer of which nothing of that is seen
 SWAY = 0.3  # hertz: the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
 LEAST = 0.1  # metres that a foot moves to and fro at least, against the pelvis, for an event
-SHARE = 1.0 / 3.0  # of the whole range of that, which it moves at least
+SHARE = 0.2  # of the whole range of that, which it moves at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def low_pass(series: Array, cutoff: float, fps: float) -> Array:
 def _tops(series: Array) -> Array:
     """Return where a series is at its tops, in frames and between them.
 
-    A top is the highest place between two where it is lower by a third of the whole range, and by `LEAST`.
+    A top is the highest place between two where it is lower by a fifth of the whole range, and by `LEAST`.
     """
     lowest, highest = np.percentile(series, [2, 98])
     step = max(LEAST, SHARE * float(highest - lowest))

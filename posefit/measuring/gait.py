@@ -20,6 +20,7 @@ STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps a minute
 LEAST_SPEED = 0.2  # metres a second
 LEAST_STEPS = 2  # of a walk
 LEAST_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
+WIDEST = 0.35  # metres between the lines that the feet of a walk keep to; who dances or dodges goes wider
 RUNS = 0.5  # the Froude number from which people run rather than walk
 STANDS = 0.57  # share of a stride; a runner's foot stands shorter, as told by toes that are farthest behind
 GRAVITY = 9.81  # metres a second squared
@@ -66,31 +67,19 @@ class Gait:
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     """Return the gait of a motion; `unknown` frames, such as held or lost ones, count for nothing."""
     if motion.fps < SLOWEST:
-        return Gait(why=f"it has fewer than {SLOWEST:g} frames a second")
+        return Gait(why=f"fewer than {SLOWEST:g} frames a second")
     events = gait_events(motion)
     steps = list(_steps(events, motion.fps, set(unknown)))
-    walked = _total(steps, "step_seconds")
-    stance, stride_seconds, stride_length = (
-        _mean(steps, name) for name in ("stance_share", "stride_seconds", "stride_length")
-    )
-    known = (len(motion) - len(unknown)) / motion.fps
-    if len(_values(steps, "step_seconds")) < LEAST_STEPS:
-        return Gait(steps=steps, why=_why_not(events, motion.fps))
-    if walked < LEAST_SHARE * known:
-        return Gait(steps=steps, why=f"steps of a walk in {walked:.1f} of {known:.1f} s")
-    if stance is None or stride_seconds is None or stride_length is None:
-        return Gait(steps=steps, why="no whole stride found")
-    speed = stride_length / stride_seconds
-    if stance < STANDS or froude_number(speed, _leg(motion)) > RUNS:
-        return Gait(steps=steps, why=f"the person runs, at {speed:.1f} m/s")
+    if why := _why_not(motion, events, steps, (len(motion) - len(unknown)) / motion.fps):
+        return Gait(steps=steps, why=why)
     return Gait(
         steps=steps,
-        cadence=cadence(walked / len(_values(steps, "step_seconds"))),
-        speed=speed,
+        cadence=cadence(_mean(steps, "step_seconds")),
+        speed=_mean(steps, "stride_length") / _mean(steps, "stride_seconds"),  # WHITTLE2007 (speed)
         step_length=_mean(steps, "step_length"),
-        stride_length=stride_length,
+        stride_length=_mean(steps, "stride_length"),
         step_width=_mean(steps, "step_width"),
-        stance_share=stance,
+        stance_share=_mean(steps, "stance_share"),
     )
 
 
@@ -157,20 +146,25 @@ def _forwards(events: GaitEvents, start: float, end: float) -> float:
     return float(moved @ at_frames(events.heading, 0.5 * (start + end)))
 
 
-def _why_not(events: GaitEvents, fps: float) -> str:
-    last = len(events.pelvis) - 1.0
+def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float) -> str:
+    """Return why a motion of which so many seconds are known is no walk; empty where it is one."""
     strikes = sum(len(events.strikes[side]) for side in SIDES)
     if strikes <= LEAST_STEPS:
         return f"{strikes or 'no'} strike{'' if strikes == 1 else 's'} of a foot found"
-    speed = _speed(events, fps, last)
+    speed = float(((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum(axis=1).mean() * motion.fps)
     if speed < LEAST_SPEED:
-        return f"the person moves forwards at {speed:.2f} m/s"
-    return "the feet do not strike in turn at the pace of a walk, or too little is known"
-
-
-def _speed(events: GaitEvents, fps: float, last: float) -> float:
-    moved = ((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum()
-    return float(moved * fps / last)
+        return f"the person moves {'forwards' if speed > -LEAST_SPEED else 'backwards'} at {abs(speed):.2f} m/s"
+    stance = _values(steps, "stance_share")
+    if froude_number(speed, _leg(motion)) > RUNS or (stance and np.mean(stance) < STANDS):
+        return f"the person runs, at {speed:.1f} m/s"
+    timed = _values(steps, "step_seconds")
+    if len(timed) < LEAST_STEPS:
+        return "the feet do not strike in turn at the pace of a walk, or too little is known"
+    if sum(timed) < LEAST_SHARE * known:
+        return f"steps of a walk in {sum(timed):.1f} of {known:.1f} s"
+    if (width := _mean(steps, "step_width")) > WIDEST:
+        return f"steps are {width:.2f} m wide"
+    return "" if stance else "no whole stride found"
 
 
 def _leg(motion: Motion) -> float:
@@ -183,9 +177,5 @@ def _values(steps: list[Step], name: str) -> list[float]:
     return [value for one in steps if (value := getattr(one, name)) is not None]
 
 
-def _total(steps: list[Step], name: str) -> float:
-    return float(sum(_values(steps, name)))
-
-
-def _mean(steps: list[Step], name: str) -> float | None:
-    return float(np.mean(values)) if (values := _values(steps, name)) else None
+def _mean(steps: list[Step], name: str) -> float:
+    return float(np.mean(_values(steps, name)))
