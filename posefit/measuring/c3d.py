@@ -47,7 +47,7 @@ def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gai
 
 def _header(motion: Motion, start: int) -> bytes:
     last = min(len(motion), MOST)
-    words = struct.pack("<BBHHHHHfHHf", 2, MAGIC, len(PLACES), 0, 1, last, 0, -1.0, start, 0, motion.fps)
+    words = struct.pack("<BBHHHHHfHHf", 2, MAGIC, len(PLACES), 0, 1, last, 0, -1.0, start, 1, motion.fps)
     return words.ljust(BLOCK, b"\0")
 
 

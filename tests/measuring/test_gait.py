@@ -14,7 +14,6 @@ from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from tests.measuring.walker import SPEED, walker
 
-CMU = Path(__file__).parents[3] / "shared" / "data" / "cmu"
 WALKS = ("02_01", "05_01", *(f"16_{k}" for k in (*range(12, 19), *range(20, 33), 47, 58)))
 
 
@@ -36,12 +35,10 @@ def test_walks_of_real_people_are_as_published(name: str) -> None:
 
 
 @pytest.mark.parametrize("clip", ["02_01", "16_15"])
-def test_events_are_near_those_of_a_slow_twin(clip: str) -> None:
+def test_events_are_near_those_of_a_slow_twin(cmu: Path, clip: str) -> None:
     # O'Connor et al. 2007: the middle of the foot falls fastest just before it strikes and rises fastest at toe off
-    subject = clip[:2]
-    if not (CMU / subject / f"{clip}.amc").exists():
-        pytest.skip("the clips at 120 frames a second are not here")
-    motion = read_clip(CMU / subject / f"{subject}.asf", CMU / subject / f"{clip}.amc", fps=120.0)
+    folder = cmu / clip[:2]
+    motion = read_clip(folder / f"{clip[:2]}.asf", folder / f"{clip}.amc", fps=120.0)
     events = gait_events(motion.resampled(30.0))
     joints = motion.skeleton.joints(motion.poses, motion.translations)
     off_by: dict[str, list[float]] = {"strike": [], "off": []}
