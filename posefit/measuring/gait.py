@@ -46,7 +46,10 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
-    """What a motion's gait is like, with every step; None where it is no walk, and `why` says so in a few words."""
+    """What a motion's gait is like, with every step; None where it is no walk, and `why` says so in a few words.
+
+    Strides and stance are None, too, where no stride is whole.
+    """
 
     steps: list[Step] = field(default_factory=list, repr=False)
     why: str = ""  # empty where it is a walk
@@ -72,11 +75,14 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     steps = list(_steps(events, motion.fps, set(unknown)))
     if why := _why_not(motion, events, steps, (len(motion) - len(unknown)) / motion.fps):
         return Gait(steps=steps, why=why)
+    timed, length = _mean(steps, "step_seconds"), _mean(steps, "step_length")
+    assert timed is not None
+    assert length is not None
     return Gait(
         steps=steps,
-        cadence=cadence(_mean(steps, "step_seconds")),
-        speed=_mean(steps, "stride_length") / _mean(steps, "stride_seconds"),  # WHITTLE2007 (speed)
-        step_length=_mean(steps, "step_length"),
+        cadence=cadence(timed),
+        speed=walking_speed(length, cadence(timed)),
+        step_length=length,
         stride_length=_mean(steps, "stride_length"),
         step_width=_mean(steps, "step_width"),
         stance_share=_mean(steps, "stance_share"),
@@ -86,6 +92,11 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
 def cadence(step_seconds: float) -> float:
     """Return how many steps there are in a minute."""
     return 60.0 / step_seconds  # WHITTLE2007 (cadence)
+
+
+def walking_speed(step_length: float, cadence: float) -> float:
+    """Return metres a second, of the length of a step in metres and steps a minute."""
+    return step_length * cadence / 60.0  # WHITTLE2007 (speed)
 
 
 def stance_share(strike: float, toe_off: float, next_strike: float) -> float:
@@ -162,9 +173,8 @@ def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float
         return "the feet do not strike in turn at the pace of a walk, or too little is known"
     if sum(timed) < LEAST_SHARE * known:
         return f"steps of a walk in {sum(timed):.1f} of {known:.1f} s"
-    if (width := _mean(steps, "step_width")) > WIDEST:
-        return f"steps are {width:.2f} m wide"
-    return "" if stance else "no whole stride found"
+    width = _mean(steps, "step_width")
+    return f"steps are {width:.2f} m wide" if width is not None and width > WIDEST else ""
 
 
 def _leg(motion: Motion) -> float:
@@ -177,5 +187,5 @@ def _values(steps: list[Step], name: str) -> list[float]:
     return [value for one in steps if (value := getattr(one, name)) is not None]
 
 
-def _mean(steps: list[Step], name: str) -> float:
-    return float(np.mean(_values(steps, name)))
+def _mean(steps: list[Step], name: str) -> float | None:
+    return float(np.mean(values)) if (values := _values(steps, name)) else None

@@ -76,9 +76,10 @@ def walked(gait: Mapping[str, Any]) -> str:
     """Return in one line what somebody's gait is like, or why nobody can say."""
     if not gait["walk"]:
         return f"no figures of gait: {gait['why']}"
+    stance = "" if gait["stance_share"] is None else f"stance {100.0 * gait['stance_share']:.0f} %, "
     return (
         f"gait: {gait['cadence']:.0f} steps a minute, step {gait['step_length']:.2f} m, speed {gait['speed']:.2f} m/s, "
-        f"stance {100.0 * gait['stance_share']:.0f} %, over {gait['steps']} steps"
+        f"{stance}over {gait['steps']} steps"
     )
 
 

@@ -12,7 +12,7 @@ from posefit.measuring.angles import (
     shoulder_angles,
 )
 from posefit.measuring.events import gait_events
-from posefit.measuring.gait import cadence, froude_number, gait_of, stance_share
+from posefit.measuring.gait import cadence, froude_number, gait_of, stance_share, walking_speed
 from tests.measuring.walker import FIRST, SPEED, STANCE, STRIDE, walker
 
 # Axes of a right side: columns are where X (forwards), Y (up) and Z (to the right) have gone.
@@ -111,7 +111,8 @@ def test_a_step_is_as_long_as_the_body_moves_meanwhile() -> None:  # WHITTLE2007
     assert gait.stride_length == pytest.approx(SPEED * STRIDE, abs=0.005)
 
 
-def test_speed_is_the_way_of_a_stride_over_its_time() -> None:  # WHITTLE2007 (speed)
+def test_speed_is_the_length_of_the_steps_of_a_minute() -> None:  # WHITTLE2007 (speed)
+    assert walking_speed(0.6, 120.0) == pytest.approx(1.2)
     assert gait_of(walker(speed=1.3)).speed == pytest.approx(1.3, abs=0.01)
 
 
