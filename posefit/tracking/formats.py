@@ -78,6 +78,7 @@ def write_formats(
         translations=estimate.translations,
         fps=np.array(estimate.fps),
         joints=np.array(JOINTS),
+        places=np.array(PLACES),
         costs=np.array([frame.cost for frame in frames]),
         radii=scene.body.radii,
         **dict[str, Any](sure),

@@ -97,7 +97,9 @@ def test_what_is_written_opens_elsewhere(tracked: tuple[Path, posefit.Track]) ->
     video = cv2.VideoCapture(str(out / "overlay.mp4"))
     assert round(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 24
     video.release()
-    assert arrays(out / "poses.npz")["radii"].shape == (26, 2)
+    stored = arrays(out / "poses.npz")
+    assert stored["radii"].shape == (26, 2)
+    assert dict(zip(stored["joints"], stored["places"], strict=True))["lfemur"] == "left_knee"
 
 
 def toml(path: Path, *cameras: posefit.Camera) -> Path:
