@@ -38,7 +38,7 @@ class Step:
     toe_off_seconds: float | None = None
     step_seconds: float | None = None
     step_length: float | None = None  # metres along the way that the person faces, from the other ankle at its strike
-    step_width: float | None = None  # metres across it
+    step_width: float | None = None  # metres across it, between both ankles at the strike
     stride_seconds: float | None = None
     stride_length: float | None = None  # metres
     stance_share: float | None = None
@@ -124,7 +124,9 @@ def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
             x, z = at_frames(events.heading, time)
             told["step_seconds"] = (time - strikes[k - 1][0]) / fps
             told["step_length"] = float(apart @ (x, z))  # WHITTLE2007 (step length)
-            told["step_width"] = abs(float(apart @ (z, -x)))
+            # at one moment: between two, whatever is wrong with a person's depth would count
+            beside = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], time)
+            told["step_width"] = abs(float(beside @ (z, -x)))
         following = strikes[k + 1 : k + 3]
         in_turn = [side for _, side in following] == [side for side in SIDES if side != foot] + [foot]
         times = [time, *(one for one, _ in following)]
