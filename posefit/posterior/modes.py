@@ -7,9 +7,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.posterior.calibration import Recalibration
+from posefit.posterior.kernels import mean_distances
 
 # ours: metres, the mean over joints, beyond which two poses are of two modes; a mirrored stride is 0.15 to 0.2 off
 APART = 0.1
@@ -84,16 +85,18 @@ class Posterior:
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> list[Mode]:
-    """Return what a frame may show, the likeliest first: poses that are alike are one mode. Weights sum to 1.
+    """Return what a frame may show, the likeliest first: poses that are alike are one mode.
 
     Poses are alike where their joints are at most `apart` metres from each other, the mean over joints, both roots at
     one point. The pose of a mode is that of its medoid, which somebody can really have; a mean might be nobody's.
-    Weights are shares of the poses' weight, raised to the sharpness of the posterior's recalibration.
+    Weights are shares of the poses' weight, raised to the sharpness of the posterior's recalibration; they sum to 1,
+    less how likely that has it that the truth is like none of them.
     """
     found = _clusters(_distances(skeleton.joints(posterior.poses)), posterior.weights, apart)
     if posterior.recalibration is not None:
         powers = [weight**posterior.recalibration.sharpness for weight, _ in found]  # temperature scaling
-        found = [(power / sum(powers), row) for power, (_, row) in zip(powers, found, strict=True)]
+        share = (1.0 - posterior.recalibration.none) / sum(powers)
+        found = [(share * power, row) for power, (_, row) in zip(powers, found, strict=True)]
     return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in found]
 
 
@@ -147,7 +150,7 @@ def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: floa
 
 def _distances(joints: Array) -> Array:
     """Return how far joints (K, 27, 3) are from each other (K, K), metres, the mean over joints."""
-    return np.array([np.linalg.norm(joints - one, axis=-1).mean(axis=-1) for one in joints])
+    return np.asarray(mean_distances(writeable(joints)))
 
 
 def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[float, int]]:

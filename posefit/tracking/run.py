@@ -12,9 +12,10 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
 from posefit.listening import QUIET, Listener
+from posefit.measuring.gait import gait_of
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
-from posefit.tracking.evaluation import LOST, Evaluation
+from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, opened, task_of
@@ -118,8 +119,10 @@ def follow(
             "settings": method.settings,
             "body": None if shape is None else _described(shape),
             "modes": [round(mode.weight, 6) for mode in modes] or None,
+            "none_of_modes": _none_right(found),
             "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
             "lost_frames": _numbers(rows, "lost", LOST),
+            "gait": gait_of(estimate, unseen(rows)).as_dict(),
             "warnings": [*scene.warnings, *method.audit.warnings],
         }
         output.finish(scene, estimate, found, rows, summary)
@@ -142,6 +145,13 @@ def _whole(skeleton: Skeleton, found: Sequence[Frame]) -> list[TrackMode]:
     each = [frame.posterior for frame in found if frame.posterior is not None and frame.posterior.coherent]
     alike = len(each) == len(found) and len({len(one) for one in each}) == 1
     return track_modes(skeleton, each) if alike else []
+
+
+def _none_right(found: Sequence[Frame]) -> float | None:
+    """Return how likely no mode of a frame is right, the mean over frames; None where nobody says."""
+    learned = [frame.posterior.recalibration for frame in found if frame.posterior is not None]
+    said = [one.none for one in learned if one is not None]
+    return round(float(np.mean(said)), 6) if said else None
 
 
 def _numbers(rows: Sequence[Mapping[str, float]], name: str, least: float) -> list[int] | None:

@@ -201,6 +201,10 @@ def test_what_is_held_or_lost_is_blank_for_other_programs_and_marked_in_the_tabl
     assert all("" not in one for k, one in enumerate(fields) if k not in (1, 4))
     with (tmp_path / "out" / "frames.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
+    with (tmp_path / "out" / "angles.csv").open(newline="") as file:
+        angles = list(csv.DictReader(file))
+    assert [k for k, row in enumerate(angles) if row["left_knee_flexion"] == ""] == [1, 4]
+    assert [k for k, row in enumerate(rows) if row["left_knee_x"] == ""] == [1, 4]
     assert [row["usable"] for row in rows] == ["1.0", "0.0", "1.0", "1.0", "1.0", "1.0"]
     assert [row["lost"] for row in rows] == ["0.1", "0.1", "0.1", "0.1", "0.9", "0.1"]
     stored = arrays(tmp_path / "out" / "poses.npz")
@@ -228,6 +232,19 @@ def test_frames_and_tracks_have_modes(told: Any) -> None:
     # whose body faces the other way has his left where his right was
     assert "left and right: unknown in 6 of 6 frames" in table(result.summary)
     assert "frames lost" not in table(result.summary)
+
+
+def test_the_summary_says_how_likely_no_mode_of_a_frame_is_right(told: Any) -> None:
+    scene = walk()
+    shown = doubtful(scene, np.zeros(FRAMES), turned=0.25)
+    frames = []
+    for k, frame in enumerate(shown):
+        assert frame.posterior is not None
+        learned = Recalibration(none=0.1 * k)
+        frames.append(replace(frame, posterior=replace(frame.posterior, recalibration=learned)))
+    result = told(frames, scene)
+    assert result.summary["none_of_modes"] == pytest.approx(0.25)
+    assert [mode.weight for mode in result.found[5].modes] == pytest.approx([0.375, 0.125])
 
 
 def test_rows_that_are_no_tracks_make_no_modes_of_the_whole(told: Any) -> None:
