@@ -27,6 +27,7 @@ ASKED = {
     "view_degrees": ("degrees", "where the cameras were told to stand; null where nobody said"),
     "translation": ("", "how the root's place is found: known, searched or aligned"),
     "first_pose": ("", "how the first pose is found: searched, or given"),
+    "steady": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/steady.md)"),
     "views": ("", "number of cameras"),
     "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
     "size": ("pixels", "width and height of the first camera's masks"),

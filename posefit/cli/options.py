@@ -100,6 +100,11 @@ TRACK = (
     click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
     *EXTRACTION,
     click.option("--tracks", type=int, default=1, show_default=True, help="Tracks of other beginnings; one is kept."),
+    click.option(
+        "--steady/--no-steady",
+        default=None,
+        help="The root goes smoothly, and feet that stand do not slide; by default so for footage.",
+    ),
     click.option("--seed", type=int, default=0, show_default=True),
     click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),
     click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),

@@ -70,6 +70,7 @@ def track(
     extraction: Extraction | None = None,
     up: Up | None = None,
     tracks: int = 1,
+    steady: bool | None = None,
     seed: int = 0,
     threads: int = 1,
     ask_seconds: float | None = None,
@@ -99,8 +100,10 @@ def track(
     is searched `restarts` times (8; 0 for a tracker that looks ahead), and the person's build is fitted to
     `body_frames` (30; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
     followed so many times from different beginnings, each at the full budget, and the track is kept whose whole cost is
-    least. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
-    calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video.
+    least. A track is `steady` where nobody knows the truth: its root goes smoothly, and feet that stand stay where they
+    are; False leaves what was found in each frame. `view_degrees` gives where the camera stands, several of them
+    several cameras; `camera` is a camera or a calibration, one a view, in whose world `up` points up; `extraction` is
+    how masks are taken from video.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
     not at all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
@@ -188,6 +191,7 @@ def track(
                 "view_degrees": view_degrees,
             },
             tracks=tracks,
+            steady=steady,
         )
         if rerun is not None:
             from posefit.tracking.recording import record

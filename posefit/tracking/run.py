@@ -15,6 +15,7 @@ from posefit.listening import QUIET, Listener
 from posefit.measuring.gait import gait_of
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
+from posefit.steadying.frames import steadied_frames
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
@@ -58,12 +59,14 @@ def follow(
     listener: Listener = QUIET,
     source: Mapping[str, Any] | None = None,
     tracks: int = 1,
+    steady: bool | None = None,
 ) -> Track:
     """Return a scene's motion followed by a method that learns from `training`, with what it is worth.
 
     With several `tracks`, each from another beginning and at the full budget, the one is kept whose whole cost is
     least; evaluations and times are those of all. `output` gets every frame as it comes and everything at the end;
-    `source` is what the summary says of where the scene is from. Raises ValueError where something does not fit.
+    `source` is what the summary says of where the scene is from. What was found is `steady` in the end, by
+    default where nobody knows the truth. Raises ValueError where something does not fit.
     """
     choice, opening = choice or Choice(), opening or Opening()
     if seed < 0:
@@ -74,6 +77,9 @@ def follow(
         for warning in scene.warnings:
             listener.say(f"warning: {warning}")
         task = task_of(scene, opening, training, choice.budget(), threads)
+        steady = scene.truth is None if steady is None else steady
+        if steady and task.translation == "known":
+            raise ValueError("steady must be given where the translation is searched or aligned, got known")
         method = prepare(choice, task)
         task, shape = opened(scene, method, task, opening, seed, listener)
         scene = replace(scene, body=task.body)
@@ -83,6 +89,8 @@ def follow(
         usable = [observation.usable for observation in scene.observations] if tracks > 1 else []
         each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
         found, told = _kept(scene, each, usable, training)
+        if steady:
+            found = steadied_frames(scene, found, method.beta)
         found = [_moded(frame, scene.body.skeleton) for frame in found]
         modes = _whole(scene.body.skeleton, found)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
@@ -112,6 +120,7 @@ def follow(
             "train": [motion.name for motion in training],
             "translation": task.translation,
             "first_pose": opening.first_pose,
+            "steady": steady,
             "views": len(scene.cameras),
             "camera": scene.placing,
             "size": [scene.cameras[0].width, scene.cameras[0].height],

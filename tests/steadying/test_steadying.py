@@ -1,0 +1,147 @@
+"""Tracks that shake, of motions whose steady form is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.motion import recorded
+from posefit.motion.motion import Motion
+from posefit.motion.steadiness import acceleration, slides, standing
+from posefit.steadying import path
+from posefit.steadying.path import Seen, steadied
+from posefit.steadying.squares import Squares
+from posefit.steadying.stance import stances
+
+EYE = np.array([0.0, 1.0, 6.0])
+
+
+def walk() -> Motion:
+    """Return a walk of a recorded person, three metres or more in front of a camera at `EYE`, across its sight."""
+    motion = recorded.clip("02_01").motion().resampled(30.0)
+    places = motion.translations - motion.translations.mean(axis=0) * [1.0, 0.0, 1.0]
+    ways = np.diff(places[:, [0, 2]], axis=0).sum(axis=0)
+    turn = -np.arctan2(-ways[1], ways[0])
+    cosine, sine = np.cos(turn), np.sin(turn)
+    turned = places @ np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
+    poses = motion.poses.copy()
+    poses[:, 0] += turn
+    return replace(motion, poses=poses, translations=turned)
+
+
+def shaken(motion: Motion, seed: int = 0) -> Motion:
+    """Return a motion as a search of each frame finds it: depth worst; its angles are smooth, and off."""
+    rng = np.random.default_rng(seed)
+    poses, places = motion.poses.copy(), motion.translations.copy()
+    legs, times = list(path.LEGS), np.arange(len(motion)) / motion.fps
+    waves = np.sin(2.0 * np.pi * times[:, None] + rng.uniform(0.0, 6.0, len(legs)))
+    poses[:, legs] += np.radians(2.0) * waves * motion.skeleton.free[legs]
+    places += rng.normal(0.0, [0.005, 0.005, 0.05], places.shape)
+    return replace(motion, poses=poses, translations=places)
+
+
+def joints_of(motion: Motion) -> np.ndarray:
+    return motion.skeleton.joints(motion.poses, motion.translations)
+
+
+def all_seen(motion: Motion) -> Seen:
+    return Seen(np.ones(len(motion), dtype=bool), EYE)
+
+
+def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
+    rng = np.random.default_rng(3)
+    count, numbers = 7, 3
+    now, feet, ways = (
+        rng.normal(size=(count, numbers)),
+        rng.normal(size=(count, 2)),
+        rng.normal(size=(count, 2, numbers)),
+    )
+    squares = Squares.of(count, numbers)
+    squares.add(slice(0, 3), np.eye(3) * 4.0, 4.0 * now)
+    squares.add_bends(slice(1, 3), now[:, 1:], 5.0)
+    squares.add_steps(np.array([2, 3]), feet, ways, 6.0)
+
+    lines, values = [*(2.0 * np.eye(count * numbers))], [*(2.0 * now.reshape(-1))]
+    for k in range(count - 2):
+        for column in (1, 2):
+            line = np.zeros((count, numbers))
+            line[k : k + 3, column] = [5.0, -10.0, 5.0]
+            lines.append(line.reshape(-1))
+            values.append(5.0 * (now[k, column] - 2.0 * now[k + 1, column] + now[k + 2, column]))
+    for k in (2, 3):
+        for axis in range(2):
+            line = np.zeros((count, numbers))
+            line[k], line[k + 1] = -6.0 * ways[k, axis], 6.0 * ways[k + 1, axis]
+            lines.append(line.reshape(-1))
+            values.append(6.0 * (feet[k + 1, axis] - feet[k, axis]))
+    expected = np.linalg.lstsq(np.array(lines), np.array(values), rcond=None)[0].reshape(count, numbers)
+    np.testing.assert_allclose(squares.least(), expected, atol=1e-10)
+
+
+def test_stances_of_a_walk_are_those_of_feet_that_are_low_and_slow() -> None:
+    motion = walk()
+    found = stances(joints_of(motion), motion.fps, EYE)
+    stands = standing(joints_of(motion), motion.fps)
+    assert found[stands].mean() > 0.95
+    assert found.any(axis=1).mean() > 0.9  # who walks has a foot on the ground,
+    assert found.mean() < 0.75  # and the other one in the air for two fifths of the time
+    assert stances(joints_of(motion)[:2], motion.fps, EYE).shape == (2, 2)
+
+
+def test_a_track_that_shakes_becomes_steady_and_its_feet_stand() -> None:
+    motion = walk()
+    found, stands = shaken(motion), standing(joints_of(motion), motion.fps)
+    told = steadied(found, all_seen(found))
+    before, after, true = (np.nanmean(acceleration(joints_of(one), 30.0)) for one in (found, told, motion))
+    assert before > 5.0 * true
+    assert after < 1.3 * true
+    assert slides(joints_of(found), stands).mean() > 0.05
+    assert slides(joints_of(told), stands).mean() < 0.02
+    off, was = (np.linalg.norm(joints_of(one) - joints_of(motion), axis=2).mean() for one in (told, found))
+    assert off < 0.6 * was
+    others = np.setdiff1d(np.arange(66), path.LEGS)
+    np.testing.assert_array_equal(told.poses[:, others], found.poses[:, others])
+
+
+def test_frames_that_show_too_little_are_bridged_and_strange_places_are_not_believed() -> None:
+    motion = walk()
+    usable = np.ones(len(motion), dtype=bool)
+    usable[:4] = usable[20:25] = False
+    places = motion.translations.copy()
+    places[~usable] += [200.0, 30.0, -500.0]
+    places[40, 2] -= 20.0
+    told = steadied(replace(motion, translations=places), Seen(usable, EYE))
+    off = np.linalg.norm(told.translations - motion.translations, axis=1)
+    assert off[20:25].max() < 0.05
+    assert off[40] < 0.1
+    assert np.linalg.norm(told.translations[0] - motion.translations[4]) < 0.3
+
+
+def test_long_tracks_are_steadied_in_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = shaken(walk())
+    whole = steadied(found, all_seen(found))
+    monkeypatch.setattr(path, "WINDOW", 30)
+    monkeypatch.setattr(path, "OVERLAP", 25)
+    parts = steadied(found, all_seen(found))
+    assert np.abs(parts.translations - whole.translations).max() < 0.02
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_the_shortest_tracks_are_told(frames: int) -> None:
+    motion = walk().frames(0, frames)
+    assert len(steadied(motion, all_seen(motion))) == frames
+
+
+def test_a_track_is_steady_where_it_is_asked_for_and_tells_the_cost_of_what_it_tells() -> None:
+    settings = {"frames": (0, 8), "translation": "aligned", "evaluations": 400}
+    found = posefit.track("walk", **settings)
+    told = posefit.track("walk", **settings, steady=True)
+    assert (found.summary["steady"], told.summary["steady"]) == (False, True)
+    assert told.summary["acceleration"] < found.summary["acceleration"]
+    assert told.summary["cost"] != found.summary["cost"]
+    assert [frame.evaluations for frame in told.found] == [frame.evaluations for frame in found.found]
+    with pytest.raises(
+        ValueError, match="steady must be given where the translation is searched or aligned, got known"
+    ):
+        posefit.track("walk", frames=(0, 3), steady=True)
