@@ -38,7 +38,8 @@ def box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, 
     return tuple(map(int, parts))
 
 
-EXTRACT = (
+EXTRACTION = (
+    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks: the frames are masks."),
     click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
     click.option("--roi", callback=box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
     click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
@@ -64,10 +65,6 @@ WITHOUT = (
     click.option(
         "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
     ),
-)
-EXTRACTION = (
-    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks."),
-    *EXTRACT,
 )
 TRACK = (
     click.argument("source", nargs=-1),

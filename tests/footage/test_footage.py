@@ -20,8 +20,9 @@ from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.footage.extract import extract
 from posefit.footage.masks import Straight, Views
-from posefit.footage.segmentation import Extraction
+from posefit.footage.segmentation import MOVED, OFTEN, PERIOD, SMALL, Extraction, _Still
 from posefit.footage.stacks import StackMasks
+from posefit.footage.video import Video
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip
@@ -304,6 +305,48 @@ def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:
     found = extract(tmp_path / "moving.avi", tmp_path / "two")
     assert any("the camera seems to move" in warning for warning in found["warnings"])
     assert extract(tmp_path / "still.avi", tmp_path / "three")["warnings"] == []
+
+
+def repainted(path: Path, source: Path, change: Any) -> Path:
+    """Write a video anew, each frame as `change(image, k)` has it."""
+    capture = cv2.VideoCapture(str(source))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    k = 0
+    while (read := capture.read())[0]:
+        writer.write(np.clip(change(read[1].astype(np.float32), k), 0, 255).astype(np.uint8))
+        k += 1
+    writer.release()
+    capture.release()
+    return path
+
+
+def in_front(image: Any, k: int) -> Any:
+    """Somebody stands before the camera, half of the picture wide, and sways."""
+    left = 30 + round(15 * np.sin(k / 4.0))
+    image[20:, left : left + SIZE[0] // 2] = (40.0, 30.0, 120.0)
+    return image
+
+
+def plain(image: Any, k: int) -> Any:
+    """A wall without anything on it, which shows the person's own edges and no others."""
+    image[:] = np.linspace(140.0, 170.0, SIZE[1])[:, None, None]
+    return in_front(image, k)
+
+
+def flickering(image: Any, k: int) -> Any:
+    """Stripes of light, as a lamp gives them."""
+    rows = np.arange(SIZE[1]) / SIZE[1]
+    return image * (1.0 + 0.12 * np.sin(2.0 * np.pi * (1.5 * rows + 0.37 * k)))[:, None, None]
+
+
+@pytest.mark.parametrize("change", [in_front, plain, flickering])
+def test_a_camera_that_stands_still_does_not_seem_to_move(
+    filmed: tuple[Path, list[Any]], tmp_path: Path, change: Any
+) -> None:
+    video = Video.of(repainted(tmp_path / "a.avi", filmed[0], change))
+    still = _Still(SIZE)
+    shifts = [still.shift(image) for image in video.frames(0, None, SIZE, step=PERIOD)]
+    assert np.mean([shift > MOVED * SMALL for shift in shifts]) < OFTEN
 
 
 def test_a_video_that_changes_its_size_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
