@@ -13,6 +13,7 @@ from posefit.footage.extract import store
 from posefit.footage.masks import FPS, FolderMasks, Masks, Range, Straight, Views
 from posefit.footage.scene import Placing, Scene, observed
 from posefit.footage.segmentation import Segmentation
+from posefit.footage.settled import settled
 from posefit.footage.stacks import StackMasks
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
@@ -36,10 +37,14 @@ class CameraView:
     warnings: Sequence[str] = ()
 
 
-def masks_of(path: Path, fps: float | None, frames: Range) -> CameraView:
-    """Return what a folder or an .npz of masks shows, at `fps`, or else at the rate that the file states, or 30."""
-    masks = FolderMasks.of(path, frames) if path.is_dir() else StackMasks.of(path, frames)
-    return CameraView(masks, Views([masks]).sizes[0], None, fps or masks.fps or FPS)
+def masks_of(path: Path, fps: float | None, frames: Range, label: int | None, holes: float | None) -> CameraView:
+    """Return what a folder or an .npz of masks shows of one person, at `fps`, or else at the file's own rate, or 30.
+
+    `label` is the value that he has, and `holes` the largest that is filled. Raises ValueError where nobody is seen.
+    """
+    masks = FolderMasks.of(path, frames, label) if path.is_dir() else StackMasks.of(path, frames, label)
+    one = settled(masks, path, holes)
+    return CameraView(one, Views([one]).sizes[0], None, fps or masks.fps or FPS, warnings=one.warnings)
 
 
 def video_of(video: Video, found: Segmentation, folder: Path, listener: Listener) -> CameraView:

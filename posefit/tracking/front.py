@@ -68,6 +68,8 @@ def track(
     body_frames: int | None = None,
     height: float | None = None,
     extraction: Extraction | None = None,
+    label: int | None = None,
+    holes: float | None = None,
     up: Up | None = None,
     tracks: int = 1,
     seed: int = 0,
@@ -100,7 +102,8 @@ def track(
     `body_frames` (30; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
     followed so many times from different beginnings, each at the full budget, and the track is kept whose whole cost is
     least. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
-    calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video.
+    calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video. `label` is
+    the value that the person has in masks of several things, and `holes` the largest that is filled, a share of him.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at
     all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
@@ -130,6 +133,8 @@ def track(
         extraction=extraction,
         height=height,
         up=up,
+        label=label,
+        holes=holes,
     )
     if isinstance(source, Scene) and viewing != Viewing():
         raise ValueError(f"a scene must be followed as it is, got {viewing}")
