@@ -80,6 +80,7 @@ def combined(
             maps.append(None)
             continue
         if one.filmed is None:
+            calibration = calibration.padded(one.size) or calibration
             _check_shape(calibration, one.size)
         placed.append(calibration.camera(one.size, world))
         bent = calibration.maps(one.size) if calibration.distorted else None
@@ -118,9 +119,12 @@ def calibrated(
         raise ValueError(f"camera must be given for each view, {views}, got {len(known)}")
     if views > 1 and any(isinstance(one, Calibration) and one.rotation is None for one in known):
         raise ValueError("camera must say where each of several cameras stands, got a file without rotation")
-    for one, size in zip(known, filmed, strict=False):
-        if isinstance(one, Calibration) and size is not None and one.size != size:
-            raise _other_size(one, size)
+    for k, (one, size) in enumerate(zip(known, filmed, strict=False)):
+        if isinstance(one, Calibration) and size is not None:
+            fitting = one.padded(size)
+            if fitting is None:
+                raise _other_size(one, size)
+            known[k] = fitting
     return known
 
 

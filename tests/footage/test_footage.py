@@ -21,6 +21,7 @@ from posefit.fitting.space import SearchSpace
 from posefit.footage.extract import extract
 from posefit.footage.masks import Straight, Views
 from posefit.footage.segmentation import MOVED, OFTEN, PERIOD, SMALL, Extraction, _Still
+from posefit.footage.source import Viewing, scene_of
 from posefit.footage.stacks import StackMasks
 from posefit.footage.video import Video
 from posefit.geometry.rotation import wrapped
@@ -305,6 +306,28 @@ def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:
     found = extract(tmp_path / "moving.avi", tmp_path / "two")
     assert any("the camera seems to move" in warning for warning in found["warnings"])
     assert extract(tmp_path / "still.avi", tmp_path / "three")["warnings"] == []
+
+
+@pytest.mark.parametrize("kind", ["video", "masks"])
+def test_a_calibration_fits_footage_that_a_codec_filled_up(
+    filmed: tuple[Path, list[Any]], tmp_path: Path, kind: str
+) -> None:
+    (tmp_path / "camera.json").write_text(camera(np.pi / 2).to_json())
+    source = tmp_path / ("a.avi" if kind == "video" else "a.npz")
+    if kind == "video":
+        writer = cv2.VideoWriter(str(source), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (SIZE[0], SIZE[1] + 8))
+        capture = cv2.VideoCapture(str(filmed[0]))
+        while (read := capture.read())[0]:
+            writer.write(np.pad(read[1], ((0, 8), (0, 0), (0, 0)), mode="edge"))
+        writer.release()
+        capture.release()
+    else:
+        np.savez(source, masks=[np.pad(mask, ((0, 8), (0, 0))) for mask in [NOBODY] * EMPTY + truth()])
+    scene = scene_of([source], Viewing(cameras=[tmp_path / "camera.json"], frames=(EMPTY + 6, EMPTY + 30)), tmp_path)
+    (one,) = scene.cameras
+    assert (one.width, one.height) == (SIZE[0], SIZE[1] + 8)
+    np.testing.assert_allclose(one.centre, camera(np.pi / 2).centre)
+    np.testing.assert_allclose(one.focal, camera(np.pi / 2).focal)
 
 
 def repainted(path: Path, source: Path, change: Any) -> Path:
