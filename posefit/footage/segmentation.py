@@ -104,6 +104,8 @@ class Segmentation:
                 self._shifts.append(still.shift(image))
             found = person(*model.classify(image), self._roi, self._ignored)
             self.rows.append(_judged(found, self.start + k, latest))
+            if not self._video.is_filmed(self.start + k):
+                self.rows[-1]["usable"] = 0
             yield image, found
         if not any(row["usable"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
@@ -118,7 +120,7 @@ class Segmentation:
     @property
     def warnings(self) -> list[str]:
         """What a user should look at before he trusts the masks."""
-        said, name = [], self.name
+        said, name = [*self._video.warnings], self.name
         if self._missing > LOST * len(self.rows):
             said.append(f"{name}: {self._damage}")
         seen = [row for row in self.rows if row["area"]]
