@@ -92,13 +92,17 @@ def opened(
         listener.say(f"looking for the first pose, {restarts} times")
         task = begun(task, scene.observations, follow, restarts, seed)
     shape = None
-    if body_frames:
+    if body_frames and (seen := len(usable(scene.observations, body_frames))) < LEAST:
+        few = f"{seen} of them show enough of the person" if seen < body_frames else f"{seen} are too few"
+        listener.say(
+            f"no build is fitted to {body_frames} frames: {few}, at least {LEAST} are needed; it is the average"
+        )
+    elif body_frames:
         listener.say(f"fitting the person's build to {body_frames} frames")
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = how.height or (task.body.stature if alone else None)
         shape = built(task, scene.observations, follow, body_frames, height, seed)
-        if shape is not None:
-            task = replace(task, body=shape.body)
+        task = replace(task, body=shape.body)
     return task, shape
 
 
@@ -176,11 +180,9 @@ def built(
     frames: int,
     height: float | None,
     seed: int,
-) -> Shape | None:
-    """Return the person's build, from the first usable frames; None where there are too few."""
+) -> Shape:
+    """Return the person's build, from the first usable frames."""
     chosen = usable(observations, frames)
-    if len(chosen) < LEAST:
-        return None
     return fit_shape(
         task.body,
         task.cameras,
