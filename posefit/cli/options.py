@@ -106,7 +106,11 @@ TRACK = (
     click.option("--translation", help="Root translation: known, searched or aligned."),
     *HEIGHT,
     click.option("--restarts", type=int, help="Searches of a first pose nobody knows: 8, or 0 for exemplars."),
-    click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
+    click.option(
+        "--body-frames",
+        type=int,
+        help="Frames a build is fitted to, every third; by default 12 for footage, 0 for none.",
+    ),
     *EXTRACTION,
     *MASKS,
     click.option("--tracks", type=int, default=1, show_default=True, help="Tracks of other beginnings; one is kept."),

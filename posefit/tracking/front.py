@@ -99,7 +99,7 @@ def track(
     else from the built-in walks. Where it is not, it is the tracker `exemplars`, which learns from the library; or, if
     an optimiser or a prior is given, `sapso` with `loose`, which learns from the built-in walks. There the first frame
     is searched `restarts` times (8; 0 for a tracker that looks ahead), and the person's build is fitted to
-    `body_frames` (30; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
+    `body_frames` (12; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
     followed so many times from different beginnings, each at the full budget, and the track is kept whose whole cost is
     least. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
     calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video. `label` is

@@ -29,6 +29,7 @@ from posefit.motion import built_in
 from posefit.motion.amc import read_clip
 from posefit.motion.bvh import read_bvh
 from posefit.registry import registry
+from posefit.tracking.table import table
 from tests.files import arrays
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, truth, walk
 
@@ -100,6 +101,15 @@ def test_what_is_written_opens_elsewhere(tracked: tuple[Path, posefit.Track]) ->
     assert round(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 24
     video.release()
     assert arrays(out / "poses.npz")["radii"].shape == (26, 2)
+
+
+def test_the_printed_overlap_is_that_of_the_summary_and_of_the_files(tracked: tuple[Path, posefit.Track]) -> None:
+    out, result = tracked
+    stored = json.loads((out / "summary.json").read_text())
+    assert f"IoU {stored['iou']:.3f}," in table(result.summary)
+    with (out / "frames.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if float(row["usable"])]
+    assert stored["iou"] == pytest.approx(np.mean([float(row["iou"]) for row in rows]))
 
 
 def toml(path: Path, *cameras: posefit.Camera) -> Path:
