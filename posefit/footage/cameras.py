@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 
 from posefit.footage.extract import store
+from posefit.footage.given.settled import settled
 from posefit.footage.masks import FPS, FolderMasks, Masks, Range, Straight, Views
 from posefit.footage.scene import Placing, Scene, observed
 from posefit.footage.segmentation import Segmentation
-from posefit.footage.settled import settled
 from posefit.footage.stacks import StackMasks
 from posefit.footage.video import Video
 from posefit.geometry.body import Body

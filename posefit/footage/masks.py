@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.fitting.tracker import Observation
-from posefit.footage.values import Palette, Reading, many_colours
+from posefit.footage.given.values import Palette, Reading, many_colours
 from posefit.silhouette.mask import Mask, Silhouette
 
 DIGITS = 1_000  # of a number in a name

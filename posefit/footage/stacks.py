@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived
+from posefit.footage.given.values import Palette, Reading
 from posefit.footage.masks import Range, existing, span
-from posefit.footage.values import Palette, Reading
 from posefit.reading import quoted
 from posefit.silhouette.mask import Silhouette
 

@@ -13,8 +13,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from posefit.cli import main
+from posefit.footage.given.settled import Settled, settled
 from posefit.footage.masks import FolderMasks
-from posefit.footage.settled import Settled, settled
 from posefit.footage.stacks import StackMasks
 from tests.footage.conftest import SIZE, truth
 
