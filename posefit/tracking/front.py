@@ -105,8 +105,8 @@ def track(
     calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video. `label` is
     the value that the person has in masks of several things, and `holes` the largest that is filled, a share of him.
 
-    With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at
-    all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
+    With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
+    not at all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
     recording for the Rerun viewer goes. Raises ValueError for every mistake in the arguments or files.
     """
     sources = _sources(source)
