@@ -93,8 +93,6 @@ def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[floa
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
     task = known_task(scene, choice, start, setup.translation)
     shape = built(task, scene.observations, following(prepare(choice, task)), BODY_FRAMES, height, seed)
-    if shape is None:
-        raise ValueError(f"motion must have frames enough to fit a build to, got {motion}")
     return _off(shape.body, true), _off(start, true)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from posefit.cli.following import extraction_of, without_subjects
-from posefit.cli.options import CAMERAS, EXTRACTION, HEIGHT, VIEWS, WITHOUT, options
+from posefit.cli.options import CAMERAS, EXTRACTION, HEIGHT, MASKS, VIEWS, WITHOUT, options
 from posefit.cli.output import json_line, results_alone, say
 
 
@@ -22,7 +22,7 @@ from posefit.cli.output import json_line, results_alone, say
 @options(WITHOUT)
 @click.option("--build", metavar="DIR", help="Of footage: the folder of a track, whose build the person has.")
 @click.option("--translation", help="Root translation: known, by default where it is, or aligned.")
-@options(EXTRACTION)
+@options((*EXTRACTION, *MASKS))
 @click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number.")
 @click.option("--out", metavar="DIR", help="Write a picture and all numbers to this new folder.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
@@ -47,6 +47,8 @@ def ambiguity(as_json: bool, out: str | None, **given: Any) -> None:
         extraction=extraction_of(given, source[0]),
         height=given["height"],
         up=given["up"],
+        label=given["label"],
+        holes=given["holes"],
     )
     subjects = given["without_subject"]
     with results_alone() if as_json else nullcontext(), written_to(out) as write:

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from posefit.cli.options import EXTRACT, TRACK, frame_range, options
+from posefit.cli.options import EXTRACTION, TRACK, frame_range, options
 from posefit.cli.output import json_line, progress, results_alone, say
 
 
@@ -59,19 +59,22 @@ def fit(as_json: bool, **options: Any) -> None:
 @click.command()
 @click.argument("video")
 @click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
-@click.option(
-    "--method", default="mixture", show_default=True, help="mixture, median, mean, or masks: the frames are masks."
-)
-@options(EXTRACT)
+@options(EXTRACTION)
+@click.option("--method", hidden=True, help="What --extraction was called.")
 @click.option("--frames", callback=frame_range, metavar="A:B", help="Only these frames.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def extract(video: str, out: str, as_json: bool, frames: Any, **options: Any) -> None:
+def extract(video: str, out: str, as_json: bool, frames: Any, method: str | None, **options: Any) -> None:
     """Take the masks of one person out of a VIDEO before a still background."""
     from posefit.footage.extract import extract as run
     from posefit.footage.segmentation import Extraction
 
-    given = {name: value for name, value in options.items() if value is not None}
-    result = run(video, out, Extraction(**given), frames=frames, progress=progress)
+    if method is not None:
+        if options["extraction"] is not None:
+            raise ValueError(f"--method must be left out beside --extraction, which it is called now, got {method!r}")
+        say("--method is called --extraction now, as for posefit track")
+        options["extraction"] = method
+    how = _extraction_given(options)
+    result = run(video, out, Extraction(**how), frames=frames, progress=progress)
     for warning in result["warnings"]:
         say(f"warning: {warning}")
     if as_json:
@@ -110,12 +113,17 @@ def extraction_of(options: dict[str, Any], source: str) -> Any:
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import kind_of, useless_for
 
-    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
-    given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
+    given = _extraction_given(options)
     if given and (kind := kind_of(source)) != "video":
         name = next(iter(given))
         raise useless_for(kind, "extraction" if name == "method" else name, given[name], "video")
     return Extraction(**given) if given else None
+
+
+def _extraction_given(options: dict[str, Any]) -> dict[str, Any]:
+    """Return those keywords of `Extraction` that options say, which are taken out of them but for `extraction`."""
+    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
+    return {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
 
 
 def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:

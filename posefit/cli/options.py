@@ -38,7 +38,16 @@ def box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, 
     return tuple(map(int, parts))
 
 
-EXTRACT = (
+def label(_: click.Context, __: click.Parameter, value: str | None) -> int | None:
+    """Return the number that a label is: 15, or 0x800000 for a colour."""
+    try:
+        return None if value is None else int(value, 0)
+    except ValueError:
+        raise click.BadParameter(f"expected a whole number such as 15, or a colour 0xRRGGBB, got {value!r}") from None
+
+
+EXTRACTION = (
+    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks: the frames are masks."),
     click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
     click.option("--roi", callback=box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
     click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
@@ -59,15 +68,15 @@ VIEWS = (
     click.option("--size", callback=_size, metavar="WxH", help="Image of a rendered motion, by default 320x240."),
     click.option("--fps", type=float, help="Rate to resample a motion to, or of masks; by default 30, or theirs."),
 )
+MASKS = (
+    click.option("--label", callback=label, metavar="N", help="Of masks: the value or the colour that the person has."),
+    click.option("--holes", type=float, metavar="SHARE", help="Fill holes up to this share of him; by default 0.02."),
+)
 HEIGHT = (click.option("--height", type=float, metavar="METRES", help="How tall the person in the footage stands."),)
 WITHOUT = (
     click.option(
         "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
     ),
-)
-EXTRACTION = (
-    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks."),
-    *EXTRACT,
 )
 TRACK = (
     click.argument("source", nargs=-1),
@@ -97,8 +106,13 @@ TRACK = (
     click.option("--translation", help="Root translation: known, searched or aligned."),
     *HEIGHT,
     click.option("--restarts", type=int, help="Searches of a first pose nobody knows: 8, or 0 for exemplars."),
-    click.option("--body-frames", type=int, help="Frames a build is fitted to; by default 30 for footage, 0 for none."),
+    click.option(
+        "--body-frames",
+        type=int,
+        help="Frames a build is fitted to, every third; by default 12 for footage, 0 for none.",
+    ),
     *EXTRACTION,
+    *MASKS,
     click.option("--tracks", type=int, default=1, show_default=True, help="Tracks of other beginnings; one is kept."),
     click.option(
         "--steady/--no-steady",

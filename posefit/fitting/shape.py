@@ -44,8 +44,9 @@ NAMES = ("scale", *(f"{name} length" for name in LENGTHS), *(f"{name} girth" for
 SPREAD = np.array([0.10] + [0.06] * len(LENGTHS) + [0.30] * len(GIRTHS))
 REACH = 3.0  # spreads to either side that are searched
 PULL = 0.15  # cost of a factor that is one spread away from 1
-ROUNDS = 4  # poses with the body, then the body with the poses
-GENERATIONS = 60  # of CMA-ES, a round
+ROUNDS = 2  # poses with the body, then the body with the poses
+GENERATIONS, AGAIN = 60, 20  # of CMA-ES: in the first round, and where it begins near the end
+WIDTH, NEAR = 0.5, 0.2  # spreads that its first draws lie apart, in the same order
 
 
 def _members(groups: dict[str, tuple[str, ...]]) -> Array:
@@ -96,10 +97,10 @@ def fit_shape(
     """
     factors = np.ones(len(NAMES))
     base = body
-    for _ in range(ROUNDS):
+    for k in range(ROUNDS):
         frames = follow(shaped(base, factors, height))
         fitted = _Frames(base, cameras, observations, frames, height, aligned)
-        factors = fitted.search(factors, np.arange(len(observations)), rng)
+        factors = fitted.search(factors, np.arange(len(observations)), rng, first=k == 0)
     drawn = [
         fitted.search(factors, rng.integers(len(observations), size=len(observations)), rng) for _ in range(resamples)
     ]
@@ -130,13 +131,15 @@ class _Frames:
                 total += float(mismatch(areas(body, camera, silhouette, pose, translation))[0])
         return total / (len(chosen) * len(self.cameras))
 
-    def search(self, start: Array, chosen: NDArray[np.int64], rng: np.random.Generator) -> Array:
+    def search(
+        self, start: Array, chosen: NDArray[np.int64], rng: np.random.Generator, *, first: bool = False
+    ) -> Array:
         """Return the factors (17,) that fit the chosen frames best, by CMA-ES in spreads of their logarithms."""
         mean = np.clip(np.log(start) / SPREAD, -REACH, REACH)
         population = usual_population(len(NAMES))
-        strategy = Strategy(mean, np.full(len(NAMES), 0.5), population)
+        strategy = Strategy(mean, np.full(len(NAMES), WIDTH if first else NEAR), population)
         best, least = mean, np.inf
-        for _ in range(GENERATIONS):
+        for _ in range(GENERATIONS if first else AGAIN):
             asked = _within_reach(strategy, rng, population)
             costs = np.array([self.cost(np.exp(SPREAD * one), chosen) + PULL * float(one @ one) for one in asked])
             if costs.min() < least:

@@ -14,6 +14,7 @@
 | observations that are spoilt on purpose | spoilt.py |
 | several cameras: calibrations, lens distortion, which camera saw what | cameras.py |
 | masks read when their turn comes; those of an .npz file; pictures of strangers | masks.py, stacks.py, images.py |
+| what the values of masks mean; one person of them, whole | given/ |
 | video, read and written frame by frame | video.py |
 | the person told from a still background; the files of `posefit extract` | segmentation.py, extract.py |
 

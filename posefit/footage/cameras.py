@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from posefit.footage.extract import store
+from posefit.footage.given.settled import settled
 from posefit.footage.masks import FPS, FolderMasks, Masks, Range, Straight, Views
 from posefit.footage.scene import Placing, Scene, observed
 from posefit.footage.segmentation import Segmentation
@@ -36,10 +37,14 @@ class CameraView:
     warnings: Sequence[str] = ()
 
 
-def masks_of(path: Path, fps: float | None, frames: Range) -> CameraView:
-    """Return what a folder or an .npz of masks shows, at `fps`, or else at the rate that the file states, or 30."""
-    masks = FolderMasks.of(path, frames) if path.is_dir() else StackMasks.of(path, frames)
-    return CameraView(masks, Views([masks]).sizes[0], None, fps or masks.fps or FPS)
+def masks_of(path: Path, fps: float | None, frames: Range, label: int | None, holes: float | None) -> CameraView:
+    """Return what a folder or an .npz of masks shows of one person, at `fps`, or else at the file's own rate, or 30.
+
+    `label` is the value that he has, and `holes` the largest that is filled. Raises ValueError where nobody is seen.
+    """
+    masks = FolderMasks.of(path, frames, label) if path.is_dir() else StackMasks.of(path, frames, label)
+    one = settled(masks, path, holes)
+    return CameraView(one, Views([one]).sizes[0], None, fps or masks.fps or FPS, warnings=one.warnings)
 
 
 def video_of(video: Video, found: Segmentation, folder: Path, listener: Listener) -> CameraView:
@@ -75,6 +80,7 @@ def combined(
             maps.append(None)
             continue
         if one.filmed is None:
+            calibration = calibration.padded(one.size) or calibration
             _check_shape(calibration, one.size)
         placed.append(calibration.camera(one.size, world))
         bent = calibration.maps(one.size) if calibration.distorted else None
@@ -113,9 +119,12 @@ def calibrated(
         raise ValueError(f"camera must be given for each view, {views}, got {len(known)}")
     if views > 1 and any(isinstance(one, Calibration) and one.rotation is None for one in known):
         raise ValueError("camera must say where each of several cameras stands, got a file without rotation")
-    for one, size in zip(known, filmed, strict=False):
-        if isinstance(one, Calibration) and size is not None and one.size != size:
-            raise _other_size(one, size)
+    for k, (one, size) in enumerate(zip(known, filmed, strict=False)):
+        if isinstance(one, Calibration) and size is not None:
+            fitting = one.padded(size)
+            if fitting is None:
+                raise _other_size(one, size)
+            known[k] = fitting
     return known
 
 

@@ -2,6 +2,7 @@
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from posefit.reading import check_size, cut
 PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
 LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
 FORMATS = "PNG, JPEG, BMP, TIFF or PGM"
+INDEXED = 3  # PNG's type of colour for a palette
+COLOURFUL, OFTEN = 32, 0.02  # of 255, and the share of a picture's pixels: with more it is no mask
 _FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # of JPEG: markers before a frame's height and width
 _WIDTH, _HEIGHT, _SAMPLES = 256, 257, 277  # tags of TIFF
 
@@ -22,7 +25,49 @@ def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
     """
     import cv2
 
-    path = Path(path)
+    content = _content(Path(path))
+    image = None if content is None else _decoded(content, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+def read_values(path: Path, labelled: bool = False) -> tuple[NDArray[Any], bool] | None:
+    """Return the values (height, width) by which an image marks a person, and whether they are degrees; None for none.
+
+    They are its alpha channel, where it has one that says anything and no labels are asked for; else the indices of a
+    palette of colours, or colours as 0xRRGGBB, or grey levels, of 8 or 16 bits. Raises ValueError as `read_image` does.
+    """
+    import cv2
+
+    content = _content(path)
+    if content is None:
+        return None
+    if content.startswith(b"\xff\xd8"):
+        image = _decoded(content, cv2.IMREAD_GRAYSCALE)
+        return None if image is None else (image, True)
+    image = _decoded(content, cv2.IMREAD_UNCHANGED)
+    if image is None or image.ndim == 2:
+        return None if image is None else (image, False)
+    if image.shape[2] == 4 and not labelled and (image[..., 3] != np.iinfo(image.dtype).max).any():
+        return image[..., 3], True
+    if (image[..., 0] == image[..., 1]).all() and (image[..., 0] == image[..., 2]).all():
+        return image[..., 0], False
+    if image.dtype != np.uint8:
+        image = (image // 256).astype(np.uint8)
+    blue, green, red = (image[..., k].astype(np.int32) for k in range(3))
+    colours = (red << 16) | (green << 8) | blue
+    palette = _palette(content)
+    return colours if palette is None else _indices(colours, palette), False
+
+
+def is_colourful(path: Path) -> bool:
+    """Return whether a JPEG has colours, which no mask has; other pictures say by their values what they are."""
+    if path.suffix.lower() not in (".jpg", ".jpeg") or (image := read_image(path, grey=False)) is None:
+        return False
+    return bool((np.ptp(image, axis=2) > COLOURFUL).mean() > OFTEN)
+
+
+def _content(path: Path) -> bytes | None:
+    """Return what is in the file of a picture; None where it is none. Raises ValueError where that is too much."""
     if not path.is_file():
         return None
     check_size(path, LARGEST_FILE)
@@ -34,11 +79,33 @@ def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
         raise ValueError(
             f"{path}: expected at most {PIXELS // 10**6} million pixels, got {cut(f'{size[0]}x{size[1]}')}"
         )
+    return content
+
+
+def _decoded(content: bytes, how: int) -> NDArray[Any] | None:
+    import cv2
+
     try:
-        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+        return cv2.imdecode(np.frombuffer(content, np.uint8), how)
     except cv2.error:
         return None
-    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+def _palette(content: bytes) -> NDArray[np.int32] | None:
+    """Return the colours of a PNG's palette as 0xRRGGBB; None where it has none."""
+    if content[:4] != b"\x89PNG" or content[25] != INDEXED:
+        return None
+    place = content.find(b"PLTE")
+    length = int.from_bytes(content[place - 4 : place], "big")
+    stored = np.frombuffer(content, np.uint8, 3 * (length // 3), place + 4).reshape(-1, 3).astype(np.int32)
+    return np.asarray((stored[:, 0] << 16) | (stored[:, 1] << 8) | stored[:, 2])
+
+
+def _indices(colours: NDArray[np.int32], palette: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Return which entry of a palette each colour is: the first, where it stands there twice."""
+    known, first = np.unique(palette, return_index=True)
+    places = np.clip(np.searchsorted(known, colours), 0, len(known) - 1)
+    return np.asarray(first[places], dtype=np.uint8)
 
 
 def size_of(content: bytes) -> tuple[int, int] | None:

@@ -1,5 +1,6 @@
 """Masks that are read when their turn comes, so that memory does not grow with their number."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.fitting.tracker import Observation
+from posefit.footage.given.values import Palette, Reading, many_colours
 from posefit.silhouette.mask import Mask, Silhouette
 
+DIGITS = 1_000  # of a number in a name
 FPS = 30.0  # of motions and masks, where nobody says
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 Range = tuple[int | None, int | None]
@@ -42,15 +45,34 @@ class FolderMasks:
     """The masks of a folder of images, each read when its turn comes."""
 
     files: Sequence[Path]
+    reading: Reading  # of their values
+    labelled: bool
     fps: float | None = None  # a folder does not say it
 
     @classmethod
-    def of(cls, path: Path, frames: Range) -> "FolderMasks":
-        """Return the masks of a folder, in the order of their names, cut to `frames`."""
-        files = sorted(file for file in path.iterdir() if file.suffix.lower() in IMAGES)
-        if not files:
+    def of(cls, path: Path, frames: Range, label: int | None = None) -> "FolderMasks":
+        """Return the masks of a folder, in the order of their names, cut to `frames`: 2 comes before 10.
+
+        Raises ValueError naming the file where one is no image, or of another size than the first.
+        """
+        from posefit.footage.images import is_colourful
+
+        # a hidden file is none of them: some systems put one beside each image that they copy
+        files = (file for file in path.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
+        found = sorted(files, key=_natural)
+        if not found:
             raise ValueError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
-        return cls(files[slice(*span(frames, len(files)))])
+        chosen = found[slice(*span(frames, len(found)))]
+        if is_colourful(chosen[0]):
+            raise many_colours(path)
+        palette, shape = Palette(), None
+        for file in chosen:
+            values, soft = _values(file, label is not None)
+            shape = values.shape if shape is None else shape
+            if values.shape != shape:
+                raise ValueError(f"{file}: mask must have shape {shape}, got {values.shape}")
+            palette.add(values, soft)
+        return cls(chosen, palette.reading(label, path), label is not None)
 
     def __len__(self) -> int:
         return len(self.files)
@@ -64,26 +86,23 @@ class FolderMasks:
         return str(self.files[k])
 
     def silhouette(self, k: int) -> Silhouette:
-        """Return mask k. Raises ValueError naming the file where it is no mask, or empty, or full."""
-        from posefit.footage.images import FORMATS, read_image
-
-        image = read_image(self.files[k], grey=True)
-        if image is None:
-            raise ValueError(f"{self.files[k]}: expected an image ({FORMATS}), got a file that is none")
-        return shown_person(person_in(image), None, self.label(k))
+        """Return mask k. Raises ValueError naming the file where it is no image."""
+        return Silhouette.of(self.reading.person(_values(self.files[k], self.labelled)[0]))
 
 
-def person_in(mask: NDArray[Any]) -> Mask:
-    """Return where a person is: above 127 where values go beyond 1, else above 0."""
-    return np.asarray(np.greater(mask, 127 if mask.max() > 1 else 0))
+def _values(file: Path, labelled: bool) -> tuple[NDArray[Any], bool]:
+    from posefit.footage.images import FORMATS, read_values
+
+    found = read_values(file, labelled)
+    if found is None:
+        raise ValueError(f"{file}: expected an image ({FORMATS}), got a file that is none")
+    return found
 
 
-def shown_person(person: Mask, known: NDArray[Any] | None, label: str) -> Silhouette:
-    """Return the silhouette of a person's mask. Raises ValueError where nobody is there, or nothing else."""
-    if not person.any() or person.all():
-        came = "an empty one" if not person.any() else "one without background"
-        raise ValueError(f"{label}: expected a mask with a person before a background, got {came}")
-    return Silhouette.of(person, known)
+def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
+    """Return what files are sorted by: numbers in their names count as such."""
+    parts = re.findall(r"[0-9]+|[^0-9]+", file.name)
+    return [(int(part), "") if part.isdigit() and len(part) < DIGITS else (-1, part) for part in parts], file.name
 
 
 class PackedMasks:
@@ -190,9 +209,6 @@ class Views(Sequence[Observation]):
     def _silhouette(self, view: int, k: int) -> Silhouette:
         masks = self.masks[view]
         silhouette = masks.silhouette(k)
-        if silhouette.size != self.sizes[view]:
-            expected, came = ((s[1], s[0]) for s in (self.sizes[view], silhouette.size))
-            raise ValueError(f"{masks.label(k)}: mask must have shape {expected}, got {came}")
         if len(self.masks) > 1 and not masks.is_usable(k):
             return Silhouette.of(silhouette.mask, np.zeros_like(silhouette.mask))
         return silhouette

@@ -36,7 +36,12 @@ OFTEN = 0.2  # the share of frames from which on something is worth a warning
 LOST = 0.02  # the share of a file's frames that may be missing without a word
 PERIOD = 5  # every so many frames it is looked whether the camera moved
 SMALL = 160  # pixels: the width of the pictures that are compared for it
-TILES = 3  # to a side
+TILES = 4  # to a side
+FINE, COARSE = 1.0, 4.0  # pixels: what is smaller or larger is not looked at
+REACH = 4  # pixels by which a tile is looked for to either side
+TEXTURE = 0.7  # grey levels a pixel: a tile that changes less along some axis does not tell where it went
+FREE = 0.25  # the share of these tiles that a person leaves free at least
+SPREAD = 0.5  # the share of all tiles that have such texture at least: else it may be the person's alone
 MOVED = 0.008  # of the width: a camera that moved by more since the first frame is said to move
 
 
@@ -99,6 +104,8 @@ class Segmentation:
                 self._shifts.append(still.shift(image))
             found = person(*model.classify(image), self._roi, self._ignored)
             self.rows.append(_judged(found, self.start + k, latest))
+            if not self._video.is_filmed(self.start + k):
+                self.rows[-1]["usable"] = 0
             yield image, found
         if not any(row["usable"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
@@ -113,7 +120,7 @@ class Segmentation:
     @property
     def warnings(self) -> list[str]:
         """What a user should look at before he trusts the masks."""
-        said, name = [], self.name
+        said, name = [*self._video.warnings], self.name
         if self._missing > LOST * len(self.rows):
             said.append(f"{name}: {self._damage}")
         seen = [row for row in self.rows if row["area"]]
@@ -148,28 +155,41 @@ class _Still:
     def __init__(self, size: tuple[int, int]) -> None:
         self._size = SMALL, max(16 * TILES, round(SMALL * size[1] / size[0]))
         self._tile = self._size[0] // TILES, self._size[1] // TILES
-        self._window = cv2.createHanningWindow(self._tile, cv2.CV_32F)
         self._first: Any = None
 
     def shift(self, image: Image) -> float:
         """Return by how many pixels of a picture `SMALL` wide an image is shifted against the first.
 
-        It is the median over tiles, of which a person who walks by covers only a few.
+        Tiles that a person covers seem to be anywhere, but a camera that moves takes along every tile: what all but a
+        few of those with texture are shifted by at least is the camera's part. Where few have any, nobody can tell.
         """
         small = cv2.cvtColor(cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
-        grey = small.astype(np.float32)
+        grey: Any = cv2.GaussianBlur(small.astype(np.float32), (0, 0), FINE)  # noise is no texture,
+        grey -= cv2.GaussianBlur(grey, (0, 0), COARSE)  # and light that changes is none
         if self._first is None:
-            self._first = grey
+            self._first = [tile[REACH:-REACH, REACH:-REACH] if _textured(tile) else None for tile in self._tiles(grey)]
         found = [
-            cv2.phaseCorrelate(before, now, self._window)[0]
-            for before, now in zip(self._tiles(self._first), self._tiles(grey), strict=True)
+            _away(before, now) for before, now in zip(self._first, self._tiles(grey), strict=True) if before is not None
         ]
-        return float(np.hypot(*np.median(found, axis=0)))
+        return float(np.quantile(found, FREE)) if len(found) > SPREAD * TILES**2 else 0.0
 
     def _tiles(self, image: Any) -> list[Any]:
         wide, tall = self._tile
         corners = [(y * tall, x * wide) for y in range(TILES) for x in range(TILES)]
         return [np.ascontiguousarray(image[y : y + tall, x : x + wide]) for y, x in corners]
+
+
+def _textured(tile: Any) -> bool:
+    """Return whether a tile changes along both axes, so that a shift can be told from it."""
+    down, across = np.gradient(tile)
+    tensor = [[np.mean(across * across), np.mean(across * down)], [np.mean(across * down), np.mean(down * down)]]
+    return bool(np.linalg.eigvalsh(tensor)[0] > TEXTURE**2)
+
+
+def _away(before: Any, now: Any) -> float:
+    """Return by how many pixels what was in the middle of a tile lies off it now: where it correlates best."""
+    likeness = cv2.matchTemplate(now, before, cv2.TM_CCOEFF_NORMED)  # knows nothing of how bright it is
+    return float(np.hypot(*np.subtract(cv2.minMaxLoc(likeness)[3], REACH)))
 
 
 def _background(video: Video, how: Extraction, size: tuple[int, int]) -> Background:

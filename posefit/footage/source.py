@@ -40,7 +40,8 @@ class Viewing:
     `cameras`, or calibration files, one a view; `view_degrees` from where, where no camera says; the `size` of
     rendered pictures, by default 320 x 240; the rate `fps` of motions and masks, by default 30 or what a file of masks
     states; which `frames`. For real footage: its `extraction`, how tall the person stands in metres (`height`), and
-    which axis of the calibration's world points up (`up`).
+    which axis of the calibration's world points up (`up`). For masks: the `label` that the person has, where there are
+    several, and the largest of his `holes` that is filled, as a share of his area.
     """
 
     asf: str | Path | None = None
@@ -52,6 +53,8 @@ class Viewing:
     extraction: Extraction | None = None
     height: float | None = None
     up: Up | None = None
+    label: int | None = None
+    holes: float | None = None
 
     def __post_init__(self) -> None:
         for degrees in self.view_degrees:
@@ -66,6 +69,10 @@ class Viewing:
         for end in pair("frames", self.frames, "(start, stop), either of which may be None"):
             if end is not None and (isinstance(end, bool) or not isinstance(end, int | np.integer)):
                 raise ValueError(f"frames must be two whole numbers or None, got {quoted(self.frames)}")
+        if self.label is not None and (isinstance(self.label, bool) or not isinstance(self.label, int | np.integer)):
+            raise ValueError(f"label must be a whole number, got {quoted(self.label)}")
+        if self.holes is not None and not 0.0 <= finite_number("holes", self.holes) <= 1.0:
+            raise ValueError(f"holes must lie in 0 to 1, a share of the person's area, got {self.holes}")
         if self.height is not None and not HEIGHTS[0] <= finite_number("height", self.height) <= HEIGHTS[1]:
             raise ValueError(f"height must lie in {HEIGHTS[0]} to {HEIGHTS[1]} metres, got {self.height}")
 
@@ -76,6 +83,8 @@ class Viewing:
             useless.append(("extraction", self.extraction, "video"))
         if kind == "video":
             useless.append(("fps", self.fps, "motions and masks"))
+        if kind != "masks":
+            useless += [("label", self.label, "masks"), ("holes", self.holes, "masks")]
         if kind == "motion":
             useless.append(("height", self.height, "footage"))
         else:
@@ -110,7 +119,7 @@ def scene_of(sources: Sequence[Source], viewing: Viewing, work: Path, listener: 
         seen = _filmed(paths, viewing, work, listener)
     else:
         calibrated(viewing.cameras, [None] * len(paths))
-        seen = [masks_of(path, viewing.fps, viewing.frames) for path in paths]
+        seen = [masks_of(path, viewing.fps, viewing.frames, viewing.label, viewing.holes) for path in paths]
     facing = viewing.view_degrees[0] if viewing.view_degrees else None
     return combined(seen, paths[0].stem, _body(viewing), viewing.cameras, facing, viewing.up)
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived
-from posefit.footage.masks import Range, existing, person_in, shown_person, span
+from posefit.footage.given.values import Palette, Reading
+from posefit.footage.masks import Range, existing, span
 from posefit.reading import quoted
 from posefit.silhouette.mask import Silhouette
 
@@ -17,6 +18,8 @@ PACKED = 2_000_000_000  # bytes of a file
 UNPACKED = 6_000_000_000  # bytes that its arrays unpack to; in memory they are an eighth of that
 FASTEST = 1000.0  # frames a second
 NAMES = ("masks", "valid", "usable", "fps")
+
+KNOWN = Reading()  # of what is 0 or not
 
 Planes = NDArray[np.uint8]  # (T, bytes of a frame)
 
@@ -34,7 +37,7 @@ class StackMasks:
     fps: float | None = None  # where the file says it
 
     @classmethod
-    def of(cls, path: Path, frames: Range) -> "StackMasks":
+    def of(cls, path: Path, frames: Range, label: int | None = None) -> "StackMasks":
         """Return the masks of an .npz file, cut to `frames`. Raises ValueError naming the file where it is none."""
         existing(path)
         with archived(path, NAMES, "the key masks", UNPACKED, PACKED) as found:
@@ -46,8 +49,8 @@ class StackMasks:
             start, stop = span(frames, stack.shape[0])
             if usable is not None and not usable[start:stop].any():
                 raise ValueError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
-            masks = _packed(path, stack, start, stop, mask=True)
-            valid = None if known is None else _packed(path, known, start, stop, mask=False)
+            masks = _packed(stack, start, stop, _reading(path, stack, start, stop, label))
+            valid = None if known is None else _packed(known, start, stop, KNOWN)
         size = stack.shape[2], stack.shape[1]
         return cls(path, start, size, masks, valid, None if usable is None else usable[start:stop], fps)
 
@@ -63,10 +66,8 @@ class StackMasks:
         return f"{self.path}[{self.start + k}]"
 
     def silhouette(self, k: int) -> Silhouette:
-        """Return mask k. Raises ValueError naming its place where it is empty, or full."""
-        person = self._plane(self.masks, k)
-        known = None if self.known is None else self._plane(self.known, k)
-        return shown_person(person, known, self.label(k)) if self.is_usable(k) else Silhouette.of(person, known)
+        """Return mask k."""
+        return Silhouette.of(self._plane(self.masks, k), None if self.known is None else self._plane(self.known, k))
 
     def _plane(self, planes: Planes, k: int) -> NDArray[np.bool_]:
         width, height = self.size
@@ -86,15 +87,30 @@ def _shape(shape: Sequence[int]) -> str:
     return quoted(tuple(shape))
 
 
-def _packed(path: Path, stored: Stored, start: int, stop: int, mask: bool) -> Planes:
-    """Return the bits of frames start to stop; of the others nothing is kept, but they are checked as well."""
+def _reading(path: Path, stored: Stored, start: int, stop: int, label: int | None) -> Reading:
+    """Return how frames start to stop are read; what is true or false needs no look."""
+    if stored.dtype.kind == "b" and label is None:
+        return KNOWN
+    palette = Palette()
+    for k, frame in enumerate(stored.rows()):
+        _check_finite(path, k, frame)
+        if start <= k < stop:
+            palette.add(frame, soft=False)
+    return palette.reading(label, path)
+
+
+def _check_finite(path: Path, k: int, frame: NDArray[Any]) -> None:
+    if frame.dtype.kind == "f" and not np.isfinite(frame).all():
+        raise ValueError(f"{path}: masks must be finite, got nan or infinity in frame {k}")
+
+
+def _packed(stored: Stored, start: int, stop: int, reading: Reading) -> Planes:
+    """Return the bits of frames start to stop; of the others nothing is kept, but they are read to the end."""
     height, width = stored.shape[1:]
     planes = np.empty((stop - start, (height * width + 7) // 8), dtype=np.uint8)
     for k, frame in enumerate(stored.rows()):
-        if frame.dtype.kind == "f" and not np.isfinite(frame).all():
-            raise ValueError(f"{path}: masks must be finite, got nan or infinity in frame {k}")
         if start <= k < stop:
-            planes[k - start] = np.packbits(person_in(frame) if mask else frame != 0)
+            planes[k - start] = np.packbits(reading.person(frame))
     return planes
 
 

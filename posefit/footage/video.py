@@ -3,16 +3,21 @@
 import errno
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.footage.images import PIXELS
 from posefit.silhouette.foreground import Image
 
+Order = NDArray[np.int64]  # (T,) numbers of frames
 CODE = "mp4v"
+UNEVEN = 0.75  # of the distance between frames: one that comes so much too early or too late is not in its place
+DENSEST = 4.0  # times the mean rate: frames are not taken more often, however short some of them are
 # what is wrong with a file is said once, by us; a user who wants to hear FFmpeg may set it himself
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
@@ -25,6 +30,8 @@ class Video:
     fps: float
     size: tuple[int, int]  # width and height in pixels, as filmed
     claimed: int = 0  # frames, by what the file says of itself; 0 where it says nothing
+    _order: Order = field(kw_only=True, repr=False, compare=False)  # of the file's frames: one for each moment
+    _filmed: NDArray[np.bool_] = field(kw_only=True, repr=False, compare=False)  # (T,) at that moment
 
     @classmethod
     def of(cls, path: str | Path) -> "Video":
@@ -47,39 +54,94 @@ class Video:
         finally:
             capture.release()
         rate = fps if np.isfinite(fps) and 0.0 < fps <= 1000.0 else 30.0
-        return cls(path, rate, (image.shape[1], image.shape[0]), int(claimed) if 0.0 < claimed < 1e9 else 0)
+        order, filmed, rate = _even(_moments(path), rate)
+        said = int(claimed) if 0.0 < claimed < 1e9 else 0
+        if (np.diff(order) != 1).any():
+            said = 0  # of the frames as they were filmed, which are others
+        return cls(path, rate, (image.shape[1], image.shape[0]), said, _order=order, _filmed=filmed)
 
     def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop, scaled to `size`.
 
         Raises ValueError where a frame has another size than the first.
         """
+        wanted = self._order[start:stop:step]
         capture = cv2.VideoCapture(str(self.path))
         try:
-            k = 0
-            while stop is None or k < stop:
-                if k < start or (k - start) % step:
-                    if not capture.grab():
-                        return
-                else:
-                    read, image = capture.read()
+            k, image = -1, None
+            for number in wanted.tolist():
+                while k < number - 1 and capture.grab():
+                    k += 1
+                if k < number:
+                    read, filmed = capture.read()
                     if not read:
                         return
-                    if (image.shape[1], image.shape[0]) != self.size:
-                        came = f"{image.shape[1]}x{image.shape[0]} in frame {k}"
+                    k += 1
+                    if (filmed.shape[1], filmed.shape[0]) != self.size:
+                        came = f"{filmed.shape[1]}x{filmed.shape[0]} in frame {k}"
                         raise ValueError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
-                    yield np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-                k += 1
+                    image = np.asarray(cv2.resize(filmed, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+                assert image is not None
+                yield image
         finally:
             capture.release()
 
     def count(self) -> int:
-        """Return how many frames there are, by going through them: what a file says of itself is often wrong."""
-        capture, count = cv2.VideoCapture(str(self.path)), 0
-        while capture.grab():
-            count += 1
-        capture.release()
-        return count
+        """Return how many frames there are: what a file says of itself is often wrong."""
+        return len(self._order)
+
+    def is_filmed(self, k: int) -> bool:
+        """Return whether frame k was filmed at its time; else it is the frame before or after it once more."""
+        return bool(self._filmed[k])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know of its frames' times."""
+        if not self.uneven:
+            return []
+        held = np.count_nonzero(~self._filmed)
+        return [
+            f"{self.path}: its frames come at uneven times; it is looked at {self.fps:.3g} times a second, so that "
+            f"{held} of {self.count()} frames stand for moments that nobody filmed, and are held"
+        ]
+
+    @property
+    def uneven(self) -> bool:
+        """Whether its frames come at times so uneven that some are taken twice, or none at all."""
+        return bool((np.diff(self._order) != 1).any())
+
+
+def _moments(path: Path) -> Array:
+    """Return when each frame is shown, in seconds, by going through them."""
+    capture, times = cv2.VideoCapture(str(path)), []
+    while capture.grab():
+        times.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
+    capture.release()
+    return np.array(times)
+
+
+def _even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
+    """Return which frames are shown at even times, which of them then, and how many a second: all, if they are even.
+
+    Frames at uneven times are taken at their usual distance, each moment the one that is nearest to it.
+    """
+    whole = np.arange(len(times))
+    apart = np.diff(times)
+    if len(times) < 3 or not (apart > 0.0).all():  # a file that does not say
+        return whole, whole >= 0, fps
+    mean = float(apart.mean())
+    if np.abs(times - times[0] - mean * whole).max() <= UNEVEN * mean:
+        return whole, whole >= 0, fps
+    usual = max(float(np.median(apart)), mean / DENSEST)
+    usual = float(apart.sum() / np.maximum(np.round(apart / usual), 1.0).sum())  # stamps are rounded
+    moments = times[0] + usual * np.arange(round((times[-1] - times[0]) / usual) + 1)
+    later = np.clip(np.searchsorted(times, moments), 1, len(times) - 1)
+    earlier = moments - times[later - 1] <= times[later] - moments
+    order = np.where(earlier, later - 1, later)
+    off = np.abs(times[order] - moments)
+    least = np.full(len(times), np.inf)
+    np.minimum.at(least, order, off)
+    return order, off == least[order], 1.0 / usual
 
 
 class VideoWriter:

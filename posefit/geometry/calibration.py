@@ -5,7 +5,7 @@ differs, and is turned to +y here: the axis that the images of all cameras see p
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,6 +21,7 @@ Up = Literal["x", "y", "z"]
 LARGEST_FILE = 1_000_000  # bytes
 MESSAGE = 300  # characters of what is wrong
 DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV describes a lens by
+BLOCK = 16  # pixels: codecs fill pictures up to a multiple of it
 SUBPIXELS = 64.0  # Qualisys counts lengths on the sensor in 64ths of a pixel
 HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
 # The rotation of the world that turns an axis to +y.
@@ -56,6 +57,17 @@ class Calibration:
         focal = np.diag(self.matrix)[:2] * scale
         centre = (self.matrix[:2, 2] + HALF) * scale
         return Camera(*size, focal, centre, _orthonormal(rotation), translation)
+
+    def padded(self, size: tuple[int, int]) -> "Calibration | None":
+        """Return the calibration of pictures of another size that only have rows or columns more or less at their end.
+
+        Codecs fill up a picture to blocks of 16 pixels, so that 1080 rows become 1088, and some programs leave them
+        there. None where the sizes differ otherwise.
+        """
+        for one, other in zip(self.size, size, strict=True):
+            if one != other and (abs(one - other) >= BLOCK or max(one, other) % BLOCK):
+                return None
+        return replace(self, size=size)
 
     def maps(self, size: tuple[int, int]) -> tuple[Any, Any]:
         """Return the two maps with which cv2.remap undoes the distortion of pictures scaled to `size`."""

@@ -144,7 +144,7 @@ def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None
     size = int(np.ptp(np.flatnonzero(mask.any(axis=1)))) + 1
     dark = _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
     mask, pieces, rival = _largest(_cleaned(seen | dark, height) & inside)
-    mask = _without_holes(mask)
+    mask = without_holes(mask)
     touches = bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
     return Person(mask, known | mask, int(mask.sum()), pieces, rival, touches)
 
@@ -175,14 +175,12 @@ def _morphed(mask: Mask, operation: int, size: float) -> Mask:
     return np.asarray(cv2.morphologyEx(mask.astype(np.uint8), operation, kernel) > 0)
 
 
-def _without_holes(mask: Mask) -> Mask:
+def without_holes(mask: Mask, most: float = HOLE) -> Mask:
+    """Return a mask whose holes are filled that have at most this share of its area."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
-    largest = HOLE * mask.sum()
     height, width = mask.shape
-    filled = mask.copy()
-    for k in range(1, count):
-        left, top, wide, tall, area = stats[k]
-        enclosed = left > 0 and top > 0 and left + wide < width and top + tall < height
-        if enclosed and area <= largest:
-            filled |= labels == k
-    return filled
+    lefts, tops, widths, heights, areas = stats[:count].T
+    enclosed = (lefts > 0) & (tops > 0) & (lefts + widths < width) & (tops + heights < height)
+    fills = enclosed & (areas <= most * mask.sum())
+    fills[0] = False  # the person
+    return np.asarray(mask | fills[labels])

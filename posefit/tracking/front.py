@@ -68,6 +68,8 @@ def track(
     body_frames: int | None = None,
     height: float | None = None,
     extraction: Extraction | None = None,
+    label: int | None = None,
+    holes: float | None = None,
     up: Up | None = None,
     tracks: int = 1,
     steady: bool | None = None,
@@ -98,12 +100,13 @@ def track(
     else from the built-in walks. Where it is not, it is the tracker `exemplars`, which learns from the library; or, if
     an optimiser or a prior is given, `sapso` with `loose`, which learns from the built-in walks. There the first frame
     is searched `restarts` times (8; 0 for a tracker that looks ahead), and the person's build is fitted to
-    `body_frames` (30; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
+    `body_frames` (12; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
     followed so many times from different beginnings, each at the full budget, and the track is kept whose whole cost is
     least. A track is `steady` where nobody knows the truth: its root goes smoothly, and feet that stand stay where they
     are; False leaves what was found in each frame. `view_degrees` gives where the camera stands, several of them
     several cameras; `camera` is a camera or a calibration, one a view, in whose world `up` points up; `extraction` is
-    how masks are taken from video.
+    how masks are taken from video. `label` is the value that the person has in masks of several things, and `holes` the
+    largest that is filled, a share of him.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
     not at all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
@@ -133,6 +136,8 @@ def track(
         extraction=extraction,
         height=height,
         up=up,
+        label=label,
+        holes=holes,
     )
     if isinstance(source, Scene) and viewing != Viewing():
         raise ValueError(f"a scene must be followed as it is, got {viewing}")

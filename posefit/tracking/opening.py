@@ -19,11 +19,11 @@ from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.method import Method
 
 RESTARTS = 8  # searches of the first frame
-BODY_FRAMES = 30  # from which a build is found
+BODY_FRAMES = 12  # from which a build is found
 COMPILING = 60.0  # seconds that a plugin's first calls may take longer than its limit
 POPULATIONS = 8  # that are searched to compile what a search needs
 FRAMES = 10  # how many a start is judged by
-STRIDE = 3  # and how far apart they are, so that it shows which way somebody walks
+STRIDE = 3  # and how far apart these and those are, so that it shows which way somebody walks, and more of his body
 MOVED = 0.3  # metres; who goes so far in these frames goes where he faces
 ROWS = 240  # that the pictures have at least in which starts are compared
 BACKWARDS = 1.1  # what multiplies the cost of a start that faces the other way
@@ -92,13 +92,17 @@ def opened(
         listener.say(f"looking for the first pose, {restarts} times")
         task = begun(task, scene.observations, follow, restarts, seed)
     shape = None
-    if body_frames:
+    if body_frames and (seen := len(usable(scene.observations, body_frames))) < LEAST:
+        few = f"{seen} of them show enough of the person" if seen < body_frames else f"{seen} are too few"
+        listener.say(
+            f"no build is fitted to {body_frames} frames: {few}, at least {LEAST} are needed; it is the average"
+        )
+    elif body_frames:
         listener.say(f"fitting the person's build to {body_frames} frames")
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = how.height or (task.body.stature if alone else None)
         shape = built(task, scene.observations, follow, body_frames, height, seed)
-        if shape is not None:
-            task = replace(task, body=shape.body)
+        task = replace(task, body=shape.body)
     return task, shape
 
 
@@ -176,11 +180,12 @@ def built(
     frames: int,
     height: float | None,
     seed: int,
-) -> Shape | None:
-    """Return the person's build, from the first usable frames; None where there are too few."""
-    chosen = usable(observations, frames)
-    if len(chosen) < LEAST:
-        return None
+) -> Shape:
+    """Return the person's build, from the first usable frames: every third, where there are so many."""
+    chosen, stride = usable(observations, frames, STRIDE), STRIDE
+    if len(chosen) < frames:
+        chosen, stride = usable(observations, frames), 1
+    task = replace(task, fps=task.fps / stride)
     return fit_shape(
         task.body,
         task.cameras,

@@ -186,7 +186,7 @@ class OutputFolder:
         """Write everything."""
         import cv2
 
-        folder, painter = self._building, Painter(scene)
+        folder, painter = self._building, Painter(scene, [row["usable"] == 1.0 for row in rows])
         sure = intervals_of(scene.body.skeleton, frames)
         radii = sure.get("joint_radii")
         write_formats(folder, scene, estimate, frames, rows, summary, sure)

@@ -35,11 +35,12 @@ LINE = 22  # pixels from one line to the next
 
 
 class Painter:
-    """Paints frame after frame; keeps small stills of a few of them for the summary."""
+    """Paints frame after frame; keeps small stills of a few of them for the summary, of those that are `usable`."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, usable: Sequence[bool] = ()) -> None:
         self._scene = scene
-        self._wanted = np.unique(np.linspace(0, scene.count - 1, STILLS).round().astype(int)).tolist()
+        shown = np.flatnonzero(usable) if any(usable) else np.arange(scene.count)
+        self._wanted = np.unique(shown[np.linspace(0, len(shown) - 1, STILLS).round().astype(int)]).tolist()
         self._stills: list[Image] = []
         self._count = 0
 

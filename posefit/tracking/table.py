@@ -37,7 +37,7 @@ def table(summary: Mapping[str, Any]) -> str:
             "the person; IoU is that of the others"
         )
     lines += [said] if (said := undetermined(summary)) else []
-    lines += [walked(summary["gait"])] if summary["frames"] > 1 else []
+    lines += [gait_line(summary["gait"])] if summary["frames"] > 1 else []
     if summary["body"] is not None:
         body = summary["body"]
         parts = [
@@ -72,7 +72,7 @@ def undetermined(summary: Mapping[str, Any]) -> str:
     return "; ".join(parts)
 
 
-def walked(gait: Mapping[str, Any]) -> str:
+def gait_line(gait: Mapping[str, Any]) -> str:
     """Return in one line what somebody's gait is like, or why nobody can say."""
     if not gait["walk"]:
         return f"no figures of gait: {gait['why']}"

@@ -279,13 +279,9 @@ def test_bad_motion_files_are_refused(clip: tuple[Path, Path], tmp_path: Path) -
 def test_bad_masks_are_refused(tmp_path: Path) -> None:
     folder, out = masks(tmp_path / "masks", 4), tmp_path / "out"
     good = cv2.imread(str(folder / "0002.png"), 0)
-    for image, message in (
-        (np.zeros_like(good), "0002.png: expected a mask with a person before a background, got an empty one"),
-        (np.full_like(good, 255), "0002.png: expected a mask with a person before a background, got one without"),
-        (good[:, :60], "0002.png: mask must have shape (90, 120), got (90, 60)"),
-    ):
-        cv2.imwrite(str(folder / "0002.png"), image)
-        assert message in fails("track", folder, "--out", out, "--prior", "loose", *FEW)
+    cv2.imwrite(str(folder / "0002.png"), good[:, :60])
+    message = "0002.png: mask must have shape (90, 120), got (90, 60)"
+    assert message in fails("track", folder, "--out", out, "--prior", "loose", *FEW)
     (folder / "0002.png").write_bytes(b"no image")
     assert "0002.png: expected an image" in fails("track", folder, "--out", out, "--prior", "loose", *FEW)
     (tmp_path / "empty").mkdir()

@@ -166,21 +166,21 @@ def test_the_command_prints_what_it_found(filmed: tuple[Path, list[Any]], tmp_pa
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--method", "magic"], "extraction method must be one of mixture, mean, median, masks, got 'magic'"),
-        (["--method", "mean"], "background must be frames A:B or an image for the method mean, got none"),
+        (["--extraction", "magic"], "extraction method must be one of mixture, mean, median, masks, got 'magic'"),
+        (["--extraction", "mean"], "background must be frames A:B or an image for the method mean, got none"),
         (["--background", "0:5"], "background must be given for the method mean only, got '0:5' with mixture"),
         (
-            ["--method", "mean", "--background", "nothing.png"],
+            ["--extraction", "mean", "--background", "nothing.png"],
             "background must be frames A:B or an image, got 'nothing.png'",
         ),
-        (["--method", "mean", "--background", "90:99"], "frames must choose some of the 60 frames, got 90:99"),
+        (["--extraction", "mean", "--background", "90:99"], "frames must choose some of the 60 frames, got 90:99"),
         (["--frames", "90:"], "frames must choose some of the 60 frames, got 90:"),
         (["--roi", "1,2,3"], "expected X,Y,WIDTH,HEIGHT in pixels"),
         (["--roi", "100,0,100,100"], "roi must lie within the video's 160x120 pixels"),
         (["--ignore", "nothing.png"], "nothing.png: expected an image of what to ignore"),
         (["--width", "3"], "width must lie in 36 to 8192 pixels, got 3"),
         (
-            ["--frames", "0:8", "--method", "mean", "--background", "0:12"],
+            ["--frames", "0:8", "--extraction", "mean", "--background", "0:12"],
             "expected a person who moves before a still background",
         ),
     ],
@@ -194,6 +194,21 @@ def test_a_mistake_is_one_line_and_leaves_nothing(
     assert len(lines) == 1
     assert message in lines[0]
     assert not list(tmp_path.iterdir())
+
+
+def test_the_old_name_of_an_option_is_understood_and_the_new_one_said(
+    filmed: tuple[Path, list[Any]], tmp_path: Path
+) -> None:
+    old = run("extract", filmed[0], "--out", tmp_path / "old", "--method", "median", "--json")
+    assert old.exit_code == 0, old.stderr
+    assert json.loads(old.stdout)["method"] == "median"
+    assert old.stderr.splitlines()[0] == "--method is called --extraction now, as for posefit track"
+    words = ("--method", "median", "--extraction", "mean")
+    both = run("extract", filmed[0], "--out", tmp_path / "both", *words)
+    assert both.exit_code == 2
+    assert "--method must be left out beside --extraction, which it is called now, got 'median'" in both.stderr
+    assert not (tmp_path / "both").exists()
+    assert "--method" not in run("extract", "--help").stdout
 
 
 def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
@@ -244,7 +259,7 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     masks = np.stack(truth()[10:22]).astype(np.uint8)
     masks[6] = 0  # nobody at all
     path = stored_masks(tmp_path / "a.npz", masks=masks, usable=usable)
-    result = posefit.track(path, prior="loose", view_degrees=90, evaluations=400, out=tmp_path / "out")
+    result = posefit.track(path, prior="loose", view_degrees=90, evaluations=400, steady=False, out=tmp_path / "out")
     assert result.summary["frames"] == 12
     assert result.summary["held_frames"] == 3
     assert result.summary["evaluations"] == 9 * 400

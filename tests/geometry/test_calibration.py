@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from posefit.geometry.calibration import read_calibrations, upright
+from posefit.geometry.calibration import Calibration, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from tests.geometry.calibrations import QUALISYS, TOML, opencv
 
@@ -203,3 +203,32 @@ def test_a_lens_has_as_many_numbers_as_opencv_knows(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"))
     with pytest.raises(ValueError, match="a distortion of 3 numbers"):
         read_calibrations(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("made_for", "came", "fits"),
+    [
+        ((1080, 1920), (1088, 1920), True),
+        ((1920, 1080), (1920, 1088), True),
+        ((1920, 1088), (1920, 1080), True),  # calibrated with the padding, filmed without
+        ((854, 480), (864, 480), True),
+        ((1920, 1080), (1080, 1920), False),
+        ((1080, 1920), (1096, 1920), False),
+        ((1080, 1920), (1082, 1920), False),
+    ],
+)
+def test_a_picture_that_a_codec_filled_up_has_the_camera_that_it_had(
+    made_for: tuple[int, int], came: tuple[int, int], fits: bool
+) -> None:
+    matrix = np.array([[1500.0, 0.0, 531.0], [0.0, 1510.0, 970.0], [0.0, 0.0, 1.0]])
+    one = Calibration("a", made_for, matrix, np.zeros(4), None, None)
+    padded = one.padded(came)
+    assert (padded is not None) == fits
+    if padded is None:
+        return
+    before, after = one.camera(made_for, np.eye(3)), padded.camera(came, np.eye(3))
+    np.testing.assert_array_equal(after.focal, before.focal)
+    np.testing.assert_array_equal(after.centre, before.centre)  # what is added, is added at the end
+    assert (after.width, after.height) == came
+    half = padded.camera((came[0] // 2, came[1] // 2), np.eye(3))  # scaled by the picture's own size
+    np.testing.assert_allclose(half.focal, before.focal / 2)

@@ -12,7 +12,7 @@ from posefit.measuring.gait import Gait, gait_of
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
-from posefit.tracking.table import walked
+from posefit.tracking.table import gait_line
 from tests.measuring.walker import SPEED, walker
 
 WALKS = ("02_01", "05_01", *(f"16_{k}" for k in (*range(12, 19), *range(20, 33), 47, 58)))
@@ -127,7 +127,7 @@ def test_two_steps_are_enough_though_no_stride_is_whole() -> None:
     assert gait.cadence == pytest.approx(100.0, abs=1.0)
     assert gait.speed == pytest.approx(SPEED, abs=0.01)
     assert (gait.stride_length, gait.stance_share) == (None, None)
-    assert walked(gait.as_dict()) == "gait: 100 steps a minute, step 0.60 m, speed 1.00 m/s, over 2 steps"
+    assert gait_line(gait.as_dict()) == "gait: 100 steps a minute, step 0.60 m, speed 1.00 m/s, over 2 steps"
 
 
 def test_a_strike_in_an_unknown_frame_is_none() -> None:

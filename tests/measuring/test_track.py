@@ -11,7 +11,7 @@ import posefit
 from posefit.geometry.skeleton import JOINTS, PARENTS
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import gait_of
-from posefit.tracking.table import table, walked
+from posefit.tracking.table import gait_line, table
 
 TENTH = 1e-4  # metres
 
@@ -33,8 +33,8 @@ def test_a_track_of_a_walk_says_its_gait(tracked: posefit.Track, out: Path) -> N
     true = gait_of(tracked.truth)  # type: ignore[arg-type]
     assert told["cadence"] == pytest.approx(true.cadence, abs=3.0)
     assert told["speed"] == pytest.approx(true.speed, abs=0.05)
-    assert walked(told) in table(tracked.summary).splitlines()
-    assert walked(told).startswith(f"gait: {told['cadence']:.0f} steps a minute, step ")
+    assert gait_line(told) in table(tracked.summary).splitlines()
+    assert gait_line(told).startswith(f"gait: {told['cadence']:.0f} steps a minute, step ")
     with (out / "gait.csv").open(newline="") as file:
         steps = list(csv.DictReader(file))
     assert sum(step["step_seconds"] != "" for step in steps) == told["steps"]

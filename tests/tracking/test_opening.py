@@ -16,7 +16,7 @@ from posefit.footage.scene import synthetic
 from posefit.motion import built_in
 from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
-from posefit.tracking.opening import begun
+from posefit.tracking.opening import Opening, begun, built, task_of
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
@@ -86,3 +86,38 @@ def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole
     )
     np.testing.assert_array_equal(first.areas, whole)
     assert begin.cameras is task.cameras
+
+
+@pytest.mark.parametrize(
+    ("count", "asked", "said"),
+    [
+        (12, 4, "no build is fitted to 4 frames: 4 are too few, at least 5 are needed; it is the average"),
+        (3, 30, "no build is fitted to 30 frames: 3 of them show enough of the person, at least 5 are needed"),
+        (12, 5, "fitting the person's build to 5 frames"),
+    ],
+)
+def test_too_few_frames_for_a_build_are_said(tmp_path: Path, count: int, asked: int, said: str) -> None:
+    scene = synthetic(built_in.motion("walk", frames=count), [90.0], (120, 90), [], (None, None))
+    np.savez(tmp_path / "a.npz", masks=[scene.observations[k].silhouettes[0].mask for k in range(count)])
+    heard: list[str] = []
+    track = posefit.track(
+        tmp_path / "a.npz", prior="loose", evaluations=80, restarts=1, body_frames=asked, say=heard.append
+    )
+    assert any(line.startswith(said) for line in heard)
+    assert (track.summary["body"] is None) == said.startswith("no build")
+
+
+def test_a_build_sees_every_third_frame_where_there_are_so_many() -> None:
+    scene = synthetic(built_in.motion("walk", frames=30), [90.0], (120, 90), [], (None, None))
+    task = task_of(scene, Opening(), [built_in.motion("walk")], 80, 1)
+    looked: list[tuple[int, float]] = []
+
+    def follow(mine: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        seen = list(observations)
+        looked.append((len(seen), mine.fps))
+        pose, place = built_in.motion("walk").poses[0], scene.anchor
+        return (Frame(pose, place, 0.0, np.zeros((1, 3), np.int64), 0, 0.0, np.empty(0)) for _ in seen)
+
+    built(task, scene.observations, follow, 10, None, 0)
+    built(task, scene.observations, follow, 11, None, 0)  # of which there are not so many thirds
+    assert set(looked) == {(10, scene.fps / 3), (11, scene.fps)}

@@ -42,6 +42,23 @@ def pixels(image: Any, colour: tuple[int, int, int], close: int = 0) -> int:
     return int((np.abs(image.astype(int) - np.array(colour)).max(axis=2) <= close).sum())
 
 
+@pytest.mark.parametrize(
+    ("usable", "wanted"),
+    [
+        ([True] * 7, [0, 1, 2, 4, 5, 6]),
+        ([False, False, True, True, False, True, False], [2, 3, 5]),
+        ([False] * 7, [0, 1, 2, 4, 5, 6]),  # there is nothing better
+    ],
+)
+def test_stills_are_of_frames_that_show_the_person(scene: Scene, usable: list[bool], wanted: list[int]) -> None:
+    painter, kept = Painter(scene, usable), []
+    for k in range(FRAMES):
+        before = len(painter._stills)
+        painter.add(right(scene, k), scene.observations[k], row())
+        kept += [k] * (len(painter._stills) - before)
+    assert kept == wanted
+
+
 def test_a_bone_is_as_solid_as_the_less_sure_of_its_ends() -> None:
     radii = np.zeros(len(JOINTS))
     radii[JOINTS.index("lfoot")] = 0.175  # halfway from 5 to 30 cm

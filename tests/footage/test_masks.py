@@ -1,0 +1,321 @@
+"""Masks from elsewhere, as programs write them: what they mean, who is in them, and what is said where that is open."""
+
+import json
+import struct
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from posefit.cli import main
+from posefit.footage.given.settled import Settled, settled
+from posefit.footage.masks import FolderMasks
+from posefit.footage.stacks import StackMasks
+from tests.footage.conftest import SIZE, truth
+
+ALL = (None, None)
+QUICK = ["--prior", "loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]
+
+
+@pytest.fixture(scope="module")
+def walk() -> list[Any]:
+    """Six masks of somebody who walks."""
+    return truth()[10:16]
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def folder(path: Path, images: Sequence[Any], suffix: str = ".png") -> Path:
+    path.mkdir()
+    for k, image in enumerate(images):
+        assert cv2.imwrite(str(path / f"{k:04d}{suffix}"), image)
+    return path
+
+
+def read(path: Path, label: int | None = None) -> Settled:
+    raw = FolderMasks.of(path, ALL, label) if path.is_dir() else StackMasks.of(path, ALL, label)
+    return settled(raw, path, holes=0.0)
+
+
+def check(path: Path, wanted: Sequence[Any], label: int | None = None) -> Settled:
+    found = read(path, label)
+    assert len(found) == len(wanted)
+    for k, mask in enumerate(wanted):
+        np.testing.assert_array_equal(found.silhouette(k).mask, mask)
+    return found
+
+
+def chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]]) -> None:
+    """Write a PNG with a palette, as tools for annotation do; OpenCV writes none."""
+    height, width = numbers.shape
+    rows = b"".join(b"\0" + row.astype(np.uint8).tobytes() for row in numbers)
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0))
+        + chunk(b"PLTE", bytes(value for colour in colours for value in colour))
+        + chunk(b"IDAT", zlib.compress(rows))
+        + chunk(b"IEND", b"")
+    )
+
+
+# what values mean
+
+
+@pytest.mark.parametrize("values", [(0, 1), (0, 255), (0, 38), (0, 128), (64, 192)])
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_two_values_are_a_mask_whichever_they_are(
+    walk: list[Any], tmp_path: Path, values: tuple[int, int], kind: Any
+) -> None:
+    images = [np.where(mask, values[1], values[0]).astype(kind) for mask in walk]
+    assert check(folder(tmp_path / "a", images), walk).warnings == []
+    np.savez(tmp_path / "a.npz", masks=np.stack(images))
+    check(tmp_path / "a.npz", walk)
+
+
+def test_sixteen_bits_and_jpeg_are_read_as_ever(walk: list[Any], tmp_path: Path) -> None:
+    check(folder(tmp_path / "deep", [np.where(mask, 65_535, 0).astype(np.uint16) for mask in walk]), walk)
+    lossy = folder(tmp_path / "lossy", [np.where(mask, 255, 0).astype(np.uint8) for mask in walk], ".jpg")
+    wanted = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) > 127 for file in sorted(lossy.iterdir())]
+    check(lossy, wanted)
+
+
+def softened(mask: Any) -> Any:
+    """Return a mask as a network gives it: degrees from 0 to 1."""
+    return cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) * 0.97
+
+
+@pytest.mark.parametrize(("kind", "full"), [(np.uint8, 255), (np.uint16, 65_535), (np.float32, 1.0), (np.float64, 255)])
+def test_soft_masks_are_cut_half_way(walk: list[Any], tmp_path: Path, kind: Any, full: float) -> None:
+    soft = [(softened(mask) * full).astype(kind) for mask in walk]
+    soft[2] = (soft[2] * 0.3).astype(kind)  # nobody, as the network thinks; a frame's own scale would show him
+    wanted = [one > (full // 2 if full > 1 else 0.5) for one in soft]
+    np.savez(tmp_path / "a.npz", masks=np.stack(soft))
+    assert not check(tmp_path / "a.npz", wanted).is_usable(2)
+    if np.issubdtype(kind, np.integer):
+        check(folder(tmp_path / "a", soft), wanted)
+
+
+def test_the_alpha_of_somebody_cut_out_is_the_mask(walk: list[Any], tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    cut_out = [
+        np.dstack([rng.integers(0, 255, (*mask.shape, 3)), 255 * softened(mask)]).astype(np.uint8) for mask in walk
+    ]
+    assert check(folder(tmp_path / "a", cut_out), [one[..., 3] > 127 for one in cut_out]).warnings == []
+    opaque = [
+        np.dstack([255 * mask, 255 * mask, 255 * mask, np.full(mask.shape, 255)]).astype(np.uint8) for mask in walk
+    ]
+    check(folder(tmp_path / "b", opaque), walk)
+
+
+PALETTE = [(0, 0, 0), (128, 0, 0), (0, 128, 0), (128, 128, 0)]
+
+
+def labelled(walk: list[Any]) -> list[Any]:
+    """Return label images: the floor is 1, the person 2, somebody's bag 3."""
+    images = []
+    for mask in walk:
+        numbers = np.zeros(mask.shape, dtype=np.uint8)
+        numbers[-12:] = 1
+        numbers[30:44, 4:18] = 3
+        numbers[mask] = 2
+        images.append(numbers)
+    return images
+
+
+@pytest.mark.parametrize("kind", ["palette", "grey", "colours", "npz"])
+def test_labels_are_told_apart_and_one_is_chosen(walk: list[Any], tmp_path: Path, kind: str) -> None:
+    images, path, label = labelled(walk), tmp_path / "masks", 2
+    if kind == "palette":
+        path.mkdir()
+        for k, numbers in enumerate(images):
+            indexed(path / f"{k}.png", numbers, PALETTE)
+    elif kind == "grey":
+        folder(path, images)
+    elif kind == "colours":
+        label = 0x008000
+        folder(path, [np.array(PALETTE, dtype=np.uint8)[numbers][..., ::-1] for numbers in images])
+    else:
+        path = tmp_path / "masks.npz"
+        np.savez(path, masks=np.stack(images).astype(np.int32))
+    check(path, walk, label)
+    names = "0x800000, 0x008000, 0x808000" if kind == "colours" else "1, 2, 3"
+    result = run("track", path, "--out", tmp_path / "out", *QUICK)
+    assert result.exit_code == 2
+    came = result.stderr.splitlines()[-1]
+    assert "expected masks of one person, got the labels " in came
+    assert "; --label N chooses one" in came
+    assert all(name in came for name in names.split(", "))
+    result = run("track", path, "--out", tmp_path / "out", "--label", "9", *QUICK)
+    assert "label must be one of those that are there, " in result.stderr
+    assert ", got 9" in result.stderr
+    assert not (tmp_path / "out").exists()
+    assert run("track", path, "--out", tmp_path / "out", "--label", hex(label), *QUICK).exit_code == 0
+
+
+def test_a_palette_of_one_colour_and_one_of_greys_need_no_label(walk: list[Any], tmp_path: Path) -> None:
+    for name, colours, value in (("one", PALETTE, 1), ("grey", [(k, k, k) for k in range(256)], 255)):
+        (tmp_path / name).mkdir()
+        for k, mask in enumerate(walk):
+            indexed(tmp_path / name / f"{k}.png", np.where(mask, value, 0), colours)
+        check(tmp_path / name, walk)
+
+
+def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path) -> None:
+    images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
+    smooth = [
+        cv2.resize(cv2.resize(one, (480, 360), interpolation=0), SIZE, interpolation=cv2.INTER_AREA) for one in images
+    ]
+    smooth[0][5, 5] = 90
+    check(folder(tmp_path / "a", smooth), [one > 127 for one in smooth])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["MASKS", "--label", "person"], "expected a whole number such as 15, or a colour 0xRRGGBB, got 'person'"),
+        (["MASKS", "--holes", "2"], "holes must lie in 0 to 1, a share of the person's area, got 2.0"),
+        (["walk", "--label", "1"], "label must be given for masks only, got 1 for a motion"),
+        (["walk", "--holes", "0.1"], "holes must be given for masks only, got 0.1 for a motion"),
+        (["SOFT", "--label", "1"], "label must be given for masks whose values are labels, PNG or whole numbers"),
+        (["PHOTOS"], "photos: expected masks, got pictures in many colours; a person cut out needs an alpha channel"),
+        (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
+        (
+            ["EMPTY"],
+            "0000.png: expected a mask with a person before a background, got an empty one first, and no other",
+        ),
+        (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
+    ],
+)
+def test_a_mistake_with_masks_is_one_line_and_leaves_nothing(
+    walk: list[Any], tmp_path: Path, words: list[str], message: str
+) -> None:
+    inputs = tmp_path / "in"
+    inputs.mkdir()
+    images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
+    photo = [np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)]
+    stand = {
+        "MASKS": folder(inputs / "masks", images),
+        "SOFT": folder(inputs / "soft", images, ".jpg"),
+        "PHOTOS": folder(inputs / "photos", photo, ".jpg"),
+        "PICTURES": folder(inputs / "pictures", photo),
+        "EMPTY": folder(inputs / "empty", [np.zeros_like(one) for one in images]),
+        "SIZES": folder(inputs / "sizes", [images[0], images[1][::2, ::2], *images[2:]]),
+    }
+    result = run("track", *(stand.get(word, word) for word in words), "--out", tmp_path / "out", *QUICK)
+    assert result.exit_code == 2, result.output
+    assert message in result.stderr.splitlines()[-1]
+    assert [one.name for one in tmp_path.iterdir()] == ["in"]
+
+
+def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.mkdir()
+    for k in (2, 10, 1, 100):
+        cv2.imwrite(str(path / f"mask{k}.png"), np.where(walk[0], 255, 0).astype(np.uint8))
+    (path / "._mask1.png").write_bytes(b"what a Mac puts beside it")
+    assert [file.name for file in FolderMasks.of(path, ALL).files] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
+
+
+# who is in them
+
+
+def stack(path: Path, masks: Sequence[Any]) -> Path:
+    np.savez(path, masks=np.stack(masks))
+    return path
+
+
+@pytest.mark.parametrize(
+    "write", [stack, lambda path, masks: folder(path, [255 * one.astype(np.uint8) for one in masks])]
+)
+def test_inverted_masks_are_turned_round_and_said(
+    walk: list[Any], tmp_path: Path, write: Callable[[Path, Sequence[Any]], Path]
+) -> None:
+    path = write(tmp_path / "a.npz", [~mask for mask in walk])
+    (warning,) = check(path, walk).warnings
+    assert warning == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
+
+
+def test_somebody_who_fills_a_side_is_not_inverted(tmp_path: Path) -> None:
+    near = np.zeros((120, 160), dtype=bool)
+    near[10:, 30:130] = True  # on the lower border, for most of it
+    assert check(stack(tmp_path / "a.npz", [near] * 3), [near] * 3).warnings == []
+
+
+def test_empty_and_full_masks_are_held_and_counted(walk: list[Any], tmp_path: Path) -> None:
+    masks = [mask.copy() for mask in walk]
+    masks[0][:] = False
+    masks[3][:] = False
+    masks[4][:] = True
+    path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in masks])
+    found = check(path, masks)
+    assert [found.is_usable(k) for k in range(6)] == [False, True, True, False, False, True]
+    result = run("track", path, "--out", tmp_path / "out", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    assert "3 frames show too little of the person: the pose is held" in result.stdout
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["held_frames"] == 3
+
+
+def blob(*middles: tuple[int, int], wide: int = 16, tall: int = 60) -> Any:
+    mask = np.zeros((120, 200), dtype=bool)
+    for x, y in middles:
+        mask[max(0, y - tall // 2) : y + tall // 2, max(0, x - wide // 2) : x + wide // 2] = True
+    return mask
+
+
+def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Path) -> None:
+    goer, stander = [(40 + 4 * k, 60) for k in range(25)], (100, 58)
+    masks = [blob(one, tall=64) | blob(stander) for one in goer]  # he goes past, and they touch for a while
+    found = read(stack(tmp_path / "a.npz", masks))
+    for k in (*range(10), *range(20, 25)):
+        np.testing.assert_array_equal(found.silhouette(k).mask, blob(goer[k], tall=64), err_msg=str(k))
+    (warning,) = found.warnings
+    several = sum(cv2.connectedComponents(mask.astype(np.uint8))[0] > 2 for mask in masks)
+    assert f"several people in {several} of 25 masks; the largest of the first is followed, then" in warning
+    assert "leaps" not in warning
+
+
+def test_a_leap_to_somebody_else_is_named(tmp_path: Path) -> None:
+    masks = [blob((40, 60), tall=64) | blob((180, 60))] * 3 + [blob((180, 60)) | blob((160, 60))] * 2
+    (warning,) = read(stack(tmp_path / "a.npz", masks)).warnings
+    assert warning.endswith(
+        "then the nearest to the last, which leaps at " + str(tmp_path / "a.npz") + "[3]: look there"
+    )
+
+
+def test_somebody_in_pieces_is_one_person_and_specks_are_nobody(tmp_path: Path) -> None:
+    tree, table = blob((60, 60)), blob((60, 60))
+    tree[:, 59:61] = False
+    table[50:62] = False
+    speck = blob((60, 60)) | blob((150, 30), wide=6, tall=6)
+    for k, mask in enumerate((tree, table, speck)):
+        assert check(stack(tmp_path / f"{k}.npz", [mask] * 3), [mask] * 3).warnings == []
+    known = np.ones_like(tree)
+    hidden = blob((60, 60), wide=60)
+    known[:, 45:75] = False
+    np.savez(tmp_path / "b.npz", masks=[hidden & known] * 3, valid=[known] * 3)
+    check(tmp_path / "b.npz", [hidden & known] * 3)
+
+
+def test_small_holes_are_filled_unless_somebody_asks_otherwise(tmp_path: Path) -> None:
+    mask = blob((60, 60), wide=40)
+    holed = mask.copy()
+    holed[50:53, 50:53] = False
+    holed[60:75, 55:65] = False  # between an arm and the body
+    path = stack(tmp_path / "a.npz", [holed] * 2)
+    raw = StackMasks.of(path, ALL)
+    filled = settled(raw, path).silhouette(0).mask
+    assert filled[51, 51]
+    assert not filled[65, 60]
+    np.testing.assert_array_equal(settled(raw, path, holes=0.0).silhouette(0).mask, holed)
+    np.testing.assert_array_equal(settled(raw, path, holes=1.0).silhouette(0).mask, mask)
