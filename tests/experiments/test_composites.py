@@ -253,7 +253,7 @@ def test_a_track_that_is_the_truth_has_no_error(tmp_path: Path) -> None:
     assert told["seen"] == 20
     assert told["body_iou"] == told["facing_right"] == told["acceleration_ratio"] == told["said_unknown"] == 1.0
     assert told["mpjpe_mm"] == told["place_mm"] == told["lost"] == told["swapped"] == told["said_lost"] == 0.0
-    assert told["slide_cm"] == told["true_slide_cm"]
+    assert told["slide_cm"] == told["own_slide_cm"] == told["true_slide_cm"]
     assert "other_person" not in told
     poses = track.motion.poses.copy()
     poses[:, 0] += np.pi

@@ -23,6 +23,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "said_unknown": ("unknown %", 0, 100.0),
     "acceleration_ratio": ("accel. x", 1, 1.0),
     "slide_cm": ("slide cm", 1, 1.0),
+    "own_slide_cm": ("own cm", 1, 1.0),
     "true_slide_cm": ("true cm", 1, 1.0),
 }
 GROUPS = {"passing": PASSING, "always there": ALWAYS}
