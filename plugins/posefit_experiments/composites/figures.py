@@ -83,7 +83,7 @@ def steadiness(true_joints: Array, joints: Array, seen: NDArray[np.bool_], fps: 
     mean, true_mean = (float(one[inner].mean()) for one in (felt, true_felt))
     return {
         "acceleration": mean,
-        "acceleration_ratio": mean / true_mean,
+        "true_acceleration": true_mean,
         **{name: 100.0 * float(steps.mean()) if len(steps) else None for name, steps in found.items()},
     }
 
