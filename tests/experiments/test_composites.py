@@ -135,7 +135,7 @@ def test_a_quick_look_is_two_rows_of_each_extraction_and_all_is_every_one() -> N
 
 def test_a_walk_goes_on_without_a_jump() -> None:
     clip = ways.frames_of("16_47")
-    long = ways.walked(clip, 12.0)
+    long = ways.walked_on(clip, 12.0)
     assert np.linalg.norm(long.translations[-1] - long.translations[0]) == pytest.approx(12.0, abs=0.1)
     most = [np.nanmax(acceleration(one.skeleton.joints(one.poses, one.translations), 30.0)) for one in (clip, long)]
     assert most[1] < 1.5 * most[0]
