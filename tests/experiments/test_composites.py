@@ -135,7 +135,7 @@ def test_a_quick_look_is_two_rows_of_each_extraction_and_all_is_every_one() -> N
 
 def test_a_walk_goes_on_without_a_jump() -> None:
     clip = ways.frames_of("16_47")
-    long = ways.walked(clip, 12.0)
+    long = ways.walked_on(clip, 12.0)
     assert np.linalg.norm(long.translations[-1] - long.translations[0]) == pytest.approx(12.0, abs=0.1)
     most = [np.nanmax(acceleration(one.skeleton.joints(one.poses, one.translations), 30.0)) for one in (clip, long)]
     assert most[1] < 1.5 * most[0]
@@ -251,9 +251,10 @@ def test_a_track_that_is_the_truth_has_no_error(tmp_path: Path) -> None:
     track = true_track(made)
     told = track_figures(track, made.actors[0].body.radii, made, truth)
     assert told["seen"] == 20
-    assert told["body_iou"] == told["facing_right"] == told["acceleration_ratio"] == told["said_unknown"] == 1.0
+    assert told["body_iou"] == told["facing_right"] == told["said_unknown"] == 1.0
+    assert told["acceleration"] == told["true_acceleration"]
     assert told["mpjpe_mm"] == told["place_mm"] == told["lost"] == told["swapped"] == told["said_lost"] == 0.0
-    assert told["slide_cm"] == told["true_slide_cm"]
+    assert told["slide_cm"] == told["own_slide_cm"] == told["true_slide_cm"]
     assert "other_person" not in told
     poses = track.motion.poses.copy()
     poses[:, 0] += np.pi
@@ -278,19 +279,20 @@ def test_steadiness_counts_seen_frames_alone() -> None:
     seen[30:] = False
     broken = joints.copy()
     broken[32:] += np.random.default_rng(0).normal(0.0, 0.5, broken[32:].shape)
-    assert steadiness(joints, broken, seen, 30.0)["acceleration_ratio"] == 1.0
+    told = steadiness(joints, broken, seen, 30.0)
+    assert told["acceleration"] == told["true_acceleration"]
 
 
 def test_tables_tell_what_was_refused_and_compare_who_passes_with_who_stays() -> None:
     place = {"views": 1, "extraction": "mixture", "seed": 0}
     rows = [
-        {"situation": "through", **place, "mask_iou": 0.9, "mpjpe_mm": 40.0, "slide_cm": None},
-        {"situation": "back", **place, "mask_iou": 0.8, "mpjpe_mm": 60.0, "slide_cm": 3.0},
+        {"situation": "through", **place, "mask_iou": 0.9, "mpjpe_mm": 40.0, "own_slide_cm": None},
+        {"situation": "back", **place, "mask_iou": 0.8, "mpjpe_mm": 60.0, "own_slide_cm": 3.0},
         {"situation": "stands", **place, "refused": "nobody moves"},
     ]
     passing, always = by_presence(rows)
     assert passing["mask_iou"] == pytest.approx(0.85)
-    assert passing["slide_cm"] == 3.0
+    assert passing["own_slide_cm"] == 3.0
     assert (always["rows"], always["refused"], always["mask_iou"]) == (1, 1, None)
     lines = list(composites_lines({"rows": rows, "groups": by_presence(rows)}))
     assert any("refused: nobody moves" in line for line in lines)

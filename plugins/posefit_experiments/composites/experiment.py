@@ -25,7 +25,6 @@ from posefit_experiments.composites.tables import by_presence
 from posefit_experiments.grid import Progress, check_seeds, each
 
 LARGEST = 50_000_000  # bytes of a file of rows
-EXTRACTIONS = ("mixture", "median", "mean")
 GIVEN = "mean"  # the extraction that is given pictures without anybody
 QUICK = (("through", 1), ("stands", 1))  # situations and numbers of cameras of a quick look
 
@@ -162,7 +161,9 @@ def _kept(
 
 
 def _extraction(method: str) -> Extraction:
-    return Extraction(method=method, background=f"0:{BEFORE}" if method == GIVEN else None)  # type: ignore[arg-type]
+    """Return how people are taken out. Raises ValueError where there is no method of that name."""
+    told: dict[str, Any] = {"method": method, "background": f"0:{BEFORE}" if method == GIVEN else None}
+    return Extraction(**told)
 
 
 def _taken_out(videos: Sequence[Path], how: Extraction, frames: Any, folder: Path) -> tuple[Any, Any]:

@@ -67,17 +67,24 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
 
 
 def steadiness(true_joints: Array, joints: Array, seen: NDArray[np.bool_], fps: float) -> dict[str, Any]:
-    """Return how joints accelerate and feet slide beside the truth's own, in the runs of frames that are seen."""
+    """Return how joints accelerate and feet slide beside the truth's own, in the runs of frames that are seen.
+
+    A fitted foot slides while the true one stands, and, as anybody would see it, while it stands itself.
+    """
     felt, true_felt = (acceleration(one, fps) for one in (joints, true_joints))
     inner = seen & np.roll(seen, 1) & np.roll(seen, -1) & np.isfinite(felt)
     stands = standing(true_joints, fps) & seen[:, None]
-    steps, true_steps = (100.0 * slides(one, stands) for one in (joints, true_joints))
+    own = standing(joints, fps) & seen[:, None]
+    found = {
+        "slide_cm": slides(joints, stands),
+        "own_slide_cm": slides(joints, own),
+        "true_slide_cm": slides(true_joints, stands),
+    }
     mean, true_mean = (float(one[inner].mean()) for one in (felt, true_felt))
     return {
         "acceleration": mean,
-        "acceleration_ratio": mean / true_mean,
-        "slide_cm": float(steps.mean()) if len(steps) else None,
-        "true_slide_cm": float(true_steps.mean()) if len(steps) else None,
+        "true_acceleration": true_mean,
+        **{name: 100.0 * float(steps.mean()) if len(steps) else None for name, steps in found.items()},
     }
 
 

@@ -17,7 +17,7 @@ from posefit.footage.video import Video
 from posefit.silhouette.foreground import Image
 
 FILMED = (1768, 994)  # pixels of the video
-EMPTY = (0, 8, 16, 24, 30, *range(216, 230))  # frames: a pixel is empty in most of them
+EMPTY = (0, 8, 16, 24, 30, *range(216, 230))  # frames, an odd number: a pixel is empty in most of them
 LIVING = 31  # frames from the first, whose difference from the empty picture is what lives in it
 PEOPLE = 25  # grey levels: where it ever differs by more, somebody is there
 SEEN = (1240, 697)  # pixels of the part that one camera sees
@@ -46,10 +46,10 @@ def plate(video: str | Path, camera: int, size: tuple[int, int]) -> Plate:
     part = np.s_[top : top + SEEN[1], left : left + SEEN[0]]
 
     def scaled(image: Any) -> Any:
-        seen = cv2.resize(image[part], size, interpolation=cv2.INTER_AREA)
+        seen = cv2.resize(image[part].astype(np.float32), size, interpolation=cv2.INTER_AREA)
         return seen[:, ::-1] if camera % 2 else seen
 
-    return Plate(scaled(still).astype(np.float32), np.stack([scaled(one).astype(np.int8) for one in living]))
+    return Plate(scaled(still), np.stack([scaled(one).astype(np.int8) for one in living]))
 
 
 def sensed(image: NDArray[np.float32], k: int, rng: np.random.Generator) -> Image:
@@ -71,14 +71,18 @@ def check_video(path: str) -> Video:
 
 
 @lru_cache(maxsize=1)
-def _empty(path: str) -> tuple[NDArray[np.float32], list[NDArray[np.float32]]]:
+def _empty(path: str) -> tuple[NDArray[np.float32], list[NDArray[np.int8]]]:
     """Return the whole empty picture, and what the first frames differ from it by where nobody is."""
     video = check_video(path)
     frames = {k: image for k, image in enumerate(video.frames(0, None, FILMED)) if k in EMPTY or k < LIVING}
-    still = np.median([frames[k] for k in EMPTY], axis=0).astype(np.float32)
-    away = [frames[k].astype(np.float32) - still for k in range(LIVING)]
-    most = np.max([cv2.GaussianBlur(np.abs(one).max(axis=2), (0, 0), 4.0) for one in away], axis=0)
+    half = len(EMPTY) // 2  # of an odd number: the median is one of them
+    still = np.partition([frames[k] for k in EMPTY], half, axis=0)[half].astype(np.float32)
+    most, away = np.zeros(still.shape[:2], dtype=np.float32), []
+    for k in range(LIVING):
+        differs = frames[k].astype(np.float32) - still
+        most = np.maximum(most, cv2.GaussianBlur(np.abs(differs).max(axis=2), (0, 0), 4.0))
+        away.append(np.clip(differs, -128.0, 127.0).astype(np.int8))  # a quarter of the memory
     somebody = cv2.dilate((most > PEOPLE).astype(np.uint8), np.ones((41, 41), dtype=np.uint8)) > 0
     for one in away:
-        one[somebody] = 0.0
+        one[somebody] = 0
     return still, away

@@ -21,12 +21,14 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "said_lost": ("said lost %", 0, 100.0),
     "swapped": ("swapped %", 0, 100.0),
     "said_unknown": ("unknown %", 0, 100.0),
-    "acceleration_ratio": ("accel. x", 1, 1.0),
+    "acceleration": ("m/s2", 1, 1.0),
+    "true_acceleration": ("true m/s2", 1, 1.0),
     "slide_cm": ("slide cm", 1, 1.0),
+    "own_slide_cm": ("own cm", 1, 1.0),
     "true_slide_cm": ("true cm", 1, 1.0),
 }
 GROUPS = {"passing": PASSING, "always there": ALWAYS}
-COMPARED = ("mask_iou", "body_iou", "mpjpe_mm", "facing_right", "lost", "swapped", "acceleration_ratio", "slide_cm")
+COMPARED = ("mask_iou", "body_iou", "mpjpe_mm", "facing_right", "lost", "swapped", "acceleration", "own_slide_cm")
 
 
 def by_presence(rows: Sequence[Row]) -> list[dict[str, Any]]:

@@ -35,7 +35,7 @@ def frames_of(name: str, start: int = 0, stop: int | None = None) -> Motion:
     return motion.frames(start, len(motion) if stop is None else min(stop, len(motion)))
 
 
-def walked(motion: Motion, metres: float) -> Motion:
+def walked_on(motion: Motion, metres: float) -> Motion:
     """Return a walk that goes on for so many metres: the cycle of a clip, again and again.
 
     What the cycle's last pose differs from its first by is spread over all of it, so that nothing jumps.
@@ -108,7 +108,7 @@ def longest(motion: Motion) -> float:
 
 def through(motion: Motion, body: Body, reach: float, *, back: bool = False, aside: float = 0.0) -> Motion:
     """Return a walk from x = -reach to x = reach, or back, `aside` metres nearer to z."""
-    long = walked(motion, 2.0 * reach)
+    long = walked_on(motion, 2.0 * reach)
     ahead = on_ground(facing_elsewhere(long, (-ALONG if back else ALONG) - heading(long)), body)
     return moved(ahead, [0.0, 0.0, aside] - middle_of(ahead))
 
