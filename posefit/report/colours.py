@@ -6,6 +6,7 @@ without their yellow. The page has them a little darker where white would swallo
 
 from collections.abc import Mapping
 
+from posefit.page.document import colour_style
 from posefit.tracking.drawing.colours import LEFT, OTHER, RIGHT
 
 METHODS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # on paper
@@ -41,5 +42,4 @@ DARK = _named(
 
 def style() -> str:
     """Return the colours as variables of a page's style, for light and for dark screens."""
-    light, dark = ("".join(f" --{name}: {colour};" for name, colour in one.items()) for one in (LIGHT, DARK))
-    return f":root {{{light} }}\n@media (prefers-color-scheme: dark) {{ :root {{{dark} }} }}\n"
+    return colour_style(LIGHT, DARK)
