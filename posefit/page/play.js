@@ -24,12 +24,12 @@ function clock(button, pace, advance) {
 }
 
 // Lets mouse, touch and keys turn the gaze, and paints again whenever what a canvas shows may look different.
-function turnable(canvas, paint) {
+function turnable(canvas, repaint) {
   const turn = (yaw, pitch, zoom) => {
     gaze.yaw += yaw;
     gaze.pitch = Math.max(-1.5, Math.min(1.5, gaze.pitch + pitch));
     gaze.zoom = Math.max(0.4, Math.min(4, gaze.zoom * zoom));
-    paint();
+    repaint();
   };
   const held = new Map();
   const apart = () => {
@@ -58,7 +58,7 @@ function turnable(canvas, paint) {
     },
     { passive: false },
   );
-  const keys = {
+  const turns = {
     ArrowLeft: [0.12, 0, 1],
     ArrowRight: [-0.12, 0, 1],
     ArrowUp: [0, 0.12, 1],
@@ -68,10 +68,10 @@ function turnable(canvas, paint) {
     "-": [0, 0, 1 / 1.1],
   };
   canvas.addEventListener("keydown", (event) => {
-    if (!keys[event.key] || event.ctrlKey || event.metaKey) return;
+    if (!turns[event.key] || event.ctrlKey || event.metaKey) return;
     event.preventDefault();
-    turn(...keys[event.key]);
+    turn(...turns[event.key]);
   });
-  new ResizeObserver(paint).observe(canvas);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
+  new ResizeObserver(repaint).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
 }

@@ -28,6 +28,7 @@ FILES = (
     "summary.json",
     "overlay.mp4",
     "summary.png",
+    "track.html",
 )
 
 Rows = Sequence[Mapping[str, float]]
