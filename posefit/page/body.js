@@ -2,7 +2,7 @@
 const BONES = D.parents.map((parent, joint) => [parent, joint]).slice(1);
 const NEAR = 0.05; // metres before a camera: what is nearer is not drawn
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const limbs = () => ({ left: ink("--left"), right: ink("--right"), middle: ink("--ink") });
+const limbs = () => ({ left: ink("--left"), right: ink("--right"), middle: ink("--middle") });
 
 // Numbers of 16 bits in base 64: a function of the place that gives one, null where there is none.
 function unpacked(text) {

@@ -20,8 +20,8 @@ def _named(methods: tuple[str, ...], bodies: Mapping[str, str]) -> dict[str, str
 
 
 # Of a page's variables: c0, c1, ... of methods; the limbs of a body, as in the pictures of a track; truth and estimate.
-LIGHT = _named(_LIGHT, {**BODY_LIGHT, "estimate": _LIGHT[1], "swapped": _LIGHT[3]})
-DARK = _named(_DARK, {**BODY_DARK, "estimate": _DARK[1], "swapped": hexadecimal(OTHER)})
+LIGHT = _named(_LIGHT, {**BODY_LIGHT, "middle": "var(--ink)", "estimate": _LIGHT[1], "swapped": _LIGHT[3]})
+DARK = _named(_DARK, {**BODY_DARK, "middle": "var(--ink)", "estimate": _DARK[1], "swapped": hexadecimal(OTHER)})
 
 
 def style() -> str:

@@ -22,7 +22,7 @@ from posefit.tracking.table import undetermined
 from posefit.version import __version__
 
 UNIT = np.radians(0.1)  # of angles in a page
-CURVES = ("mpjpe_mm", "error_degrees", "cost", "iou", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "seconds")
+CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "seconds")
 
 
 def track_data(
@@ -103,7 +103,8 @@ def _told(summary: State) -> str:
 
 def _held(summary: State) -> list[str]:
     held = summary["held_frames"]
-    return [f"{held} of {summary['frames']} frames show too little of the person: the pose is held."] if held else []
+    show = "shows" if held == 1 else "show"
+    return [f"{held} of {summary['frames']} frames {show} too little of the person: the pose is held."] if held else []
 
 
 def _facts(summary: State) -> list[list[str]]:

@@ -97,17 +97,20 @@ function chart(width, { lines, bands, label, unit, digits }) {
     const top = height - (ROW + 2) * (MARKS.length - k);
     const wide = Math.max(across, 1);
     svg.append(draw("rect", { class: "rule", x: LEFT, width: width - LEFT - RIGHT, y: top, height: ROW }));
-    for (const frame of D.marks[name])
+    const there = range(shown).map((frame) => (D.marks[name].includes(frame) ? 1 : null));
+    for (const run of runsOf(there)) {
+      const [from, to] = [Math.max(LEFT, x(run[0]) - wide / 2), Math.min(width - RIGHT, x(run.at(-1)) + wide / 2)];
       svg.append(
         draw("rect", {
           class: `mark ${name}`,
-          x: Math.max(LEFT, x(frame) - wide / 2),
-          width: Math.min(wide, width - RIGHT - Math.max(LEFT, x(frame) - wide / 2)),
+          x: from,
+          width: to - from,
           y: top,
           height: ROW,
           style: `fill: var(${colour})`,
         }),
       );
+    }
   });
   const line = draw("line", {
     class: "now",

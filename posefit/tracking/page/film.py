@@ -13,9 +13,9 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
 
 FRAMES = 1_200  # of a track at most; of longer ones every second, fourth, ... is shown
-FILMED, MASKS = 4_000_000, 1_200_000  # characters of all frames that were filmed, and of all cameras' masks together
+FILMED, MASKS = 4_500_000, 1_200_000  # characters of all frames that were filmed, and of all cameras' masks together
 HIGHEST = 360  # pixels of a picture
-QUALITY = 60  # of JPEG, 0 to 100
+QUALITIES = (70, 50, 35, 25)  # of JPEG, 0 to 100: the best of which all frames have room, by the size of the first
 
 
 class Strip:
@@ -50,13 +50,17 @@ class Film:
         self.step = 1
         while scene.count > FRAMES * self.step:
             self.step *= 2
+        self._wanted, self._quality = -(-scene.count // self.step), 0
         self._filmed = Strip(FILMED, self.step) if scene.pictures is not None else None
         self._masks = [Strip(MASKS // len(scene.cameras), self.step) for _ in scene.cameras]
 
     def add(self, observation: Observation, filmed: Image | None) -> None:
         """Take the next frame."""
         if self._filmed is not None and filmed is not None:
-            self._filmed.add(lambda: _jpeg(filmed))
+            if not self._quality:
+                fitting = [one for one in QUALITIES if self._wanted * len(_jpeg(filmed, one)) <= FILMED]
+                self._quality = max(fitting, default=QUALITIES[-1])
+            self._filmed.add(lambda: _jpeg(filmed, self._quality))
         for strip, silhouette in zip(self._masks, observation.silhouettes, strict=True):
             strip.add(lambda mask=silhouette.mask: _png(mask))  # type: ignore[misc]
 
@@ -68,8 +72,8 @@ class Film:
         }
 
 
-def _jpeg(image: Image) -> str:
-    return _encoded(".jpg", _small(image), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+def _jpeg(image: Image, quality: int) -> str:
+    return _encoded(".jpg", _small(image), [cv2.IMWRITE_JPEG_QUALITY, quality])
 
 
 def _png(mask: Mask) -> str:

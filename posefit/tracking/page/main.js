@@ -108,8 +108,9 @@ function player() {
   $("camera-label").hidden = D.cameras.length < 2;
   $("with-film").parentNode.hidden = !D.film;
   $("with-mask").checked = !D.film;
+  $("close-up").checked = closeness(0) > 1.4;
   $("truth-label").hidden = !truthAt;
-  for (const id of ["with-film", "with-mask", "with-body", "with-truth"])
+  for (const id of ["with-film", "with-mask", "with-body", "with-truth", "close-up"])
     $(id).onchange = () => {
       legends();
       paint();

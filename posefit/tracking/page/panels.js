@@ -3,6 +3,8 @@ const SURE = 0.05; // metres: a joint's 80 % interval, up to which a limb is dra
 const UNSURE = 0.3; // and from which on it is faintest
 const FAINTEST = 0.2; // how much of a faintest limb's colour is left
 const SOLID = 0.65; // how much of what was filmed the body hides
+const CLOSE = 1.4; // times the body's height is that of a close-up, which is
+const CALM = 6; // centred on the mean over so many frames to either side
 const show = { frame: 0, camera: 0 };
 const shown = Math.ceil(D.count / D.step); // frames of this page
 const estimateAt = decoded(D.estimate);
@@ -48,15 +50,40 @@ function pictureOf(strip, place) {
   return image.complete && image.naturalWidth ? image : null;
 }
 
-// A sheet as large as another canvas, with the same scale.
-function layer(canvas, scale) {
-  const sheetOf = document.createElement("canvas");
-  sheetOf.width = canvas.width;
-  sheetOf.height = canvas.height;
-  const pen = sheetOf.getContext("2d");
-  pen.scale(scale, scale);
+// The pen of a sheet as large as another canvas, for what has to be put together before it is drawn there.
+function layer(canvas) {
+  const { width, height } = canvas;
+  const pen = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
   pen.lineCap = pen.lineJoin = "round";
   return pen;
+}
+
+// Of each camera, where the body's middle is and how tall it is in pixels, frame by frame.
+const framed = D.cameras.map((camera) =>
+  range(shown).map((frame) => {
+    const pixels = seen(camera, estimateAt(frame)).filter(([, , depth]) => depth > NEAR);
+    const [xs, ys] = [0, 1].map((k) => pixels.map((pixel) => pixel[k]));
+    const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    return pixels.length ? { x: (left + right) / 2, y: (top + bottom) / 2, tall: bottom - top } : null;
+  }),
+);
+const middle = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
+
+// How many times larger a picture of a camera is in a close-up: so that most of its height is the body's.
+function closeness(camera) {
+  const tall = framed[camera].filter(given).map((one) => one.tall);
+  return tall.length ? Math.max(1, Math.min(6, D.cameras[camera].size[1] / (CLOSE * Math.max(middle(tall), 1)))) : 1;
+}
+
+// The part of a camera's picture that is shown: its left and top, and how many times larger it is.
+function part(frame) {
+  const [wide, high] = D.cameras[show.camera].size;
+  const zoom = $("close-up").checked ? closeness(show.camera) : 1;
+  const about = framed[show.camera].slice(Math.max(0, frame - CALM), frame + CALM + 1).filter(given);
+  if (zoom === 1 || !about.length) return { left: 0, top: 0, zoom: 1 };
+  const mean = (name) => about.reduce((sum, one) => sum + one[name], 0) / about.length;
+  const within = (centre, side) => Math.max(0, Math.min(side - side / zoom, centre - side / zoom / 2));
+  return { left: within(mean("x"), wide), top: within(mean("y"), high), zoom };
 }
 
 // A body of tapered cones, far ones first; what lies behind shows through where it is not solid.
@@ -105,31 +132,33 @@ function paintPicture() {
   const canvas = $("picture");
   const { pen, width } = sheet(canvas, camera.size[1] / camera.size[0]);
   const scale = width / camera.size[0];
-  pen.scale(scale, scale);
   const film = filmed();
   const masks = D.masks[show.camera];
-  const every = (film ?? masks).every;
-  const place = Math.floor((show.frame * D.step) / every);
-  const frame = (place * every) / D.step; // the body is drawn as it was in the picture
-  const behind = film ? pictureOf(film, place) : null;
-  if (behind) pen.drawImage(behind, 0, 0, camera.size[0], camera.size[1]);
-  const pixels = seen(camera, estimateAt(frame));
   const body = $("with-body").checked;
   const masked = $("with-mask").checked;
-  const device = scale * (window.devicePixelRatio || 1);
-  const over = layer(canvas, device);
+  const every = Math.max(film ? film.every : 1, masked || !film ? masks.every : 1);
+  const frame = Math.floor((show.frame * D.step) / every) * (every / D.step); // all is drawn as it was in the picture
+  const { left, top, zoom } = part(frame);
+  const factor = zoom * scale;
+  pen.scale(factor, factor);
+  pen.translate(-left, -top);
+  const behind = film ? pictureOf(film, (frame * D.step) / film.every) : null;
+  if (behind) pen.drawImage(behind, 0, 0, camera.size[0], camera.size[1]);
+  const pixels = seen(camera, estimateAt(frame));
+  const over = layer(canvas);
+  over.setTransform(pen.getTransform());
   const solid = solids(frame);
   if (masked) {
-    const mask = pictureOf(masks, Math.floor((place * every) / masks.every));
+    const mask = pictureOf(masks, (frame * D.step) / masks.every);
     agreement(over, camera.size, mask, body ? outline(camera, pixels, D.radii) : null);
-  } else if (body) cones(over, camera, pixels, solid, 1.5 / scale);
+  } else if (body) cones(over, camera, pixels, solid, 1.5 / factor);
   pen.globalAlpha = film ? SOLID : 1;
-  pen.drawImage(over.canvas, 0, 0, camera.size[0], camera.size[1]);
+  pen.drawImage(over.canvas, left, top, camera.size[0] / zoom, camera.size[1] / zoom);
   pen.globalAlpha = 1;
   if (!body) return frame;
-  if (masked) sticks(pen, pixels, limbs(), 2.5 / scale);
+  if (masked) sticks(pen, pixels, limbs(), 2.5 / factor);
   const other = otherOf(frame);
-  if (other) sticks(pen, seen(camera, other.joints), ink("--other"), 2.5 / scale);
+  if (other) sticks(pen, seen(camera, other.joints), ink("--other"), 2.5 / factor);
   return frame;
 }
 
@@ -172,10 +201,11 @@ function legends() {
     entry("--missed", body ? "mask only" : "mask"),
     body ? entry("--spilled", "body only") : null,
   ];
-  const may = D.others.at.length ? entry("--other", "may be this, too", true) : null;
-  const sides = [entry("--left", "left limbs"), entry("--right", "right limbs")];
-  $("picture-legend").replaceChildren(...[...(masked ? fit : []), ...(body ? [...sides, may] : [])].filter(given));
+  const sides = () => [entry("--left", "left limbs"), entry("--right", "right limbs")];
+  const may = () => (D.others.at.length ? entry("--other", "may be this, too", true) : null);
   const truth = truthAt && $("with-truth").checked ? entry("--ink", "truth", true) : null;
   const faint = D.intervals ? make("li", {}, "faint: unsure") : null;
-  $("turning-legend").replaceChildren(...[...sides, truth, may, faint].filter(given));
+  const below = (id, entries) => $(id).replaceChildren(...entries.filter(given));
+  below("picture-legend", [...(masked ? fit : []), ...(body ? [...sides(), may()] : [])]);
+  below("turning-legend", [...sides(), truth, may(), faint]);
 }
