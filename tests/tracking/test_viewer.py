@@ -178,10 +178,11 @@ def test_the_body_is_where_the_camera_sees_it(chromium: Any, doubtful: Path, cam
     assert scene.truth is not None
     with opened(chromium, doubtful) as seen:
         page = seen.page
-        page.locator("#camera").select_option(value=str(camera))
+        page.locator("#camera").select_option(index=camera)
         for box in ("close-up", "with-mask"):
             page.locator(f"#{box}").uncheck()
         page.locator("#frame").fill("8")
+        assert page.locator("#picture").get_attribute("aria-label").startswith(f"Camera {camera + 1} with the body on")
         drawn = cv2.resize((picture(page, "picture")[..., 3] > 100).astype(np.uint8), SIZE) > 0
         page.locator("#with-body").uncheck()
         page.locator("#with-mask").check()

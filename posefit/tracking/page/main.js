@@ -36,8 +36,8 @@ function paint() {
   paintBody();
   cursors.forEach((move) => move(show.frame));
   const said = told(show.frame);
-  if (said === last) return;
-  last = said;
+  if (last === `${show.camera} ${said}`) return;
+  last = `${show.camera} ${said}`;
   $("frame").value = show.frame;
   $("frame").setAttribute("aria-valuetext", said);
   $("reading").textContent = pictured === show.frame ? said : `${said}; the picture is of frame ${pictured * D.step}`;
