@@ -32,6 +32,7 @@ FILES = {
     "summary.json",
     "overlay.mp4",
     "summary.png",
+    "track.html",
 }
 KEYS = {
     "motion",

@@ -15,7 +15,9 @@ from posefit.silhouette.mask import Mask
 FRAMES = 1_200  # of a track at most; of longer ones every second, fourth, ... is shown
 FILMED, MASKS = 4_500_000, 1_200_000  # characters of all frames that were filmed, and of all cameras' masks together
 HIGHEST = 360  # pixels of a picture
-QUALITIES = (70, 50, 35, 25)  # of JPEG, 0 to 100: the best of which all frames have room, by the size of the first
+# pixels of height and quality of JPEG, 0 to 100: the first for which there is room, by the size of the first frame
+FINENESS = ((HIGHEST, 70), (HIGHEST, 50), (HIGHEST, 35), (288, 35), (216, 35))
+SPARE = 0.2  # of the room, as later frames may be larger
 
 
 class Strip:
@@ -50,17 +52,20 @@ class Film:
         self.step = 1
         while scene.count > FRAMES * self.step:
             self.step *= 2
-        self._wanted, self._quality = -(-scene.count // self.step), 0
+        self._wanted = -(-scene.count // self.step)
+        self._fineness: tuple[int, int] | None = None  # not known before the first frame
         self._filmed = Strip(FILMED, self.step) if scene.pictures is not None else None
         self._masks = [Strip(MASKS // len(scene.cameras), self.step) for _ in scene.cameras]
 
     def add(self, observation: Observation, filmed: Image | None) -> None:
         """Take the next frame."""
         if self._filmed is not None and filmed is not None:
-            if not self._quality:
-                fitting = [one for one in QUALITIES if self._wanted * len(_jpeg(filmed, one)) <= FILMED]
-                self._quality = max(fitting, default=QUALITIES[-1])
-            self._filmed.add(lambda: _jpeg(filmed, self._quality))
+            if self._fineness is None:
+                room = (1.0 - SPARE) * FILMED
+                fitting = (how for how in FINENESS if self._wanted * len(_jpeg(filmed, *how)) <= room)
+                self._fineness = next(fitting, FINENESS[-1])
+            height, quality = self._fineness
+            self._filmed.add(lambda: _jpeg(filmed, height, quality))
         for strip, silhouette in zip(self._masks, observation.silhouettes, strict=True):
             strip.add(lambda mask=silhouette.mask: _png(mask))  # type: ignore[misc]
 
@@ -72,21 +77,20 @@ class Film:
         }
 
 
-def _jpeg(image: Image, quality: int) -> str:
-    return _encoded(".jpg", _small(image), [cv2.IMWRITE_JPEG_QUALITY, quality])
+def _jpeg(image: Image, height: int, quality: int) -> str:
+    return _encoded(".jpg", _small(image, height), [cv2.IMWRITE_JPEG_QUALITY, quality])
 
 
 def _png(mask: Mask) -> str:
-    """Return a mask as a white picture that is clear where the mask is not."""
-    clear = _small(np.where(mask, 255, 0).astype(np.uint8))
-    return _encoded(".png", cv2.merge([np.full_like(clear, 255)] * 3 + [clear]), [cv2.IMWRITE_PNG_COMPRESSION, 6])
+    """Return a mask as a picture of one bit a pixel, white where the mask is."""
+    return _encoded(".png", 255 * _small(mask.astype(np.uint8)), [cv2.IMWRITE_PNG_BILEVEL, 1])
 
 
-def _small(image: Image) -> Image:
+def _small(image: Image, highest: int = HIGHEST) -> Image:
     height, width = image.shape[:2]
-    if height <= HIGHEST:
+    if height <= highest:
         return image
-    size = (max(1, round(width * HIGHEST / height)), HIGHEST)
+    size = (max(1, round(width * highest / height)), highest)
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 

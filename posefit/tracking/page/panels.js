@@ -105,10 +105,21 @@ function cones(pen, camera, pixels, solid, width) {
   pen.globalAlpha = 1;
 }
 
+// A mask that is clear where its picture is black.
+const cut = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+function cutOut(image) {
+  Object.assign(cut.canvas, { width: image.naturalWidth, height: image.naturalHeight });
+  cut.drawImage(image, 0, 0);
+  const held = cut.getImageData(0, 0, cut.canvas.width, cut.canvas.height);
+  for (let k = 0; k < held.data.length; k += 4) held.data[k + 3] = held.data[k];
+  cut.putImageData(held, 0, 0);
+  return cut.canvas;
+}
+
 // Where mask and body agree, and where they do not, each in its colour.
 function agreement(pen, size, mask, path) {
   if (mask) {
-    pen.drawImage(mask, 0, 0, size[0], size[1]);
+    pen.drawImage(cutOut(mask), 0, 0, size[0], size[1]);
     pen.globalCompositeOperation = "source-in";
     pen.fillStyle = ink("--missed");
     pen.fillRect(0, 0, size[0], size[1]);
