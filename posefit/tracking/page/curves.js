@@ -206,7 +206,7 @@ function jointAbout() {
     const values = heights(estimateAt);
     add(values, "--accent", D.places[at]);
     if (truthAt) add(heights(truthAt), "--ink", "truth", true);
-    const label = `Height of ${D.places[at]}`;
+    const label = `Height of the ${D.places[at]}`;
     return { lines, bands: band(values, (frame, level) => radius(frame, level, at)), label, unit: "m", digits: 2 };
   }
   const count = D.angles.names.length;
@@ -250,8 +250,8 @@ function curves() {
   grouped(
     $("joint"),
     [
-      ["height above the floor, m", D.places.map((name, joint) => [`height:${joint}`, name])],
-      ["angle, degrees", D.angles.names.map((name, angle) => [`angle:${angle}`, name])],
+      ["heights above the floor", D.places.map((name, joint) => [`height:${joint}`, `${name}: height, m`])],
+      ["angles of the pose", D.angles.names.map((name, angle) => [`angle:${angle}`, `${name}: angle, degrees`])],
     ],
     `height:${D.places.indexOf("left ankle")}`,
   );
