@@ -230,6 +230,17 @@ def test_doubtful_frames_are_marked_and_said(chromium: Any, doubtful: Path) -> N
         assert reading(page).endswith("; lost")
 
 
+def test_a_single_frame_has_no_player_and_no_curves(chromium: Any, tmp_path: Path) -> None:
+    scene = walk(1)
+    with opened(chromium, viewed(tmp_path / "out", scene, right(scene)), 390) as seen:
+        assert seen.page.locator("#lead").inner_text() == "A single frame."
+        assert not seen.page.locator("#frame").is_visible()
+        assert seen.page.locator("#curves").count() == 0
+        seen.page.keyboard.press("n")
+        assert reading(seen.page).startswith("frame 0 of 1, 0.00 s; MPJPE 0 mm")
+        assert seen.complaints == []
+
+
 def test_a_click_in_a_curve_goes_to_its_frame(chromium: Any, doubtful: Path) -> None:
     with opened(chromium, doubtful) as seen:
         page = seen.page

@@ -171,9 +171,3 @@ def test_it_is_one_file_that_links_to_nothing_but_itself(tmp_path: Path) -> None
     assert held(page)["title"] == name
     assert held(page)["film"] is held(page)["intervals"] is None
     assert embedded(held(page)["others"]) == '{"at":[],"weights":[],"joints":""}'
-
-
-def test_a_single_frame_has_a_viewer_too(tmp_path: Path) -> None:
-    scene = walk(1)
-    data = held(viewed(tmp_path / "out", scene, right(scene)))
-    assert (data["count"], data["step"], len(data["masks"][0]["pictures"])) == (1, 1, 1)

@@ -5,7 +5,7 @@ function header() {
   document.title = `${D.title}: a track of posefit`;
   $("title").textContent = D.title;
   const time = `${number(D.count / D.fps, 1)} s at ${+D.fps.toPrecision(4)} frames a second`;
-  $("lead").textContent = `${counted(D.count, "frame")}, ${time}.`;
+  $("lead").textContent = shown > 1 ? `${counted(D.count, "frame")}, ${time}.` : "A single frame.";
   $("told").textContent = D.told;
   $("notes").append(...D.notes.map((text) => make("p", { class: "note warn" }, text)));
   $("facts").append(...D.facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
@@ -87,6 +87,7 @@ function pressed(event) {
 }
 
 function player() {
+  $("controls").hidden = shown === 1;
   $("frame").max = shown - 1;
   $("frame").oninput = () => seek(+$("frame").value);
   choose(
@@ -134,7 +135,8 @@ header();
 player();
 legends();
 upright();
-curves();
+if (shown > 1) curves();
+else $("curves").remove();
 look(0.7, 0.15);
 turnable($("turning"), paint);
 new ResizeObserver(paint).observe($("picture"));
