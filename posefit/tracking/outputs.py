@@ -197,7 +197,7 @@ class OutputFolder:
         writer: VideoWriter | None = None
         told = repeat(None) if radii is None else radii
         for frame, observation, row, picture, one in zip(frames, scene.observations, rows, filmed, told, strict=False):
-            film.add(observation, picture)
+            film.add(frame, observation, picture)
             image = painter.add(frame, observation, row, picture, one)
             if writer is None:
                 writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))

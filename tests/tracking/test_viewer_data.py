@@ -44,23 +44,51 @@ def image(uri: str) -> Any:
 def test_a_strip_keeps_what_it_has_room_for_evenly(count: int, room: int, every: int) -> None:
     strip = Strip(room, 1)
     for k in range(count):
-        strip.add(lambda k=k: f"{k:010d}")  # type: ignore[misc]
+        strip.add((k, 0, 1, 1), lambda k=k: [f"{k:06d}", "more"])  # type: ignore[misc]
     assert strip.every == every
-    assert [int(one) for one in strip.pictures] == list(range(0, count, every))
+    assert [int(one) for _, (one, _) in strip.pictures] == list(range(0, count, every))
+    assert [box[0] for box, _ in strip.pictures] == list(range(0, count, every))
 
 
 def test_of_a_long_track_a_picture_is_always_of_a_frame_that_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(film, "FRAMES", 10)
     scene = replace(walk(2), count=41)
-    pictures = Film(scene)
+    pictures, (frame, _) = Film(scene), right(walk(2))
     assert pictures.step == 8
     for k in range(41):
-        mask = np.zeros(SIZE[::-1], bool)
-        mask[: k + 1] = True
-        pictures.add(Observation([Silhouette.of(mask)]), None)
+        mask = np.ones(SIZE[::-1], bool)  # so large that all of it is shown
+        mask[100, : k + 1] = False
+        pictures.add(frame, Observation([Silhouette.of(mask)]), None)
     (masks,) = pictures.as_dict()["masks"]
     assert masks["every"] == 8
-    assert [int((image(one) > 0)[:, 0].sum()) for one in masks["pictures"]] == [1, 9, 17, 25, 33, 41]
+    assert [box for box, _ in masks["pictures"]] == [[0, 0, *SIZE]] * 6
+    assert [int((image(one) == 0).sum()) for _, one in masks["pictures"]] == [1, 9, 17, 25, 33, 41]
+
+
+def test_a_picture_is_of_the_part_that_mask_and_body_are_in() -> None:
+    scene = walk(1)
+    (frame,), seen = right(scene), scene.observations[0]
+    mask = seen.silhouettes[0].mask
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+
+    def about(shown: Any) -> Any:
+        pictures = Film(scene)
+        pictures.add(frame, Observation([Silhouette.of(shown)]), None)
+        ((box, uri),) = pictures.as_dict()["masks"][0]["pictures"]
+        left, top, width, high = box
+        np.testing.assert_array_equal(image(uri) > 0, shown[top : top + high, left : left + width])
+        return box
+
+    left, top, width, high = about(mask)
+    assert (top, high) == (0, SIZE[1])  # the person fills the picture's height
+    space = 0.25 * (rows[-1] + 1 - rows[0])
+    assert left == pytest.approx(columns[0] - space, abs=3.0)
+    assert left + width == pytest.approx(columns[-1] + 1 + space, abs=3.0)
+    far = np.zeros_like(mask)
+    far[:20, :20] = True  # something else was seen, and the body stays in the picture
+    assert about(far)[:2] == [0, 0]
+    assert sum(about(far)[::2]) == pytest.approx(left + width, abs=40.0)
+    assert about(np.zeros_like(mask))[1] == 0
 
 
 def filming(count: int, size: tuple[int, int]) -> tuple[Scene, Any]:
@@ -71,16 +99,18 @@ def filming(count: int, size: tuple[int, int]) -> tuple[Scene, Any]:
     return scene, picture
 
 
-@pytest.mark.parametrize(("count", "every", "height"), [(20, 1, 360), (120, 1, 216), (600, 4, 216)])
-def test_pictures_of_leaves_stay_within_a_few_megabytes(count: int, every: int, height: int) -> None:
+@pytest.mark.parametrize(("count", "every"), [(20, 1), (120, 1), (600, 4)])
+def test_pictures_of_leaves_stay_within_a_few_megabytes(count: int, every: int) -> None:
     scene, picture = filming(count, (960, 540))
-    pictures, seen = Film(scene), scene.observations[0]
+    pictures, (frame, _), seen = Film(scene), right(walk(2)), scene.observations[0]
     for _ in range(count):
-        pictures.add(seen, picture)
+        pictures.add(frame, seen, picture)
     strip = pictures.as_dict()["film"]
     assert strip["every"] == every
-    assert sum(map(len, strip["pictures"])) <= film.FILMED
-    assert image(strip["pictures"][0]).shape == (height, height * 16 // 9, 3)
+    assert sum(len(near) + len(coarse) for _, near, coarse in strip["pictures"]) <= film.FILMED
+    box, near, coarse = strip["pictures"][0]
+    assert image(near).shape[1] / image(near).shape[0] == pytest.approx(box[2] / box[3], abs=0.02)
+    assert image(coarse).shape == (180, 320, 3)
 
 
 def test_a_viewer_of_120_frames_costs_less_than_a_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,7 @@
-"""Small pictures of what was seen, as many as there is room for in a page."""
+"""Small pictures of what was seen, as many and as fine as there is room for in a page.
+
+Of a frame that was filmed there are two: the part about the person, and all of it, coarse.
+"""
 
 import base64
 from collections.abc import Callable
@@ -7,39 +10,46 @@ from typing import Any
 import cv2
 import numpy as np
 
-from posefit.fitting.tracker import Observation
+from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
+from posefit.silhouette.rasteriser import NEAR
 
 FRAMES = 1_200  # of a track at most; of longer ones every second, fourth, ... is shown
 FILMED, MASKS = 4_500_000, 1_200_000  # characters of all frames that were filmed, and of all cameras' masks together
+SPARE = 0.2  # of the room for what was filmed, as later frames may need more than the first
 HIGHEST = 360  # pixels of a picture
-# pixels of height and quality of JPEG, 0 to 100: the first for which there is room, by the size of the first frame
-FINENESS = ((HIGHEST, 70), (HIGHEST, 50), (HIGHEST, 35), (288, 35), (216, 35))
-SPARE = 0.2  # of the room, as later frames may be larger
+# pixels of height and quality of JPEG, 0 to 100, of the part about the person: the first for which there is room
+FINENESS = ((HIGHEST, 75), (HIGHEST, 50), (288, 40), (216, 35))
+COARSE = (180, 35)  # the same of the whole frame
+AROUND = 0.25  # of the larger side of a person's box, to each side
+
+Box = tuple[int, int, int, int]  # left, top, width and height in pixels of a camera
 
 
 class Strip:
     """Keeps pictures of every frame, or of every second, fourth, ... once there is no more room."""
 
     def __init__(self, room: int, every: int) -> None:
-        self.pictures: list[str] = []
+        self.pictures: list[tuple[Box, list[str]]] = []
         self.every = every
         self._room, self._count = room, 0
 
-    def add(self, picture: Callable[[], str]) -> None:
-        """Take the next frame, of which `picture` makes a picture if it is wanted."""
+    def add(self, box: Box, pictures: Callable[[], list[str]]) -> None:
+        """Take the next frame, whose `pictures` are made if they are wanted; the first is of the box."""
         if self._count % self.every == 0:
-            self.pictures.append(picture())
-            while len(self.pictures) > 1 and sum(map(len, self.pictures)) > self._room:
+            self.pictures.append((box, pictures()))
+            while len(self.pictures) > 1 and sum(len(one) for _, each in self.pictures for one in each) > self._room:
                 self.pictures = self.pictures[::2]
                 self.every *= 2
         self._count += 1
 
     def as_dict(self) -> dict[str, Any]:
         """Return the pictures, and of how many frames each is the first."""
-        return {"every": self.every, "pictures": self.pictures}
+        return {"every": self.every, "pictures": [[list(box), *each] for box, each in self.pictures]}
 
 
 class Film:
@@ -52,22 +62,25 @@ class Film:
         self.step = 1
         while scene.count > FRAMES * self.step:
             self.step *= 2
+        self._body, self._cameras = scene.body, scene.cameras
         self._wanted = -(-scene.count // self.step)
         self._fineness: tuple[int, int] | None = None  # not known before the first frame
         self._filmed = Strip(FILMED, self.step) if scene.pictures is not None else None
         self._masks = [Strip(MASKS // len(scene.cameras), self.step) for _ in scene.cameras]
 
-    def add(self, observation: Observation, filmed: Image | None) -> None:
+    def add(self, frame: Frame, observation: Observation, filmed: Image | None) -> None:
         """Take the next frame."""
+        masks = [silhouette.mask for silhouette in observation.silhouettes]
+        boxes = [_about(one, self._body, camera, frame) for one, camera in zip(masks, self._cameras, strict=True)]
         if self._filmed is not None and filmed is not None:
             if self._fineness is None:
-                room = (1.0 - SPARE) * FILMED
-                fitting = (how for how in FINENESS if self._wanted * len(_jpeg(filmed, *how)) <= room)
+                each = int((1.0 - SPARE) * FILMED / self._wanted)
+                fitting = (how for how in FINENESS if sum(map(len, _photographs(filmed, boxes[0], how))) <= each)
                 self._fineness = next(fitting, FINENESS[-1])
-            height, quality = self._fineness
-            self._filmed.add(lambda: _jpeg(filmed, height, quality))
-        for strip, silhouette in zip(self._masks, observation.silhouettes, strict=True):
-            strip.add(lambda mask=silhouette.mask: _png(mask))  # type: ignore[misc]
+            fineness = self._fineness
+            self._filmed.add(boxes[0], lambda: _photographs(filmed, boxes[0], fineness))
+        for strip, mask, box in zip(self._masks, masks, boxes, strict=True):
+            strip.add(box, lambda mask=mask, box=box: [_png(mask, box)])  # type: ignore[misc]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the pictures that there are, as a page's scripts read them."""
@@ -77,20 +90,50 @@ class Film:
         }
 
 
+def _about(mask: Mask, body: Body, camera: Camera, frame: Frame) -> Box:
+    """Return the part of a picture that holds the mask and the body, with some space about them."""
+    pixels, depths = camera.project(body.skeleton.joints(frame.pose, frame.translation))
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    points = [pixels[depths > NEAR]]
+    if len(rows):
+        points.append(np.array([[columns[0], rows[0]], [columns[-1] + 1, rows[-1] + 1]]))
+    size = np.array([camera.width, camera.height])
+    inside = np.clip(np.concatenate(points), 0, size)
+    if not len(inside):
+        return (0, 0, camera.width, camera.height)
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    space = AROUND * (high - low).max() + 1.0
+    left, top = np.floor(np.clip(low - space, 0, size - 1)).astype(int).tolist()
+    right, bottom = np.ceil(np.clip(high + space, 1, size)).astype(int).tolist()
+    return (left, top, right - left, bottom - top)
+
+
+def _cut(image: Image, box: Box) -> Image:
+    left, top, width, height = box
+    return image[top : top + height, left : left + width]
+
+
+def _photographs(image: Image, box: Box, fineness: tuple[int, int]) -> list[str]:
+    return [_jpeg(_cut(image, box), *fineness), _jpeg(image, *COARSE)]
+
+
 def _jpeg(image: Image, height: int, quality: int) -> str:
     return _encoded(".jpg", _small(image, height), [cv2.IMWRITE_JPEG_QUALITY, quality])
 
 
-def _png(mask: Mask) -> str:
-    """Return a mask as a picture of one bit a pixel, white where the mask is."""
-    return _encoded(".png", 255 * _small(mask.astype(np.uint8)), [cv2.IMWRITE_PNG_BILEVEL, 1])
+def _png(mask: Mask, box: Box) -> str:
+    """Return a part of a mask as a picture of one bit a pixel, white where the mask is."""
+    small = 255 * _small(_cut(mask.astype(np.uint8), box), HIGHEST)
+    return _encoded(".png", small, [cv2.IMWRITE_PNG_BILEVEL, 1])
 
 
-def _small(image: Image, highest: int = HIGHEST) -> Image:
+def _small(image: Image, highest: int) -> Image:
+    """Return a picture that is at most so high, and at most twice as wide as that."""
     height, width = image.shape[:2]
-    if height <= highest:
+    factor = max(height / highest, width / (2 * highest))
+    if factor <= 1.0:
         return image
-    size = (max(1, round(width * highest / height)), highest)
+    size = (max(1, round(width / factor)), max(1, round(height / factor)))
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 

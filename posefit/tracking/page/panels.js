@@ -35,11 +35,9 @@ function otherOf(frame) {
   return place < 0 ? null : { weight: D.others.weights[place], joints: otherAt(place) };
 }
 
-// A picture by its strip and place in it: it is there once it is decoded, and then everything is painted again.
+// A picture by its data: it is there once it is decoded, and then everything is painted again.
 const pictures = new Map();
-function pictureOf(strip, place) {
-  const uri = strip.pictures[place];
-  if (!uri) return null;
+function pictureOf(uri) {
   if (!pictures.has(uri)) {
     const image = new Image();
     image.onload = paint;
@@ -48,6 +46,13 @@ function pictureOf(strip, place) {
   }
   const image = pictures.get(uri);
   return image.complete && image.naturalWidth ? image : null;
+}
+
+// Draws what was filmed in a frame: all of it, coarse, and the part about the person.
+function photograph(pen, size, [box, near, coarse]) {
+  const [behind, person] = [pictureOf(coarse), pictureOf(near)];
+  if (behind) pen.drawImage(behind, 0, 0, size[0], size[1]);
+  if (person) pen.drawImage(person, ...box);
 }
 
 // The pen of a sheet as large as another canvas, for what has to be put together before it is drawn there.
@@ -117,9 +122,10 @@ function cutOut(image) {
 }
 
 // Where mask and body agree, and where they do not, each in its colour.
-function agreement(pen, size, mask, path) {
+function agreement(pen, size, [box, uri], path) {
+  const mask = pictureOf(uri);
   if (mask) {
-    pen.drawImage(cutOut(mask), 0, 0, size[0], size[1]);
+    pen.drawImage(cutOut(mask), ...box);
     pen.globalCompositeOperation = "source-in";
     pen.fillStyle = ink("--missed");
     pen.fillRect(0, 0, size[0], size[1]);
@@ -153,15 +159,14 @@ function paintPicture() {
   const factor = zoom * scale;
   pen.scale(factor, factor);
   pen.translate(-left, -top);
-  const behind = film ? pictureOf(film, (frame * D.step) / film.every) : null;
-  if (behind) pen.drawImage(behind, 0, 0, camera.size[0], camera.size[1]);
+  const of = (strip) => strip.pictures[Math.min((frame * D.step) / strip.every, strip.pictures.length - 1)];
+  if (film) photograph(pen, camera.size, of(film));
   const pixels = seen(camera, estimateAt(frame));
   const over = layer(canvas);
   over.setTransform(pen.getTransform());
   const solid = solids(frame);
   if (masked) {
-    const mask = pictureOf(masks, (frame * D.step) / masks.every);
-    agreement(over, camera.size, mask, body ? outline(camera, pixels, D.radii) : null);
+    agreement(over, camera.size, of(masks), body ? outline(camera, pixels, D.radii) : null);
   } else if (body) cones(over, camera, pixels, solid, 1.5 / factor);
   pen.globalAlpha = film ? SOLID : 1;
   pen.drawImage(over.canvas, left, top, camera.size[0] / zoom, camera.size[1] / zoom);
