@@ -11,7 +11,7 @@ from posefit.geometry.camera import Camera
 LARGEST = 32_767  # of 16 bits
 
 
-def packed(values: Array, unit: float = 1e-3) -> str:
+def in_16_bits(values: Array, unit: float = 1e-3) -> str:
     """Return numbers in 16 bits each, little-endian in base 64, as multiples of a unit: a millimetre, if in metres.
 
     What is beyond 32,767 units counts as so many; NaN is -32,768.
@@ -21,7 +21,7 @@ def packed(values: Array, unit: float = 1e-3) -> str:
     return base64.b64encode(whole.tobytes()).decode()
 
 
-def seen_from(camera: Camera, origin: Array) -> dict[str, Any]:
+def camera_seen_from(camera: Camera, origin: Array) -> dict[str, Any]:
     """Return a camera that sees points in metres from the origin."""
     return {
         "size": [camera.width, camera.height],

@@ -7,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
-from posefit.page.bodies import packed, seen_from
+from posefit.page.bodies import camera_seen_from, in_16_bits
 from posefit.report.runs import Runs
 from posefit.sweep.cell import Cell, cell_scene, digest_of
 from posefit.sweep.ledger import Ledger
@@ -57,7 +57,12 @@ def _chosen(runs: Runs) -> Iterator[int]:
 
 
 def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> dict[str, Any]:
-    scene: dict[str, Any] = {"truth": packed(truth - origin), "frames": len(truth), "step": step, "fps": place["fps"]}
+    scene: dict[str, Any] = {
+        "truth": in_16_bits(truth - origin),
+        "frames": len(truth),
+        "step": step,
+        "fps": place["fps"],
+    }
     try:
         for path, digest in place["files"].items():
             if digest_of(path) != digest:
@@ -77,7 +82,7 @@ def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> 
         return {**scene, "cameras": [], "radii": []}
     return {
         **scene,
-        "cameras": [seen_from(camera, origin) for camera in made.cameras],
+        "cameras": [camera_seen_from(camera, origin) for camera in made.cameras],
         "radii": np.round(made.body.radii, 4).tolist(),
     }
 
@@ -85,7 +90,7 @@ def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> 
 def _track(truth: Array, estimate: Array, origin: Array) -> dict[str, Any]:
     errors = metrics.mpjpe_mm(truth, estimate)
     return {
-        "estimate": packed(estimate - origin),
+        "estimate": in_16_bits(estimate - origin),
         "mpjpe": np.round(errors).astype(int).tolist(),
         "lost": np.flatnonzero(errors > metrics.LOST_MM).tolist(),
         "swapped": np.flatnonzero(metrics.swapped(truth, estimate)).tolist(),

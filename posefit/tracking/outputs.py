@@ -23,8 +23,8 @@ from posefit.posterior.modes import Posterior
 from posefit.reading import cut
 from posefit.tracking.formats import FILES, Rows, State, intervals_of, write_formats
 from posefit.tracking.identity import Told, difference
+from posefit.tracking.page.album import Album
 from posefit.tracking.page.content import track_data
-from posefit.tracking.page.film import Film
 from posefit.tracking.page.webpage import viewer_document
 from posefit.tracking.picture import Painter
 from posefit.tracking.table import undetermined
@@ -189,7 +189,7 @@ class OutputFolder:
         """Write everything."""
         import cv2
 
-        folder, painter, film = self._building, Painter(scene), Film(scene)
+        folder, painter, album = self._building, Painter(scene), Album(scene)
         sure = intervals_of(scene.body.skeleton, frames)
         radii = sure.get("joint_radii")
         write_formats(folder, scene, estimate, frames, rows, summary, sure)
@@ -197,7 +197,7 @@ class OutputFolder:
         writer: VideoWriter | None = None
         told = repeat(None) if radii is None else radii
         for frame, observation, row, picture, one in zip(frames, scene.observations, rows, filmed, told, strict=False):
-            film.add(frame, observation, picture)
+            album.add(frame, observation, picture)
             image = painter.add(frame, observation, row, picture, one)
             if writer is None:
                 writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))
@@ -206,5 +206,5 @@ class OutputFolder:
         writer.close()
         if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, radii, undetermined(summary))):
             raise OSError("no room for summary.png")
-        page = viewer_document(track_data(scene, estimate, frames, rows, summary, sure, film))
+        page = viewer_document(track_data(scene, estimate, frames, rows, summary, sure, album))
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")

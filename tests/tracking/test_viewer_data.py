@@ -17,9 +17,9 @@ from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.page.document import embedded
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.page import film
+from posefit.tracking.page import album
+from posefit.tracking.page.album import Album, Strip
 from posefit.tracking.page.content import _beside, _marked
-from posefit.tracking.page.film import Film, Strip
 from tests.tracking.viewing import SIZE, doubting, right, viewed, walk
 
 
@@ -51,9 +51,9 @@ def test_a_strip_keeps_what_it_has_room_for_evenly(count: int, room: int, every:
 
 
 def test_of_a_long_track_a_picture_is_always_of_a_frame_that_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(film, "FRAMES", 10)
+    monkeypatch.setattr(album, "FRAMES", 10)
     scene = replace(walk(2), count=41)
-    pictures, (frame, _) = Film(scene), right(walk(2))
+    pictures, (frame, _) = Album(scene), right(walk(2))
     assert pictures.step == 8
     for k in range(41):
         mask = np.ones(SIZE[::-1], bool)  # so large that all of it is shown
@@ -72,7 +72,7 @@ def test_a_picture_is_of_the_part_that_mask_and_body_are_in() -> None:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
 
     def about(shown: Any) -> Any:
-        pictures = Film(scene)
+        pictures = Album(scene)
         pictures.add(frame, Observation([Silhouette.of(shown)]), None)
         ((box, uri),) = pictures.as_dict()["masks"][0]["pictures"]
         left, top, width, high = box
@@ -102,12 +102,12 @@ def filming(count: int, size: tuple[int, int]) -> tuple[Scene, Any]:
 @pytest.mark.parametrize(("count", "every"), [(20, 1), (120, 1), (600, 4)])
 def test_pictures_of_leaves_stay_within_a_few_megabytes(count: int, every: int) -> None:
     scene, picture = filming(count, (960, 540))
-    pictures, (frame, _), seen = Film(scene), right(walk(2)), scene.observations[0]
+    pictures, (frame, _), seen = Album(scene), right(walk(2)), scene.observations[0]
     for _ in range(count):
         pictures.add(frame, seen, picture)
     strip = pictures.as_dict()["film"]
     assert strip["every"] == every
-    assert sum(len(near) + len(coarse) for _, near, coarse in strip["pictures"]) <= film.FILMED
+    assert sum(len(near) + len(coarse) for _, near, coarse in strip["pictures"]) <= album.FILMED
     box, near, coarse = strip["pictures"][0]
     assert image(near).shape[1] / image(near).shape[0] == pytest.approx(box[2] / box[3], abs=0.02)
     assert image(coarse).shape == (180, 320, 3)
@@ -129,7 +129,7 @@ def test_a_viewer_of_120_frames_costs_less_than_a_second(tmp_path: Path, monkeyp
 
         monkeypatch.setattr(owner, name, instead)
 
-    timed(film.Film, "add")
+    timed(album.Album, "add")
     timed(outputs, "track_data")
     timed(outputs, "viewer_document")
     scene = walk(120)

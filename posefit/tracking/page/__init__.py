@@ -3,7 +3,7 @@
 | looking for | file |
 |---|---|
 | the document, and how it is written | webpage.py |
-| small pictures of what was seen, as many as there is room for | film.py |
+| small pictures of what was seen, as many as there is room for | album.py |
 | everything the page shows, as data | content.py |
 | colours, those of bodies on any page too | colours.py |
 | the places of everything, empty; how it looks | viewer.html, viewer.css |

@@ -11,12 +11,12 @@ from posefit.footage.scene import Scene
 from posefit.geometry.places import place
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
 from posefit.motion.motion import Motion
-from posefit.page.bodies import packed, seen_from
+from posefit.page.bodies import camera_seen_from, in_16_bits
 from posefit.posterior.modes import other_mode
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.formats import Rows, State
 from posefit.tracking.measures import FRAME
-from posefit.tracking.page.film import Film
+from posefit.tracking.page.album import Album
 from posefit.tracking.picture import LIKELY
 from posefit.tracking.table import undetermined
 from posefit.version import __version__
@@ -32,14 +32,14 @@ def track_data(
     rows: Rows,
     summary: State,
     sure: Mapping[str, Array],
-    film: Film,
+    album: Album,
 ) -> dict[str, Any]:
     """Return everything that the viewer shows; `sure` is what `posefit.tracking.formats.intervals_of` gave.
 
     Joints are millimetres from the first place of the root and angles tenths of a degree, in 16 bits each. Of a long
     track every `step`-th frame is there; a frame is marked if one of those that it stands for is.
     """
-    step, skeleton = film.step, estimate.skeleton
+    step, skeleton = album.step, estimate.skeleton
     joints = skeleton.joints(estimate.poses, estimate.translations)[::step]
     origin = np.round(joints[0, 0], 3)
     truth, free = scene.truth, skeleton.free
@@ -60,10 +60,10 @@ def track_data(
         "count": len(frames),
         "step": step,
         "fps": estimate.fps,
-        "cameras": [seen_from(camera, origin) for camera in scene.cameras],
-        **film.as_dict(),
-        "estimate": packed(joints - origin),
-        "truth": None if true is None else packed(true - origin),
+        "cameras": [camera_seen_from(camera, origin) for camera in scene.cameras],
+        **album.as_dict(),
+        "estimate": in_16_bits(joints - origin),
+        "truth": None if true is None else in_16_bits(true - origin),
         "others": _others(scene, frames[::step], origin),
         "columns": {name: _column(name) for name in CURVES if name in rows[0]},
         "rows": {name: [row[name] for row in rows[::step]] for name in CURVES if name in rows[0]},
@@ -74,15 +74,15 @@ def track_data(
         },
         "angles": {
             "names": [name for name, there in zip(_angle_names(), free, strict=True) if there],
-            "values": packed(angles[:, free], UNIT),
-            "truth": None if truth is None else packed(_beside(angles, truth.poses[::step])[:, free], UNIT),
+            "values": in_16_bits(angles[:, free], UNIT),
+            "truth": None if truth is None else in_16_bits(_beside(angles, truth.poses[::step])[:, free], UNIT),
         },
         "intervals": None
         if not said
         else {
             "levels": [round(100 * level) for level in sure["levels"].tolist()],
-            "joints": packed(said["joint_radii"]),
-            "angles": packed(said["angle_halves"][..., free], UNIT),
+            "joints": in_16_bits(said["joint_radii"]),
+            "angles": in_16_bits(said["angle_halves"][..., free], UNIT),
         },
     }
 
@@ -136,7 +136,7 @@ def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, A
     return {
         "at": list(there),
         "weights": [mode.weight for mode in there.values()],
-        "joints": packed(np.array(joints)),
+        "joints": in_16_bits(np.array(joints)),
     }
 
 

@@ -52,8 +52,8 @@ class Strip:
         return {"every": self.every, "pictures": [[list(box), *each] for box, each in self.pictures]}
 
 
-class Film:
-    """What the first camera filmed, where one did, and the masks of all cameras, frame by frame.
+class Album:
+    """Pictures of what the first camera filmed, where one did, and the masks of all cameras, frame by frame.
 
     `step` is that of the frames shown: a power of two, so that every picture is of one of them.
     """
