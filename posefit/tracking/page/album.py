@@ -24,7 +24,7 @@ SPARE = 0.2  # of the room for what was filmed, as later frames may need more th
 HIGHEST = 360  # pixels of a picture
 # pixels of height and quality of JPEG, 0 to 100, of the part about the person: the first for which there is room
 FINENESS = ((HIGHEST, 75), (HIGHEST, 50), (288, 40), (216, 35))
-COARSE = (180, 35)  # the same of the whole frame
+COARSE = (200, 50)  # the same of the whole frame
 AROUND = 0.25  # of the larger side of a person's box, to each side
 
 Box = tuple[int, int, int, int]  # left, top, width and height in pixels of a camera
