@@ -155,7 +155,7 @@ def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> N
     free = truth.skeleton.free
     angles = numbers(data["angles"]["values"]).reshape(4, -1) / 10.0
     np.testing.assert_allclose(angles, np.degrees(np.unwrap(truth.poses, axis=0)[:, free]), atol=0.051)
-    assert data["angles"]["names"][:4] == ["root yaw", "root pitch", "root roll", "lfemur x"]
+    assert data["angles"]["names"][:4] == ["root yaw", "root pitch", "root roll", "lfemur x (bone to the left knee)"]
     # nothing but the pose itself, blurred by 2 cm: Maxwell's law
     radii = numbers(data["intervals"]["joints"]).reshape(4, 3, 27)
     np.testing.assert_allclose(radii[0, :, 1], 20.0 * np.array([1.5382, 2.1544, 2.7955]), atol=1.0)

@@ -146,7 +146,7 @@ def _marked(said: Sequence[bool], step: int) -> list[int]:
 
 
 def _angle_names() -> list[str]:
-    inner = [f"{JOINTS[joint]} {axis}" for joint in INNER for axis in "xyz"]
+    inner = [f"{JOINTS[joint]} {axis} (bone to the {place(JOINTS[joint])})" for joint in INNER for axis in "xyz"]
     return ["root yaw", "root pitch", "root roll", *inner]
 
 
