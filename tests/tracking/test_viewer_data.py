@@ -110,7 +110,7 @@ def test_pictures_of_leaves_stay_within_a_few_megabytes(count: int, every: int) 
     assert sum(len(near) + len(coarse) for _, near, coarse in strip["pictures"]) <= album.FILMED
     box, near, coarse = strip["pictures"][0]
     assert image(near).shape[1] / image(near).shape[0] == pytest.approx(box[2] / box[3], abs=0.02)
-    assert image(coarse).shape == (200, 356, 3)
+    assert image(coarse).shape[0] in {height for _, (height, _) in album.FINENESS}
 
 
 def test_a_viewer_of_120_frames_costs_less_than_a_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

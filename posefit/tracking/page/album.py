@@ -22,11 +22,17 @@ FRAMES = 1_200  # of a track at most; of longer ones every second, fourth, ... i
 FILMED, MASKS = 4_500_000, 1_200_000  # characters of all frames that were filmed, and of all cameras' masks together
 SPARE = 0.2  # of the room for what was filmed, as later frames may need more than the first
 HIGHEST = 360  # pixels of a picture
-# pixels of height and quality of JPEG, 0 to 100, of the part about the person: the first for which there is room
-FINENESS = ((HIGHEST, 75), (HIGHEST, 50), (288, 40), (216, 35))
-COARSE = (200, 50)  # the same of the whole frame
+# pixels of height and quality of JPEG, 0 to 100, of the part about the person and of the whole frame: the first for which
+# there is room
+FINENESS = (
+    ((HIGHEST, 75), (200, 50)),
+    ((HIGHEST, 50), (200, 50)),
+    ((288, 40), (180, 35)),
+    ((216, 35), (120, 30)),
+)
 AROUND = 0.25  # of the larger side of a person's box, to each side
 
+Fineness = tuple[tuple[int, int], tuple[int, int]]
 Box = tuple[int, int, int, int]  # left, top, width and height in pixels of a camera
 
 
@@ -64,7 +70,7 @@ class Album:
             self.step *= 2
         self._body, self._cameras = scene.body, scene.cameras
         self._wanted = -(-scene.count // self.step)
-        self._fineness: tuple[int, int] | None = None  # not known before the first frame
+        self._fineness: Fineness | None = None  # not known before the first frame
         self._filmed = Strip(FILMED, self.step) if scene.pictures is not None else None
         self._masks = [Strip(MASKS // len(scene.cameras), self.step) for _ in scene.cameras]
 
@@ -113,8 +119,8 @@ def _cut(image: Image, box: Box) -> Image:
     return image[top : top + height, left : left + width]
 
 
-def _photographs(image: Image, box: Box, fineness: tuple[int, int]) -> list[str]:
-    return [_jpeg(_cut(image, box), *fineness), _jpeg(image, *COARSE)]
+def _photographs(image: Image, box: Box, fineness: Fineness) -> list[str]:
+    return [_jpeg(_cut(image, box), *fineness[0]), _jpeg(image, *fineness[1])]
 
 
 def _jpeg(image: Image, height: int, quality: int) -> str:
