@@ -15,6 +15,7 @@ import pytest
 
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
+from posefit.measuring.angles import clinical_angles
 from posefit.page.document import embedded
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.page import album
@@ -156,6 +157,12 @@ def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> N
     angles = numbers(data["angles"]["values"]).reshape(4, -1) / 10.0
     np.testing.assert_allclose(angles, np.degrees(np.unwrap(truth.poses, axis=0)[:, free]), atol=0.051)
     assert data["angles"]["names"][:4] == ["root yaw", "root pitch", "root roll", "lfemur x (bone to the left knee)"]
+    clinical = numbers(data["clinical"]["values"]).reshape(4, -1) / 10.0
+    knee = data["clinical"]["names"].index("left knee flexion")
+    wanted = clinical_angles(truth.skeleton, truth.poses)["left_knee_flexion"]
+    np.testing.assert_allclose(clinical[:, knee], wanted, atol=0.051)
+    assert data["clinical"]["truth"] == data["clinical"]["values"]
+    assert data["places"][3] == "left ankle"
     # nothing but the pose itself, blurred by 2 cm: Maxwell's law
     radii = numbers(data["intervals"]["joints"]).reshape(4, 3, 27)
     np.testing.assert_allclose(radii[0, :, 1], 20.0 * np.array([1.5382, 2.1544, 2.7955]), atol=1.0)

@@ -22,8 +22,8 @@ FRAMES = 1_200  # of a track at most; of longer ones every second, fourth, ... i
 FILMED, MASKS = 4_500_000, 1_200_000  # characters of all frames that were filmed, and of all cameras' masks together
 SPARE = 0.2  # of the room for what was filmed, as later frames may need more than the first
 HIGHEST = 360  # pixels of a picture
-# pixels of height and quality of JPEG, 0 to 100, of the part about the person and of the whole frame: the first that have
-# room
+# pixels of height and quality of JPEG, 0 to 100, of the part about the person and of the whole frame: the finest
+# for which there is room
 FINENESS = (
     ((HIGHEST, 75), (200, 50)),
     ((HIGHEST, 50), (200, 50)),

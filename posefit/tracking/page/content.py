@@ -8,8 +8,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.geometry.places import place
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
+from posefit.measuring.angles import COLUMNS, clinical_angles
+from posefit.measuring.centres import PLACES
 from posefit.motion.motion import Motion
 from posefit.page.bodies import camera_seen_from, in_16_bits
 from posefit.posterior.modes import other_mode
@@ -21,7 +22,8 @@ from posefit.tracking.picture import LIKELY
 from posefit.tracking.table import undetermined
 from posefit.version import __version__
 
-UNIT = np.radians(0.1)  # of angles in a page
+TENTH = 0.1  # degrees: the unit of angles in a page
+UNIT = np.radians(TENTH)
 CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "seconds")
 
 
@@ -53,7 +55,7 @@ def track_data(
         "notes": [*_held(summary), *map(str, summary["warnings"])],
         "facts": _facts(summary),
         "joints": JOINTS,
-        "places": [place(joint) for joint in JOINTS],
+        "places": [_words(place) for place in PLACES],
         "parents": PARENTS,
         "sides": SIDES,
         "radii": np.round(scene.body.radii, 4).tolist(),
@@ -76,6 +78,11 @@ def track_data(
             "names": [name for name, there in zip(_angle_names(), free, strict=True) if there],
             "values": in_16_bits(angles[:, free], UNIT),
             "truth": None if truth is None else in_16_bits(_beside(angles, truth.poses[::step])[:, free], UNIT),
+        },
+        "clinical": {
+            "names": [_words(name) for name in COLUMNS],
+            "values": in_16_bits(_clinical(estimate, step), TENTH),
+            "truth": None if truth is None else in_16_bits(_clinical(truth, step), TENTH),
         },
         "intervals": None
         if not said
@@ -146,8 +153,18 @@ def _marked(said: Sequence[bool], step: int) -> list[int]:
 
 
 def _angle_names() -> list[str]:
-    inner = [f"{JOINTS[joint]} {axis} (bone to the {place(JOINTS[joint])})" for joint in INNER for axis in "xyz"]
+    inner = [f"{JOINTS[joint]} {axis} (bone to the {_words(PLACES[joint])})" for joint in INNER for axis in "xyz"]
     return ["root yaw", "root pitch", "root roll", *inner]
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _clinical(motion: Motion, step: int) -> Array:
+    """Return the clinical angles (T, n) in degrees of every `step`-th frame."""
+    found = clinical_angles(motion.skeleton, motion.poses[::step])
+    return np.column_stack([found[name] for name in COLUMNS])
 
 
 def _beside(angles: Array, true: Array) -> Array:

@@ -187,7 +187,8 @@ function sureAbout() {
   return { lines, bands, label: "How far joints may be off", unit: "mm", digits: 0 };
 }
 
-// The height of a joint above the floor in metres, or an angle in degrees, with intervals and the truth.
+// The height of a joint above the floor in metres, or an angle in degrees, with the truth; intervals are those of heights
+// and of the pose's own angles.
 function jointAbout() {
   const [kind, which] = $("joint").value.split(":");
   const at = +which;
@@ -209,20 +210,23 @@ function jointAbout() {
     const label = `Height of the ${D.places[at]}`;
     return { lines, bands: band(values, (frame, level) => radius(frame, level, at)), label, unit: "m", digits: 2 };
   }
-  const count = D.angles.names.length;
+  const { names, values: told, truth } = kind === "clinical" ? D.clinical : D.angles;
+  const count = names.length;
   const degrees = (text) => {
     const value = unpacked(text);
-    return frames.map((frame) => value(frame * count + at) / 10);
+    return frames.map((frame) => value(frame * count + at)).map((tenths) => (given(tenths) ? tenths / 10 : null));
   };
-  const values = degrees(D.angles.values);
-  add(values, "--accent", D.angles.names[at]);
-  if (D.angles.truth) add(degrees(D.angles.truth), "--ink", "truth", true);
+  const values = degrees(told);
+  add(values, "--accent", names[at]);
+  if (truth) add(degrees(truth), "--ink", "truth", true);
+  const about = { lines, label: names[at], unit: "degrees", digits: 1 };
+  if (kind === "clinical") return { ...about, bands: [] };
   const half = D.intervals ? unpacked(D.intervals.angles) : null;
   const halfOf = (frame, level) => {
     const value = half((frame * levels.length + level) * count + at);
     return given(value) ? value / 10 : null;
   };
-  return { lines, bands: band(values, halfOf), label: D.angles.names[at], unit: "degrees", digits: 1 };
+  return { ...about, bands: band(values, halfOf) };
 }
 
 // A select of grouped names.
@@ -251,6 +255,7 @@ function curves() {
     $("joint"),
     [
       ["heights above the floor", D.places.map((name, joint) => [`height:${joint}`, `${name}: height, m`])],
+      ["clinical angles", D.clinical.names.map((name, angle) => [`clinical:${angle}`, `${name}, degrees`])],
       ["angles of the pose", D.angles.names.map((name, angle) => [`angle:${angle}`, `${name}: angle, degrees`])],
     ],
     `height:${D.places.indexOf("left ankle")}`,
