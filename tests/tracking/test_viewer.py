@@ -230,6 +230,19 @@ def test_doubtful_frames_are_marked_and_said(chromium: Any, doubtful: Path) -> N
         assert reading(page).endswith("; lost")
 
 
+def test_a_joint_has_intervals_and_a_clinical_angle_has_none(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful) as seen:
+        page = seen.page
+        for label, bands, said in (
+            ("left ankle: height, m", 3, "dashed: the truth, with intervals of 50, 80, 95 %"),
+            ("left knee flexion, degrees", 0, "dashed: the truth"),
+            ("root yaw: angle, degrees", 3, "dashed: the truth, with intervals of 50, 80, 95 %"),
+        ):
+            page.locator("#joint").select_option(label=label)
+            assert page.locator("#joint-chart polygon").count() == bands
+            assert page.locator("#joint-caption").inner_text() == said
+
+
 def test_a_single_frame_has_no_player_and_no_curves(chromium: Any, tmp_path: Path) -> None:
     scene = walk(1)
     with opened(chromium, viewed(tmp_path / "out", scene, right(scene)), 390) as seen:

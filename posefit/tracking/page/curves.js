@@ -187,8 +187,8 @@ function sureAbout() {
   return { lines, bands, label: "How far joints may be off", unit: "mm", digits: 0 };
 }
 
-// The height of a joint above the floor in metres, or an angle in degrees, with the truth; intervals are those of heights
-// and of the pose's own angles.
+// The height of a joint above the floor in metres, or an angle in degrees, with the truth; heights and the pose's own
+// angles have intervals.
 function jointAbout() {
   const [kind, which] = $("joint").value.split(":");
   const at = +which;
@@ -210,13 +210,13 @@ function jointAbout() {
     const label = `Height of the ${D.places[at]}`;
     return { lines, bands: band(values, (frame, level) => radius(frame, level, at)), label, unit: "m", digits: 2 };
   }
-  const { names, values: told, truth } = kind === "clinical" ? D.clinical : D.angles;
+  const { names, values: found, truth } = kind === "clinical" ? D.clinical : D.angles;
   const count = names.length;
   const degrees = (text) => {
     const value = unpacked(text);
     return frames.map((frame) => value(frame * count + at)).map((tenths) => (given(tenths) ? tenths / 10 : null));
   };
-  const values = degrees(told);
+  const values = degrees(found);
   add(values, "--accent", names[at]);
   if (truth) add(degrees(truth), "--ink", "truth", true);
   const about = { lines, label: names[at], unit: "degrees", digits: 1 };
@@ -261,7 +261,6 @@ function curves() {
     `height:${D.places.indexOf("left ankle")}`,
   );
   $("joint").onchange = redraw;
-  $("joint-caption").textContent = `${truthAt ? "dashed: the truth" : ""}${between}`.replace(/^, /, "");
   follows($("figure-chart"), figureAbout);
   if (D.intervals) {
     $("sure-caption").textContent =
@@ -269,7 +268,12 @@ function curves() {
       `${D.rows.mpjpe_mm ? "; the line is how far they are" : ""}`;
     follows($("sure-chart"), sureAbout);
   } else $("sure").remove();
-  follows($("joint-chart"), jointAbout);
+  follows($("joint-chart"), () => {
+    const about = jointAbout();
+    const said = [about.lines.length > 1 ? "dashed: the truth" : "", about.bands.length ? between.slice(2) : ""];
+    $("joint-caption").textContent = said.filter(Boolean).join(", ");
+    return about;
+  });
   $("marks").append(
     ...MARKS.map(([name, colour, words]) => entry(colour, `${words}: ${counted(D.marks[name].length, "frame")}`)),
   );
