@@ -50,6 +50,12 @@ MUTANTS = (
         "tests/report/test_contest.py::test_certainty_is_pooled_over_runs_frame_by_frame",
     ),
     Mutant(
+        "the viewer of a long track has the marks of those frames alone that it shows",
+        "posefit/tracking/page/content.py",
+        (("for k, one in enumerate(said) if one}", "for k, one in enumerate(said) if one and k % step == 0}"),),
+        "tests/tracking/test_viewer_data.py::test_a_frame_that_is_shown_bears_the_marks_of_those_that_it_stands_for",
+    ),
+    Mutant(
         "a track that is drawn steps anywhere, not where the last state goes on to",
         "plugins/posefit_exemplars/sampling.py",
         (("likely = first.kernel[rows] * likely", "likely = 1.0 * likely"),),

@@ -34,7 +34,7 @@ def track(as_json: bool, **options: Any) -> None:
 
     click.echo(table(result.summary))
     if options["out"]:
-        click.echo(f"written to {options['out']}: watch overlay.mp4, look at summary.png")
+        click.echo(f"written to {options['out']}: open track.html, watch overlay.mp4, look at summary.png")
 
 
 @click.command()
@@ -53,7 +53,7 @@ def fit(as_json: bool, **options: Any) -> None:
 
     click.echo(table(result.summary))
     if options["out"]:
-        click.echo(f"written to {options['out']}: look at summary.png")
+        click.echo(f"written to {options['out']}: open track.html, look at summary.png")
 
 
 @click.command()

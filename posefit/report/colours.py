@@ -6,7 +6,9 @@ without their yellow. The page has them a little darker where white would swallo
 
 from collections.abc import Mapping
 
-from posefit.tracking.drawing.colours import LEFT, OTHER, RIGHT
+from posefit.page.document import colour_style
+from posefit.tracking.drawing.colours import OTHER, hexadecimal
+from posefit.tracking.page.colours import BODY_DARK, BODY_LIGHT
 
 METHODS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # on paper
 _LIGHT = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b97a00", "#3b9bd1", "#111")
@@ -17,29 +19,11 @@ def _named(methods: tuple[str, ...], bodies: Mapping[str, str]) -> dict[str, str
     return {**{f"c{k}": colour for k, colour in enumerate(methods)}, **bodies}
 
 
-def _hexadecimal(blue_green_red: tuple[int, int, int]) -> str:
-    blue, green, red = blue_green_red
-    return f"#{red:02x}{green:02x}{blue:02x}"
-
-
 # Of a page's variables: c0, c1, ... of methods; the limbs of a body, as in the pictures of a track; truth and estimate.
-LIGHT = _named(
-    _LIGHT,
-    {"left": _LIGHT[1], "right": _LIGHT[0], "truth": "#7a8794", "estimate": _LIGHT[1], "swapped": _LIGHT[3]},
-)
-DARK = _named(
-    _DARK,
-    {
-        "left": _hexadecimal(LEFT),
-        "right": _hexadecimal(RIGHT),
-        "truth": "#98a5b3",
-        "estimate": _DARK[1],
-        "swapped": _hexadecimal(OTHER),
-    },
-)
+LIGHT = _named(_LIGHT, {**BODY_LIGHT, "middle": "var(--ink)", "estimate": _LIGHT[1], "swapped": _LIGHT[3]})
+DARK = _named(_DARK, {**BODY_DARK, "middle": "var(--ink)", "estimate": _DARK[1], "swapped": hexadecimal(OTHER)})
 
 
 def style() -> str:
     """Return the colours as variables of a page's style, for light and for dark screens."""
-    light, dark = ("".join(f" --{name}: {colour};" for name, colour in one.items()) for one in (LIGHT, DARK))
-    return f":root {{{light} }}\n@media (prefers-color-scheme: dark) {{ :root {{{dark} }} }}\n"
+    return colour_style(LIGHT, DARK)

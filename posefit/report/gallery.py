@@ -1,6 +1,5 @@
 """The moving pictures of a report: joints of some runs, as few bytes as they need."""
 
-import base64
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
-from posefit.geometry.camera import Camera
+from posefit.page.bodies import camera_seen_from, in_16_bits
 from posefit.report.runs import Runs
 from posefit.sweep.cell import Cell, cell_scene, digest_of
 from posefit.sweep.ledger import Ledger
@@ -58,7 +57,12 @@ def _chosen(runs: Runs) -> Iterator[int]:
 
 
 def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> dict[str, Any]:
-    scene: dict[str, Any] = {"truth": _packed(truth - origin), "frames": len(truth), "step": step, "fps": place["fps"]}
+    scene: dict[str, Any] = {
+        "truth": in_16_bits(truth - origin),
+        "frames": len(truth),
+        "step": step,
+        "fps": place["fps"],
+    }
     try:
         for path, digest in place["files"].items():
             if digest_of(path) != digest:
@@ -78,32 +82,16 @@ def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> 
         return {**scene, "cameras": [], "radii": []}
     return {
         **scene,
-        "cameras": [_camera(camera, origin) for camera in made.cameras],
+        "cameras": [camera_seen_from(camera, origin) for camera in made.cameras],
         "radii": np.round(made.body.radii, 4).tolist(),
-    }
-
-
-def _camera(camera: Camera, origin: Array) -> dict[str, Any]:
-    """Return a camera that sees points in metres from the origin."""
-    return {
-        "size": [camera.width, camera.height],
-        "focal": np.round(camera.focal, 3).tolist(),
-        "centre": np.round(camera.centre, 3).tolist(),
-        "rotation": np.round(camera.rotation, 6).tolist(),
-        "translation": np.round(camera.translation + camera.rotation @ origin, 6).tolist(),
     }
 
 
 def _track(truth: Array, estimate: Array, origin: Array) -> dict[str, Any]:
     errors = metrics.mpjpe_mm(truth, estimate)
     return {
-        "estimate": _packed(estimate - origin),
+        "estimate": in_16_bits(estimate - origin),
         "mpjpe": np.round(errors).astype(int).tolist(),
         "lost": np.flatnonzero(errors > metrics.LOST_MM).tolist(),
         "swapped": np.flatnonzero(metrics.swapped(truth, estimate)).tolist(),
     }
-
-
-def _packed(joints: Array) -> str:
-    millimetres = np.clip(np.round(1e3 * joints), -32_768, 32_767).astype("<i2")
-    return base64.b64encode(millimetres.tobytes()).decode()

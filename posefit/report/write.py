@@ -7,8 +7,9 @@ from typing import Any
 
 from posefit.files import replaceable, replaced_file
 from posefit.geometry.skeleton import ANGLES
+from posefit.page.document import plain
 from posefit.report.content import data_of
-from posefit.report.page.webpage import MARK, document, plain
+from posefit.report.page.webpage import MARK, document
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 

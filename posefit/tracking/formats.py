@@ -31,6 +31,7 @@ FILES = (
     "summary.json",
     "overlay.mp4",
     "summary.png",
+    "track.html",
 )
 
 Rows = Sequence[Mapping[str, float]]

@@ -23,6 +23,9 @@ from posefit.posterior.modes import Posterior
 from posefit.reading import cut
 from posefit.tracking.formats import FILES, Rows, State, intervals_of, write_formats
 from posefit.tracking.identity import Told, difference
+from posefit.tracking.page.album import Album
+from posefit.tracking.page.content import track_data
+from posefit.tracking.page.webpage import viewer_document
 from posefit.tracking.picture import Painter
 from posefit.tracking.table import undetermined
 
@@ -186,7 +189,8 @@ class OutputFolder:
         """Write everything."""
         import cv2
 
-        folder, painter = self._building, Painter(scene, [row["usable"] == 1.0 for row in rows])
+        folder, album = self._building, Album(scene)
+        painter = Painter(scene, [row["usable"] == 1.0 for row in rows])
         sure = intervals_of(scene.body.skeleton, frames)
         radii = sure.get("joint_radii")
         write_formats(folder, scene, estimate, frames, rows, summary, sure)
@@ -194,6 +198,7 @@ class OutputFolder:
         writer: VideoWriter | None = None
         told = repeat(None) if radii is None else radii
         for frame, observation, row, picture, one in zip(frames, scene.observations, rows, filmed, told, strict=False):
+            album.add(frame, observation, picture)
             image = painter.add(frame, observation, row, picture, one)
             if writer is None:
                 writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))
@@ -202,3 +207,5 @@ class OutputFolder:
         writer.close()
         if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, radii, undetermined(summary))):
             raise OSError("no room for summary.png")
+        page = viewer_document(track_data(scene, estimate, frames, rows, summary, sure, album))
+        (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")

@@ -35,6 +35,7 @@ FILES = {
     "summary.json",
     "overlay.mp4",
     "summary.png",
+    "track.html",
 }
 KEYS = {
     "motion",

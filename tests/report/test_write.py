@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit.page.document import embedded, plain
 from posefit.report.content import data_of
-from posefit.report.page.webpage import MARK, embedded, plain
+from posefit.report.page.webpage import MARK
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import fails, run

@@ -34,13 +34,6 @@ function legend() {
 
 const visible = () => D.taking_part.map((m, place) => [m, place]).filter(([m]) => !hidden.has(m));
 
-function steps(low, high, count) {
-  const rough = (high - low) / count || 1;
-  const size = 10 ** Math.floor(Math.log10(rough));
-  const step = size * [1, 2, 5, 10].find((one) => one * size >= rough);
-  return range(Math.floor(high / step) - Math.ceil(low / step) + 1).map((k) => (Math.ceil(low / step) + k) * step);
-}
-
 // A chart of series {m, values, low, high} over D.evaluations, on a log scale.
 function chart(width, series, most, label, stepped) {
   const height = Math.max(240, Math.min(380, 0.62 * width));

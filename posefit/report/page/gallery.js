@@ -1,5 +1,5 @@
 // The gallery: a card an instance, and the window that plays its tracks.
-const show = { row: null, frame: 0, camera: 0, playing: null };
+const show = { row: null, frame: 0, camera: 0 };
 const pictured = Object.keys(D.gallery.tracks).map(Number);
 const watch = (row) =>
   D.gallery.tracks[row]
@@ -181,82 +181,24 @@ function strip() {
   );
 }
 
-function play(on) {
-  if (show.playing) cancelAnimationFrame(show.playing);
-  show.playing = null;
-  $("play").textContent = on ? "Pause" : "Play";
-  if (!on) return;
-  let last = performance.now();
-  const tick = (now) => {
+const play = clock(
+  $("play"),
+  () => {
     const scene = sceneOf(D.rows.instance[show.row]);
-    const pace = (1000 * scene.step) / scene.fps;
-    if (now - last >= pace) {
-      show.frame = (show.frame + Math.max(1, Math.floor((now - last) / pace))) % scene.frames;
-      last = now;
-      paint();
-    }
-    show.playing = requestAnimationFrame(tick);
-  };
-  show.playing = requestAnimationFrame(tick);
-}
-
-function turn(yaw, pitch, zoom) {
-  gaze.yaw += yaw;
-  gaze.pitch = Math.max(-1.5, Math.min(1.5, gaze.pitch + pitch));
-  gaze.zoom = Math.max(0.4, Math.min(4, gaze.zoom * zoom));
-  paint();
-}
+    return (1000 * scene.step) / scene.fps;
+  },
+  (over) => {
+    show.frame = (show.frame + over) % sceneOf(D.rows.instance[show.row]).frames;
+    paint();
+  },
+);
 
 function viewer() {
-  const canvas = $("turning");
-  const held = new Map();
-  const apart = () => {
-    const [a, b] = [...held.values()];
-    return Math.hypot(a[0] - b[0], a[1] - b[1]);
-  };
-  canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
-    held.set(event.pointerId, [event.clientX, event.clientY]);
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    const before = held.get(event.pointerId);
-    if (!before) return;
-    const wide = held.size === 2 ? apart() : 0;
-    held.set(event.pointerId, [event.clientX, event.clientY]);
-    if (held.size === 2) return turn(0, 0, apart() / Math.max(wide, 1));
-    turn((before[0] - event.clientX) / 120, (event.clientY - before[1]) / 120, 1);
-  });
-  for (const name of ["pointerup", "pointercancel"])
-    canvas.addEventListener(name, (event) => held.delete(event.pointerId));
-  canvas.addEventListener(
-    "wheel",
-    (event) => {
-      event.preventDefault();
-      turn(0, 0, event.deltaY < 0 ? 1.1 : 1 / 1.1);
-    },
-    { passive: false },
-  );
-  const keys = {
-    ArrowLeft: [0.12, 0, 1],
-    ArrowRight: [-0.12, 0, 1],
-    ArrowUp: [0, 0.12, 1],
-    ArrowDown: [0, -0.12, 1],
-    "+": [0, 0, 1.1],
-    "=": [0, 0, 1.1],
-    "-": [0, 0, 1 / 1.1],
-  };
-  canvas.addEventListener("keydown", (event) => {
-    if (!keys[event.key] || event.ctrlKey || event.metaKey) return;
-    event.preventDefault();
-    turn(...keys[event.key]);
-  });
-  $("play").onclick = () => play(!show.playing);
+  turnable($("turning"), paint);
   $("frame").oninput = () => {
     play(false);
     show.frame = +$("frame").value;
     paint();
   };
   $("viewer").addEventListener("close", () => play(false));
-  new ResizeObserver(paint).observe(canvas);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
 }

@@ -23,3 +23,9 @@ def write(image: Image, text: str, at: tuple[int, int], colour: Any = TEXT, scal
 def width_of(text: str, scale: float = 0.5) -> int:
     """Return how many pixels wide a text is."""
     return int(cv2.getTextSize(text, _FONT, scale, 1)[0][0])
+
+
+def hexadecimal(colour: tuple[int, int, int]) -> str:
+    """Return a colour as a page has it."""
+    blue, green, red = colour
+    return f"#{red:02x}{green:02x}{blue:02x}"

@@ -1,0 +1,77 @@
+// What moves a page's bodies: a clock, and whoever turns them.
+// A clock that goes on by some frames at a time, and the button that starts and stops it; returns what does that, too.
+// `pace` gives the milliseconds of a frame, and `advance` is told how many are over.
+function clock(button, pace, advance) {
+  let handle = null;
+  const play = (on) => {
+    if (handle) cancelAnimationFrame(handle);
+    handle = null;
+    button.textContent = on ? "Pause" : "Play";
+    if (!on) return;
+    let last = performance.now();
+    const tick = (now) => {
+      const over = Math.floor((now - last) / pace());
+      if (over >= 1) {
+        last += over * pace();
+        advance(over);
+      }
+      handle = requestAnimationFrame(tick);
+    };
+    handle = requestAnimationFrame(tick);
+  };
+  button.onclick = () => play(!handle);
+  return play;
+}
+
+// Lets mouse, touch and keys turn the gaze, and paints again whenever what a canvas shows may look different.
+function turnable(canvas, repaint) {
+  const turn = (yaw, pitch, zoom) => {
+    gaze.yaw += yaw;
+    gaze.pitch = Math.max(-1.5, Math.min(1.5, gaze.pitch + pitch));
+    gaze.zoom = Math.max(0.4, Math.min(4, gaze.zoom * zoom));
+    repaint();
+  };
+  const held = new Map();
+  const apart = () => {
+    const [a, b] = [...held.values()];
+    return Math.hypot(a[0] - b[0], a[1] - b[1]);
+  };
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    held.set(event.pointerId, [event.clientX, event.clientY]);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const before = held.get(event.pointerId);
+    if (!before) return;
+    const wide = held.size === 2 ? apart() : 0;
+    held.set(event.pointerId, [event.clientX, event.clientY]);
+    if (held.size === 2) return turn(0, 0, apart() / Math.max(wide, 1));
+    turn((before[0] - event.clientX) / 120, (event.clientY - before[1]) / 120, 1);
+  });
+  for (const name of ["pointerup", "pointercancel"])
+    canvas.addEventListener(name, (event) => held.delete(event.pointerId));
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      turn(0, 0, event.deltaY < 0 ? 1.1 : 1 / 1.1);
+    },
+    { passive: false },
+  );
+  const turns = {
+    ArrowLeft: [0.12, 0, 1],
+    ArrowRight: [-0.12, 0, 1],
+    ArrowUp: [0, 0.12, 1],
+    ArrowDown: [0, -0.12, 1],
+    "+": [0, 0, 1.1],
+    "=": [0, 0, 1.1],
+    "-": [0, 0, 1 / 1.1],
+  };
+  canvas.addEventListener("keydown", (event) => {
+    if (!turns[event.key] || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    turn(...turns[event.key]);
+  });
+  new ResizeObserver(repaint).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+}

@@ -1,0 +1,28 @@
+"""The colours of a track's viewer, for light and for dark screens: those of its pictures, where a screen is dark."""
+
+from posefit.tracking.drawing.colours import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
+
+# of tracks, on any page: the limbs of a body, and the truth
+BODY_LIGHT = {"left": "#d55e00", "right": "#0072b2", "truth": "#7a8794"}
+BODY_DARK = {"left": hexadecimal(LEFT), "right": hexadecimal(RIGHT), "truth": "#98a5b3"}
+
+LIGHT = {
+    **BODY_LIGHT,
+    "middle": "#8d97a3",
+    "both": "#8fc3a3",
+    "missed": "#c8372d",
+    "spilled": "#3b8fd1",
+    "other": "#9a3f86",
+    "unsure": "#0072b2",
+    "held": "#7a8794",
+}
+DARK = {
+    **BODY_DARK,
+    "middle": hexadecimal(MIDDLE),
+    "both": hexadecimal(BOTH),
+    "missed": hexadecimal(MISSED),
+    "spilled": hexadecimal(SPILLED),
+    "other": hexadecimal(OTHER),
+    "unsure": hexadecimal(RIGHT),
+    "held": "#98a5b3",
+}

@@ -1,0 +1,172 @@
+"""What the viewer shows of a track, as data: bodies, figures, intervals, and words."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Frame
+from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
+from posefit.measuring.angles import COLUMNS, clinical_angles
+from posefit.measuring.centres import PLACES
+from posefit.motion.motion import Motion
+from posefit.page.bodies import camera_seen_from, in_16_bits
+from posefit.posterior.modes import other_mode
+from posefit.tracking.evaluation import LOST
+from posefit.tracking.formats import Rows, State
+from posefit.tracking.measures import FRAME
+from posefit.tracking.page.album import Album
+from posefit.tracking.picture import LIKELY
+from posefit.tracking.table import undetermined
+from posefit.version import __version__
+
+TENTH = 0.1  # degrees: the unit of angles in a page
+UNIT = np.radians(TENTH)
+CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "seconds")
+
+
+def track_data(
+    scene: Scene,
+    estimate: Motion,
+    frames: Sequence[Frame],
+    rows: Rows,
+    summary: State,
+    sure: Mapping[str, Array],
+    album: Album,
+) -> dict[str, Any]:
+    """Return everything that the viewer shows; `sure` is what `posefit.tracking.formats.intervals_of` gave.
+
+    Joints are millimetres from the first place of the root and angles tenths of a degree, in 16 bits each. Of a long
+    track every `step`-th frame is there; a frame is marked if one of those that it stands for is.
+    """
+    step, skeleton = album.step, estimate.skeleton
+    joints = skeleton.joints(estimate.poses, estimate.translations)[::step]
+    origin = np.round(joints[0, 0], 3)
+    truth, free = scene.truth, skeleton.free
+    true = None if truth is None else truth.skeleton.joints(truth.poses, truth.translations)[::step]
+    angles = np.unwrap(estimate.poses[::step], axis=0)
+    said = {name: values[::step] for name, values in sure.items() if name != "levels"}
+    return {
+        "version": __version__,
+        "title": str(summary["motion"]),
+        "told": _told(summary),
+        "notes": [*_held(summary), *map(str, summary["warnings"])],
+        "facts": _facts(summary),
+        "joints": JOINTS,
+        "places": [_words(place) for place in PLACES],
+        "parents": PARENTS,
+        "sides": SIDES,
+        "radii": np.round(scene.body.radii, 4).tolist(),
+        "count": len(frames),
+        "step": step,
+        "fps": estimate.fps,
+        "cameras": [camera_seen_from(camera, origin) for camera in scene.cameras],
+        **album.as_dict(),
+        "estimate": in_16_bits(joints - origin),
+        "truth": None if true is None else in_16_bits(true - origin),
+        "others": _others(scene, frames[::step], origin),
+        "columns": {name: _column(name) for name in CURVES if name in rows[0]},
+        "rows": {name: [row[name] for row in rows[::step]] for name in CURVES if name in rows[0]},
+        "marks": {
+            "held": _marked([not row["usable"] for row in rows], step),
+            "lost": _marked([row["lost"] >= LOST for row in rows], step),
+            "unknown": _marked([row["unknown_sides"] == 1.0 for row in rows], step),
+        },
+        "angles": {
+            "names": [name for name, there in zip(_angle_names(), free, strict=True) if there],
+            "values": in_16_bits(angles[:, free], UNIT),
+            "truth": None if truth is None else in_16_bits(_beside(angles, truth.poses[::step])[:, free], UNIT),
+        },
+        "clinical": {
+            "names": [_words(name) for name in COLUMNS],
+            "values": in_16_bits(_clinical(estimate, step), TENTH),
+            "truth": None if truth is None else in_16_bits(_clinical(truth, step), TENTH),
+        },
+        "intervals": None
+        if not said
+        else {
+            "levels": [round(100 * level) for level in sure["levels"].tolist()],
+            "joints": in_16_bits(said["joint_radii"]),
+            "angles": in_16_bits(said["angle_halves"][..., free], UNIT),
+        },
+    }
+
+
+def _told(summary: State) -> str:
+    """Return the sentence that says what was not determined."""
+    if told := undetermined(summary):
+        return f"Not determined: {told}."
+    silent = [
+        words
+        for name, words in (("unknown_sides", "which side is left"), ("lost_frames", "which frames are lost"))
+        if summary[name] is None
+    ]
+    if silent:
+        return f"The method does not say {' or '.join(silent)}: that nothing is marked does not mean that all is right."
+    return "The method calls left and right known in every frame, and no frame lost."
+
+
+def _held(summary: State) -> list[str]:
+    held = summary["held_frames"]
+    show = "shows" if held == 1 else "show"
+    return [f"{held} of {summary['frames']} frames {show} too little of the person: the pose is held."] if held else []
+
+
+def _facts(summary: State) -> list[list[str]]:
+    """Return names and values of what the track was made with."""
+    known = [
+        ("method", str(summary["method"])),
+        ("seed", str(summary["seed"])),
+        ("cameras", f"{summary['views']}, {summary['camera']}"),
+        ("translation", str(summary["translation"])),
+        ("IoU", f"{summary['iou']:.3f}"),
+        ("posefit", str(summary["version"])),
+    ]
+    if summary["mpjpe_mm"] is not None:
+        known.insert(0, ("MPJPE", f"{summary['mpjpe_mm']:.0f} mm"))
+    return [list(pair) for pair in known]
+
+
+def _column(name: str) -> dict[str, Any]:
+    measure = FRAME[name]
+    return {"label": measure.label, "unit": measure.unit, "digits": measure.digits, "factor": measure.factor}
+
+
+def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
+    """Return what else frames may show, where that is likely: their numbers among those shown, weights and joints."""
+    skeleton = scene.body.skeleton
+    found = [other_mode(skeleton, frame.modes, frame.pose, LIKELY) for frame in frames]
+    there = {k: mode for k, mode in enumerate(found) if mode is not None}
+    joints = [skeleton.joints(mode.pose, mode.translation) - origin for mode in there.values()]
+    return {
+        "at": list(there),
+        "weights": [mode.weight for mode in there.values()],
+        "joints": in_16_bits(np.array(joints)),
+    }
+
+
+def _marked(said: Sequence[bool], step: int) -> list[int]:
+    """Return the frames shown that stand for one of which it is said."""
+    return sorted({k // step for k, one in enumerate(said) if one})
+
+
+def _angle_names() -> list[str]:
+    inner = [f"{JOINTS[joint]} {axis} (bone to the {_words(PLACES[joint])})" for joint in INNER for axis in "xyz"]
+    return ["root yaw", "root pitch", "root roll", *inner]
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _clinical(motion: Motion, step: int) -> Array:
+    """Return the clinical angles (T, n) in degrees of every `step`-th frame."""
+    found = clinical_angles(motion.skeleton, motion.poses[::step])
+    return np.column_stack([found[name] for name in COLUMNS])
+
+
+def _beside(angles: Array, true: Array) -> Array:
+    """Return the same true angles (T, n), by as many whole turns as bring them nearest to others."""
+    return np.asarray(true + 2.0 * np.pi * np.round((angles - true) / (2.0 * np.pi)))

@@ -1,0 +1,227 @@
+// The two views of a frame: what a camera saw with the body on it, and the body in 3D.
+const SURE = 0.05; // metres: a joint's 80 % interval, up to which a limb is drawn solid,
+const UNSURE = 0.3; // and from which on it is faintest
+const FAINTEST = 0.2; // how much of a faintest limb's colour is left
+const SOLID = 0.65; // how much of what was filmed the body hides
+const CLOSE = 1.4; // times the body's height is that of a close-up, which is
+const CALM = 6; // centred on the mean over so many frames to either side
+const show = { frame: 0, camera: 0 };
+const shown = Math.ceil(D.count / D.step); // frames of this page
+const estimateAt = decoded(D.estimate);
+const truthAt = D.truth ? decoded(D.truth) : null;
+const otherAt = decoded(D.others.joints);
+const radiusAt = D.intervals ? unpacked(D.intervals.joints) : () => null;
+
+// Metres that a joint may be off at a level; null where nobody says.
+function radius(frame, level, joint) {
+  const value = radiusAt((frame * D.intervals.levels.length + level) * D.joints.length + joint);
+  return given(value) ? value / 1000 : null;
+}
+
+// How solid each bone is drawn, 0 to 1: as sure as the less sure of its ends.
+function solids(frame) {
+  if (!D.intervals) return BONES.map(() => 1);
+  const level = D.intervals.levels.indexOf(80);
+  const each = D.joints.map((_, joint) => {
+    const off = radius(frame, level, joint) ?? 0;
+    return Math.max(FAINTEST, Math.min(1, (UNSURE - off) / (UNSURE - SURE)));
+  });
+  return BONES.map(([parent, joint]) => Math.min(each[parent], each[joint]));
+}
+
+// What else a frame may show: its weight and joints; null where nothing else is likely.
+function otherOf(frame) {
+  const place = D.others.at.indexOf(frame);
+  return place < 0 ? null : { weight: D.others.weights[place], joints: otherAt(place) };
+}
+
+// A picture by its data: it is there once it is decoded, and then everything is painted again.
+const pictures = new Map();
+function pictureOf(uri) {
+  if (!pictures.has(uri)) {
+    const image = new Image();
+    image.onload = paint;
+    image.src = uri;
+    pictures.set(uri, image);
+  }
+  const image = pictures.get(uri);
+  return image.complete && image.naturalWidth ? image : null;
+}
+
+// Draws what was filmed in a frame: all of it, coarse, and the part about the person.
+function photograph(pen, size, [box, near, coarse]) {
+  const [behind, person] = [pictureOf(coarse), pictureOf(near)];
+  if (behind) pen.drawImage(behind, 0, 0, size[0], size[1]);
+  if (person) pen.drawImage(person, ...box);
+}
+
+// The pen of a sheet as large as another canvas, for what has to be put together before it is drawn there.
+function layer(canvas) {
+  const { width, height } = canvas;
+  const pen = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
+  pen.lineCap = pen.lineJoin = "round";
+  return pen;
+}
+
+// Of each camera, where the body's middle is and how tall it is in pixels, frame by frame.
+const framed = D.cameras.map((camera) =>
+  range(shown).map((frame) => {
+    const pixels = seen(camera, estimateAt(frame)).filter(([, , depth]) => depth > NEAR);
+    const [xs, ys] = [0, 1].map((k) => pixels.map((pixel) => pixel[k]));
+    const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    return pixels.length ? { x: (left + right) / 2, y: (top + bottom) / 2, tall: bottom - top } : null;
+  }),
+);
+const middle = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
+
+// How many times larger a picture of a camera is in a close-up: so that most of its height is the body's.
+function closeness(camera) {
+  const tall = framed[camera].filter(given).map((one) => one.tall);
+  return tall.length ? Math.max(1, Math.min(6, D.cameras[camera].size[1] / (CLOSE * Math.max(middle(tall), 1)))) : 1;
+}
+
+// The part of a camera's picture that is shown: its left and top, and how many times larger it is.
+function part(frame) {
+  const [wide, high] = D.cameras[show.camera].size;
+  const zoom = $("close-up").checked ? closeness(show.camera) : 1;
+  const about = framed[show.camera].slice(Math.max(0, frame - CALM), frame + CALM + 1).filter(given);
+  if (zoom === 1 || !about.length) return { left: 0, top: 0, zoom: 1 };
+  const mean = (name) => about.reduce((sum, one) => sum + one[name], 0) / about.length;
+  const within = (centre, side) => Math.max(0, Math.min(side - side / zoom, centre - side / zoom / 2));
+  return { left: within(mean("x"), wide), top: within(mean("y"), high), zoom };
+}
+
+// A body of tapered cones, far ones first; what lies behind shows through where it is not solid.
+function cones(pen, camera, pixels, solid, width) {
+  const colours = limbs();
+  const edge = ink("--back");
+  const far = BONES.map(([parent, joint]) => pixels[parent][2] + pixels[joint][2]);
+  const order = range(BONES.length).sort((a, b) => far[b] - far[a]);
+  for (const bone of order) {
+    const path = new Path2D();
+    if (!addCone(path, camera, pixels, D.radii, bone)) continue;
+    pen.globalAlpha = solid[bone];
+    pen.strokeStyle = edge;
+    pen.lineWidth = width;
+    pen.stroke(path);
+    pen.fillStyle = colours[D.sides[BONES[bone][1]]];
+    pen.fill(path);
+  }
+  pen.globalAlpha = 1;
+}
+
+// A mask that is clear where its picture is black.
+const cut = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+function cutOut(image) {
+  Object.assign(cut.canvas, { width: image.naturalWidth, height: image.naturalHeight });
+  cut.drawImage(image, 0, 0);
+  const held = cut.getImageData(0, 0, cut.canvas.width, cut.canvas.height);
+  for (let k = 0; k < held.data.length; k += 4) held.data[k + 3] = held.data[k];
+  cut.putImageData(held, 0, 0);
+  return cut.canvas;
+}
+
+// Where mask and body agree, and where they do not, each in its colour.
+function agreement(pen, size, [box, uri], path) {
+  const mask = pictureOf(uri);
+  if (mask) {
+    pen.drawImage(cutOut(mask), ...box);
+    pen.globalCompositeOperation = "source-in";
+    pen.fillStyle = ink("--missed");
+    pen.fillRect(0, 0, size[0], size[1]);
+  }
+  if (path) {
+    pen.globalCompositeOperation = "source-atop";
+    pen.fillStyle = ink("--both");
+    pen.fill(path);
+    pen.globalCompositeOperation = "destination-over";
+    pen.fillStyle = ink("--spilled");
+    pen.fill(path);
+  }
+  pen.globalCompositeOperation = "source-over";
+}
+
+// The strip of a camera's pictures that is shown: what was filmed, if that is wanted, or the masks.
+const filmed = () => (show.camera === 0 && D.film && $("with-film").checked ? D.film : null);
+
+function paintPicture() {
+  const camera = D.cameras[show.camera];
+  const canvas = $("picture");
+  const { pen, width } = sheet(canvas, camera.size[1] / camera.size[0]);
+  const scale = width / camera.size[0];
+  const film = filmed();
+  const masks = D.masks[show.camera];
+  const body = $("with-body").checked;
+  const masked = $("with-mask").checked;
+  const every = Math.max(film ? film.every : 1, masked || !film ? masks.every : 1);
+  const frame = Math.floor((show.frame * D.step) / every) * (every / D.step); // all is drawn as it was in the picture
+  const { left, top, zoom } = part(frame);
+  const factor = zoom * scale;
+  pen.scale(factor, factor);
+  pen.translate(-left, -top);
+  const of = (strip) => strip.pictures[Math.min((frame * D.step) / strip.every, strip.pictures.length - 1)];
+  if (film) photograph(pen, camera.size, of(film));
+  const pixels = seen(camera, estimateAt(frame));
+  const over = layer(canvas);
+  over.setTransform(pen.getTransform());
+  const solid = solids(frame);
+  if (masked) {
+    agreement(over, camera.size, of(masks), body ? outline(camera, pixels, D.radii) : null);
+  } else if (body) cones(over, camera, pixels, solid, 1.5 / factor);
+  pen.globalAlpha = film ? SOLID : 1;
+  pen.drawImage(over.canvas, left, top, camera.size[0] / zoom, camera.size[1] / zoom);
+  pen.globalAlpha = 1;
+  if (!body) return frame;
+  if (masked) sticks(pen, pixels, limbs(), 2.5 / factor);
+  const other = otherOf(frame);
+  if (other) sticks(pen, seen(camera, other.joints), ink("--other"), 2.5 / factor);
+  return frame;
+}
+
+const lowest = (at) => Math.min(...range(shown).map((k) => Math.min(...at(k).map((point) => point[1]))));
+const floor = lowest(truthAt ?? estimateAt);
+
+function paintBody() {
+  const joints = estimateAt(show.frame);
+  const canvas = $("turning");
+  const { pen, camera } = stage(canvas, joints[0], floor, canvas.clientWidth < 420 ? 0.9 : 0.75);
+  cones(pen, camera, seen(camera, joints), solids(show.frame), 1.5);
+  if (truthAt && $("with-truth").checked) sticks(pen, seen(camera, truthAt(show.frame)), ink("--ink"), 1.5);
+  const other = otherOf(show.frame);
+  if (other) sticks(pen, seen(camera, other.joints), ink("--other"), 2.5);
+}
+
+// Looks from where the first camera stands, turned by some radians to its right, and from so high up.
+function look(right, up) {
+  const [x, , z] = D.cameras[0].rotation[2];
+  gaze.yaw = Math.atan2(-x, -z) + right;
+  gaze.pitch = up;
+  paint();
+}
+
+// An entry of a legend: a patch of a colour, or a line, and what it means.
+function entry(colour, words, thin) {
+  const patch = draw(
+    "svg",
+    { width: 16, height: 12, "aria-hidden": "true" },
+    draw("rect", { y: thin ? 5 : 0, width: 16, height: thin ? 2.5 : 12, style: `fill: var(${colour})` }),
+  );
+  return make("li", {}, patch, words);
+}
+
+function legends() {
+  const masked = $("with-mask").checked;
+  const body = $("with-body").checked;
+  const fit = [
+    body ? entry("--both", "mask and body") : null,
+    entry("--missed", body ? "mask only" : "mask"),
+    body ? entry("--spilled", "body only") : null,
+  ];
+  const sides = () => [entry("--left", "left limbs"), entry("--right", "right limbs")];
+  const may = () => (D.others.at.length ? entry("--other", "may be this, too", true) : null);
+  const truth = truthAt && $("with-truth").checked ? entry("--ink", "truth", true) : null;
+  const faint = D.intervals ? make("li", {}, "faint: unsure") : null;
+  const below = (id, entries) => $(id).replaceChildren(...entries.filter(given));
+  below("picture-legend", [...(masked ? fit : []), ...(body ? [...sides(), may()] : [])]);
+  below("turning-legend", [...sides(), truth, may(), faint]);
+}

@@ -1,0 +1,332 @@
+"""The viewer of a track in a real browser: it opens without a complaint, and video, body and curves move together."""
+
+import base64
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from posefit.silhouette.cost import project
+from tests.report.browser import Watched, browser, opened
+from tests.tracking.viewing import SIZE, doubting, right, viewed, walk
+
+FRAMES = 12
+MIRRORED = [0.0, 0.0, 0.3, 0.4, 0.15, *[0.0] * 7]
+LOST, HELD = 5, 1
+EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028'\"&"
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def doubtful(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the viewer of a track in two cameras, of which one frame is held, two may be mirrored, and one is lost."""
+    scene = walk(FRAMES, [45.0, 135.0])
+    seen = list(scene.observations)
+    seen[HELD] = replace(seen[HELD], usable=False)
+    frames = [replace(one, lost=0.9 if k == LOST else 0.1) for k, one in enumerate(doubting(scene, MIRRORED))]
+    return viewed(tmp_path_factory.mktemp("doubtful") / "out", replace(scene, observations=seen), frames)
+
+
+@pytest.fixture(scope="module")
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the viewer of a track that somebody filmed, whose truth nobody knows, and which has a hostile name."""
+    scene = walk(FRAMES)
+    pictures = [np.full((SIZE[1], SIZE[0], 3), (20 * k, 200, 40), np.uint8) for k in range(FRAMES)]
+    unknown = replace(scene, truth=None, name=EVIL, warnings=[EVIL], pictures=lambda: iter(pictures))
+    return viewed(tmp_path_factory.mktemp("filmed") / "out", unknown, right(scene))
+
+
+def picture(page: Any, canvas: str) -> Any:
+    """Return what a canvas shows, (height, width, 4)."""
+    text = page.evaluate("id => document.getElementById(id).toDataURL()", canvas).partition(",")[2]
+    return cv2.imdecode(np.frombuffer(base64.b64decode(text), np.uint8), cv2.IMREAD_UNCHANGED)
+
+
+def waited(seen: Watched, condition: Callable[[], Any]) -> None:
+    """Wait until something is so: two minutes at the most."""
+    for _ in range(3000):
+        if condition():
+            return
+        seen.page.wait_for_timeout(40)
+    raise AssertionError("it never came to be so")
+
+
+def reading(page: Any) -> str:
+    return str(page.locator("#reading").inner_text())
+
+
+def state(page: Any) -> tuple[bytes, bytes, tuple[str, ...]]:
+    """Return what the two canvases show, and where the lines of the curves are."""
+    lines = page.locator("svg .now").evaluate_all("all => all.map((one) => one.getAttribute('transform'))")
+    return picture(page, "picture").tobytes(), picture(page, "turning").tobytes(), tuple(lines)
+
+
+@pytest.mark.parametrize("width", [320, 390, 1280])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("which", ["doubtful", "filmed"])
+def test_it_opens_without_a_complaint_and_asks_for_nothing_else(
+    chromium: Any, request: pytest.FixtureRequest, which: str, width: int, scheme: str
+) -> None:
+    path = request.getfixturevalue(which)
+    with opened(chromium, path, width, color_scheme=scheme) as seen:
+        assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+        for canvas in ("picture", "turning"):
+            waited(seen, lambda name=canvas: (picture(seen.page, name)[..., 3] > 0).mean() > 0.02)
+        for select in ("figure", "joint"):
+            for option in seen.page.locator(f"#{select} option").evaluate_all("all => all.map((one) => one.value)"):
+                seen.page.locator(f"#{select}").select_option(value=option)
+                assert seen.page.locator(f"#{select}-chart svg path").count() >= 1
+        seen.page.locator("summary").click()
+        assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+        assert seen.complaints == []
+        assert [one for one in seen.requests if not one.startswith("data:")] == [path.as_uri()]
+
+
+def test_the_slider_moves_picture_body_and_curves_together(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful) as seen:
+        page = seen.page
+        before = state(page)
+        assert len(before[2]) == 3
+        page.locator("#frame").fill("7")
+        waited(seen, lambda: all(new != old for new, old in zip(state(page), before, strict=True)))
+        assert len(set(state(page)[2])) == 1
+        assert reading(page).startswith(f"frame 7 of {FRAMES}, 0.23 s; MPJPE 0 mm; IoU 1.000; cost 0.00")
+        assert page.locator("#frame").get_attribute("aria-valuetext") == reading(page)
+        assert page.locator("#turning").get_attribute("aria-label").endswith(reading(page))
+
+
+def test_it_plays_and_stops(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful, 390) as seen:
+        page, readings = seen.page, set()
+        page.locator("#speed").select_option("0.5")
+        page.locator("#play").click()
+        assert page.locator("#play").inner_text() == "Pause"
+        waited(seen, lambda: readings.add(reading(page)) or len(readings) > 3)
+        page.locator("#play").click()
+        assert page.locator("#play").inner_text() == "Play"
+        still = reading(page)
+        page.wait_for_timeout(300)
+        assert reading(page) == still
+        assert seen.complaints == []
+
+
+def test_keys_go_from_frame_to_frame_and_to_what_is_marked(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful) as seen:
+        page = seen.page
+
+        def after(*keys: str) -> int:
+            for key in keys:
+                page.keyboard.press(key)
+            return int(reading(page).split()[1])
+
+        assert [after("ArrowRight"), after("ArrowRight"), after("ArrowLeft")] == [1, 2, 1]
+        assert [after("End"), after("ArrowRight"), after("Home"), after("ArrowLeft")] == [11, 11, 0, 0]
+        assert [after("Shift+ArrowRight"), after("Home")] == [10, 0]
+        assert [after("n") for _ in range(5)] == [HELD, 2, 3, LOST, HELD]
+        assert after("p") == LOST
+        page.keyboard.press(" ")
+        assert page.locator("#play").inner_text() == "Pause"
+        page.keyboard.press(" ")
+        page.locator("#frame").focus()
+        assert [after("Home"), after("ArrowRight")] == [0, 1]
+        page.locator("#figure").focus()
+        assert after("ArrowDown") == 1  # a list's keys are its own
+        page.locator("#with-body").focus()
+        page.keyboard.press(" ")
+        assert not page.locator("#with-body").is_checked()
+        assert page.locator("#play").inner_text() == "Play"
+
+
+def test_the_body_turns_by_mouse_and_keys_and_stands_as_somebody_sees_it(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful, 390, has_touch=True) as seen:
+        page = seen.page
+        page.locator("#turning").scroll_into_view_if_needed()
+        box = page.locator("#turning").bounding_box()
+        shown = [picture(page, "turning").tobytes()]
+
+        def drag() -> None:
+            page.mouse.move(box["x"] + 50, box["y"] + 50)
+            page.mouse.down()
+            page.mouse.move(box["x"] + 120, box["y"] + 80, steps=3)
+            page.mouse.up()
+
+        def focused(key: str) -> Callable[[], None]:
+            return lambda: page.locator("#turning").press(key)
+
+        clicks = [page.locator(f"#from-{one}").click for one in ("camera", "side", "above")]
+        for act in [drag, focused("ArrowLeft"), focused("ArrowUp"), focused("+"), *clicks]:
+            act()
+            shown.append(picture(page, "turning").tobytes())
+            assert shown[-1] != shown[-2]
+        assert reading(page).startswith("frame 0 of")  # the same keys turn the body here, and change no frame
+        page.locator("#with-truth").check()
+        assert picture(page, "turning").tobytes() != shown[-1]
+
+
+@pytest.mark.parametrize("camera", [0, 1])
+def test_the_body_is_where_the_camera_sees_it(chromium: Any, doubtful: Path, camera: int) -> None:
+    scene = walk(FRAMES, [45.0, 135.0])
+    assert scene.truth is not None
+    with opened(chromium, doubtful) as seen:
+        page = seen.page
+        page.locator("#camera").select_option(index=camera)
+        for box in ("close-up", "with-mask"):
+            page.locator(f"#{box}").uncheck()
+        page.locator("#frame").fill("8")
+        assert page.locator("#picture").get_attribute("aria-label").startswith(f"Camera {camera + 1} with the body on")
+        drawn = cv2.resize((picture(page, "picture")[..., 3] > 100).astype(np.uint8), SIZE) > 0
+        page.locator("#with-body").uncheck()
+        page.locator("#with-mask").check()
+        waited(seen, lambda: (picture(page, "picture")[..., 3] > 0).any())
+        mask = cv2.resize((picture(page, "picture")[..., 3] > 100).astype(np.uint8), SIZE) > 0
+    true = project(scene.body, scene.cameras[camera], scene.truth.poses[8], scene.truth.translations[8])
+    for one in (drawn, mask):
+        assert (one & true).sum() / (one | true).sum() > 0.95
+
+
+def pixels(image: Any, colour: str) -> int:
+    """Return how many pixels have a colour, or nearly."""
+    wanted = np.array([int(colour[k : k + 2], 16) for k in (5, 3, 1)])
+    return int(((np.abs(image[..., :3].astype(int) - wanted).max(axis=2) < 12) & (image[..., 3] > 200)).sum())
+
+
+def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful, color_scheme="light") as seen:
+        page = seen.page
+        for frame, weight in ((2, 30), (3, 40), (4, 0)):
+            page.locator("#frame").fill(str(frame))
+            assert (f"may be the thin bones: {weight} %" in reading(page)) == (weight > 20)
+            for canvas in ("picture", "turning"):
+                assert (pixels(picture(page, canvas), "#9a3f86") > 60) == (weight > 20), (frame, canvas)
+
+
+def test_doubtful_frames_are_marked_and_said(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful) as seen:
+        page = seen.page
+        told = page.locator("#told").inner_text()
+        assert told == "Not determined: left and right: unknown in 2 of 12 frames; 1 frame lost."
+        assert page.locator("#notes").inner_text().startswith("1 of 12 frames shows too little of the person")
+        said = page.locator("#marks li").all_inner_texts()
+        assert said == [
+            "lost: 1 frame",
+            "left and right unknown: 2 frames",
+            "pose held: too little is seen: 1 frame",
+        ]
+        chart = page.locator("#sure-chart")
+        assert [chart.locator(f".mark.{name}").count() for name in ("lost", "unknown", "held")] == [1, 1, 1]
+        assert chart.locator("polygon").count() == 3  # 50, 80 and 95 %
+        wide = [chart.locator(f".mark.{name}").bounding_box()["width"] for name in ("lost", "unknown")]
+        assert wide[1] == pytest.approx(2 * wide[0], rel=0.05)
+        page.locator("#frame").fill(str(LOST))
+        assert reading(page).endswith("; lost")
+
+
+def test_a_joint_has_intervals_and_a_clinical_angle_has_none(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful) as seen:
+        page = seen.page
+        for label, bands, said in (
+            ("left ankle: height, m", 3, "dashed: the truth, with intervals of 50, 80, 95 %"),
+            ("left knee flexion, degrees", 0, "dashed: the truth"),
+            ("root yaw: angle, degrees", 3, "dashed: the truth, with intervals of 50, 80, 95 %"),
+        ):
+            page.locator("#joint").select_option(label=label)
+            assert page.locator("#joint-chart polygon").count() == bands
+            assert page.locator("#joint-caption").inner_text() == said
+
+
+def test_a_single_frame_has_no_player_and_no_curves(chromium: Any, tmp_path: Path) -> None:
+    scene = walk(1)
+    with opened(chromium, viewed(tmp_path / "out", scene, right(scene)), 390) as seen:
+        assert seen.page.locator("#lead").inner_text() == "A single frame."
+        assert not seen.page.locator("#frame").is_visible()
+        assert seen.page.locator("#curves").count() == 0
+        seen.page.keyboard.press("n")
+        assert reading(seen.page).startswith("frame 0 of 1, 0.00 s; MPJPE 0 mm")
+        assert seen.complaints == []
+
+
+def test_a_click_in_a_curve_goes_to_its_frame(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful) as seen:
+        page = seen.page
+        page.locator("#joint-chart").scroll_into_view_if_needed()
+        box = page.locator("#joint-chart svg").bounding_box()
+        page.mouse.click(box["x"] + box["width"] - 13, box["y"] + 30)
+        assert reading(page).startswith("frame 11 of")
+        page.mouse.click(box["x"] + 49, box["y"] + 30)
+        assert reading(page).startswith("frame 0 of")
+
+
+def test_what_was_filmed_lies_behind_the_body_and_can_be_hidden(chromium: Any, filmed: Path) -> None:
+    with opened(chromium, filmed) as seen:
+        page = seen.page
+        page.locator("#with-body").uncheck()
+        for frame in (0, 9):
+            page.locator("#frame").fill(str(frame))
+            wanted = np.array([20 * frame, 200, 40])
+            waited(seen, lambda w=wanted: np.abs(picture(page, "picture")[5, 5, :3].astype(int) - w).max() < 8)
+        page.locator("#with-film").uncheck()
+        assert picture(page, "picture")[5, 5, 3] == 0
+        page.locator("#with-film").check()
+        page.locator("#with-mask").check()
+        waited(seen, lambda: (np.abs(picture(page, "picture").astype(int) - [180, 200, 40, 255]).max(2) > 40).any())
+
+
+def test_names_are_text_and_what_nobody_says_is_not_shown(chromium: Any, filmed: Path) -> None:
+    with opened(chromium, filmed) as seen:
+        page = seen.page
+        assert page.locator("#title").text_content() == EVIL
+        assert page.locator("#notes").text_content().endswith(EVIL)
+        told = page.locator("#told").inner_text()
+        assert told.startswith("The method does not say which side is left or which frames are lost: that nothing is")
+        for hidden in ("#sure", "#doubtful", "#truth-label", "#camera-label"):
+            assert not page.locator(hidden).is_visible()
+        assert "MPJPE" not in page.locator("body").inner_text()
+        assert seen.complaints == []
+
+
+CONTRASTS = """() => {
+  const parts = (text) => text.match(/[\\d.]+/g).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((one) => one / 255)
+    .map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, one, k) => sum + [0.2126, 0.7152, 0.0722][k] * one, 0);
+  const found = [];
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const node = walker.currentNode.parentElement;
+    if (!walker.currentNode.data.trim() || node.closest("script, noscript, [hidden]")) continue;
+    const style = getComputedStyle(node);
+    let under = node;
+    while (under && (parts(getComputedStyle(under).backgroundColor)[3] ?? 1) === 0) under = under.parentElement;
+    const [ink, back] = [node.closest("svg") ? style.fill : style.color, getComputedStyle(under).backgroundColor]
+      .map((one) => light(parts(one)));
+    found.push([walker.currentNode.data.trim(), (Math.max(ink, back) + 0.05) / (Math.min(ink, back) + 0.05)]);
+  }
+  return found;
+}"""
+NAMELESS = """() => [...document.querySelectorAll("button, input, select, canvas, svg, section")]
+  .filter((one) => !one.closest("[hidden], [aria-hidden=true]"))
+  .filter((one) => !(one.getAttribute("aria-label") || one.getAttribute("aria-labelledby") ||
+    one.closest("label")?.textContent.trim() || (one.tagName === "BUTTON" && one.textContent.trim())))
+  .map((one) => one.outerHTML.slice(0, 80))"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("which", ["doubtful", "filmed"])
+def test_words_can_be_read_and_everything_has_a_name(
+    chromium: Any, request: pytest.FixtureRequest, which: str, scheme: str
+) -> None:
+    with opened(chromium, request.getfixturevalue(which), color_scheme=scheme) as seen:
+        seen.page.locator("summary").click()
+        contrasts = seen.page.evaluate(CONTRASTS)
+        assert len(contrasts) > 40
+        assert [(words, ratio) for words, ratio in contrasts if ratio < 4.5] == []
+        assert seen.page.evaluate(NAMELESS) == []

@@ -1,0 +1,210 @@
+"""What the viewer of a track holds: pictures within their room, all of a long track's marks, and nothing from outside."""
+
+import base64
+import html.parser
+import json
+import re
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from posefit.fitting.tracker import Observation
+from posefit.footage.scene import Scene
+from posefit.measuring.angles import clinical_angles
+from posefit.page.document import embedded
+from posefit.silhouette.mask import Silhouette
+from posefit.tracking.page import album
+from posefit.tracking.page.album import Album, Strip
+from posefit.tracking.page.content import _beside, _marked
+from tests.tracking.viewing import SIZE, doubting, right, viewed, walk
+
+
+def held(page: Path) -> dict[str, Any]:
+    """Return the data of a page."""
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page.read_text("utf-8"))
+    assert found
+    return dict(json.loads(found[1]))
+
+
+def numbers(text: str) -> Any:
+    return np.frombuffer(base64.b64decode(text), "<i2").astype(float)
+
+
+def image(uri: str) -> Any:
+    return cv2.imdecode(np.frombuffer(base64.b64decode(uri.partition(",")[2]), np.uint8), cv2.IMREAD_UNCHANGED)
+
+
+@pytest.mark.parametrize(
+    ("count", "room", "every"), [(7, 70, 1), (8, 70, 2), (14, 70, 2), (15, 70, 4), (100, 10, 128), (3, 0, 4)]
+)
+def test_a_strip_keeps_what_it_has_room_for_evenly(count: int, room: int, every: int) -> None:
+    strip = Strip(room, 1)
+    for k in range(count):
+        strip.add((k, 0, 1, 1), lambda k=k: [f"{k:06d}", "more"])  # type: ignore[misc]
+    assert strip.every == every
+    assert [int(one) for _, (one, _) in strip.pictures] == list(range(0, count, every))
+    assert [box[0] for box, _ in strip.pictures] == list(range(0, count, every))
+
+
+def test_of_a_long_track_a_picture_is_always_of_a_frame_that_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(album, "FRAMES", 10)
+    scene = replace(walk(2), count=41)
+    pictures, (frame, _) = Album(scene), right(walk(2))
+    assert pictures.step == 8
+    for k in range(41):
+        mask = np.ones(SIZE[::-1], bool)  # so large that all of it is shown
+        mask[100, : k + 1] = False
+        pictures.add(frame, Observation([Silhouette.of(mask)]), None)
+    (masks,) = pictures.as_dict()["masks"]
+    assert masks["every"] == 8
+    assert [box for box, _ in masks["pictures"]] == [[0, 0, *SIZE]] * 6
+    assert [int((image(one) == 0).sum()) for _, one in masks["pictures"]] == [1, 9, 17, 25, 33, 41]
+
+
+def test_a_picture_is_of_the_part_that_mask_and_body_are_in() -> None:
+    scene = walk(1)
+    (frame,), seen = right(scene), scene.observations[0]
+    mask = seen.silhouettes[0].mask
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+
+    def about(shown: Any) -> Any:
+        pictures = Album(scene)
+        pictures.add(frame, Observation([Silhouette.of(shown)]), None)
+        ((box, uri),) = pictures.as_dict()["masks"][0]["pictures"]
+        left, top, width, high = box
+        np.testing.assert_array_equal(image(uri) > 0, shown[top : top + high, left : left + width])
+        return box
+
+    left, top, width, high = about(mask)
+    assert (top, high) == (0, SIZE[1])  # the person fills the picture's height
+    space = 0.25 * (rows[-1] + 1 - rows[0])
+    assert left == pytest.approx(columns[0] - space, abs=3.0)
+    assert left + width == pytest.approx(columns[-1] + 1 + space, abs=3.0)
+    far = np.zeros_like(mask)
+    far[:20, :20] = True  # something else was seen, and the body stays in the picture
+    assert about(far)[:2] == [0, 0]
+    assert sum(about(far)[::2]) == pytest.approx(left + width, abs=40.0)
+    assert about(np.zeros_like(mask))[1] == 0
+
+
+def filming(count: int, size: tuple[int, int]) -> tuple[Scene, Any]:
+    """Return a scene that was filmed, and its pictures: as hard to compress as leaves."""
+    seed = np.random.default_rng(0).integers(0, 255, (size[1] // 8, size[0] // 8, 3)).astype(np.uint8)
+    picture = cv2.resize(seed, size, interpolation=cv2.INTER_CUBIC)
+    scene = replace(walk(2), count=count, pictures=lambda: iter([picture] * count))
+    return scene, picture
+
+
+@pytest.mark.parametrize(("count", "every"), [(20, 1), (120, 1), (600, 4)])
+def test_pictures_of_leaves_stay_within_a_few_megabytes(count: int, every: int) -> None:
+    scene, picture = filming(count, (960, 540))
+    pictures, (frame, _), seen = Album(scene), right(walk(2)), scene.observations[0]
+    for _ in range(count):
+        pictures.add(frame, seen, picture)
+    strip = pictures.as_dict()["film"]
+    assert strip["every"] == every
+    assert sum(len(near) + len(coarse) for _, near, coarse in strip["pictures"]) <= album.FILMED
+    box, near, coarse = strip["pictures"][0]
+    assert image(near).shape[1] / image(near).shape[0] == pytest.approx(box[2] / box[3], abs=0.02)
+    assert image(coarse).shape[0] in {height for _, (height, _) in album.FINENESS}
+
+
+def test_a_viewer_of_120_frames_costs_less_than_a_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from posefit.tracking import outputs
+
+    spent: dict[str, float] = {}
+
+    def timed(owner: Any, name: str) -> None:
+        act = getattr(owner, name)
+
+        def instead(*given: Any) -> Any:
+            begun = time.process_time()
+            found = act(*given)
+            spent[name] = spent.get(name, 0.0) + time.process_time() - begun
+            return found
+
+        monkeypatch.setattr(owner, name, instead)
+
+    timed(album.Album, "add")
+    timed(outputs, "track_data")
+    timed(outputs, "viewer_document")
+    scene = walk(120)
+    picture = filming(1, SIZE)[1]
+    path = viewed(
+        tmp_path / "out", replace(scene, pictures=lambda: iter([picture] * 120)), doubting(scene, [0.3] * 120)
+    )
+    assert len(spent) == 3
+    assert sum(spent.values()) < 1.0
+    assert path.stat().st_size < 6_000_000
+    assert held(path)["film"]["every"] == held(path)["masks"][0]["every"] == 1
+
+
+def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> None:
+    scene = walk(4)
+    truth = scene.truth
+    assert truth is not None
+    data = held(viewed(tmp_path / "out", scene, doubting(scene, [0.0, 0.3, 0.0, 0.0])))
+    joints = numbers(data["estimate"]).reshape(4, 27, 3)
+    true = 1e3 * truth.skeleton.joints(truth.poses, truth.translations)
+    np.testing.assert_allclose(joints - joints[0, 0], true - true[0, 0], atol=1.01)
+    assert data["truth"] == data["estimate"]
+    free = truth.skeleton.free
+    angles = numbers(data["angles"]["values"]).reshape(4, -1) / 10.0
+    np.testing.assert_allclose(angles, np.degrees(np.unwrap(truth.poses, axis=0)[:, free]), atol=0.051)
+    assert data["angles"]["names"][:4] == ["root yaw", "root pitch", "root roll", "lfemur x (bone to the left knee)"]
+    clinical = numbers(data["clinical"]["values"]).reshape(4, -1) / 10.0
+    knee = data["clinical"]["names"].index("left knee flexion")
+    wanted = clinical_angles(truth.skeleton, truth.poses)["left_knee_flexion"]
+    np.testing.assert_allclose(clinical[:, knee], wanted, atol=0.051)
+    assert data["clinical"]["truth"] == data["clinical"]["values"]
+    assert data["places"][3] == "left ankle"
+    # nothing but the pose itself, blurred by 2 cm: Maxwell's law
+    radii = numbers(data["intervals"]["joints"]).reshape(4, 3, 27)
+    np.testing.assert_allclose(radii[0, :, 1], 20.0 * np.array([1.5382, 2.1544, 2.7955]), atol=1.0)
+    assert data["intervals"]["levels"] == [50, 80, 95]
+    assert data["others"]["at"] == [1]
+    assert data["others"]["weights"] == pytest.approx([0.3])
+    assert data["marks"] == {"held": [], "lost": [], "unknown": [1]}
+    assert data["told"] == "Not determined: left and right: unknown in 1 of 4 frames."
+
+
+def test_a_frame_that_is_shown_bears_the_marks_of_those_that_it_stands_for() -> None:
+    said = [k in (3, 4, 9) for k in range(12)]
+    assert _marked(said, 1) == [3, 4, 9]
+    assert _marked(said, 4) == [0, 1, 2]
+
+
+def test_true_angles_stand_beside_those_that_were_found() -> None:
+    found = np.array([[3.2], [9.5]])
+    np.testing.assert_allclose(_beside(found, np.array([[-3.1], [3.1]])), [[-3.1 + 2 * np.pi], [3.1 + 2 * np.pi]])
+
+
+class Outside(html.parser.HTMLParser):
+    """Collects what a page would fetch."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.links += [value or "" for name, value in attrs if name in ("src", "href", "action", "srcset", "data")]
+
+
+def test_it_is_one_file_that_links_to_nothing_but_itself(tmp_path: Path) -> None:
+    scene = walk(3)
+    name = "</script><script>alert(1)</script>"
+    page = viewed(tmp_path / "out", replace(scene, name=name), right(scene))
+    text = page.read_text("utf-8")
+    assert Outside(text).links == ["#player"]
+    assert "url(" not in text
+    assert "@import" not in text
+    assert text.count("</script>") == 2
+    assert held(page)["title"] == name
+    assert held(page)["film"] is held(page)["intervals"] is None
+    assert embedded(held(page)["others"]) == '{"at":[],"weights":[],"joints":""}'
