@@ -62,7 +62,7 @@ def mean(film: Film, *, background: str) -> Still:
     return mean_background([film.picture(background)])
 
 
-def masks(film: Film) -> Drawn:
+def masks(_film: Film) -> Drawn:
     """The frames are masks already: what is bright is the person."""
     return Drawn()
 

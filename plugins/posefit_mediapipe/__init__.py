@@ -12,7 +12,10 @@ on-device real-time body pose tracking, 2020. Version 0.10.14 carries the weight
 """
 
 import os
+import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -44,19 +47,20 @@ class MediaPipe:
     def segment(self, image: Image) -> tuple[Mask, Mask]:
         """Return where the soft mask of the person is above the threshold, and that nothing is a shadow."""
         nobody = np.zeros(image.shape[:2], dtype=bool)
-        soft = self._model.process(np.ascontiguousarray(image[..., ::-1])).segmentation_mask
+        with warnings.catch_warnings():  # of its own use of protobuf
+            warnings.simplefilter("ignore")
+            soft = self._model.process(np.ascontiguousarray(image[..., ::-1])).segmentation_mask
         return (nobody if soft is None else np.asarray(soft > self._threshold)), nobody.copy()
 
 
 def _model(confidence: float) -> Any:
-    """Return MediaPipe's pose model, which says on stderr what concerns its own developers alone."""
-    os.environ.setdefault("GLOG_minloglevel", "2")
-    with warnings.catch_warnings():
+    """Return MediaPipe's pose model."""
+    with _silent(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from mediapipe.python.solutions.pose import Pose
 
         # smoothing mixes a frame with those before it, and silhouettes would lag behind
-        return Pose(
+        model = Pose(
             model_complexity=1,
             enable_segmentation=True,
             smooth_segmentation=False,
@@ -64,6 +68,22 @@ def _model(confidence: float) -> Any:
             min_detection_confidence=confidence,
             min_tracking_confidence=confidence,
         )
+        model.process(np.zeros((64, 64, 3), dtype=np.uint8))  # what it has to say, it says of its first picture
+    return model
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep what is written to stderr from users: the model's libraries greet their own developers there."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 @hookimpl

@@ -1,6 +1,6 @@
 """`posefit track`, `fit` and `extract`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -60,18 +60,25 @@ def fit(as_json: bool, **options: Any) -> None:
 @click.argument("video")
 @click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
 @click.option(
-    "--method", default="mixture", show_default=True, help="mixture, median, mean, or masks: the frames are masks."
+    "--method",
+    "--extraction",
+    help="mixture, by default, or mean of --background; median, masks, or another segmenter of `posefit plugins`.",
 )
 @options(EXTRACT)
+@click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Of the method; repeatable.")
 @click.option("--frames", callback=frame_range, metavar="A:B", help="Only these frames.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def extract(video: str, out: str, as_json: bool, frames: Any, **options: Any) -> None:
+def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], **options: Any) -> None:
     """Take the masks of one person out of a VIDEO before a still background."""
     from posefit.footage.extract import extract as run
-    from posefit.footage.segmentation import Extraction
+    from posefit.footage.segmentation import Extraction, segmenter_name
+    from posefit.registry import registry
+    from posefit.settings import parse_texts
 
     given = {name: value for name, value in options.items() if value is not None}
-    result = run(video, out, Extraction(**given), frames=frames, progress=progress)
+    offer = registry().offer("segmenter", segmenter_name(options["method"], options["background"]))
+    how = Extraction(**given, settings=parse_texts(offer.name, offer.factory, settings))
+    result = run(video, out, how, frames=frames, progress=progress)
     for warning in result["warnings"]:
         say(f"warning: {warning}")
     if as_json:
@@ -86,31 +93,40 @@ def extract(video: str, out: str, as_json: bool, frames: Any, **options: Any) ->
 def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Return the keywords of `posefit.track` that options stand for.
 
-    `--set` gives the settings of optimiser, prior and tracker, as their types ask; `tracker.` also sets the tracker
+    `--set` gives the settings of optimiser, prior, tracker and segmenter, as their types ask; `tracker.` also sets the tracker
     that an optimiser and a prior are driven by.
     """
+    from posefit.footage.segmentation import segmenter_name
+    from posefit.footage.source import kind_of
     from posefit.tracking.method import FOLLOWER, parse_settings, usual
 
     options["source"] = options["source"] or ("walk",)
-    options["extraction"] = extraction_of(options, options["source"][0])
+    filmed = kind_of(options["source"][0]) == "video"
+    segmenter = segmenter_name(options["extraction"], options["background"]) if filmed else None
     options["view_degrees"] = options["view_degrees"] or None
     settings, named = options.pop("settings"), {name: options[name] for name in ("optimiser", "prior", "tracker")}
-    searched = any(text.partition(".")[0] != FOLLOWER for text in settings)
+    searched = any(text.partition(".")[0] not in (FOLLOWER, segmenter) for text in settings)
     chosen = usual(options["source"][0], **named, train=options["train"], searched=searched)
     if left_out := options.pop("without_subject"):
         options["train"] = without_subjects(chosen.train, left_out)
-    return options | chosen.method | parse_settings(settings, **chosen.method)
+    parsed = parse_settings(settings, **chosen.method, segmenter=segmenter)
+    options["extraction"] = extraction_of(options, options["source"][0], parsed.pop("segmenter_settings", {}))
+    return options | chosen.method | parsed
 
 
-def extraction_of(options: dict[str, Any], source: str) -> Any:
+def extraction_of(options: dict[str, Any], source: str, settings: Mapping[str, Any] | None = None) -> Any:
     """Return how the person is taken out of a video, as options say, which are taken out of them; None by default.
+
+    `settings` are the segmenter's.
 
     Raises ValueError where they say it of another kind of source.
     """
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import kind_of, useless_for
 
-    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
+    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")} | {
+        "settings": settings or None
+    }
     given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
     if given and (kind := kind_of(source)) != "video":
         name = next(iter(given))

@@ -39,7 +39,7 @@ def box(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, 
 
 
 EXTRACT = (
-    click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
+    click.option("--background", metavar="A:B|IMAGE", help="Frames without the person, or an image."),
     click.option("--roi", callback=box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
     click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
     click.option("--width", type=int, help="Larger videos are scaled down to this; by default 640."),
@@ -66,7 +66,10 @@ WITHOUT = (
     ),
 )
 EXTRACTION = (
-    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks."),
+    click.option(
+        "--extraction",
+        help="Of video: mixture, by default, or mean of --background; median, masks, or another segmenter.",
+    ),
     *EXTRACT,
 )
 TRACK = (

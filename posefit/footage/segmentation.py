@@ -55,7 +55,7 @@ class Extraction:
     def __post_init__(self) -> None:
         if not 36 <= self.width <= 8192:
             raise ValueError(f"width must lie in 36 to 8192 pixels, got {self.width}")
-        object.__setattr__(self, "method", self.method or (USUAL if self.background is None else PICTURED))
+        object.__setattr__(self, "method", segmenter_name(self.method, self.background))
         offer = registry().offer("segmenter", self.name)
         needed = {setting.name: setting.default is Parameter.empty for setting in offer.settings}
         if self.background is not None:
@@ -83,6 +83,11 @@ class Extraction:
         offer = registry().offer("segmenter", self.name)
         with blamed(offer.label, "it", passed=(ValueError, ImportError)):
             return cast(Segmenter, offer.factory(film, **self.settings))
+
+
+def segmenter_name(method: str | None, background: str | None) -> str:
+    """Return the segmenter that is meant: the usual one, or that of a background, where none is named."""
+    return method or (USUAL if background is None else PICTURED)
 
 
 class Segmentation:

@@ -22,7 +22,7 @@ FILL = (0.07, 0.5)
 SMALLEST = 12  # pixels of the longer side below which nobody can be told from noise
 LAG = 0.1  # seconds between two pictures that are compared for motion
 MOVING = 25  # grey levels by which a pixel that moved has changed
-ENOUGH = 0.02  # of the mask's area: fewer pixels that moved say nothing
+ENOUGH = 0.1  # of the mask's area: fewer pixels that moved beside it say nothing
 AROUND = 0.5  # of the person's longer side: motion is looked for as far as that from the mask
 SLACK = 0.02  # of the same: motion as near as that to the mask is the mask's own
 BESIDE = 0.5  # a frame is not usable where a larger share of what moves lies outside the mask
@@ -49,11 +49,7 @@ class Watch:
         ghost = self._is_ghost(image, found.mask)
         whole = found.area > 0 and not found.touches_border
         likely = (
-            whole
-            and side >= SMALLEST
-            and FILL[0] <= found.area / side**2 <= FILL[1]
-            and beside <= BESIDE
-            and not ghost
+            whole and side >= SMALLEST and FILL[0] <= found.area / side**2 <= FILL[1] and beside <= BESIDE and not ghost
         )
         usual = float(np.median(self._areas)) if self._areas else float(found.area)
         jitter = abs(found.area / usual - 1.0) if usual else 0.0
@@ -90,12 +86,10 @@ class Watch:
             max(0, columns[0] - far) : columns[-1] + 1 + far,
         ]
         changed = (cv2.medianBlur(moved, 5)[window] > 0) & found.valid[window]
-        count = int(changed.sum())
-        if count < ENOUGH * found.area:
-            return 0.0
         width = 2 * max(1, round(SLACK * reach)) + 1
         near = cv2.dilate(mine[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
-        return float((changed & ~near).sum() / count)
+        beside = int((changed & ~near).sum())
+        return float(beside / changed.sum()) if beside > ENOUGH * found.area else 0.0
 
     def _is_ghost(self, image: Image, mask: Mask) -> bool:
         """Return whether the outline of a mask is an edge of the background rather than of the picture.

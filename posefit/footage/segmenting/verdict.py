@@ -42,7 +42,9 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
     usable = sum(row["usable"] for row in whole)
     instead = advice(method, learned=learned)
     if beside > UNEXPLAINED and unsteady:
-        moves = f"{beside:.0%} of what moves lies outside the masks, and they change by {larger:.0%} from frame to frame"
+        moves = (
+            f"{beside:.0%} of what moves lies outside the masks, and they change by {larger:.0%} from frame to frame"
+        )
         where = "the person seems to stand in the background" if learned else "the masks do not show the whole person"
         return Verdict(f"{where}: {moves}{instead}", True)
     if ghosts > GHOSTS:
