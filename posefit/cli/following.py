@@ -93,8 +93,8 @@ def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence
 def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Return the keywords of `posefit.track` that options stand for.
 
-    `--set` gives the settings of optimiser, prior, tracker and segmenter, as their types ask; `tracker.` also sets the tracker
-    that an optimiser and a prior are driven by.
+    `--set` gives the settings of optimiser, prior, tracker and segmenter, as their types ask; `tracker.` also
+    sets the tracker that an optimiser and a prior are driven by.
     """
     from posefit.footage.segmentation import segmenter_name
     from posefit.footage.source import kind_of
@@ -124,10 +124,9 @@ def extraction_of(options: dict[str, Any], source: str, settings: Mapping[str, A
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import kind_of, useless_for
 
-    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")} | {
-        "settings": settings or None
-    }
-    given = {name: value for name, value in {**how, "method": options["extraction"]}.items() if value is not None}
+    how = {name: options.pop(name) for name in ("background", "roi", "ignore", "width")}
+    how |= {"method": options["extraction"], "settings": settings or None}
+    given = {name: value for name, value in how.items() if value is not None}
     if given and (kind := kind_of(source)) != "video":
         name = next(iter(given))
         raise useless_for(kind, "extraction" if name == "method" else name, given[name], "video")

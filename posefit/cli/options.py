@@ -66,10 +66,7 @@ WITHOUT = (
     ),
 )
 EXTRACTION = (
-    click.option(
-        "--extraction",
-        help="Of video: mixture, by default, or mean of --background; median, masks, or another segmenter.",
-    ),
+    click.option("--extraction", help="Of video: mixture, or mean with --background; else median, masks, ..."),
     *EXTRACT,
 )
 TRACK = (

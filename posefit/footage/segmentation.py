@@ -62,9 +62,8 @@ class Extraction:
             if "background" not in needed:
                 offers = registry().offers["segmenter"].values()
                 takers = [one.name for one in offers if any(setting.name == "background" for setting in one.settings)]
-                raise ValueError(
-                    f"background must be given for the method {' or '.join(takers)} only, got {self.background!r} with {self.name}"
-                )
+                came = f"{self.background!r} with {self.name}"
+                raise ValueError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
             object.__setattr__(self, "settings", {**self.settings, "background": self.background})
         check(self.name, offer.factory, self.settings)
         for name, must in needed.items():

@@ -3,14 +3,17 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.footage.images import read_image
 from posefit.footage.video import Video
 from posefit.silhouette.foreground import Image
 
+T = TypeVar("T", bound=np.generic)
 Box = tuple[int, int, int, int]  # x, y, width, height
 
 
@@ -45,7 +48,7 @@ class VideoFilm:
             )
         return self.cut(np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8))
 
-    def cut(self, image: Image) -> Image:
-        """Return the part of a scaled frame (height, width, 3) that a segmenter gets to see."""
+    def cut(self, image: NDArray[T]) -> NDArray[T]:
+        """Return the part of a scaled frame or mask (height, width, ...) that a segmenter gets to see."""
         x, y, wide, tall = self.part
         return np.ascontiguousarray(image[y : y + tall, x : x + wide])
