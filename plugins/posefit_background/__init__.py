@@ -4,8 +4,8 @@ They know nothing of people. Whoever is in the picture all the time is learned i
 the video; `mean` is told what the picture looks like without him.
 
 >>> import numpy as np
->>> from posefit_background import masks
->>> person, shadow = masks(None).segment(np.full((2, 2, 3), 255, dtype=np.uint8))
+>>> from posefit_background import given_masks
+>>> person, shadow = given_masks(None).segment(np.full((2, 2, 3), 255, dtype=np.uint8))
 >>> bool(person.all()), bool(shadow.any())
 (True, False)
 """
@@ -19,7 +19,7 @@ from posefit.silhouette.foreground import (
     SAMPLES,
     THRESHOLD,
     Drawn,
-    Film,
+    Footage,
     Mixture,
     Still,
     mean_background,
@@ -27,7 +27,7 @@ from posefit.silhouette.foreground import (
 )
 
 
-def mixture(film: Film, *, history: int = HISTORY, threshold: float = THRESHOLD) -> Mixture:
+def learned_mixture(film: Footage, *, history: int = HISTORY, threshold: float = THRESHOLD) -> Mixture:
     """Each pixel's background is an adaptive mixture of Gaussians, learned from the whole video: OpenCV's MOG2.
 
     Settings:
@@ -39,7 +39,7 @@ def mixture(film: Film, *, history: int = HISTORY, threshold: float = THRESHOLD)
     return Mixture(film.frames(), history, threshold)
 
 
-def median(film: Film, *, samples: int = SAMPLES) -> Still:
+def learned_median(film: Footage, *, samples: int = SAMPLES) -> Still:
     """Each pixel's background is its median over some frames of the whole video, before which a person may walk.
 
     Settings:
@@ -50,7 +50,7 @@ def median(film: Film, *, samples: int = SAMPLES) -> Still:
     return median_background([image for image, _ in zip(film.frames(step=step), range(samples), strict=False)])
 
 
-def mean(film: Film, *, background: str) -> Still:
+def given_mean(film: Footage, *, background: str) -> Still:
     """Each pixel's background is its mean over frames without a person, or a picture of the empty scene.
 
     Settings:
@@ -62,7 +62,7 @@ def mean(film: Film, *, background: str) -> Still:
     return mean_background([film.picture(background)])
 
 
-def masks(_film: Film) -> Drawn:
+def given_masks(_film: Footage) -> Drawn:
     """The frames are masks already: what is bright is the person."""
     return Drawn()
 
@@ -70,5 +70,7 @@ def masks(_film: Film) -> Drawn:
 @hookimpl
 def posefit_register_segmenters(register: RegisterSegmenter) -> None:
     """Register `mixture`, `median`, `mean` and `masks`."""
-    for segmenter in (mixture, median, mean, masks):
-        register(segmenter.__name__, segmenter)
+    register("mixture", learned_mixture)
+    register("median", learned_median)
+    register("mean", given_mean)
+    register("masks", given_masks)

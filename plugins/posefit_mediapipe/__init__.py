@@ -23,7 +23,7 @@ import numpy as np
 from posefit import hookimpl
 from posefit.fitting.check import between
 from posefit.hooks import RegisterSegmenter
-from posefit.silhouette.foreground import Film, Image
+from posefit.silhouette.foreground import Footage, Image
 from posefit.silhouette.mask import Mask
 
 
@@ -38,7 +38,7 @@ class MediaPipe:
         threshold: of the soft mask, from which on a pixel is the person's, between 0 and 1.
     """
 
-    def __init__(self, film: Film, *, confidence: float = 0.3, threshold: float = 0.5) -> None:
+    def __init__(self, film: Footage, *, confidence: float = 0.3, threshold: float = 0.5) -> None:
         between("confidence", confidence, 0.0, 1.0)
         between("threshold", threshold, 0.0, 1.0, ends=False)
         self._threshold = threshold

@@ -13,13 +13,13 @@ import numpy as np
 from posefit.fitting.guard import BrokenRuleError, blamed
 from posefit.footage.images import read_image
 from posefit.footage.masks import Range, span
-from posefit.footage.segmenting.film import Box, VideoFilm
+from posefit.footage.segmenting.film import Box, VideoFootage
 from posefit.footage.segmenting.signs import Watch
 from posefit.footage.segmenting.verdict import Verdict, advice, verdict
 from posefit.footage.video import Video
 from posefit.registry import registry
 from posefit.settings import check
-from posefit.silhouette.foreground import Film, Image, Person, Segmenter, person
+from posefit.silhouette.foreground import Footage, Image, Person, Segmenter, person
 from posefit.silhouette.mask import Mask
 
 USUAL = "mixture"  # the segmenter of video, where nobody names another
@@ -77,7 +77,7 @@ class Extraction:
         assert self.method is not None
         return self.method
 
-    def segmenter(self, film: Film) -> Segmenter:
+    def segmenter(self, film: Footage) -> Segmenter:
         """Return the segmenter, which has looked at a film. Raises ValueError where a setting does not fit it."""
         offer = registry().offer("segmenter", self.name)
         with blamed(offer.label, "it", passed=(ValueError, ImportError)):
@@ -102,7 +102,7 @@ class Segmentation:
         self.rows: list[dict[str, Any]] = []
         self.name, self.method, self._video = video.path, how.name, video
         self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
-        self._film = VideoFilm(video, self.size, self._roi or (0, 0, *self.size))
+        self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
         self._learn = partial(how.segmenter, self._film)
         self._given = "background" in how.settings
         self._segmenter = self._learn() if self._given else None  # what is given is checked now

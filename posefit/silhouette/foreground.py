@@ -31,7 +31,7 @@ HISTORY = 500  # frames that a mixture remembers
 THRESHOLD = 25.0  # squared standard deviations from its nearest Gaussian, from which on a pixel is foreground
 
 
-class Film(Protocol):
+class Footage(Protocol):
     """What a segmenter may look at before the first frame: a video at its working size, as far as the roi goes."""
 
     def __len__(self) -> int:
@@ -59,7 +59,7 @@ class Segmenter(Protocol):
         ...
 
 
-SegmenterFactory = Callable[..., Segmenter]  # called with a `Film`, and settings as keywords
+SegmenterFactory = Callable[..., Segmenter]  # called with a `Footage`, and settings as keywords
 
 
 @dataclass(frozen=True)

@@ -459,7 +459,7 @@ def test_a_new_plugin_replaces_nothing(tmp_path: Path) -> None:
     assert "name must be small letters" in fails("plugins", "new", "9 lives", "--out", tmp_path / "x")
     known = fails("plugins", "new", "sapso", "--out", tmp_path / "x")
     assert "name must be a new one, got 'sapso', which posefit registers already" in known
-    assert "kind must be one of optimiser, prior, tracker, command, got 'camera'" in fails(
+    assert "kind must be one of optimiser, prior, tracker, segmenter, command, got 'camera'" in fails(
         "plugins", "new", "a", "--kind", "camera", "--out", tmp_path / "x"
     )
     assert not (tmp_path / "x").exists()

@@ -18,7 +18,7 @@ Box = tuple[int, int, int, int]  # x, y, width, height
 
 
 @dataclass(frozen=True)
-class VideoFilm:
+class VideoFootage:
     """A video scaled to `size` and cut to `part`, x, y, width and height in its scaled pixels."""
 
     video: Video
