@@ -1,4 +1,4 @@
-"""Do several cameras see one person, and is he as large as he should be? Their masks alone say so, before any search."""
+"""Do several cameras see one person, and is he as large as he should be? Their masks say so before any search."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from posefit.geometry.camera import Camera
 from posefit.silhouette.mask import Silhouette
 
 FRAMES = 20  # that are looked at, spread over the footage
-APART = 0.35  # of the person's height: rays to the middles of his masks that pass each other by more do not meet in him
+APART = 0.7  # of the person's height: rays to the middles of his masks that pass each other by more do not meet in him
 SHORT, TALL = 0.45, 1.9  # times his height: what he may seem to be, from above, crouching, or with his arms up
 
 
@@ -45,13 +45,11 @@ def disagreement(views: Views, cameras: Sequence[Camera], stature: float) -> str
         extents = [extent_of(silhouette) for silhouette in views[shown[k]].silhouettes]
         place, away = meeting(cameras, [middle for middle, _ in extents])
         depths = [float((camera.rotation @ place + camera.translation)[2]) for camera in cameras]
-        misses.append(away.max())
+        misses.append(2.0 * away.max())
         heights = zip(cameras, extents, depths, strict=True)
         seem.append([tall * depth / camera.focal[1] for camera, (_, tall), depth in heights])
     miss, tall = float(np.median(misses)), np.median(seem, axis=0)
-    looked = (
-        "the masks show parts of him, or somebody else, or the calibrations are of other cameras, or in another order"
-    )
+    looked = "the masks show only parts of him, or somebody else, or the calibrations are in another order"
     if miss > APART * stature:
         return f"expected cameras that see one person, got views that pass each other by {miss:.1f} m: {looked}"
     wrong = np.flatnonzero((tall < SHORT * stature) | (tall > TALL * stature))

@@ -32,15 +32,16 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
     person or clothes like the background, and is a warning.
     """
     whole = [row for row in rows if row["area"] and not row["touches_border"]]
+    usable = sum(row["usable"] for row in whole)
+    instead = advice(method, learned=learned)
+    nobody = f"expected masks of a person, got none in any of {len(rows)} frames{instead}"
     if len(whole) < FEW:
-        return None
+        return None if usable else Verdict(nobody, True)
     beside = float(np.median([row["beside"] for row in whole]))
     pairs = [(a, b) for a, b in pairwise(whole) if b["frame"] == a["frame"] + 1]
     taller, larger = (_change(pairs, name) for name in ("longer_side", "area"))
     unsteady = taller > TALLER or larger > LARGER
     ghosts = float(np.mean([row["ghost"] for row in whole]))
-    usable = sum(row["usable"] for row in whole)
-    instead = advice(method, learned=learned)
     if beside > UNEXPLAINED and unsteady:
         moves = (
             f"{beside:.0%} of what moves lies outside the masks, and they change by {larger:.0%} from frame to frame"
@@ -51,7 +52,7 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
         said = f"{ghosts:.0%} of the masks show a place that is empty now: the person was learned into the background"
         return Verdict(f"{said}{instead}", ghosts > EMPTY)
     if not usable:
-        return Verdict(f"expected masks of a person, got none in {len(whole)} frames{instead}", True)
+        return Verdict(nobody, True)
     if unsteady:
         said = f"the masks change by {larger:.0%} from frame to frame: parts of the person seem to be missing"
         return Verdict(f"{said}{instead}", usable < MOST * len(whole))
