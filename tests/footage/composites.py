@@ -58,7 +58,8 @@ def composed(path: Path, kind: Kind, places: list[Any]) -> tuple[Path, list[Any]
     motion = moving(kind)
     body = posefit.Body.of(motion.skeleton)
     azimuth = np.pi / 2 if kind in ("passing", "grey", "leaving") else 0.6
-    camera = posefit.Camera.around(np.array([0.0, 1.1, 0.0]), azimuth, 6.5 if wide > 400 else 5.5, (wide, tall))
+    middle, away = (1.35, 6.9) if wide > 400 else (1.1, 5.5)  # on the lawn, his head below the roof
+    camera = posefit.Camera.around(np.array([0.0, middle, 0.0]), azimuth, away, (wide, tall))
     cloth = cv2.GaussianBlur(rng.normal(0.0, 1.0, (tall, wide)), (0, 0), 2.0)
     cloth *= 14.0 / cloth.std()
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (wide, tall))
