@@ -52,6 +52,10 @@ ROW = {
 }
 SAID = {
     "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
+    "none_of_modes": (
+        "",
+        "how likely it is that none of a frame's modes is right, the mean over frames; where a method says",
+    ),
     "unknown_sides": ("", "numbers of the frames whose left and right are called unknown; where a method says"),
     "lost_frames": ("", "numbers of the frames that are called lost; where a method says"),
 }

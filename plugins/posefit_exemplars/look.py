@@ -6,6 +6,7 @@ from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.problem import over_views
 from posefit.fitting.tracker import Observation, Task
+from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton
 from posefit.silhouette.cost import Areas, areas
@@ -88,6 +89,17 @@ class Look:
             areas(self._task.body, camera, silhouette, pose[None], place[None]) for camera, silhouette in self._full
         ]
         return float(over_views(counts, self._observation.silhouettes)[0]), np.concatenate(counts)
+
+    def twins(self, pose: Array, place: Array) -> Array:
+        """Return the costs of a pose's twins (1 + cameras,): mirrored, and reflected along each camera's line of sight.
+
+        A twin that is aligned stands off the pose, wherever that was told to be, as far as both are off when aligned.
+        """
+        skeleton, one = self.skeleton, pose[None]
+        reflected = [reflected_poses(skeleton, one, facing(camera, place)) for camera in self._task.cameras]
+        poses = np.concatenate([one, mirrored_poses(skeleton, one), *reflected])
+        places = self.placed(poses, np.repeat(place[None], len(poses), axis=0))
+        return self.full(poses[1:], place + places[1:] - places[0])
 
     def _costs(self, views: Views, poses: Array, places: Array) -> Array:
         counts = [

@@ -1,5 +1,6 @@
 """A zero-phase filter over what was found: a Gaussian that looks as far ahead as back, so that nothing comes late."""
 
+import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +11,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.geometry.rotation import wrapped
-from posefit_exemplars.doubt import recalibrated
+from posefit_exemplars.doubt import recalibrated, twin_signs
 from posefit_exemplars.look import Look
 from posefit_exemplars.sampling import Ways
 
@@ -72,7 +73,14 @@ def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
         place = one.place
     cost, areas = one.look.measured(pose, place)
     used, history = int(np.ceil(one.evaluations)) + 1, np.array([cost])
-    posterior = None if one.drawn is None else recalibrated(one.drawn.about(pose, place), pose, cost, one.look)
-    seconds, cpu_seconds = one.seconds, one.cpu_seconds
-    told: dict[str, Any] = {"details": {"usable": one.look.usable}, "cpu_seconds": cpu_seconds, "posterior": posterior}
+    details: dict[str, Any] = {"usable": one.look.usable}
+    posterior, seconds, cpu_seconds = None, one.seconds, one.cpu_seconds
+    if one.drawn is not None:
+        began, begun = time.perf_counter(), time.process_time()
+        twins = one.look.twins(pose, place) if one.look.usable else np.empty(0)
+        used += len(twins)
+        details["twins"] = twin_signs(twins, cost)
+        posterior = recalibrated(one.drawn.about(pose, place), pose, cost, one.look, details["twins"])
+        seconds, cpu_seconds = seconds + time.perf_counter() - began, cpu_seconds + time.process_time() - begun
+    told: dict[str, Any] = {"details": details, "cpu_seconds": cpu_seconds, "posterior": posterior}
     return Frame(pose, place, cost, areas, used, seconds, history, **told)

@@ -110,7 +110,8 @@ class ExemplarTracker:
                 beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
             return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
         full = int(FULL * self.task.evaluations)
-        small = int(((1.0 - REFINED) * self.task.evaluations - full - 4) / look.share)
+        last = 3 + look.cameras  # the pose that is told, its twins, and what is left of a small picture's share
+        small = int(((1.0 - REFINED) * self.task.evaluations - full - last) / look.share)
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]

@@ -33,6 +33,7 @@ class Recalibration:
     angle_factors: Array = field(default_factory=lambda: np.ones((len(LEVELS), ANGLES)), repr=False)
     second_side: float = SECOND_SIDE
     sharpness: float = 1.0  # the power of modes' weights: below 1, modes are less sure than their share of samples
+    none: float = 0.0  # how likely it is that no mode is right: that the truth is unlike all of them
 
     def __post_init__(self) -> None:
         for name in ("joint_spreads", "angle_spreads", "joint_factors", "angle_factors"):
@@ -48,6 +49,8 @@ class Recalibration:
             raise ValueError(f"second_side must lie in 0 to 1, got {self.second_side}")
         if not 0.0 < self.sharpness < np.inf:
             raise ValueError(f"sharpness must be above 0 and finite, got {self.sharpness}")
+        if not 0.0 <= self.none <= 1.0:
+            raise ValueError(f"none must lie in 0 to 1, got {self.none}")
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it; its names are those that it is made from."""

@@ -84,16 +84,18 @@ class Posterior:
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> list[Mode]:
-    """Return what a frame may show, the likeliest first: poses that are alike are one mode. Weights sum to 1.
+    """Return what a frame may show, the likeliest first: poses that are alike are one mode.
 
     Poses are alike where their joints are at most `apart` metres from each other, the mean over joints, both roots at
     one point. The pose of a mode is that of its medoid, which somebody can really have; a mean might be nobody's.
-    Weights are shares of the poses' weight, raised to the sharpness of the posterior's recalibration.
+    Weights are shares of the poses' weight, raised to the sharpness of the posterior's recalibration; they sum to 1,
+    less how likely that has it that the truth is like none of them.
     """
     found = _clusters(_distances(skeleton.joints(posterior.poses)), posterior.weights, apart)
     if posterior.recalibration is not None:
         powers = [weight**posterior.recalibration.sharpness for weight, _ in found]  # temperature scaling
-        found = [(power / sum(powers), row) for power, (_, row) in zip(powers, found, strict=True)]
+        share = (1.0 - posterior.recalibration.none) / sum(powers)
+        found = [(share * power, row) for power, (_, row) in zip(powers, found, strict=True)]
     return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in found]
 
 

@@ -118,6 +118,7 @@ def follow(
             "settings": method.settings,
             "body": None if shape is None else _described(shape),
             "modes": [round(mode.weight, 6) for mode in modes] or None,
+            "none_of_modes": _none_right(found),
             "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
             "lost_frames": _numbers(rows, "lost", LOST),
             "warnings": [*scene.warnings, *method.audit.warnings],
@@ -142,6 +143,13 @@ def _whole(skeleton: Skeleton, found: Sequence[Frame]) -> list[TrackMode]:
     each = [frame.posterior for frame in found if frame.posterior is not None and frame.posterior.coherent]
     alike = len(each) == len(found) and len({len(one) for one in each}) == 1
     return track_modes(skeleton, each) if alike else []
+
+
+def _none_right(found: Sequence[Frame]) -> float | None:
+    """Return how likely no mode of a frame is right, the mean over frames; None where nobody says."""
+    learned = [frame.posterior.recalibration for frame in found if frame.posterior is not None]
+    said = [one.none for one in learned if one is not None]
+    return round(float(np.mean(said)), 6) if said else None
 
 
 def _numbers(rows: Sequence[Mapping[str, float]], name: str, least: float) -> list[int] | None:

@@ -89,6 +89,15 @@ def test_the_budget_holds_and_small_pictures_count_by_their_pixels(budget: int, 
     assert max(used) > 0.5 * budget
 
 
+@pytest.mark.parametrize("views", [(0.0, 90.0), (0.0, 45.0, 90.0, 135.0)])
+def test_the_budget_holds_for_the_twins_of_several_cameras(views: tuple[float, ...]) -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=2), views)
+    for refiner in ("none", "pso", "cma"):
+        tracker = exemplars(walk.told(evaluations=LEAST), refiner=refiner, lag=0)
+        frames = list(tracker.track(walk.seen, np.random.default_rng(0)))
+        assert max(frame.evaluations for frame in frames) <= LEAST
+
+
 @pytest.mark.parametrize("name", ["none", "pso", "sapso", "annealed", "particle", "scipy"])
 def test_any_optimiser_of_the_registry_searches_within_the_budget(walker: Walk, name: str) -> None:
     if name != "none":

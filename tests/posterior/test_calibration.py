@@ -69,6 +69,8 @@ def test_a_recalibration_is_held_against_its_shapes() -> None:
         Recalibration(joint_spreads=-np.ones(27))
     with pytest.raises(ValueError, match=r"second_side must lie in 0 to 1, got 1\.5"):
         Recalibration(second_side=1.5)
+    with pytest.raises(ValueError, match=r"none must lie in 0 to 1, got -0\.1"):
+        Recalibration(none=-0.1)
 
 
 def test_a_recalibration_comes_back_from_a_file() -> None:

@@ -119,3 +119,7 @@ def test_modes_are_as_sure_as_their_recalibration_says() -> None:
     softer = replace(plain, recalibration=Recalibration(sharpness=0.5))
     # the roots of 0.8 and 0.2 are as two to one
     np.testing.assert_allclose([mode.weight for mode in modes_of(skeleton, softer)], [2 / 3, 1 / 3])
+    unsure = replace(plain, recalibration=Recalibration(sharpness=0.5, none=0.4))
+    np.testing.assert_allclose([mode.weight for mode in modes_of(skeleton, unsure)], [0.4, 0.2])
+    nobody = replace(plain, recalibration=Recalibration(none=1.0))
+    assert [mode.weight for mode in modes_of(skeleton, nobody)] == [0.0, 0.0]

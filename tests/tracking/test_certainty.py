@@ -230,6 +230,19 @@ def test_frames_and_tracks_have_modes(told: Any) -> None:
     assert "frames lost" not in table(result.summary)
 
 
+def test_the_summary_says_how_likely_no_mode_of_a_frame_is_right(told: Any) -> None:
+    scene = walk()
+    shown = doubtful(scene, np.zeros(FRAMES), turned=0.25)
+    frames = []
+    for k, frame in enumerate(shown):
+        assert frame.posterior is not None
+        learned = Recalibration(none=0.1 * k)
+        frames.append(replace(frame, posterior=replace(frame.posterior, recalibration=learned)))
+    result = told(frames, scene)
+    assert result.summary["none_of_modes"] == pytest.approx(0.25)
+    assert [mode.weight for mode in result.found[5].modes] == pytest.approx([0.375, 0.125])
+
+
 def test_rows_that_are_no_tracks_make_no_modes_of_the_whole(told: Any) -> None:
     scene = walk()
     result = told(doubtful(scene, np.zeros(FRAMES), turned=0.25), scene)

@@ -51,12 +51,11 @@ def posterior(
         people = list(dict.fromkeys(one.track.seen.clip.subject for one in base_kept))
         if len(people) < PEOPLE:
             raise ValueError(f"tracks must be of {PEOPLE} people or more at {temperature:g}, got {len(people)}")
-        said, powers = [], []
+        said = []
         for person in people:
             doubt = doubt_of([one for one in base_kept if one.track.seen.clip.subject != person])
             his = [one for one in base_kept if one.track.seen.clip.subject == person]
             said += [judgement(doubt, one) for one in his]
-            powers += [doubt.sharpness] * len(his)
         if table is not None:
             doubt = doubt_of(base_kept)
             table.write_text(json.dumps({"temperature": temperature, **doubt.as_dict()}) + "\n", encoding="utf-8")
@@ -65,26 +64,22 @@ def posterior(
         "temperature": temperature,
         "coverage": coverages(said),
         "sides": sides(said),
-        "modes": {"recalibrated": best_modes([one.kept for one in said], powers), **_temperatures(mine, temperature)},
+        "modes": {"recalibrated": best_modes([one.kept for one in said], said), **_temperatures(mine, temperature)},
         "kept": kept_table(said, others) if others else {},
     }
 
 
 def _temperatures(tracks: list[Kept], temperature: float) -> dict[str, Any]:
     """Return what best modes are worth at each temperature, on the same clips and views; and on all tracks of ours."""
-    told = {f"{temperature:g}, all": _plain([one for one in tracks if one.track.seen.temperature == temperature])}
+    told = {f"{temperature:g}, all": best_modes([one for one in tracks if one.track.seen.temperature == temperature])}
     names = {one.track.seen.temperature for one in tracks}
     places = [{_place(one) for one in tracks if one.track.seen.temperature == name} for name in names]
     same = set.intersection(*places)
     if len(names) > 1 and same:
         for name in sorted(names):
             some = [one for one in tracks if one.track.seen.temperature == name and _place(one) in same]
-            told[f"{name:g}"] = _plain(some)
+            told[f"{name:g}"] = best_modes(some)
     return told
-
-
-def _plain(tracks: list[Kept]) -> dict[str, Any]:
-    return best_modes(tracks, [1.0] * len(tracks))
 
 
 def _place(kept: Kept) -> tuple[Any, ...]:

@@ -11,9 +11,9 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS
 from posefit.posterior.calibration import LEVELS, Recalibration, conformal_factor
 from posefit.posterior.intervals import angle_intervals, joint_intervals
-from posefit.posterior.modes import modes_of
+from posefit.posterior.modes import APART, modes_of
 from posefit.posterior.sides import nearer_mirrored, second_side
-from posefit_exemplars.doubt import Doubt, evidence
+from posefit_exemplars.doubt import Doubt, evidence, none_signs, side_signs
 from posefit_experiments.posterior.frames import Followed
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -31,7 +31,8 @@ MEMBERS = {name: np.array([JOINTS.index(joint) for joint in joints]) for name, j
 ALONE = {str(angle): np.array([angle]) for angle in range(ANGLES)}  # some have no freedom, and so no error
 TRIED = np.geomspace(0.05, 2.0, 12)  # spreads, in doubts
 EVERY = 5  # of the frames that factors are found from; neighbours say the same
-UNKNOWN = 0.1  # ours: how likely exchanged sides have to be, to be called unknown
+SWAPPED = 0.03  # of the frames whose sides are not called unknown, at most
+BOUNDS = (0.01, 0.5)  # of how likely exchanged sides have to be for that; from a half on they are likelier than not
 LEAST = 0.1  # slope of log-odds over the second side's weight
 SHARPNESSES = np.geomspace(0.05, 1.0, 24)
 TINY = 1e-12
@@ -49,7 +50,7 @@ class Kept:
     swapped: NDArray[np.bool_] = field(repr=False)  # (T,)
     second: Array = field(repr=False)  # (T,) weight of the second side
     modes: list[Array] = field(repr=False)  # weights of each frame's modes, the heaviest first
-    nearest: Array = field(repr=False)  # (T, 2) which of them is nearest to the truth, and how far the first is, metres
+    nearest: Array = field(repr=False)  # (T, 2) which of them is nearest to the truth, and how far that is, metres
 
     @classmethod
     def of(cls, track: Followed) -> "Kept":
@@ -66,7 +67,7 @@ class Kept:
             joints = skeleton.joints(np.array([mode.pose for mode in found]))
             off = np.linalg.norm(joints - skeleton.joints(truth), axis=2).mean(axis=1)
             modes.append(np.array([mode.weight for mode in found]))
-            nearest.append((off.argmin(), off[0]))
+            nearest.append((off.argmin(), off.min()))
         return cls(track, seen, track.off[:, 1:].mean(axis=1), swapped, second, modes, np.array(nearest))
 
 
@@ -77,7 +78,7 @@ def doubt_of(tracks: Sequence[Kept]) -> Doubt:
     doubt = replace(doubt, joint_spreads=joints, angle_spreads=angles)
     joint_factors, angle_factors = _factors(doubt, tracks)
     doubt = replace(doubt, joint_factors=joint_factors, angle_factors=angle_factors)
-    doubt = replace(doubt, sharpness=_sharpness(tracks))
+    doubt = replace(doubt, sharpness=_sharpness(tracks), none=_none(doubt, tracks))
     return _sided(doubt, tracks)
 
 
@@ -94,6 +95,12 @@ def _sharpness(tracks: Sequence[Kept]) -> float:
     for tried in SHARPNESSES:
         likely.append(weights @ [np.log(sharpened(modes, tried)[row]) for modes, row in pairs])
     return float(SHARPNESSES[int(np.argmax(likely))])
+
+
+def _none(doubt: Doubt, tracks: Sequence[Kept]) -> Array:
+    """Return the coefficients (3,) of the log-odds that no mode is right: the truth is far from the nearest one."""
+    signs = np.array([none_signs(doubt.log(seen)) for one in tracks for seen in one.seen])
+    return logistic(signs, np.concatenate([one.nearest[:, 1] > APART for one in tracks]), frame_weights(tracks))
 
 
 def frame_weights(tracks: Sequence[Kept]) -> Array:
@@ -115,7 +122,7 @@ def _doubt(tracks: Sequence[Kept]) -> Doubt:
     ones = Recalibration()
     return Doubt(
         slopes, (float(low), float(high)), ones.joint_spreads, ones.angle_spreads, ones.joint_factors,
-        ones.angle_factors, np.array([0.0, 1.0, 0.0]), 1.0, 0.2,
+        ones.angle_factors, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), 1.0, np.zeros(3), 0.2,
     )  # fmt: skip
 
 
@@ -179,22 +186,54 @@ def radii_of(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
     """Return the radii of joints (T, levels, 27) and the half intervals of angles (T, levels, 66)."""
     joints, angles, track = [], [], one.track
     for k in range(0, len(track), every):
-        recalibration = doubt.recalibration(doubt.log(one.seen[k]))
+        recalibration = doubt.recalibration(doubt.log(one.seen[k]), track.twins[k])
         posterior = replace(track.posterior(k), recalibration=recalibration)
         joints.append(joint_intervals(track.skeleton, posterior, track.told[k]).radii)
         angles.append(angle_intervals(posterior, track.told[k]).halves)
     return np.array(joints), np.array(angles)
 
 
+def signs_of(doubt: Doubt, one: Kept) -> Array:
+    """Return what exchanged sides of a track's frames follow from (T, 5)."""
+    each = zip(one.second, one.seen, one.track.twins, strict=True)
+    return np.array([side_signs(second, doubt.log(seen), twins) for second, seen, twins in each])
+
+
+def exchanged(sides: Array, signs: Array) -> Array:
+    """Return how likely left and right are exchanged (T,), by signs (T, 5)."""
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(signs @ sides, -30.0, 30.0))))
+
+
 def _sided(doubt: Doubt, tracks: Sequence[Kept]) -> Doubt:
-    """Return the doubt with the odds of exchanged sides."""
-    second, swapped = (np.concatenate([getattr(one, name) for one in tracks]) for name in ("second", "swapped"))
-    logs = np.array([doubt.log(seen) for one in tracks for seen in one.seen])
-    weights, design = frame_weights(tracks), np.column_stack([np.ones(len(second)), second, logs])
-    sides = logistic(design, swapped, weights)
+    """Return the doubt with the odds of exchanged sides, and with how likely they have to be to be called unknown.
+
+    That is judged on each person by the odds of the others, as whoever is followed is none of those it was found on.
+    """
+    signs = np.concatenate([signs_of(doubt, one) for one in tracks])
+    swapped, weights = np.concatenate([one.swapped for one in tracks]), frame_weights(tracks)
+    of = np.concatenate([[one.track.seen.clip.subject] * len(one.track) for one in tracks])
+    probable = np.zeros(len(signs))
+    for person in np.unique(of):
+        mine = of == person
+        probable[mine] = exchanged(_odds(signs[~mine], swapped[~mine], weights[~mine]), signs[mine])
+    return replace(doubt, sides=_odds(signs, swapped, weights), unknown=_unknown(probable, swapped, weights))
+
+
+def _odds(signs: Array, swapped: NDArray[np.bool_], weights: Array) -> Array:
+    """Return the coefficients (5,) of the log-odds of exchanged sides."""
+    weights = weights / max(weights.sum(), TINY)
+    sides = logistic(signs, swapped, weights)
     if sides[1] < LEAST:  # too few swapped frames to say what the samples know of them
-        sides = np.insert(logistic(design[:, [0, 2]], swapped, weights), 1, LEAST)
-    return replace(doubt, sides=sides, unknown=UNKNOWN)
+        sides = np.insert(logistic(np.delete(signs, 1, axis=1), swapped, weights), 1, LEAST)
+    return sides
+
+
+def _unknown(probable: Array, swapped: NDArray[np.bool_], weights: Array) -> float:
+    """Return from which probability of exchanged sides on they are unknown: few of the other frames are swapped."""
+    order = np.argsort(probable, kind="stable")
+    shares = np.cumsum((weights * swapped)[order]) / np.maximum(np.cumsum(weights[order]), TINY)
+    few = np.flatnonzero(shares <= SWAPPED)
+    return float(np.clip(probable[order][few[-1]] if len(few) else 0.0, *BOUNDS))
 
 
 def logistic(design: Array, came: NDArray[np.bool_], weights: Array) -> Array:

@@ -12,10 +12,19 @@ from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept
 from posefit.posterior.modes import APART
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
-from posefit_experiments.posterior.fit import MEMBERS, TINY, Kept, frame_weights, radii_and_angles_held, sharpened
+from posefit_experiments.posterior.fit import (
+    MEMBERS,
+    TINY,
+    Kept,
+    exchanged,
+    frame_weights,
+    radii_and_angles_held,
+    sharpened,
+    signs_of,
+)
 
 KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
-LIKELY = (0.05, 0.15, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
+LIKELY = (0.05, 0.1, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +33,8 @@ class Judged:
 
     kept: Kept
     doubts: Array = field(repr=False)  # (T,) metres
+    sharpness: float
+    none: Array = field(repr=False)  # (T,) probability that no mode is right
     unknown: NDArray[np.bool_] = field(repr=False)  # (T,)
     exchanged: Array = field(repr=False)  # (T,) probability of exchanged sides
     inside: NDArray[np.bool_] = field(repr=False)  # (T, levels, 27)
@@ -34,14 +45,15 @@ class Judged:
 def judgement(doubt: Doubt, kept: Kept) -> Judged:
     """Return what is said of a track."""
     logs = np.array([doubt.log(seen) for seen in kept.seen])
-    unknown = kept.second >= [doubt.second_side(log) for log in logs]
-    odds = doubt.sides[0] + doubt.sides[1] * kept.second + doubt.sides[2] * logs
+    least = [doubt.second_side(log, twins) for log, twins in zip(logs, kept.track.twins, strict=True)]
     radii, angles = radii_and_angles_held(doubt, kept)
     return Judged(
         kept,
         np.exp(logs),
-        unknown,
-        1.0 / (1.0 + np.exp(-odds)),
+        doubt.sharpness,
+        np.array([doubt.none_right(log) for log in logs]),
+        kept.second >= least,
+        exchanged(doubt.sides, signs_of(doubt, kept)),
         kept.track.off[:, None] <= radii,
         radii,
         angles.mean(axis=(0, 2)),
@@ -73,8 +85,8 @@ def coverages(tracks: Sequence[Judged]) -> dict[str, Any]:
         "overall": told(tracks),
         "joints": {name: told(tracks, members) for name, members in MEMBERS.items()},
         "views": by(lambda one: seen_from(one.kept)),
-        "motions": by(lambda one: one.kept.track.seen.group),
-        "translations": by(lambda one: one.kept.track.seen.translation),
+        "motions": by(_group),
+        "translations": by(_translation),
         "people": by(lambda one: one.kept.track.seen.clip.subject),
         "angles": dict(zip(("50", "80", "95"), np.mean([one.turned for one in tracks], axis=0).tolist(), strict=True)),
     }
@@ -86,20 +98,38 @@ def seen_from(kept: Kept) -> str:
 
 
 def sides(tracks: Sequence[Judged]) -> dict[str, Any]:
-    """Return how often left and right are said to be unknown, and swapped then and otherwise; by kind of motion too."""
+    """Return how often left and right are said to be unknown, and swapped then and otherwise.
+
+    Of all tracks, at other probabilities too, by kind of motion, by how many cameras, and by translation.
+    """
     told = {}
     weights = frame_weights([one.kept for one in tracks])
-    exchanged = np.concatenate([one.exchanged for one in tracks])
+    probable = np.concatenate([one.exchanged for one in tracks])
     swapped = np.concatenate([one.kept.swapped for one in tracks])
     for least in LIKELY:
-        told[f"all, from {100 * least:g} % on"] = _sides(weights, exchanged >= least, swapped)
-    for name in ("all", *sorted({one.kept.track.seen.group for one in tracks})):
-        mine = [one for one in tracks if name in ("all", one.kept.track.seen.group)]
+        told[f"all, from {100 * least:g} % on"] = _sides(weights, probable >= least, swapped)
+    parts: dict[str, list[Judged]] = {"all": list(tracks)}
+    for name_of in (_group, _cameras, _translation):
+        for name in sorted({name_of(one) for one in tracks}):
+            parts[name] = [one for one in tracks if name_of(one) == name]
+    for name, mine in parts.items():
         weights = frame_weights([one.kept for one in mine])
         unknown = np.concatenate([one.unknown for one in mine])
         swapped = np.concatenate([one.kept.swapped for one in mine])
         told[name] = _sides(weights, unknown, swapped)
     return told
+
+
+def _group(one: Judged) -> str:
+    return one.kept.track.seen.group
+
+
+def _cameras(one: Judged) -> str:
+    return {1: "one camera"}.get(len(one.kept.track.seen.views), "two cameras")
+
+
+def _translation(one: Judged) -> str:
+    return one.kept.track.seen.translation
 
 
 def _sides(weights: Array, unknown: NDArray[np.bool_], swapped: NDArray[np.bool_]) -> dict[str, float]:
@@ -112,17 +142,21 @@ def _sides(weights: Array, unknown: NDArray[np.bool_], swapped: NDArray[np.bool_
     }
 
 
-def best_modes(tracks: Sequence[Kept], sharpnesses: Sequence[float]) -> dict[str, Any]:
-    """Return how far the best mode's probability is from how often it is right; weights of each track are sharpened.
+def best_modes(tracks: Sequence[Kept], said: Sequence[Judged] = ()) -> dict[str, Any]:
+    """Return how far the best mode's probability is from how often it is right.
 
-    It is right where the truth is nearer to it than to any other mode, and so where there is no other; `several` are
-    the frames that have others. `within` is where the truth is as near to it as poses of one mode are.
+    It is right where the truth is nearer to it than to any other mode, and as near as poses of one mode are; `several`
+    are the frames that have others, `none` those in which no mode is right. Modes' weights are those that `said` makes
+    of them, in the order of the tracks; without it they are as they were drawn.
     """
-    pairs = list(zip(tracks, sharpnesses, strict=True))
-    probable = np.array([sharpened(modes, power)[0] for one, power in pairs for modes in one.modes])
+    powers = [one.sharpness for one in said] or [1.0] * len(tracks)
+    none = np.concatenate([one.none for one in said] or [np.zeros(len(one.track)) for one in tracks])
+    pairs = zip(tracks, powers, strict=True)
+    probable = (1.0 - none) * [sharpened(modes, power)[0] for one, power in pairs for modes in one.modes]
     several = np.array([len(modes) > 1 for one in tracks for modes in one.modes])
     nearest = np.concatenate([one.nearest for one in tracks])
-    right, within = nearest[:, 0] == 0.0, nearest[:, 1] <= APART
+    far = nearest[:, 1] > APART
+    right = (nearest[:, 0] == 0.0) & ~far
     second, swapped = (np.concatenate([getattr(one, name) for one in tracks]) for name in ("second", "swapped"))
     return {
         "tracks": len(tracks),
@@ -131,8 +165,9 @@ def best_modes(tracks: Sequence[Kept], sharpnesses: Sequence[float]) -> dict[str
         "calibration_error": calibration_error(probable, right),
         "several": float(several.mean()),
         "calibration_error_several": calibration_error(probable[several], right[several]) if several.any() else 0.0,
-        "within": float(within.mean()),
-        "calibration_error_within": calibration_error(probable, within),
+        "none": float(far.mean()),
+        "calibration_error_none": calibration_error(none, far),
+        "auroc": auroc(probable, right),
         "second_side_auroc": auroc(second, swapped),
         "reliability": reliability(probable, right),
     }
@@ -178,25 +213,13 @@ def posterior_lines(told: Mapping[str, Any]) -> Iterator[str]:
     for name, one in told["sides"].items():
         yield _line([name, *(f"{100 * one[each]:.1f}" for each in names)])
     yield ""
-    yield from _head(
-        [
-            "temperature",
-            "tracks",
-            "best mode, mean %",
-            "right %",
-            "error %",
-            "within 10 cm %",
-            "error %",
-            "second side AUROC",
-        ],
-        1,
-    )
+    heads = ["best mode %", "right %", "error %", "several modes %", "error %", "none right %", "error %"]
+    yield from _head(["modes", "tracks", *heads, "AUROC", "second side AUROC"], 1)
     for name, one in told["modes"].items():
         each = ["mean_probability", "right", "calibration_error", "several", "calibration_error_several"]
-        each += ["within", "calibration_error_within"]
-        rank = one["second_side_auroc"]
-        ranked = "" if rank is None else f"{rank:.2f}"
-        yield _line([name, str(one["tracks"]), *(f"{100 * one[key]:.1f}" for key in each), ranked])
+        each += ["none", "calibration_error_none"]
+        ranks = ["" if one[key] is None else f"{one[key]:.2f}" for key in ("auroc", "second_side_auroc")]
+        yield _line([name, str(one["tracks"]), *(f"{100 * one[key]:.1f}" for key in each), *ranks])
     if told["kept"]:
         yield ""
         yield from _head(["frames kept %", *next(iter(told["kept"].values()))], 1)
