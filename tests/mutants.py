@@ -69,10 +69,34 @@ MUTANTS = (
     ),
     Mutant(
         "joints of a frame that was held are told to other programs",
-        "posefit/tracking/formats.py",
+        "posefit/tracking/evaluation.py",
         (('if not row["usable"] or row["lost"]', 'if row["lost"]'),),
         "tests/tracking/test_certainty.py::"
         "test_what_is_held_or_lost_is_blank_for_other_programs_and_marked_in_the_table",
+    ),
+    Mutant(
+        "a knee bends forwards",
+        "posefit/measuring/angles.py",
+        (("* [-1.0, 1.0, 1.0]", "* [1.0, 1.0, 1.0]"),),
+        "tests/sources/test_measuring.py::test_a_knee_bends_backwards",
+    ),
+    Mutant(
+        "a left side is measured without the mirror",
+        "posefit/measuring/angles.py",
+        (('if side == "left" else one', 'if side == "none" else one'),),
+        "tests/measuring/test_angles.py::test_who_is_mirrored_has_the_other_sides_angles",
+    ),
+    Mutant(
+        "points that nobody saw lie at the origin of a .c3d",
+        "posefit/measuring/c3d.py",
+        (("(0.0, 0.0, 0.0, -1.0)", "(0.0, 0.0, 0.0, 0.0)"),),
+        "tests/measuring/test_files.py::test_a_c3d_is_what_another_reader_reads",
+    ),
+    Mutant(
+        "steps beside an unknown frame count",
+        "posefit/measuring/gait.py",
+        (("unknown & set(range(int(start), int(end) + 2))", "False"),),
+        "tests/measuring/test_gait.py::test_steps_that_touch_an_unknown_frame_count_for_nothing",
     ),
     Mutant(
         "what renders a tracker's observations counts as its evaluations",

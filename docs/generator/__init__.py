@@ -8,7 +8,7 @@ from pathlib import Path
 
 import house
 
-from generator import commands, environments, equations, figures, joints, python, settings
+from generator import angles, commands, environments, equations, figures, joints, python, settings
 
 DOCS = Path(__file__).parents[1]
 GENERATED = DOCS / "generated"
@@ -24,6 +24,7 @@ def write() -> None:
         "commands.md": commands.page(),
         "environments.md": environments.page(),
         "joints.md": joints.page(),
+        "angles.md": angles.page(),
         **{f"python/{name}.rst": text for name, text in python.pages().items()},
         "house.svg": house.drawing(),
     }

@@ -24,6 +24,12 @@ SOURCES = {
     "DUNN2023": "Dunn, Wasserman and Ramdas, Distribution-free prediction sets for two-layer hierarchical models, 2023",
     "GUO2017": "Guo, Pleiss, Sun and Weinberger, On calibration of modern neural networks, 2017",
     "BRIER1950": "Brier, Verification of forecasts expressed in terms of probability, 1950",
+    "GROOD1983": "Grood and Suntay, A joint coordinate system for the clinical description of motions: the knee, 1983",
+    "WU2002": "Wu et al., ISB recommendation on definitions of joint coordinate systems: ankle, hip and spine, 2002",
+    "WU2005": "Wu et al., ISB recommendation on definitions of joint coordinate systems: upper limb, 2005",
+    "ZENI2008": "Zeni, Richards and Higginson, Two simple methods for determining gait events, 2008",
+    "WHITTLE2007": "Whittle, Gait analysis: an introduction, 2007",
+    "ALEXANDER1989": "Alexander, Optimization and gaits in the locomotion of vertebrates, 1989",
     "CEC2013": "Li, Engelbrecht and Epitropakis, Benchmark functions for CEC'2013 on niching methods, 2013",
 }
 _TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from posefit.geometry.skeleton import JOINTS
+from posefit.measuring.centres import PLACES
 from posefit.tracking.measures import BASELINES, FRAME, MEASURES, Measure
 
 # How a value stands in a file whose table shows it times a factor.
@@ -58,6 +58,7 @@ SAID = {
     ),
     "unknown_sides": ("", "numbers of the frames whose left and right are called unknown; where a method says"),
     "lost_frames": ("", "numbers of the frames that are called lost; where a method says"),
+    "gait": ("", "[figures of the walk](../howto/measuring.md), or `why` there are none"),
 }
 CELL = {
     "method": ("", "OPTIMISER@PRIOR, or a tracker"),
@@ -100,7 +101,7 @@ def page() -> str:
         "truth is `null` where nobody knows it, and one that a method has to say where it does not.",
         "## Columns of `frames.csv`",
         "One row a frame; those that need the truth are there only where it is known.",
-        _table("column", [*_measured(FRAME.values()), ("JOINT_x, JOINT_y, JOINT_z", "m", _joints())]),
+        _table("column", [*_measured(FRAME.values()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())]),
         "## Columns of a sweep's CSV",
         "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
@@ -135,7 +136,10 @@ def _told(said: Said) -> list[tuple[str, str, str]]:
 
 
 def _joints() -> str:
-    return f"place in the world of each of the {len(JOINTS)} joints: {', '.join(JOINTS)}"
+    return (
+        f"place in the world of each of the {len(PLACES)} joints, blank in frames that were held or are called lost: "
+        f"{', '.join(PLACES)}"
+    )
 
 
 def _table(head: str, rows: Iterable[tuple[str, str, str]]) -> str:

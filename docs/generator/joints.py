@@ -1,6 +1,7 @@
 """The table of the joints: their names, where on a person they are, and where a pose holds their angles."""
 
 from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, angle_index
+from posefit.measuring.centres import PLACES
 
 WHERE = {
     "root": "pelvis",
@@ -25,12 +26,15 @@ WHERE = {
 
 def page() -> str:
     """Return the table, as Markdown."""
-    lines = ["| number | joint | where it is | its bone begins at | angles in a pose |", "|---:|---|---|---|---|"]
+    lines = [
+        "| number | joint | where it is | in tables and markers | its bone begins at | angles in a pose |",
+        "|---:|---|---|---|---|---|",
+    ]
     for number, name in enumerate(JOINTS):
         side = "" if name in WHERE else {"l": "left ", "r": "right "}[name[0]]
         place = WHERE[name if name in WHERE else name[1:]]
         begins = "" if number == 0 else f"`{JOINTS[PARENTS[number]]}`"
-        lines.append(f"| {number} | `{name}` | {side}{place} | {begins} | {_angles(number)} |")
+        lines.append(f"| {number} | `{name}` | {side}{place} | `{PLACES[number]}` | {begins} | {_angles(number)} |")
     return "\n".join(lines) + "\n"
 
 

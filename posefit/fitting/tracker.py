@@ -116,6 +116,7 @@ class Prediction:
         translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
         modes: searches of a frame that its modes are weighed by, the track's own and others; 0 weighs none. Ours.
+        modes_share: what they are found and weighed by, over the evaluations of the track's own search, above 0. Ours.
         posterior_temperature: what costs are divided by where modes are weighed, above 0. Ours.
     """
 
@@ -129,11 +130,13 @@ class Prediction:
     translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     beta: float = BETA
     modes: int = 0
+    modes_share: float = 0.2
     posterior_temperature: float = 2.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
         positive("floor", self.floor)
+        positive("modes_share", self.modes_share)
         positive("posterior_temperature", self.posterior_temperature)
         whole("modes", self.modes, 0)
         if not self.spread >= 0.0:

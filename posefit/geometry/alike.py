@@ -7,6 +7,7 @@ of the two sides are seldom equally long, and silhouettes are as much alike as t
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -83,12 +84,22 @@ def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
     """Return poses (n, 66) in which the joints of some names have the angles of their counterparts, mirrored."""
     poses = np.asarray(poses, dtype=np.float64)
     found = poses.copy()
-    for j in (j for j in INNER if JOINTS[j] in names):
+    for j, frame in _frames(skeleton):
+        if JOINTS[j] not in names:
+            continue
         mine, theirs = (slice(k, k + 3) for k in (angle_index(j), angle_index(MIRROR[j])))
-        # this bone's rest frame from the reflected one of its counterpart
-        frame = skeleton.axes[j - 1].T @ _LEFT_RIGHT @ skeleton.axes[MIRROR[j] - 1]
-        if np.allclose(frame, _LEFT_RIGHT):  # which keeps angles of more than half a turn as they are
+        if frame is None:
             found[:, mine] = poses[:, theirs] * [1.0, -1.0, -1.0]
         else:
             found[:, mine] = joint_angles_from_rotation(frame @ rotation_from_joint_angles(poses[:, theirs]) @ frame.T)
     return found
+
+
+@lru_cache(maxsize=16)
+def _frames(skeleton: Skeleton) -> list[tuple[int, Array | None]]:
+    """Return each joint with its bone's rest frame, from the reflected one of its counterpart.
+
+    None stands for a mere reflection, which keeps angles of more than half a turn as they are.
+    """
+    frames = [(j, skeleton.axes[j - 1].T @ _LEFT_RIGHT @ skeleton.axes[MIRROR[j] - 1]) for j in INNER]
+    return [(j, None if np.allclose(frame, _LEFT_RIGHT) else frame) for j, frame in frames]

@@ -17,6 +17,6 @@ A silhouette seldom tells one pose. What it leaves open is a `Posterior`: poses 
 | whether left and right are known | mirror ambiguity | sides.py |
 | several searches of any optimiser become modes with weights | multimodal optimisation | searches.py |
 | which proposals lie in one valley of the cost | hill-valley clustering, niching | hill_valley.py |
-| how much of the box each valley holds | tempered sequential Monte Carlo, waste-free | smc.py, mixture.py |
+| how much of the box each valley holds | tempered sequential Monte Carlo, waste-free | smc.py, mixture.py, kernels.py |
 | whether figures mean what they say, and making them so | conformal prediction, coverage, ECE, AUROC | calibration.py |
 """

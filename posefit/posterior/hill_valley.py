@@ -87,13 +87,12 @@ def _pairs(
     landscape: Landscape, proposals: Array, order: NDArray[np.int64], edge: float, least: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return each proposal with those that are better (p, 2), nearest first, and how often to probe them (p,)."""
-    most = proposals.shape[1] + 1
+    most, ranked = proposals.shape[1] + 1, proposals[order]
+    away = np.linalg.norm(landscape.box.towards(ranked[:, None], ranked), axis=2)
     pairs, far = [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
     for place in range(1, len(order)):
-        better = order[:place]
-        away = np.linalg.norm(landscape.box.towards(proposals[order[place]], proposals[better]), axis=1)
-        nearest = np.argsort(away, kind="stable")[:most]  # MAREE2018 (nearest better)
-        pairs.append(np.stack([np.full(len(nearest), order[place]), better[nearest]], axis=1))
-        far.append(away[nearest])
+        nearest = np.argsort(away[place, :place], kind="stable")[:most]  # MAREE2018 (nearest better)
+        pairs.append(np.stack([np.full(len(nearest), order[place]), order[nearest]], axis=1))
+        far.append(away[place, nearest])
     probes = least + (np.concatenate(far) / edge).astype(np.int64)  # MAREE2018 (test points)
     return np.concatenate(pairs), probes

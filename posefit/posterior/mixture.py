@@ -7,13 +7,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
+from posefit.posterior.kernels import log_parts, log_sums
 from posefit.posterior.landscape import Box
 
 REDRAWS = 100  # Reading S7
+SPARE = 8  # ours: proposals that are drawn beyond those that are expected to be enough
 WIDEST = 0.5  # ours: a wrapped normal of this deviation is its three nearest images to nine digits
-
-_normal = np.vectorize(lambda x: 0.5 * (1.0 + math.erf(x / math.sqrt(2.0))), otypes=[np.float64])
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +35,8 @@ class NormalMixture:
     def __post_init__(self) -> None:
         if self.centres.shape != self.spreads.shape:
             raise ValueError(f"spreads must have shape {self.centres.shape}, got {self.spreads.shape}")
+        for name in ("centres", "spreads"):
+            object.__setattr__(self, name, writeable(getattr(self, name)))
         if not (self.spreads > 0.0).all() or not (self.spreads <= WIDEST).all():
             raise ValueError(f"spreads must be above 0 and at most {WIDEST}, got {self.spreads.ravel()[:3]}")
         if not (0.0 < self.broad < 1.0 if len(self.centres) else self.broad == 1.0):
@@ -45,13 +47,14 @@ class NormalMixture:
 
         Where too few are found in 100 attempts, those are repeated. Raises ValueError where none is.
         """
-        found, tried, kept = [], 0, 0
+        found, tried, kept, more = [], 0, 0, count
         for _ in range(REDRAWS):
-            drawn = self._drawn(box, rng, count)
+            drawn = self._drawn(box, rng, more)
             found.append(drawn[box.feasible(drawn)])
-            tried, kept = tried + count, kept + len(found[-1])
+            tried, kept = tried + more, kept + len(found[-1])
             if kept >= count:
                 break
+            more = min(count, (count - kept) * tried // max(kept, 1) + SPARE)
         if not kept:
             raise ValueError(f"the box must be feasible somewhere, got nothing in {REDRAWS} x {count} draws")
         drawn = np.concatenate(found)
@@ -61,8 +64,8 @@ class NormalMixture:
         """Return the logarithm (n,) of the density of proposals (n, d), over that of the uniform distribution."""
         if not len(self.centres):
             return np.zeros(len(proposals))
-        parts = self._log_parts(box, proposals) + math.log((1.0 - self.broad) / len(self.centres))
-        return np.asarray(np.logaddexp(np.logaddexp.reduce(parts, axis=1), math.log(self.broad)))
+        each = math.log((1.0 - self.broad) / len(self.centres))
+        return np.asarray(log_sums(self._log_parts(box, proposals), each, math.log(self.broad)))
 
     def nearest(self, box: Box, proposals: Array) -> NDArray[np.int64]:
         """Return which normal distribution is the densest (n,) at proposals (n, d); 0 where there is none."""
@@ -72,18 +75,7 @@ class NormalMixture:
 
     def _log_parts(self, box: Box, proposals: Array) -> Array:
         """Return the logarithms (n, k) of the densities of the normal distributions, over the uniform one."""
-        logs = np.empty((len(proposals), len(self.centres)))
-        for k, (centre, spread) in enumerate(zip(self.centres, self.spreads, strict=True)):
-            away = box.towards(centre, proposals)
-            exponents = -0.5 * (away / spread) ** 2
-            if box.periodic.any():
-                around = [np.exp(-0.5 * ((away + turn) / spread) ** 2 - exponents) for turn in (-2.0, 2.0)]
-                images = np.log1p(np.where(box.periodic, around[0] + around[1], 0.0))
-                exponents = exponents + images
-            inside = np.where(box.periodic, 1.0, _normal((1.0 - centre) / spread) - _normal((-1.0 - centre) / spread))
-            usual = np.log(spread * math.sqrt(2.0 * math.pi) * inside / 2.0)
-            logs[:, k] = (exponents - usual).sum(axis=1)
-        return logs
+        return np.asarray(log_parts(writeable(proposals), self.centres, self.spreads, box.periodic))
 
     def _drawn(self, box: Box, rng: np.random.Generator, count: int) -> Array:
         drawn = rng.uniform(-1.0, 1.0, (count, box.dimensions))
@@ -92,8 +84,12 @@ class NormalMixture:
             return drawn
         which = rng.integers(0, len(self.centres), len(near))
         means, spreads = self.centres[which], self.spreads[which]
-        mine = box.wrap(rng.normal(means, spreads))
-        while (outside := np.abs(mine) > 1.0).any():  # of a mean in the box at least a third stays inside
-            mine[outside] = rng.normal(means[outside], spreads[outside])
+        mine = box.wrap(means + spreads * rng.standard_normal(means.shape))
+        rows, columns = np.nonzero(np.abs(mine) > 1.0)
+        while len(rows):  # of a mean in the box at least a third stays inside
+            again = means[rows, columns] + spreads[rows, columns] * rng.standard_normal(len(rows))
+            mine[rows, columns] = again
+            out = np.abs(again) > 1.0
+            rows, columns = rows[out], columns[out]
         drawn[near] = mine
         return drawn

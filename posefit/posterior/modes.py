@@ -7,9 +7,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.posterior.calibration import Recalibration
+from posefit.posterior.kernels import mean_distances
 
 # ours: metres, the mean over joints, beyond which two poses are of two modes; a mirrored stride is 0.15 to 0.2 off
 APART = 0.1
@@ -149,7 +150,7 @@ def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: floa
 
 def _distances(joints: Array) -> Array:
     """Return how far joints (K, 27, 3) are from each other (K, K), metres, the mean over joints."""
-    return np.array([np.linalg.norm(joints - one, axis=-1).mean(axis=-1) for one in joints])
+    return np.asarray(mean_distances(writeable(joints)))
 
 
 def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[float, int]]:

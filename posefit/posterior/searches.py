@@ -13,17 +13,24 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.posterior.hill_valley import valleys
-from posefit.posterior.landscape import Landscape
+from posefit.posterior.landscape import Box, Landscape
 from posefit.posterior.mixture import WIDEST, NormalMixture
-from posefit.posterior.smc import CHAIN, PARTICLES, reweighed, systematic_rows, tempered
+from posefit.posterior.smc import reweighed, systematic_rows, tempered
 
-EACH = 8  # ours: of each search, so many of its best proposals are sorted into valleys
-PROBES = 3  # ours: of a pair, at the least, as these valleys may be narrow
+EACH = 8  # ours: of each search, so many of its best proposals are sorted into valleys, at most
+TOUCHED = 12.0  # ours: evaluations for each pair of them that is; of a budget, no more than about one in eight
+PROBES = 2  # ours: of a pair, at the least, as these valleys may be narrow
 MOST = 16  # ours: valleys that the sampler starts in, the deepest
-REACH = 10.0  # ours: in temperatures above the least cost: what is not as deep weighs nothing worth a start
+REACH = 20.0  # ours: in temperatures above the least cost: what is not as deep weighs nothing worth a start
 BROAD = 0.3  # ours: the share of particles that start anywhere
-WIDTHS = 0.5 ** np.arange(7, 0, -1)  # ours: how wide a valley may be, in half-ranges of the box
+NARROWEST = 2.0**-7  # ours: how narrow a valley may be, in half-ranges of the box
+ENOUGH = 3  # ours: proposals a coordinate from which a valley's own width is found
+LOOKED_AT = 300  # ours: of those, about so many, evenly over the searches
+RIDGE = 1e-3  # of how fast costs rise, as a share of what is known of them
 WIDER = np.array([1.0, 3.0])  # ours: particles start as wide, and wider, as coordinates may change together
+EVALUATIONS = 10_000  # ours
+CHAIN = 3  # P, ours: each survivor becomes so many particles
+ROUNDS = 1  # ours: of moves, that a budget holds
 
 Searched = tuple[Array, Array]  # all that one search evaluated: proposals (n, d), costs (n,)
 
@@ -53,27 +60,33 @@ def weighed(
     temperature: float,
     rng: np.random.Generator,
     *,
-    particles: int = PARTICLES,
-    chain: int = CHAIN,
+    evaluations: int = EVALUATIONS,
 ) -> Weighed:
     """Return weighted proposals of the density exp(-cost / temperature), found from what several searches evaluated.
 
     Hills lower than a `temperature` part no valleys: silhouettes are made of pixels, and have many that mean nothing.
-    Raises ValueError where no search has met a finite cost.
+    It takes about so many `evaluations` more. Raises ValueError where no search has met a finite cost.
     """
     before = landscape.evaluations
-    proposals, costs = best_of_each(landscape, searched, EACH)
+    proposals, costs = best_of_each(landscape, searched, _each(evaluations, len(searched)))
     found = valleys(landscape, proposals, costs, tolerance=temperature, least=PROBES)
     lowest = found.lowest[costs[found.lowest] <= costs.min() + REACH * temperature][:MOST]
     modes = proposals[lowest]
-    spreads = WIDER[:, None, None] * widths(landscape, modes, costs[lowest], temperature)
+    spreads = WIDER[:, None, None] * widths(landscape.box, searched, modes, costs[lowest], temperature)
     centres = np.broadcast_to(modes, spreads.shape)
     start = NormalMixture(_rows(centres), np.minimum(_rows(spreads), WIDEST), BROAD)
-    sample = tempered(landscape, start, temperature, rng, particles=particles, chain=chain)
+    left = max(evaluations - (landscape.evaluations - before), 0)
+    particles = max(int(left / (CHAIN + ROUNDS * (CHAIN - 1))), 2) * CHAIN
+    sample = tempered(landscape, start, temperature, rng, particles=particles, chain=CHAIN, evaluations=left)
     groups = start.nearest(landscape.box, sample.proposals) % len(modes)
     shares: Array = np.bincount(groups, sample.weights, len(modes)).astype(np.float64)
     spent = landscape.evaluations - before
     return Weighed(sample.proposals, sample.weights, sample.costs, groups, modes, shares, spent)
+
+
+def _each(evaluations: int, searches: int) -> int:
+    """Return how many of the best proposals of each search are sorted into valleys."""
+    return min(max(int(np.sqrt(evaluations / TOUCHED) / searches), 1), EACH)
 
 
 def _rows(several: Array) -> Array:
@@ -88,11 +101,15 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
     """
     chosen, known = [], []
     for proposals, costs in searched:
-        usable = np.flatnonzero(np.isfinite(costs))
-        order = usable[np.argsort(costs[usable], kind="stable")][: 4 * each]
+        order = np.flatnonzero(np.isfinite(costs))
+        if len(order) > 4 * each:
+            order = order[costs[order] <= np.partition(costs[order], 4 * each)[4 * each]]
+        order = order[np.argsort(costs[order], kind="stable")][: 4 * each]
         order = order[landscape.box.feasible(proposals[order])] if len(order) else order
-        _, first = np.unique(proposals[order], axis=0, return_index=True)
-        rows = order[np.sort(first)][:each]
+        different: dict[bytes, int] = {}
+        for row in order.tolist():
+            different.setdefault(proposals[row].tobytes(), row)
+        rows = np.array(list(different.values())[:each], dtype=np.int64)
         chosen.append(proposals[rows])
         known.append(costs[rows])
     if not sum(map(len, known)):
@@ -108,15 +125,31 @@ def likelihoods(costs: Array, temperature: float) -> Array:
     return reweighed(rises, 1.0)[0]
 
 
-def widths(landscape: Landscape, modes: Array, costs: Array, temperature: float) -> Array:
+def widths(box: Box, searched: Sequence[Searched], modes: Array, costs: Array, temperature: float) -> Array:
     """Return how wide each mode (k, d) is along each coordinate (k, d), in half-ranges of the box.
 
-    That is the least of some widths at which the cost has risen by half a temperature on both sides, as it has one
-    standard deviation from the mode of a normal distribution. All are probed in one call.
+    That is the standard deviation of exp(-cost / temperature) where the cost rises from the mode as a sum of squares:
+    those sums are fitted, by least squares, to the costs of what was evaluated nearest to the mode, and where that is
+    little, of all.
     """
-    count, dimensions = modes.shape
-    steps = np.stack([WIDTHS, -WIDTHS])[:, :, None, None] * np.eye(dimensions)  # (2, w, d, d)
-    probes = landscape.box.wrap(modes[:, None, None, None] + steps)
-    found = landscape.costs(probes.reshape(-1, dimensions)).reshape(count, 2, len(WIDTHS), dimensions)
-    risen = found.min(axis=1) > costs[:, None, None] + 0.5 * temperature  # (k, w, d)
-    return np.asarray(np.where(np.any(risen, axis=1), WIDTHS[risen.argmax(axis=1)], WIDTHS[-1]))
+    proposals, known = (np.concatenate(part) for part in zip(*searched, strict=True))
+    usable = np.flatnonzero(known <= costs.min() + REACH * temperature)
+    usable = usable[:: max(len(usable) // LOOKED_AT, 1)]
+    proposals, known = proposals[usable], known[usable]
+    away = np.array([box.towards(mode, proposals) ** 2 for mode in modes])  # (k, n, d)
+    owners = away.sum(axis=2).argmin(axis=0)
+    away, rises = away[owners, np.arange(len(known))], known - costs[owners]
+    if len(modes) == 1:
+        return _width(away, rises, temperature)[None]
+    found = np.tile(_width(away, rises, temperature), (len(modes), 1))
+    for k in np.flatnonzero(np.bincount(owners, minlength=len(modes)) >= ENOUGH * modes.shape[1]):
+        found[k] = _width(away[owners == k], rises[owners == k], temperature)
+    return found
+
+
+def _width(squares: Array, rises: Array, temperature: float) -> Array:
+    """Return the standard deviations (d,) that go with costs that rise (n,) over squared distances (n, d)."""
+    gram = squares.T @ squares
+    gram += (RIDGE * np.trace(gram) / len(gram) + np.finfo(float).tiny) * np.eye(len(gram))
+    slopes = np.linalg.solve(gram, squares.T @ rises)
+    return np.asarray(np.clip(np.sqrt(0.5 * temperature / np.maximum(slopes, temperature)), NARROWEST, WIDEST))

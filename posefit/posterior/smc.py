@@ -9,14 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
+from posefit.posterior.kernels import covariance_within, effective, longest_step, taken, walked
 from posefit.posterior.landscape import Landscape
 from posefit.posterior.mixture import NormalMixture
 
 PARTICLES = 2048  # N, ours
 CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P
 SURVIVAL = 0.5  # alpha: the share of the particles that the next temperature leaves
-HALVINGS = 60  # ours: bisection steps; a double has 53 bits
+HALVINGS = 24  # ours: bisection steps, to a ten millionth of what is left
 WANTED = 0.234  # ours: the share of moves that is to be accepted, as is best for long random walks
 STEPS = 500  # ours: temperatures, at most
 
@@ -42,13 +43,15 @@ def tempered(
     particles: int = PARTICLES,
     chain: int = CHAIN,
     survival: float = SURVIVAL,
+    evaluations: int | None = None,
 ) -> Sampled:
     """Return weighted proposals of the density that exp(-cost / temperature) has in the feasible box.
 
     The particles begin at `start` and go in steps to that density, on the geometric path between both: each step is as
     long as leaves a share `survival` of them, by effective sample size. Some survive, and each becomes a chain of
-    `chain` random-walk moves, all of which are particles. Raises ValueError where a setting makes no sense, or where
-    nothing feasible is found.
+    `chain` random-walk moves, all of which are particles. With a budget of so many `evaluations`, steps are as long as
+    it takes to arrive within it, and the last particles are weighed by what is left. Raises ValueError where a setting
+    makes no sense, or where nothing feasible is found.
     """
     if not temperature > 0.0:
         raise ValueError(f"temperature must be above 0, got {temperature}")
@@ -56,6 +59,7 @@ def tempered(
         raise ValueError(f"particles must be at least 2 chains of 2 or more, got {particles} and chains of {chain}")
     if not 0.0 < survival < 1.0:
         raise ValueError(f"survival must lie between 0 and 1, got {survival}")
+    before, moved = landscape.evaluations, particles // chain * (chain - 1)
     proposals, share = start.draw(landscape.box, rng, particles)
     costs, begun = landscape.costs(proposals), start.log_density(landscape.box, proposals)
     log_evidence, exponent, factor = float(np.log(share)), 0.0, 1.0
@@ -63,20 +67,20 @@ def tempered(
     accepted: list[float] = []
     while True:
         rises = -costs / temperature - begun
-        step = next_step(rises, 1.0 - exponent, survival)
-        if len(exponents) == STEPS - 1:
-            step = 1.0 - exponent
+        rounds = _rounds(evaluations, landscape.evaluations - before, moved)
+        step = left = 1.0 - exponent
+        if rounds and len(exponents) < STEPS - 1:
+            step = max(next_step(rises, left, survival), left / (1 + rounds))
         weights, mean = reweighed(rises, step)
         log_evidence += mean  # DAU2022 (normalising constant)
-        exponent = 1.0 if step >= 1.0 - exponent else exponent + step
+        exponent = 1.0 if step >= left else exponent + step
         exponents.append(exponent)
         if exponent == 1.0:
             return Sampled(proposals, weights, costs, log_evidence, np.array(exponents), np.array(accepted))
         rows = systematic_rows(weights, rng.random(), particles // chain)
         walk = factor * _walk(start, landscape, proposals, weights)
         state = (proposals[rows], costs[rows], begun[rows])
-        states = [state]
-        moves = 0.0
+        states, moves = [state], 0.0
         for _ in range(chain - 1):
             state, share = _moved(landscape, start, state, walk, exponent, temperature, rng)
             states.append(state)
@@ -86,6 +90,11 @@ def tempered(
         proposals, costs, begun = (np.concatenate(part) for part in zip(*states, strict=True))  # DAU2022 (waste-free)
 
 
+def _rounds(evaluations: int | None, used: int, moved: int) -> float:
+    """Return how often so many particles can be `moved` within what is left of a budget."""
+    return np.inf if evaluations is None else max(evaluations - used, 0) // moved
+
+
 def next_step(rises: Array, left: float, survival: float) -> float:
     """Return how far to go on a path, at most what is `left`, so that weights exp(step rise) leave a share `survival`.
 
@@ -93,16 +102,9 @@ def next_step(rises: Array, left: float, survival: float) -> float:
     step grows, so bisection finds it.
     """
     alive = rises[rises > -np.inf]
-    if not len(alive) or _effective(left * alive) >= survival * len(alive):
+    if not len(alive) or effective(left * alive) >= survival * len(alive):
         return left
-    low, high = 0.0, left
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if _effective(middle * alive) > survival * len(alive):  # DAU2022 (exponent)
-            low = middle
-        else:
-            high = middle
-    return high
+    return float(longest_step(alive, left, survival * len(alive), HALVINGS))  # DAU2022 (exponent)
 
 
 def reweighed(rises: Array, step: float) -> tuple[Array, float]:
@@ -126,12 +128,6 @@ def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
     return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))
 
 
-def _effective(logarithms: Array) -> float:
-    """Return the effective sample size of weights whose logarithms (n,) are given."""
-    weights = np.exp(logarithms - logarithms.max())
-    return float(weights.sum() ** 2 / (weights**2).sum())
-
-
 def _walk(start: NormalMixture, landscape: Landscape, proposals: Array, weights: Array) -> Array:
     """Return the root (d, d) of a random walk's covariance, in proportion to that of the particles.
 
@@ -141,11 +137,7 @@ def _walk(start: NormalMixture, landscape: Landscape, proposals: Array, weights:
     box, dimensions = landscape.box, proposals.shape[1]
     groups = start.nearest(box, proposals)
     centres = start.centres if len(start.centres) else proposals[[weights.argmax()]]
-    around = box.towards(centres[groups], proposals)
-    for k in np.unique(groups[weights > 0.0]):
-        mine = groups == k
-        around[mine] -= weights[mine] @ around[mine] / weights[mine].sum()
-    covariance = (around * weights[:, None]).T @ around
+    covariance = covariance_within(writeable(proposals), weights, groups, centres, box.periodic)
     covariance += 1e-12 * np.eye(dimensions)
     return np.asarray(2.38 / np.sqrt(dimensions) * np.linalg.cholesky(covariance))  # DAU2022 (random walk)
 
@@ -163,15 +155,8 @@ def _moved(
     rng: np.random.Generator,
 ) -> tuple[_State, float]:
     """Return a chain's next state, and the share of its moves that was accepted."""
-    proposals, costs, begun = state
-    noise = rng.standard_normal(proposals.shape)
-    tried = landscape.box.wrap(proposals + noise @ walk.T)
-    new_costs, new_begun = landscape.costs(tried), start.log_density(landscape.box, tried)
-    rise = exponent * (costs - new_costs) / temperature + (1.0 - exponent) * (new_begun - begun)
-    taken = np.log(1.0 - rng.random(len(costs))) < rise
-    found = (
-        np.where(taken[:, None], tried, proposals),
-        np.where(taken, new_costs, costs),
-        np.where(taken, new_begun, begun),
-    )
-    return found, float(taken.mean())
+    tried = walked(state[0], rng.standard_normal(state[0].shape), walk, landscape.box.periodic)
+    new = (tried, landscape.costs(tried), start.log_density(landscape.box, tried))
+    found = (state[0].copy(), state[1].copy(), state[2].copy())
+    share = taken(*found, *new, rng.random(len(tried)), exponent, temperature)
+    return found, float(share)

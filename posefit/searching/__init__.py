@@ -9,5 +9,7 @@
 | looking for | file |
 |---|---|
 | the modes of one problem, with their weights | modes.py |
+| other poses that a silhouette hardly tells from one, as proposals | twins.py |
+| how likely a frame is lost | doubt.py |
 | those of every frame that an optimiser follows | tracker.py |
 """

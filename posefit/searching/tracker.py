@@ -1,6 +1,5 @@
 """A tracker that searches every frame, and tells what else the frame may show."""
 
-import copy
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -15,7 +14,9 @@ from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
 from posefit.posterior.modes import Posterior
 from posefit.posterior.searches import Searched, likelihoods
-from posefit.searching.modes import MakeOptimiser, elsewhere, gathered, posterior_of, told
+from posefit.posterior.smc import systematic_rows
+from posefit.searching.doubt import lost_at
+from posefit.searching.modes import KEPT, MakeOptimiser, further, gathered, told
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +24,9 @@ class WeighingTracker:
     """Follows as the tracker does that it is given, and adds a posterior to every frame in which somebody is seen.
 
     The track is the same as without. Beside the tracker's own search come others, `prediction.modes` in all, that look
-    anywhere in the same space. Where that is one and the optimiser a filter, its last particles are weighed as they
-    are. All evaluations are told, those of a frame that are beyond the budget too.
+    anywhere in the same space; they and the weighing have `prediction.modes_share` of its evaluations. Where `modes` is
+    1 and the optimiser a filter, its last particles are weighed as they are. All evaluations are told, those of a
+    frame that are beyond the budget too. Each frame says how likely it is lost.
     """
 
     tracker: SynthesisTracker
@@ -45,6 +47,7 @@ class WeighingTracker:
         return replace(
             frame,
             posterior=posterior,
+            lost=float(lost_at(np.array(frame.cost))),
             evaluations=frame.evaluations + more,
             seconds=seconds,
             cpu_seconds=cpu_seconds,
@@ -57,12 +60,25 @@ class WeighingTracker:
         problem = self.tracker.problem(cast(SearchSpace, record.space), record.observation)
         if how.modes == 1 and self.tracker.next_frame == "carry":
             particles, costs = record.found[-1]
-            return told(problem, particles, likelihoods(costs, how.posterior_temperature)), 0
-        # drawn from a copy, so that the track itself is what it is without
-        own = np.random.default_rng(copy.deepcopy(rng).integers(0, 2**63, 4))
-        others = elsewhere(problem, self.tracker.make, evaluations, own, how.modes - 1)
-        posterior, more = posterior_of(problem, [gathered(record.found), *others], how.posterior_temperature, own)
-        return posterior, more + sum(len(costs) for _, costs in others)
+            weights = likelihoods(costs, how.posterior_temperature)
+            return told(problem, *_few(particles, weights)), 0
+        own = _other(rng)  # the track itself is what it is without
+        first, more = gathered(record.found), round(how.modes_share * evaluations)
+        return further(problem, self.tracker.make, first, more, own, how.modes - 1, how.posterior_temperature)
+
+
+def _few(particles: Array, weights: Array) -> tuple[Array, Array]:
+    """Return weighted particles as they are, or where they are many, some of equal weight."""
+    if len(particles) <= KEPT:
+        return particles, weights
+    return particles[systematic_rows(weights, 0.5, KEPT)], np.full(KEPT, 1.0 / KEPT)
+
+
+def _other(rng: np.random.Generator) -> np.random.Generator:
+    """Return a generator that is seeded by what another one would draw next, which stays as it is."""
+    bits = type(rng.bit_generator)(0)
+    bits.state = rng.bit_generator.state
+    return np.random.default_rng(np.random.Generator(bits).integers(0, 2**63, 4))
 
 
 class _Record:

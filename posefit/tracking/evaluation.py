@@ -1,6 +1,6 @@
 """What a track is worth: its errors, beside baselines that anybody can reach."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,11 @@ CLOSE = 200  # of these are looked at closely, with their neighbours in the clip
 SMALL = 60  # pixels that a side of a small picture has at least
 FACTOR = 4  # by how much it is smaller at most
 LOST = 0.5  # how likely a frame has to be lost, for it to be called so
+
+
+def unseen(rows: Sequence[Mapping[str, float]]) -> set[int]:
+    """Return the numbers of the frames that were held or are called lost, which no table tells a place of."""
+    return {k for k, row in enumerate(rows) if not row["usable"] or row["lost"] >= LOST}
 
 
 def nearest(scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA) -> Array:

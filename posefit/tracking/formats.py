@@ -15,7 +15,7 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.motion.motion import Motion
 from posefit.posterior.calibration import LEVELS
 from posefit.posterior.intervals import angle_intervals, joint_intervals
-from posefit.tracking.evaluation import LOST
+from posefit.tracking.evaluation import unseen
 
 FILES = (
     "poses.npz",
@@ -24,7 +24,10 @@ FILES = (
     "track.bvh",
     "track.trc",
     "camera.json",
+    "track.c3d",
     "frames.csv",
+    "angles.csv",
+    "gait.csv",
     "summary.json",
     "overlay.mp4",
     "summary.png",
@@ -60,10 +63,14 @@ def write_formats(
     sure: Mapping[str, Array],
 ) -> None:
     """Write every file of a track to a folder but for its pictures; see `FILES`. `sure` is what `intervals_of` gave."""
+    from posefit.measuring.c3d import write_c3d
+    from posefit.measuring.centres import PLACES
+    from posefit.measuring.gait import gait_of
+    from posefit.measuring.tables import write_angles, write_gait
+    from posefit.measuring.trc import write_trc
     from posefit.motion.amc import write_amc
     from posefit.motion.asf import write_asf
     from posefit.motion.bvh import write_bvh
-    from posefit.motion.trc import write_trc
 
     np.savez_compressed(
         folder / "poses.npz",
@@ -71,6 +78,7 @@ def write_formats(
         translations=estimate.translations,
         fps=np.array(estimate.fps),
         joints=np.array(JOINTS),
+        places=np.array(PLACES),
         costs=np.array([frame.cost for frame in frames]),
         radii=scene.body.radii,
         **dict[str, Any](sure),
@@ -78,15 +86,19 @@ def write_formats(
     write_asf(folder / "skeleton.asf", estimate.skeleton)
     write_amc(folder / "track.amc", estimate)
     write_bvh(folder / "track.bvh", estimate)
-    blank = {k for k, row in enumerate(rows) if not row["usable"] or row["lost"] >= LOST}
+    blank = unseen(rows)
+    gait = gait_of(estimate, blank)
     write_trc(folder / "track.trc", estimate, blank)
+    write_c3d(folder / "track.c3d", estimate, blank, gait)
+    write_angles(folder / "angles.csv", estimate, blank)
+    write_gait(folder / "gait.csv", gait)
     (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
     joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
-    names = [f"{joint}_{axis}" for joint in JOINTS for axis in "xyz"]
+    names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
     with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([*rows[0], *names])
-        for row, points in zip(rows, joints, strict=True):
+        for k, (row, points) in enumerate(zip(rows, joints, strict=True)):
             told = ["" if np.isnan(value) else value for value in row.values()]
-            writer.writerow([*told, *(f"{value:.6f}" for value in points.reshape(-1))])
+            writer.writerow([*told, *("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))])
     (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

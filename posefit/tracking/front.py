@@ -102,8 +102,8 @@ def track(
     least. `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
     calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video.
 
-    With `out`, a new folder gets poses, .amc, .bvh, .trc, tables, a video and a picture; it appears whole or not at
-    all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
+    With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
+    not at all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
     recording for the Rerun viewer goes. Raises ValueError for every mistake in the arguments or files.
     """
     sources = _sources(source)

@@ -12,9 +12,10 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
 from posefit.listening import QUIET, Listener
+from posefit.measuring.gait import gait_of
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
-from posefit.tracking.evaluation import LOST, Evaluation
+from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, opened, task_of
@@ -121,6 +122,7 @@ def follow(
             "none_of_modes": _none_right(found),
             "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
             "lost_frames": _numbers(rows, "lost", LOST),
+            "gait": gait_of(estimate, unseen(rows)).as_dict(),
             "warnings": [*scene.warnings, *method.audit.warnings],
         }
         output.finish(scene, estimate, found, rows, summary)

@@ -37,6 +37,7 @@ def table(summary: Mapping[str, Any]) -> str:
             "the person; IoU is that of the others"
         )
     lines += [said] if (said := undetermined(summary)) else []
+    lines += [walked(summary["gait"])] if summary["frames"] > 1 else []
     if summary["body"] is not None:
         body = summary["body"]
         parts = [
@@ -69,6 +70,17 @@ def undetermined(summary: Mapping[str, Any]) -> str:
     parts = [f"left and right: unknown in {_frames(sides, of)}"] if sides else []
     parts += [f"{_frames(lost, '' if sides else of)} lost"] if lost else []
     return "; ".join(parts)
+
+
+def walked(gait: Mapping[str, Any]) -> str:
+    """Return in one line what somebody's gait is like, or why nobody can say."""
+    if not gait["walk"]:
+        return f"no figures of gait: {gait['why']}"
+    stance = "" if gait["stance_share"] is None else f"stance {100.0 * gait['stance_share']:.0f} %, "
+    return (
+        f"gait: {gait['cadence']:.0f} steps a minute, step {gait['step_length']:.2f} m, speed {gait['speed']:.2f} m/s, "
+        f"{stance}over {gait['steps']} steps"
+    )
 
 
 def _frames(count: int, of: str) -> str:

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from generator import commands, environments, equations, figures, joints, python, settings
+from generator import angles, commands, environments, equations, figures, joints, python, settings
 from generator.prose import restructured, settings_in, shortened, without_settings
 
 from posefit import track
 from posefit.geometry.skeleton import JOINTS
+from posefit.measuring.angles import COLUMNS
+from posefit.measuring.centres import PLACES
 from posefit.registry import KINDS, registry
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import DROPPED, Cell, run_cell
@@ -62,7 +64,7 @@ def test_every_key_of_summary_json_is_told(followed: Path) -> None:
 
 def test_every_column_of_frames_csv_is_told(followed: Path) -> None:
     head = (followed / "frames.csv").read_text("utf-8").splitlines()[0].split(",")
-    assert [name for name in head if name not in {f"{j}_{axis}" for j in JOINTS for axis in "xyz"}] == list(
+    assert [name for name in head if name not in {f"{place}_{axis}" for place in PLACES for axis in "xyz"}] == list(
         figures.FRAME
     )
 
@@ -103,7 +105,17 @@ def test_every_equation_has_a_line_and_a_test() -> None:
 
 def test_every_joint_is_told() -> None:
     assert len(re.findall(r"^\| \d+ \| `", joints.page(), re.MULTILINE)) == len(JOINTS)
-    assert "| 2 | `lfemur` | left knee | `lhipjoint` |" in joints.page()
+    assert "| 2 | `lfemur` | left knee | `left_knee` | `lhipjoint` |" in joints.page()
+
+
+def test_every_angle_is_told(followed: Path) -> None:
+    head = (followed / "angles.csv").read_text("utf-8").splitlines()[0].split(",")
+    assert head == ["frame", "seconds", *COLUMNS]
+    told = re.findall(r"^\| `(\w+)` \|", angles.page(), re.MULTILINE)
+    assert {name.partition("_")[2] for name in COLUMNS} == set(told)
+    page = (DOCS / "howto" / "measuring.md").read_text("utf-8")
+    steps = (followed / "gait.csv").read_text("utf-8").splitlines()[0].split(",")
+    assert re.findall(r"^\| `(\w+)` \|", page.partition("of `gait.csv`")[2], re.MULTILINE) == steps
 
 
 def test_every_environment_is_told() -> None:

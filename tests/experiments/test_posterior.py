@@ -188,9 +188,11 @@ def test_tables_are_of_whoever_was_left_out_and_what_is_stored_is_of_all(tmp_pat
     told = posterior(8.0, False, str(tracks), None, str(table), 1)
     assert 0.7 < told["coverage"]["overall"]["coverage"]["80"] < 0.9
     assert set(told["kept"]) == {"exemplars", *OTHERS}
+    assert set(told["searches"]) >= {"even", "steepness", "lost", "calibration_error"}
     assert told["modes"]["recalibrated"]["calibration_error"] <= told["modes"]["8, all"]["calibration_error"] + 0.02
     lines = list(posterior_lines(told))
-    assert all(line.startswith("| ") or line.startswith("|-") or not line for line in lines)
+    assert all(line.startswith("| ") or line.startswith("|-") or not line for line in lines[:-1])
+    assert lines[-1].startswith("lost, by the cost of what other methods found: even ")
     held = json.loads(table.read_text("utf-8"))
     assert held.pop("temperature") == 8.0
     assert Doubt.from_dict(held).as_dict() == held

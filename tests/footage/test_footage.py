@@ -82,7 +82,7 @@ def test_what_is_written_opens_elsewhere(tracked: tuple[Path, posefit.Track]) ->
     with (out / "frames.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     joints = result.motion.skeleton.joints(result.motion.poses, result.motion.translations)
-    assert float(rows[3]["lfoot_y"]) == pytest.approx(
+    assert float(rows[3]["left_ball_y"]) == pytest.approx(
         joints[3, posefit.geometry.skeleton.JOINTS.index("lfoot"), 1], abs=1e-5
     )
     clip = read_clip(out / "skeleton.asf", out / "track.amc", fps=25.0)
@@ -92,12 +92,14 @@ def test_what_is_written_opens_elsewhere(tracked: tuple[Path, posefit.Track]) ->
     np.testing.assert_allclose(bvh.skeleton.joints(bvh.poses, bvh.translations), joints, atol=1e-5)
     lines = (out / "track.trc").read_text().splitlines()
     assert lines[2].split("\t")[:5] == ["25", "25", "24", "27", "m"]
-    assert lines[3].split("\t")[:3] == ["Frame#", "Time", "root"]
+    assert lines[3].split("\t")[:3] == ["Frame#", "Time", "pelvis"]
     np.testing.assert_allclose(np.array(lines[6].split("\t"), dtype=float)[2:], joints[0].ravel(), atol=1e-5)
     video = cv2.VideoCapture(str(out / "overlay.mp4"))
     assert round(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 24
     video.release()
-    assert arrays(out / "poses.npz")["radii"].shape == (26, 2)
+    stored = arrays(out / "poses.npz")
+    assert stored["radii"].shape == (26, 2)
+    assert dict(zip(stored["joints"], stored["places"], strict=True))["lfemur"] == "left_knee"
 
 
 def toml(path: Path, *cameras: posefit.Camera) -> Path:

@@ -71,12 +71,25 @@ def test_even_rows_keep_the_shares_of_the_modes() -> None:
 
 
 def test_a_valley_is_as_wide_as_its_deviation() -> None:
-    # costs rise by half a temperature one deviation from the mode, or at the next of the widths 1/128, 1/64, ... 1/2
-    spread = np.array([0.1, 0.03])
-    landscape = Landscape(Toy(2), lambda x: 0.5 * ((x / spread) ** 2).sum(axis=1))
-    np.testing.assert_allclose(widths(landscape, np.zeros((1, 2)), np.zeros(1), 1.0), [[1 / 8, 1 / 32]])
-    flat = Landscape(Toy(2), lambda x: np.zeros(len(x)))
-    np.testing.assert_allclose(widths(flat, np.zeros((1, 2)), np.zeros(1), 1.0), 0.5)
+    # costs are a sum of squares: exp(-cost / 2) has the deviations 0.1 and 0.03 times the root of 2 about the mode
+    spread, box = np.array([0.1, 0.03]), Toy(2)
+    proposals = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, 2)) * 0.3
+    costs = 0.5 * ((proposals / spread) ** 2).sum(axis=1)
+    mode = np.zeros((1, 2)), np.zeros(1)
+    found = widths(box, [(proposals, costs)], *mode, 2.0)
+    np.testing.assert_allclose(found, [np.sqrt(2.0) * spread], rtol=0.01)
+    # what is flat is as wide as may be, and so is what nothing is known of
+    np.testing.assert_allclose(widths(box, [(proposals, np.zeros(2000))], *mode, 1.0), 0.5)
+    np.testing.assert_allclose(widths(box, [(np.zeros((1, 2)), np.zeros(1))], *mode, 1.0), 0.5)
+
+
+def test_each_valley_has_its_own_width_where_enough_is_known_of_it() -> None:
+    rng, modes, spreads = np.random.default_rng(0), np.array([[-0.5], [0.5], [0.9]]), np.array([0.05, 0.1])
+    near = [modes[k] + spreads[k] * rng.standard_normal((50, 1)) for k in range(2)]
+    searched = [(near[k], 0.5 * ((near[k][:, 0] - modes[k]) / spreads[k]) ** 2) for k in range(2)]
+    found = widths(Toy(1), searched, modes, np.zeros(3), 1.0)[:, 0]
+    np.testing.assert_allclose(found[:2], spreads, rtol=0.01)
+    assert spreads[0] < found[2] < spreads[1]  # of which nothing is known: as all are, together
 
 
 def test_the_best_of_each_search_are_different_and_feasible() -> None:

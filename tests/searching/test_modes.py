@@ -54,11 +54,12 @@ def other_side(problem: PoseProblem, posterior: Posterior, truth: Any, other: An
     return float(posterior.weights @ (off[1] < off[0]))
 
 
-def test_planted_flips_are_found_in_nine_of_ten_frames() -> None:
+@pytest.mark.parametrize("given", [{}, {"searches": 1, "share": 0.2}], ids=["usual", "as a tracker has it"])
+def test_planted_flips_are_found_in_nine_of_ten_frames(given: dict[str, Any]) -> None:
     shares = []
     for frame in range(0, 40, 4):
         problem, truth, other = side_view(frame)
-        tell = partial(modes, problem, registry().optimiser("sapso"), searches=8, evaluations=2440)
+        tell = partial(modes, problem, registry().optimiser("sapso"), evaluations=2440, **given)
         shares.append(other_side(problem, tell(rng=np.random.default_rng(frame)), truth, other))
     assert np.mean([0.1 <= share <= 0.9 for share in shares]) >= 0.9, shares
 
@@ -86,6 +87,7 @@ def test_the_same_generator_tells_the_same() -> None:
     [
         ({"searches": 0}, "searches must be at least 1, got 0"),
         ({"evaluations": 0}, "evaluations must be at least 1, got 0"),
+        ({"share": 0.0}, "share must be above 0, got 0.0"),
         ({"temperature": 0.0}, "temperature must be above 0, got 0.0"),
     ],
 )
@@ -100,12 +102,33 @@ def test_numbers_that_make_no_sense_are_refused(given: dict[str, Any], said: str
     [
         ({"modes": -1}, "modes must be 0 or more, got -1"),
         ({"modes": 2.5}, "tracker.modes must be int, got 2.5"),
+        ({"modes": 1, "modes_share": 0.0}, "modes_share must be above 0, got 0.0"),
         ({"modes": 1, "posterior_temperature": -1.0}, "posterior_temperature must be above 0, got -1.0"),
     ],
 )
 def test_a_wrong_setting_of_the_tracker_is_one_clear_error(given: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         posefit.track("walk", frames=(0, 1), tracker_settings=given, **FEW)
+
+
+@pytest.mark.parametrize(("share", "searches"), [(0.2, 0), (0.5, 1), (2.0, 3)])
+def test_all_that_modes_take_is_within_their_share(share: float, searches: int) -> None:
+    begun = []
+
+    def counted(space: posefit.Space, rng: np.random.Generator) -> posefit.Optimiser:
+        begun.append(space)
+        made: posefit.Optimiser = registry().optimiser("sapso")(space, rng)
+        return made
+
+    settings = {"modes": 4, "modes_share": share}
+    given = {**FEW, "evaluations": 2000}
+    track = posefit.track("walk", optimiser=counted, frames=(0, 2), tracker_settings=settings, **given)
+    count = len(begun)
+    posefit.track("walk", optimiser=counted, frames=(0, 2), **given)
+    # of the two frames; those that would have less than 200 evaluations are not begun
+    assert count - (len(begun) - count) == 2 * searches
+    for frame in track.found:
+        assert 1.05 * 2000 < frame.evaluations <= (1.0 + share) * 2000
 
 
 @pytest.mark.parametrize("optimiser", ["sapso", "annealed", "particle"])

@@ -80,7 +80,7 @@ def test_a_walk_has_the_covariance_of_the_particles(monkeypatch: pytest.MonkeyPa
     proposals = np.array([[0.1, 0.0], [-0.1, 0.0], [0.0, 0.2], [0.0, -0.2]])
     walk = smc._walk(NormalMixture.anywhere(2), Landscape(Toy(2), PAIR.cost), proposals, np.array([0.3, 0.3, 0.2, 0.2]))
     # covariance diag(0.6 x 0.01, 0.4 x 0.04), scaled by 2.38^2 / 2
-    np.testing.assert_allclose(walk @ walk.T, 2.38**2 / 2.0 * np.diag([0.006, 0.016]), rtol=1e-9)
+    np.testing.assert_allclose(walk @ walk.T, 2.38**2 / 2.0 * np.diag([0.006, 0.016]), rtol=1e-9, atol=1e-15)
 
 
 def test_a_walk_has_the_covariance_within_the_modes() -> None:

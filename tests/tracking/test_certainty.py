@@ -201,6 +201,10 @@ def test_what_is_held_or_lost_is_blank_for_other_programs_and_marked_in_the_tabl
     assert all("" not in one for k, one in enumerate(fields) if k not in (1, 4))
     with (tmp_path / "out" / "frames.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
+    with (tmp_path / "out" / "angles.csv").open(newline="") as file:
+        angles = list(csv.DictReader(file))
+    assert [k for k, row in enumerate(angles) if row["left_knee_flexion"] == ""] == [1, 4]
+    assert [k for k, row in enumerate(rows) if row["left_knee_x"] == ""] == [1, 4]
     assert [row["usable"] for row in rows] == ["1.0", "0.0", "1.0", "1.0", "1.0", "1.0"]
     assert [row["lost"] for row in rows] == ["0.1", "0.1", "0.1", "0.1", "0.9", "0.1"]
     stored = arrays(tmp_path / "out" / "poses.npz")

@@ -15,9 +15,9 @@ METHOD, EVALUATIONS = "exemplars", 2440
 TEMPERATURES = (4.0, 8.0, 16.0, 32.0)  # of the posterior, one of which is chosen
 OTHERS: Mapping[str, Mapping[str, Any]] = {
     "annealed@pca": {"tracker.modes": 1},  # its own particles
-    "sapso@pca": {"tracker.modes": 4},  # searches of a frame, each begun elsewhere
+    "sapso@pca": {"tracker.modes": 4, "tracker.modes_share": 2.0},  # searches of a frame, each begun elsewhere
 }
-OTHER_FRAMES, OTHER_EVERY = 20, 4  # every fourth clip is followed by other methods
+OTHER_FRAMES = 20  # of each clip that other methods follow
 DANCES, EVERYDAY = "dances", "everyday"
 # a person's clips, by group; those that other measurements have no use for
 MORE = {
@@ -91,7 +91,6 @@ def planned_tracks(temperature: float, quick: bool) -> tuple[list[OneTrack], lis
         base += tracks
         if not quick:
             others += [tracks[0]._replace(temperature=other) for other in TEMPERATURES if other != temperature]
-        if k % OTHER_EVERY == 0:
-            few = min(frames, OTHER_FRAMES)
-            others += [tracks[0]._replace(method=method, frames=few, temperature=0.0) for method in OTHERS]
+        few = min(frames, OTHER_FRAMES)
+        others += [tracks[0]._replace(method=method, frames=few, temperature=0.0) for method in OTHERS]
     return base, others

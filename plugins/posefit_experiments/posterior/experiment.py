@@ -10,7 +10,7 @@ from posefit_experiments.grid import Progress, each
 from posefit_experiments.posterior.design import METHOD, OTHERS, TEMPERATURES, planned_tracks
 from posefit_experiments.posterior.fit import Kept, doubt_of
 from posefit_experiments.posterior.frames import followed, load_tracks, save_tracks
-from posefit_experiments.posterior.tables import best_modes, coverages, judgement, kept_table, sides
+from posefit_experiments.posterior.tables import best_modes, coverages, judgement, kept_table, searches_lost, sides
 
 PEOPLE = 3  # at least, of which one is left out at a time
 
@@ -66,6 +66,7 @@ def posterior(
         "sides": sides(said),
         "modes": {"recalibrated": best_modes([one.kept for one in said], said), **_temperatures(mine, temperature)},
         "kept": kept_table(said, others) if others else {},
+        "searches": searches_lost(others) if others else {},
     }
 
 

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.metrics import LOST_MM
 from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept_errors, reliability
 from posefit.posterior.modes import APART
+from posefit.searching.doubt import LEAST_COST, lost_at
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
 from posefit_experiments.posterior.fit import (
@@ -18,11 +20,13 @@ from posefit_experiments.posterior.fit import (
     Kept,
     exchanged,
     frame_weights,
+    logistic,
     radii_and_angles_held,
     sharpened,
     signs_of,
 )
 
+LOST_METRES = 1e-3 * LOST_MM
 KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
 LIKELY = (0.05, 0.1, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
 
@@ -176,7 +180,7 @@ def best_modes(tracks: Sequence[Kept], said: Sequence[Judged] = ()) -> dict[str,
 def kept_table(tracks: Sequence[Judged], others: Sequence[Kept]) -> dict[str, Any]:
     """Return the mean error in millimetres of the frames that are least doubted, on the tracks that all methods have.
 
-    Of `exemplars` by its doubt, of others by the spread of their posteriors.
+    Of `exemplars` by its doubt, of others by how likely they say that a frame is lost.
     """
     places = {(one.track.seen.clip, one.track.seen.views): len(one.track) for one in others}
     mine = [one for one in tracks if one.kept.track.seen.translation == "known"]
@@ -184,8 +188,39 @@ def kept_table(tracks: Sequence[Judged], others: Sequence[Kept]) -> dict[str, An
     found = {METHOD: _curve([one.kept.error[:n] for one, n in pairs if n], [one.doubts[:n] for one, n in pairs if n])}
     for method in dict.fromkeys(one.track.seen.method for one in others):
         some = [one for one in others if one.track.seen.method == method]
-        found[method] = _curve([one.error for one in some], [one.seen[:, 2] for one in some])
+        found[method] = _curve([one.error for one in some], [lost_at(one.track.costs) for one in some])
     return found
+
+
+def searches_lost(others: Sequence[Kept]) -> dict[str, float]:
+    """Return how frames that searches lose follow from their costs: the model that is fitted to all of them.
+
+    And what one is worth on everybody who was left out of its fit.
+    """
+    said, came = [], []
+    for person in dict.fromkeys(one.track.seen.clip.subject for one in others):
+        his, rest = (
+            [one for one in others if (one.track.seen.clip.subject == person) == mine] for mine in (True, False)
+        )
+        if rest:
+            design, off = _costs(his)
+            said.append(1.0 / (1.0 + np.exp(-design @ logistic(*_costs(rest), frame_weights(rest)))))
+            came.append(off)
+    bias, slope = logistic(*_costs(others), frame_weights(others))
+    told = {"even": float(np.exp(-bias / slope)), "steepness": float(slope)}
+    if not said:
+        return told
+    likely, off = np.concatenate(said), np.concatenate(came)
+    rank = auroc(likely, off)
+    ranked = {} if rank is None else {"auroc": rank}
+    return {**told, "lost": float(off.mean()), "calibration_error": calibration_error(likely, off), **ranked}
+
+
+def _costs(tracks: Sequence[Kept]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return 1 and the logarithm of the cost of each frame (n, 2), and whether it is lost (n,)."""
+    costs = np.concatenate([one.track.costs for one in tracks])
+    off = np.concatenate([one.error for one in tracks]) > LOST_METRES
+    return np.column_stack([np.ones(len(costs)), np.log(np.maximum(costs, LEAST_COST))]), off
 
 
 def _curve(errors: Sequence[Array], doubts: Sequence[Array]) -> dict[str, float]:
@@ -225,6 +260,10 @@ def posterior_lines(told: Mapping[str, Any]) -> Iterator[str]:
         yield from _head(["frames kept %", *next(iter(told["kept"].values()))], 1)
         for method, curve in told["kept"].items():
             yield _line([method, *(f"{value:.0f}" for value in curve.values())])
+        yield ""
+        yield "lost, by the cost of what other methods found: " + ", ".join(
+            f"{name} {value:.3g}" for name, value in told["searches"].items()
+        )
 
 
 def _head(heads: Sequence[str], words: int) -> Iterator[str]:

@@ -3,14 +3,14 @@
 from collections.abc import Collection
 from pathlib import Path
 
-from posefit.geometry.skeleton import JOINTS
+from posefit.measuring.centres import PLACES
 from posefit.motion.motion import Motion
 
 
 def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
     """Write the 27 joints of every frame as markers, in metres and y up; of `blank` frames nothing but the time.
 
-    An empty field is a marker that nobody saw, to programs that read such files.
+    Markers are named by `PLACES`. An empty field is a marker that nobody saw, to programs that read such files.
     """
     path, joints = Path(path), motion.skeleton.joints(motion.poses, motion.translations)
     count, fps = len(motion), f"{motion.fps:g}"
@@ -18,9 +18,9 @@ def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> 
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
         "\t".join([*head, "OrigNumFrames"]),
-        "\t".join([fps, fps, str(count), str(len(JOINTS)), "m", fps, "1", str(count)]),
-        "Frame#\tTime\t" + "\t".join(f"{joint}\t\t" for joint in JOINTS),
-        "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(JOINTS) + 1) for axis in "XYZ"),
+        "\t".join([fps, fps, str(count), str(len(PLACES)), "m", fps, "1", str(count)]),
+        "Frame#\tTime\t" + "\t".join(f"{place}\t\t" for place in PLACES),
+        "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(PLACES) + 1) for axis in "XYZ"),
         "",
     ]
     for k, points in enumerate(joints):

@@ -1,0 +1,125 @@
+"""Joint positions and the events of gait as a .c3d file, which programs of motion analysis open.
+
+The format is that of the C3D file format user guide (2008): a header, parameters and 3D points in blocks of 512 bytes,
+here as little-endian real numbers, in millimetres. A point that nobody saw has the residual -1.
+"""
+
+import struct
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.measuring.centres import PLACES
+from posefit.measuring.gait import Gait
+from posefit.motion.motion import Motion
+from posefit.version import __version__
+
+BLOCK = 512  # bytes
+MAGIC, INTEL = 0x50, 84
+MOST = 0xFFFF  # frames that the header can count; more are in TRIAL
+EVENTS = 255  # that a parameter can hold
+MILLIMETRES = 1e3  # in a metre
+_ICONS = {"Foot Strike": 1, "Foot Off": 2}
+
+Value = str | int | float | Sequence[str] | Sequence[int] | Sequence[float] | Array
+
+
+def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gait: Gait | None = None) -> None:
+    """Write the 27 joints of every frame as points named by `PLACES`, y up; of `blank` frames none.
+
+    Strikes and toe-offs of `gait` are the file's events, the first 255 of them.
+    """
+    joints = motion.skeleton.joints(motion.poses, motion.translations) * MILLIMETRES
+    points = np.concatenate([joints, np.zeros((*joints.shape[:2], 1))], axis=2).astype("<f4")
+    points[sorted(blank)] = (0.0, 0.0, 0.0, -1.0)
+    parameters, start = b"", 0
+    while start != 2 + len(parameters) // BLOCK:  # where the points start is a parameter itself
+        start = 2 + len(parameters) // BLOCK
+        parameters = _section(_parameters(motion, start, gait))
+    with Path(path).open("wb") as file:
+        file.write(_header(motion, start))
+        file.write(parameters)
+        data = points.tobytes()
+        file.write(data + bytes(-len(data) % BLOCK))
+
+
+def _header(motion: Motion, start: int) -> bytes:
+    last = min(len(motion), MOST)
+    words = struct.pack("<BBHHHHHfHHf", 2, MAGIC, len(PLACES), 0, 1, last, 0, -1.0, start, 1, motion.fps)
+    return words.ljust(BLOCK, b"\0")
+
+
+def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict[str, Value]]:
+    """Return the parameters by group and name."""
+    frames = len(motion)
+    groups: dict[str, dict[str, Value]] = {
+        "POINT": {
+            "USED": len(PLACES),
+            "FRAMES": min(frames, MOST),
+            "DATA_START": start,
+            "SCALE": -1.0,
+            "RATE": motion.fps,
+            "UNITS": "mm",
+            "X_SCREEN": "+X",
+            "Y_SCREEN": "+Y",
+            "LABELS": PLACES,
+            "DESCRIPTIONS": PLACES,
+        },
+        "ANALOG": {"USED": 0, "GEN_SCALE": 1.0, "RATE": motion.fps},
+        "FORCE_PLATFORM": {"USED": 0},
+        "TRIAL": {
+            "ACTUAL_START_FIELD": [1, 0],
+            "ACTUAL_END_FIELD": [frames & MOST, frames >> 16],
+            "CAMERA_RATE": motion.fps,
+        },
+        "MANUFACTURER": {"SOFTWARE": "posefit", "VERSION": __version__},
+    }
+    if events := sorted(_events(gait))[:EVENTS] if gait and not gait.why else []:
+        groups["EVENT"] = {
+            "USED": len(events),
+            "CONTEXTS": [foot.title() for _, foot, _ in events],
+            "LABELS": [label for _, _, label in events],
+            "TIMES": np.array([divmod(seconds, 60.0) for seconds, _, _ in events]),
+            "ICON_IDS": [_ICONS[label] for _, _, label in events],
+        }
+    return groups
+
+
+def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:
+    """Yield time, foot and name of each event."""
+    for step in gait.steps:
+        yield step.strike_seconds, step.foot, "Foot Strike"
+        if step.toe_off_seconds is not None:
+            yield step.toe_off_seconds, step.foot, "Foot Off"
+
+
+def _section(groups: dict[str, dict[str, Value]]) -> bytes:
+    """Return the parameters as whole blocks."""
+    records = b""
+    for number, (group, parameters) in enumerate(groups.items(), 1):
+        records += struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0)
+        for name, value in parameters.items():
+            body = _encoded(value) + b"\0"  # no description
+            records += struct.pack("<bb", len(name), number) + name.encode() + struct.pack("<h", 2 + len(body)) + body
+    size = -(-(4 + len(records)) // BLOCK)
+    return (struct.pack("<BBBB", 1, MAGIC, size, INTEL) + records).ljust(size * BLOCK, b"\0")
+
+
+def _encoded(value: Value) -> bytes:
+    """Return a parameter's type, its sizes, the one that runs fastest first, and its content."""
+    if isinstance(value, str):
+        return struct.pack("<bBB", -1, 1, len(value)) + value.encode("ascii")
+    if isinstance(value, int):
+        return struct.pack("<bBH", 2, 0, value)
+    if isinstance(value, float):
+        return struct.pack("<bBf", 4, 0, value)
+    if isinstance(value[0], str):
+        width = max(len(str(word)) for word in value)
+        return struct.pack("<bBBB", -1, 2, width, len(value)) + b"".join(
+            str(word).encode("ascii").ljust(width) for word in value
+        )
+    array = np.asarray(value)
+    kind, stored = (2, "<u2") if array.dtype.kind == "i" else (4, "<f4")
+    return struct.pack("<bB", kind, array.ndim) + bytes(array.shape[::-1]) + array.astype(stored).tobytes()

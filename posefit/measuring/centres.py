@@ -1,0 +1,49 @@
+"""What the 27 joints of the skeleton are on a person, in the words of anatomy.
+
+The skeleton calls a joint after the bone that ends in it, so that `lfemur` is the left knee. Tables and markers have
+the names below; poses and motion capture files keep the skeleton's own.
+"""
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import JOINTS, kind, side
+from posefit.motion.motion import Motion
+
+_PLACES = {
+    "root": "pelvis",
+    "hipjoint": "hip",
+    "femur": "knee",
+    "tibia": "ankle",
+    "foot": "ball",
+    "toes": "toe",
+    "lowerback": "lumbar",
+    "upperback": "mid_spine",
+    "thorax": "neck_base",
+    "lowerneck": "mid_neck",
+    "upperneck": "head_base",
+    "head": "head_top",
+    "clavicle": "shoulder",
+    "humerus": "elbow",
+    "radius": "wrist",
+    "wrist": "palm",
+    "hand": "hand",
+}
+
+
+def place_name(joint: str) -> str:
+    """Return what a joint of the skeleton is on a person: `left_knee` of `lfemur`, `head_top` of `head`."""
+    place = _PLACES[kind(joint)]
+    return place if side(joint) == "middle" else f"{side(joint)}_{place}"
+
+
+PLACES = tuple(place_name(joint) for joint in JOINTS)  # (27,) in the order of JOINTS
+CENTRES = tuple(
+    f"{which}_{joint}"
+    for joint in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+    for which in ("left", "right")
+)
+
+
+def joint_centres(motion: Motion) -> dict[str, Array]:
+    """Return where the centres of the twelve large joints are in each frame, (T, 3) metres in the world, by name."""
+    joints = motion.skeleton.joints(motion.poses, motion.translations)
+    return {name: joints[:, PLACES.index(name)] for name in CENTRES}

@@ -1,0 +1,112 @@
+"""When feet touch the ground and leave it, of a motion in 3D. Zeni et al. 2008, coordinate-based.
+
+A foot strikes where the heel is farthest ahead of the pelvis, and lifts off where the toes are farthest behind it. That
+needs no force plate, no floor and no foot at rest, so it holds for feet that slide a little and for bodies that a
+silhouette has put a few centimetres too high. Here the ankle stands for the heel and the root for the sacrum.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.geometry.rotation import rotation_from_root_angles
+from posefit.measuring.centres import PLACES
+from posefit.measuring.segments import FORWARDS, SIDES
+from posefit.motion.motion import Motion
+
+CUTOFF = 6.0  # hertz: of a walk nothing to speak of is faster. Winter, Biomechanics and motor control, 2009
+SLOWEST = 2.0 * CUTOFF  # frames a second, with fewer of which nothing of that is seen
+SWAY = 0.3  # hertz: the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
+LEAST = 0.1  # metres that a foot moves to and fro at least, against the pelvis, for an event
+SHARE = 0.2  # of the whole range of that, which it moves at least
+
+
+@dataclass(frozen=True, eq=False)
+class GaitEvents:
+    """Times in frames, counted from 0 and with fractions, by side; and where the person went meanwhile."""
+
+    strikes: dict[str, Array]  # initial contact, by side
+    offs: dict[str, Array]  # toe off, by side
+    heading: Array  # (T, 2) of x and z: the unit vector that the pelvis faces along, without its sway
+    pelvis: Array  # (T, 2) metres
+    ankles: dict[str, Array]  # (T, 2) metres, by side
+
+
+def gait_events(motion: Motion) -> GaitEvents:
+    """Return when the feet of a motion strike and lift off; no event at all where they do not move to and fro.
+
+    Raises ValueError where there are too few frames a second to tell.
+    """
+    if motion.fps < SLOWEST:
+        raise ValueError(f"fps must be at least {SLOWEST:g} to find the events of gait, got {motion.fps:g}")
+    joints = motion.skeleton.joints(motion.poses, motion.translations)[:, :, ::2]
+    joints = low_pass(joints, CUTOFF, motion.fps)
+    facing = rotation_from_root_angles(motion.poses[:, :3]) @ FORWARDS
+    heading = low_pass(facing[:, ::2], SWAY, motion.fps)
+    heading /= np.maximum(np.linalg.norm(heading, axis=1, keepdims=True), 1e-9)
+    pelvis = joints[:, 0]
+
+    def ahead(place: str) -> Array:
+        return np.asarray(((joints[:, PLACES.index(place)] - pelvis) * heading).sum(axis=1))
+
+    strikes = {side: _tops(ahead(f"{side}_ankle")) for side in SIDES}  # ZENI2008 (heel strike)
+    offs = {side: _tops(-ahead(f"{side}_toe")) for side in SIDES}  # ZENI2008 (toe off)
+    ankles = {side: joints[:, PLACES.index(f"{side}_ankle")] for side in SIDES}
+    return GaitEvents(strikes, offs, heading, pelvis, ankles)
+
+
+def low_pass(series: Array, cutoff: float, fps: float) -> Array:
+    """Return series (T, ...) without what is faster than `cutoff` hertz, which keeps 0.71 of its size.
+
+    The filter is a Gaussian, so that nothing is shifted in time; beyond the ends it sees what mirrors them in a point,
+    so that who walks on at an even pace goes on doing so.
+    """
+    width = np.sqrt(np.log(2.0)) / (2.0 * np.pi * cutoff) * fps  # frames
+    reach = min(int(4.0 * width) + 1, len(series) - 1)
+    if reach < 1:
+        return np.array(series)
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    before, after = 2.0 * series[0] - series[reach:0:-1], 2.0 * series[-1] - series[-2 : -reach - 2 : -1]
+    longer = np.concatenate([before, series, after])
+    smooth = np.zeros_like(series)
+    for k, weight in enumerate(weights / weights.sum()):
+        smooth += weight * longer[k : k + len(series)]
+    return smooth
+
+
+def _tops(series: Array) -> Array:
+    """Return where a series is at its tops, in frames and between them.
+
+    A top is the highest place between two where it is lower by a fifth of the whole range, and by `LEAST`.
+    """
+    lowest, highest = np.percentile(series, [2, 98])
+    step = max(LEAST, SHARE * float(highest - lowest))
+    tops: list[int] = []
+    climbing, best, worst = False, 0, 0
+    for k in range(1, len(series)):
+        best = k if series[k] > series[best] else best
+        worst = k if series[k] < series[worst] else worst
+        if not climbing and series[k] > series[worst] + step:
+            climbing, best = True, k
+        elif climbing and series[k] < series[best] - step:
+            tops.append(best)
+            climbing, worst = False, k
+    return np.array([_between(series, k) for k in tops])
+
+
+def _between(series: Array, k: int) -> float:
+    """Return where the parabola through three neighbours has its top."""
+    before, here, after = series[k - 1 : k + 2]
+    bend = before - 2.0 * here + after
+    return k + 0.5 * float((before - after) / bend) if bend < 0.0 else float(k)
+
+
+def at_frames(series: Array, times: Array | float) -> Array:
+    """Return a series (T, ...) at times in frames, between which it is a straight line."""
+    times = np.asarray(times, dtype=np.float64)
+    before: NDArray[np.int64] = np.clip(times.astype(np.int64), 0, max(len(series) - 2, 0))
+    after = np.minimum(before + 1, len(series) - 1)
+    share = (times - before).reshape(times.shape + (1,) * (series.ndim - 1))
+    return np.asarray((1.0 - share) * series[before] + share * series[after])

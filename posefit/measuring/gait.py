@@ -1,0 +1,193 @@
+"""What a walk is like: cadence, lengths of steps and strides, speed, stance and the width of steps.
+
+A step of a foot lasts from the other foot's strike to its own, a stride from one of its strikes to its next. Only those
+count whose feet strike in turn, in which the person moves on the way that he faces, and of which every frame is known.
+"""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, fields
+from itertools import pairwise
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import BONES, both
+from posefit.measuring.events import SLOWEST, GaitEvents, at_frames, gait_events
+from posefit.measuring.segments import SIDES
+from posefit.motion.motion import Motion
+
+STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps a minute
+LEAST_SPEED = 0.2  # metres a second
+LEAST_STEPS = 2  # of a walk
+LEAST_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
+WIDEST = 0.35  # metres between the lines that the feet of a walk keep to; who dances or dodges goes wider
+RUNS = 0.5  # the Froude number from which people run rather than walk
+STANDS = 0.57  # share of a stride; a runner's foot stands shorter, as told by toes that are farthest behind
+GRAVITY = 9.81  # metres a second squared
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """A strike of a foot, with the step that ends in it and the stride that it begins; None where either is not known.
+
+    Seconds count from the first frame.
+    """
+
+    foot: str  # left or right
+    strike_seconds: float
+    toe_off_seconds: float | None = None
+    step_seconds: float | None = None
+    step_length: float | None = None  # metres along the way that the person faces, from the other ankle at its strike
+    step_width: float | None = None  # metres across it, between both ankles at the strike
+    stride_seconds: float | None = None
+    stride_length: float | None = None  # metres
+    stance_share: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gait:
+    """What a motion's gait is like, with every step; None where it is no walk, and `why` says so in a few words.
+
+    Strides and stance are None, too, where no stride is whole.
+    """
+
+    steps: list[Step] = field(default_factory=list, repr=False)
+    why: str = ""  # empty where it is a walk
+    cadence: float | None = None  # steps a minute
+    speed: float | None = None  # metres a second
+    step_length: float | None = None  # metres
+    stride_length: float | None = None  # metres
+    step_width: float | None = None  # metres
+    stance_share: float | None = None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return what summary.json says of it."""
+        counted = len(_values(self.steps, "step_seconds"))
+        told = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("steps", "why")}
+        return {"walk": not self.why, "why": self.why or None, "steps": counted, **told}
+
+
+def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
+    """Return the gait of a motion; `unknown` frames, such as held or lost ones, count for nothing."""
+    if motion.fps < SLOWEST:
+        return Gait(why=f"fewer than {SLOWEST:g} frames a second")
+    events = gait_events(motion)
+    steps = list(_steps(events, motion.fps, set(unknown)))
+    if why := _why_not(motion, events, steps, (len(motion) - len(unknown)) / motion.fps):
+        return Gait(steps=steps, why=why)
+    timed, length = _mean(steps, "step_seconds"), _mean(steps, "step_length")
+    assert timed is not None
+    assert length is not None
+    return Gait(
+        steps=steps,
+        cadence=cadence(timed),
+        speed=walking_speed(length, cadence(timed)),
+        step_length=length,
+        stride_length=_mean(steps, "stride_length"),
+        step_width=_mean(steps, "step_width"),
+        stance_share=_mean(steps, "stance_share"),
+    )
+
+
+def cadence(step_seconds: float) -> float:
+    """Return how many steps there are in a minute."""
+    return 60.0 / step_seconds  # WHITTLE2007 (cadence)
+
+
+def walking_speed(step_length: float, cadence: float) -> float:
+    """Return metres a second, of the length of a step in metres and steps a minute."""
+    return step_length * cadence / 60.0  # WHITTLE2007 (speed)
+
+
+def stance_share(strike: float, toe_off: float, next_strike: float) -> float:
+    """Return for which share of its stride a foot is on the ground."""
+    return (toe_off - strike) / (next_strike - strike)  # WHITTLE2007 (stance)
+
+
+def froude_number(speed: float, leg: float) -> float:
+    """Return the Froude number of a speed in metres a second and a leg's length in metres: people run above a half."""
+    return speed**2 / (GRAVITY * leg)  # ALEXANDER1989 (Froude number)
+
+
+def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
+    """Yield every strike in the order of time, with what is known of its step and its stride."""
+    strikes = sorted((time, side) for side in SIDES for time in _known(events.strikes[side], unknown))
+    for k, (time, foot) in enumerate(strikes):
+        told: dict[str, float] = {}
+        again = next((one for one, side in strikes[k + 1 :] if side == foot), np.inf)
+        offs = [one for one in _known(events.offs[foot], unknown) if time < one < again]
+        if offs:
+            told["toe_off_seconds"] = offs[0] / fps
+        if k and strikes[k - 1][1] != foot and _walked(events, fps, strikes[k - 1][0], time, unknown):
+            other = next(side for side in SIDES if side != foot)
+            apart = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], strikes[k - 1][0])
+            x, z = at_frames(events.heading, time)
+            told["step_seconds"] = (time - strikes[k - 1][0]) / fps
+            told["step_length"] = float(apart @ (x, z))  # WHITTLE2007 (step length)
+            # at one moment: between two, whatever is wrong with a person's depth would count
+            beside = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], time)
+            told["step_width"] = abs(float(beside @ (z, -x)))
+        following = strikes[k + 1 : k + 3]
+        in_turn = [side for _, side in following] == [side for side in SIDES if side != foot] + [foot]
+        times = [time, *(one for one, _ in following)]
+        if in_turn and all(_walked(events, fps, *pair, unknown) for pair in pairwise(times)):
+            end = times[-1]
+            moved = at_frames(events.ankles[foot], end) - at_frames(events.ankles[foot], time)
+            told["stride_seconds"] = (end - time) / fps
+            told["stride_length"] = float(np.linalg.norm(moved))
+            if offs:
+                told["stance_share"] = stance_share(time, offs[0], end)
+        yield Step(foot=foot, strike_seconds=time / fps, **told)
+
+
+def _known(times: Array, unknown: set[int]) -> list[float]:
+    """Return the times that do not lie beside a frame of which nothing is known."""
+    return [float(time) for time in times if not {int(time), int(np.ceil(time))} & unknown]
+
+
+def _walked(events: GaitEvents, fps: float, start: float, end: float, unknown: set[int]) -> bool:
+    """Return whether somebody walked on from one strike to the next, and whether every frame of it is known."""
+    seconds = (end - start) / fps
+    if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or unknown & set(range(int(start), int(end) + 2)):
+        return False
+    return _forwards(events, start, end) >= LEAST_SPEED * seconds
+
+
+def _forwards(events: GaitEvents, start: float, end: float) -> float:
+    """Return how far the pelvis moved on the way that it faces, in metres."""
+    moved: Array = at_frames(events.pelvis, end) - at_frames(events.pelvis, start)
+    return float(moved @ at_frames(events.heading, 0.5 * (start + end)))
+
+
+def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float) -> str:
+    """Return why a motion of which so many seconds are known is no walk; empty where it is one."""
+    strikes = sum(len(events.strikes[side]) for side in SIDES)
+    if strikes <= LEAST_STEPS:
+        return f"{strikes or 'no'} strike{'' if strikes == 1 else 's'} of a foot found"
+    speed = float(((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum(axis=1).mean() * motion.fps)
+    if speed < LEAST_SPEED:
+        return f"the person moves {'forwards' if speed > -LEAST_SPEED else 'backwards'} at {abs(speed):.2f} m/s"
+    stance = _values(steps, "stance_share")
+    if froude_number(speed, _leg(motion)) > RUNS or (stance and np.mean(stance) < STANDS):
+        return f"the person runs, at {speed:.1f} m/s"
+    timed = _values(steps, "step_seconds")
+    if len(timed) < LEAST_STEPS:
+        return "the feet do not strike in turn at the pace of a walk, or too little is known"
+    if sum(timed) < LEAST_SHARE * known:
+        return f"steps of a walk in {sum(timed):.1f} of {known:.1f} s"
+    width = _mean(steps, "step_width")
+    return f"steps are {width:.2f} m wide" if width is not None and width > WIDEST else ""
+
+
+def _leg(motion: Motion) -> float:
+    """Return how long a leg is from hip to ankle, the mean of both."""
+    bones = [BONES.index(bone) for kind in ("femur", "tibia") for bone in both(kind)]
+    return float(motion.skeleton.lengths[bones].sum()) / 2.0
+
+
+def _values(steps: list[Step], name: str) -> list[float]:
+    return [value for one in steps if (value := getattr(one, name)) is not None]
+
+
+def _mean(steps: list[Step], name: str) -> float | None:
+    return float(np.mean(values)) if (values := _values(steps, name)) else None

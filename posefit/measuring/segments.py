@@ -1,0 +1,70 @@
+"""How the segments of the body are turned: axes as the International Society of Biomechanics lays them.
+
+X points forwards, Y up along the segment and Z to the person's right, so that all segments of somebody who stands in
+the anatomical position (upright, knees and elbows straight, arms hanging, palms forwards) are turned alike. Wu et al.
+2002, 2005. Where the axes lie in a bone is read off the pose of rest, which is that of the CMU database: upright, feet
+and face forwards, arms out with the palms down, legs apart and the soles at right angles to the shanks.
+"""
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.rotation import rotation_from_joint_angles, rotation_from_root_angles
+from posefit.geometry.skeleton import BONES, PARENTS, Skeleton, angle_index, both
+
+SIDES = ("left", "right")
+# In the pose of rest the body faces along z, and its right is at -x.
+TRUNK = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+FORWARDS, PALM = np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0])
+# An elbow bends forwards and, as CMU's skeletons have its hinge, 30 degrees up from there.
+BENDING = np.array([0.0, 0.5, 0.75**0.5])
+
+
+def bone_rotations(skeleton: Skeleton, poses: Array) -> Array:
+    """Return how root and bones are turned from rest, (T, 27, 3, 3) in the world, of poses (T, 66).
+
+    Entry 0 is the root, and entry j the bone that ends in joint j.
+    """
+    poses = np.asarray(poses, dtype=np.float64)
+    turned = np.empty((len(poses), 1 + len(BONES), 3, 3))
+    turned[:, 0] = rotation_from_root_angles(poses[:, :3])
+    for joint in range(1, 1 + len(BONES)):
+        turned[:, joint] = turned[:, PARENTS[joint]]
+        if (start := angle_index(joint)) > 0:
+            axes = skeleton.axes[joint - 1]
+            turned[:, joint] @= axes @ rotation_from_joint_angles(poses[:, start : start + 3]) @ axes.T
+    return turned
+
+
+def segment_rotations(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
+    """Return the axes X, Y, Z of each segment as the columns of (T, 3, 3), in the world, by the segment's name.
+
+    Segments are `pelvis`, `thorax`, and of each side `thigh`, `shank`, `foot`, `upper_arm` and `forearm`.
+    """
+    turned = bone_rotations(skeleton, poses)
+
+    def of(bone: str) -> Array:
+        return np.asarray(turned[:, 1 + BONES.index(bone)])
+
+    def up(bone: str) -> Array:
+        return np.asarray(-skeleton.offsets[BONES.index(bone)])
+
+    segments = {"pelvis": turned[:, 0] @ TRUNK, "thorax": of("thorax") @ TRUNK}
+    bones = zip(SIDES, *(both(kind) for kind in ("femur", "tibia", "foot", "humerus", "radius", "wrist")), strict=True)
+    for side, femur, tibia, foot, humerus, radius, wrist in bones:
+        shank = _axes(FORWARDS, up(tibia))
+        segments[f"{side}_thigh"] = of(femur) @ _axes(FORWARDS, up(femur))
+        segments[f"{side}_shank"] = of(tibia) @ shank
+        segments[f"{side}_foot"] = of(foot) @ shank
+        segments[f"{side}_upper_arm"] = of(humerus) @ _axes(BENDING, up(humerus))
+        # the skeleton turns the hand where a person turns the forearm: styloids and palm go with it
+        segments[f"{side}_forearm"] = _axes(of(wrist) @ PALM, of(radius) @ up(radius))
+    return segments
+
+
+def _axes(forwards: Array, up: Array) -> Array:
+    """Return axes (..., 3, 3) whose Y is along `up` (..., 3) and whose X is as near to `forwards` as can be."""
+    y = up / np.linalg.norm(up, axis=-1, keepdims=True)
+    x = forwards - (forwards * y).sum(axis=-1, keepdims=True) * y
+    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)

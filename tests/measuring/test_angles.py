@@ -1,0 +1,147 @@
+"""Names and clinical angles of whole bodies: zero where a person stands, and one sign for both sides."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from posefit.geometry.alike import mirrored_poses
+from posefit.geometry.skeleton import ANGLES, JOINTS
+from posefit.measuring.angles import COLUMNS, clinical_angles
+from posefit.measuring.centres import CENTRES, PLACES, joint_centres
+from posefit.measuring.segments import bone_rotations, segment_rotations
+from posefit.motion import built_in, recorded
+from posefit.motion.bvh import read_bvh, write_bvh
+from tests.measuring.walker import angle
+
+SKELETON = built_in.motion("walk", frames=1).skeleton
+
+
+def measured(**turned: float) -> dict[str, float]:
+    """Return the angles of the pose of rest with some angles, such as lfemur_x, set in degrees."""
+    pose = np.zeros((1, ANGLES))
+    for name, degrees in turned.items():
+        pose[0, angle(*name.split("_"))] = np.radians(degrees)
+    return {name: float(values[0]) for name, values in clinical_angles(SKELETON, pose).items()}
+
+
+def test_the_centres_are_where_bones_meet() -> None:
+    motion = built_in.motion("walk", frames=3)
+    joints = motion.skeleton.joints(motion.poses, motion.translations)
+    centres = joint_centres(motion)
+    assert tuple(centres) == CENTRES
+    for name, joint in (("left_hip", "lhipjoint"), ("left_knee", "lfemur"), ("right_ankle", "rtibia")):
+        np.testing.assert_array_equal(centres[name], joints[:, JOINTS.index(joint)])
+    for name, joint in (("right_shoulder", "rclavicle"), ("left_elbow", "lhumerus"), ("left_wrist", "lradius")):
+        np.testing.assert_array_equal(centres[name], joints[:, JOINTS.index(joint)])
+
+
+def test_every_joint_has_a_name_of_its_own() -> None:
+    assert len(set(PLACES)) == len(JOINTS)
+    assert PLACES[JOINTS.index("lowerback")] == "lumbar"  # not of the left side
+    assert PLACES[JOINTS.index("lfoot")] == "left_ball"
+
+
+def test_bones_turn_as_the_joints_say() -> None:
+    motion = built_in.motion("jacks", frames=5)
+    turned = bone_rotations(motion.skeleton, motion.poses)
+    joints = motion.skeleton.joints(motion.poses)
+    for bone, above in (("lfemur", "lhipjoint"), ("rradius", "rhumerus"), ("head", "upperneck"), ("lhand", "lwrist")):
+        j = JOINTS.index(bone)
+        expected = joints[:, j] - joints[:, JOINTS.index(above)]
+        np.testing.assert_allclose(turned[:, j] @ motion.skeleton.offsets[j - 1], expected, atol=1e-9)
+
+
+def test_legs_are_at_zero_where_they_stand_straight() -> None:
+    found = measured(lfemur_z=-20.0, rfemur_z=20.0)  # the legs of the pose of rest are apart by 20 degrees each
+    for name in COLUMNS[:18]:
+        assert found[name] == pytest.approx(0.0, abs=1e-3), name
+
+
+@pytest.mark.parametrize(("side", "inwards"), [("left", -20.0), ("right", 20.0)])
+def test_a_leg_moves_in_clinical_words(side: str, inwards: float) -> None:
+    def leg(**turned: float) -> dict[str, float]:
+        found = measured(**{f"{side[0]}{name}": value for name, value in turned.items()})
+        return {
+            name.removeprefix(f"{side}_"): round(value, 2)
+            for name, value in found.items()
+            if name.startswith(side) and abs(value) > 1e-3 and "shoulder" not in name and "elbow" not in name
+        }
+
+    assert leg(femur_z=inwards, femur_x=-30.0) == {"hip_flexion": 30.0}
+    assert leg(femur_z=inwards, tibia_x=60.0) == {"knee_flexion": 60.0}
+    assert leg(femur_z=inwards, foot_x=-15.0) == {"ankle_dorsiflexion": 15.0}
+    assert leg() == {"hip_adduction": -20.0}
+    assert leg(femur_z=1.5 * inwards) == {"hip_adduction": 10.0}
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_arms_at_rest_are_out_with_the_palms_down(side: str) -> None:
+    rest = measured()
+    assert rest[f"{side}_shoulder_plane"] == pytest.approx(0.0, abs=1e-6)
+    assert rest[f"{side}_shoulder_elevation"] == pytest.approx(90.0)
+    # the elbow's hinge is 30 degrees up from bending straight forwards, and the thumb points forwards
+    assert rest[f"{side}_shoulder_internal_rotation"] == pytest.approx(-30.0)
+    assert rest[f"{side}_elbow_flexion"] == pytest.approx(0.0, abs=1e-6)
+    assert rest[f"{side}_elbow_pronation"] == pytest.approx(120.0)
+    bent = measured(**{f"{side[0]}radius_x": 70.0})
+    assert bent[f"{side}_elbow_flexion"] == pytest.approx(70.0)
+    assert bent[f"{side}_elbow_adduction"] == pytest.approx(0.0, abs=1e-6)
+    assert bent[f"{side}_elbow_pronation"] == pytest.approx(120.0)
+
+
+def test_a_shoulder_near_its_pole_is_left_blank() -> None:
+    # an arm that hangs, but for so many degrees
+    for elevation, blank in ((3.0, True), (9.9, True), (10.1, False), (45.0, False)):
+        found = measured(lhumerus_z=0.0, lclavicle_z=-(90.0 - elevation))
+        assert found["left_shoulder_elevation"] == pytest.approx(elevation)
+        assert np.isnan(found["left_shoulder_plane"]) == blank
+        assert np.isnan(found["left_shoulder_internal_rotation"]) == blank
+
+
+def test_who_is_mirrored_has_the_other_sides_angles() -> None:
+    motion = recorded.clip("02_01").motion()
+    skeleton = SKELETON  # alike on both sides
+    ours = clinical_angles(skeleton, motion.poses)
+    other = clinical_angles(skeleton, mirrored_poses(skeleton, motion.poses))
+    for name, values in ours.items():
+        side, _, angle_name = name.partition("_")
+        exchanged = other[f"{'right' if side == 'left' else 'left'}_{angle_name}"]
+        np.testing.assert_allclose(exchanged, values, atol=1e-6, err_msg=name)
+
+
+def test_where_somebody_faces_says_nothing_of_his_angles() -> None:
+    motion = recorded.clip("16_15").motion()
+    turned = motion.poses.copy()
+    turned[:, 0] += 2.0
+    for name, values in clinical_angles(motion.skeleton, turned).items():
+        np.testing.assert_allclose(values, clinical_angles(motion.skeleton, motion.poses)[name], atol=1e-6)
+
+
+def test_axes_are_right_handed_and_at_right_angles() -> None:
+    motion = built_in.motion("jacks", frames=5)
+    for axes in segment_rotations(motion.skeleton, motion.poses).values():
+        np.testing.assert_allclose(np.swapaxes(axes, 1, 2) @ axes, np.tile(np.eye(3), (5, 1, 1)), atol=1e-9)
+        np.testing.assert_allclose(np.linalg.det(axes), 1.0)
+
+
+def test_the_knee_of_a_walk_bends_as_published() -> None:
+    # Perry and Burnfield, Gait analysis, 2010: about 60 degrees in swing, about 20 in loading; hip 20 back, 25 forwards
+    motion = recorded.clip("02_01").motion()
+    found = clinical_angles(motion.skeleton, motion.poses)
+    for side in ("left", "right"):
+        assert 50.0 < found[f"{side}_knee_flexion"].max() < 75.0
+        assert -5.0 < found[f"{side}_knee_flexion"].min() < 15.0
+        assert 20.0 < found[f"{side}_hip_flexion"].max() < 40.0
+        assert -30.0 < found[f"{side}_hip_flexion"].min() < -5.0
+        assert 10.0 < found[f"{side}_ankle_dorsiflexion"].max() < 25.0
+        assert -25.0 < found[f"{side}_ankle_dorsiflexion"].min() < -5.0
+
+
+def test_a_motion_that_went_through_bvh_has_the_same_angles(tmp_path: Path) -> None:
+    pytest.importorskip("pybvh")
+    motion = recorded.clip("02_01").motion()
+    write_bvh(tmp_path / "walk.bvh", motion)
+    again = read_bvh(tmp_path / "walk.bvh")
+    for name, values in clinical_angles(again.skeleton, again.poses).items():
+        np.testing.assert_allclose(values, clinical_angles(motion.skeleton, motion.poses)[name], atol=1e-4)

@@ -1,0 +1,50 @@
+"""Simulation-based calibration: where a truth is drawn from the prior, it is one more draw of what the sampler tells.
+
+S. Talts, M. Betancourt, D. Simpson, A. Vehtari, A. Gelman, Validating Bayesian inference algorithms with
+simulation-based calibration, 2018.
+"""
+
+import numpy as np
+import pytest
+from scipy.stats import chisquare
+
+from posefit.arrays import Array
+from posefit.fitting.optimiser import populations
+from posefit.posterior.landscape import Landscape
+from posefit.posterior.searches import weighed
+from posefit.registry import registry
+from posefit.searching.modes import gathered
+from posefit.testing.toy import Toy
+
+NOISE, DRAWS, TRUTHS = 0.2, 9, 400
+
+
+def shown(proposals: Array) -> Array:
+    """What is seen (n, d) of proposals (n, d): of the first coordinate not its sign, of the others sums."""
+    return np.concatenate([np.abs(proposals[:, :1]), proposals[:, 1:] @ MIXED], axis=1)
+
+
+MIXED = np.array([[1.0, 0.4, 0.0], [0.0, 1.0, 0.4], [0.4, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("evaluations", [490, 4000])
+def test_a_truth_is_one_more_draw(evaluations: int) -> None:
+    space, make, rng = Toy(4), registry().optimiser("sapso"), np.random.default_rng(0)
+    ranks = []
+    for _ in range(TRUTHS):
+        truth = rng.uniform(-1.0, 1.0, (1, 4))
+        seen = shown(truth) + NOISE * rng.standard_normal((1, 4))
+
+        def cost(proposals: Array, seen: Array = seen) -> Array:
+            return np.asarray(0.5 * ((shown(proposals) - seen) ** 2).sum(axis=1) / NOISE**2)
+
+        landscape = Landscape(space, cost)
+        first = gathered([(one.copy(), costs) for one, costs in populations(make(space, rng), cost, 2440)])
+        other = first[0][[first[1].argmin()]] * [-1.0, 1.0, 1.0, 1.0]  # its twin, as a tracker knows those of poses
+        found = weighed(landscape, [first, (other, cost(other))], 1.0, rng, evaluations=evaluations)
+        assert landscape.evaluations <= 1.1 * evaluations
+        rows = rng.choice(len(found.weights), DRAWS, p=found.weights)
+        ranks.append((found.proposals[rows] < truth).sum(axis=0))
+    for column in np.transpose(ranks):
+        counts = np.bincount(column, minlength=DRAWS + 1)
+        assert chisquare(counts).pvalue > 0.01, counts

@@ -1,0 +1,28 @@
+"""How likely a frame is lost follows from what its pose costs."""
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.searching.doubt import EVEN, STEEPNESS, lost_at
+
+
+def test_a_frame_is_as_likely_lost_as_not_at_one_cost_and_likelier_the_more_it_costs() -> None:
+    assert lost_at(np.array(EVEN)) == pytest.approx(0.5)
+    each = lost_at(np.linspace(0.0, 100.0, 200))
+    assert ((each >= 0.0) & (each <= 1.0)).all()
+    assert (np.diff(each) >= 0.0).all()
+    # by hand: log-odds of twice the even cost are the steepness times ln 2
+    odds = lost_at(np.array(2.0 * EVEN)) / (1.0 - lost_at(np.array(2.0 * EVEN)))
+    assert np.log(odds) == pytest.approx(STEEPNESS * np.log(2.0))
+
+
+@pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
+def test_frames_say_it_where_modes_are_asked_for(optimiser: str) -> None:
+    given = {"optimiser": optimiser, "frames": (0, 2), "evaluations": 400, "particles": 40, "size": (160, 120)}
+    assert [frame.lost for frame in posefit.track("walk", **given).found] == [None, None]
+    track = posefit.track("walk", tracker_settings={"modes": 1}, **given)
+    assert [frame.lost for frame in track.found] == [
+        pytest.approx(float(lost_at(np.array(f.cost)))) for f in track.found
+    ]
+    assert [row["lost"] for row in track.frames] == pytest.approx([frame.lost for frame in track.found])
