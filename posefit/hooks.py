@@ -8,6 +8,7 @@ from posefit.entries import PROJECT
 from posefit.fitting.optimiser import NextFrame, OptimiserFactory
 from posefit.fitting.prior import PriorFactory
 from posefit.fitting.tracker import TrackerFactory
+from posefit.silhouette.foreground import SegmenterFactory
 
 hookspec = HookspecMarker(PROJECT)
 
@@ -38,6 +39,13 @@ class RegisterTracker(Protocol):
         """Take a tracker's factory."""
 
 
+class RegisterSegmenter(Protocol):
+    """Offers a segmenter under a name, and says what it needs."""
+
+    def __call__(self, name: str, factory: SegmenterFactory, *, needs: Needs | None = None) -> None:
+        """Take a segmenter's factory."""
+
+
 @hookspec
 def posefit_register_optimisers(register: RegisterOptimiser) -> Any:
     """Call `register(name, factory)` for each optimiser; see `posefit.fitting.optimiser`."""
@@ -51,3 +59,8 @@ def posefit_register_priors(register: RegisterPrior) -> Any:
 @hookspec
 def posefit_register_trackers(register: RegisterTracker) -> Any:
     """Call `register(name, factory)` for each tracker; see `posefit.fitting.tracker`."""
+
+
+@hookspec
+def posefit_register_segmenters(register: RegisterSegmenter) -> Any:
+    """Call `register(name, factory)` for each segmenter; see `posefit.silhouette.foreground`."""

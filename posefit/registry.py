@@ -1,4 +1,4 @@
-"""What plugins offer, by kind and name: optimisers, priors and trackers."""
+"""What plugins offer, by kind and name: optimisers, priors, trackers and segmenters."""
 
 import os
 import re
@@ -17,7 +17,7 @@ from posefit.fitting.prior import PriorFactory
 from posefit.fitting.tracker import TrackerFactory
 from posefit.settings import Setting, settings_of
 
-Kind = Literal["optimiser", "prior", "tracker"]
+Kind = Literal["optimiser", "prior", "tracker", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 

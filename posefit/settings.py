@@ -2,7 +2,7 @@
 
 import inspect
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Literal, Union, get_args, get_origin
@@ -81,6 +81,20 @@ def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) ->
             raise ValueError(f"{plugin}.{name} must be {setting.type}, got {text!r}")
         values[name] = readings[0]
     return values
+
+
+def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) -> dict[str, Any]:
+    """Return settings that texts such as `particles=20` give; the plugin's name and a dot may stand before.
+
+    Raises ValueError where a text has another form, or `parse` does.
+    """
+    given = {}
+    for text in texts:
+        setting, equals, value = text.partition("=")
+        if not equals:
+            raise ValueError(f"--set must be SETTING=VALUE such as particles=20, got {text!r}")
+        given[setting.rpartition(".")[2]] = value
+    return parse(plugin, factory, given)
 
 
 def accepts(annotation: Any, value: Any) -> bool:

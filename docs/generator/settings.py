@@ -1,4 +1,4 @@
-"""The page of the settings: every optimiser, prior and tracker that posefit brings, read from the code."""
+"""The page of the settings: every optimiser, prior, tracker and segmenter that posefit brings, read from the code."""
 
 import inspect
 from collections.abc import Callable

@@ -1,6 +1,6 @@
 """`posefit track`, `fit` and `extract`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -61,20 +61,33 @@ def fit(as_json: bool, **options: Any) -> None:
 @click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
 @options(EXTRACTION)
 @click.option("--method", hidden=True, help="What --extraction was called.")
+@click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Of the segmenter; repeatable.")
 @click.option("--frames", callback=frame_range, metavar="A:B", help="Only these frames.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def extract(video: str, out: str, as_json: bool, frames: Any, method: str | None, **options: Any) -> None:
+def extract(
+    video: str,
+    out: str,
+    as_json: bool,
+    frames: Any,
+    method: str | None,
+    settings: Sequence[str],
+    **options: Any,
+) -> None:
     """Take the masks of one person out of a VIDEO before a still background."""
     from posefit.footage.extract import extract as run
-    from posefit.footage.segmentation import Extraction
+    from posefit.footage.segmentation import Extraction, segmenter_name
+    from posefit.registry import registry
+    from posefit.settings import parse_texts
 
     if method is not None:
         if options["extraction"] is not None:
             raise ValueError(f"--method must be left out beside --extraction, which it is called now, got {method!r}")
         say("--method is called --extraction now, as for posefit track")
         options["extraction"] = method
-    how = _extraction_given(options)
-    result = run(video, out, Extraction(**how), frames=frames, progress=progress)
+    given = _extraction_given(options)
+    offer = registry().offer("segmenter", segmenter_name(given.get("method"), given.get("background")))
+    how = Extraction(**given, settings=parse_texts(offer.name, offer.factory, settings))
+    result = run(video, out, how, frames=frames, progress=progress)
     for warning in result["warnings"]:
         say(f"warning: {warning}")
     if as_json:
@@ -89,31 +102,38 @@ def extract(video: str, out: str, as_json: bool, frames: Any, method: str | None
 def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Return the keywords of `posefit.track` that options stand for.
 
-    `--set` gives the settings of optimiser, prior and tracker, as their types ask; `tracker.` also sets the tracker
-    that an optimiser and a prior are driven by.
+    `--set` gives the settings of optimiser, prior, tracker and segmenter, as their types ask; `tracker.` also
+    sets the tracker that an optimiser and a prior are driven by.
     """
+    from posefit.footage.segmentation import segmenter_name
+    from posefit.footage.source import kind_of
     from posefit.tracking.method import FOLLOWER, parse_settings, usual
 
     options["source"] = options["source"] or ("walk",)
-    options["extraction"] = extraction_of(options, options["source"][0])
+    filmed = kind_of(options["source"][0]) == "video"
+    segmenter = segmenter_name(options["extraction"], options["background"]) if filmed else None
     options["view_degrees"] = options["view_degrees"] or None
     settings, named = options.pop("settings"), {name: options[name] for name in ("optimiser", "prior", "tracker")}
-    searched = any(text.partition(".")[0] != FOLLOWER for text in settings)
+    searched = any(text.partition(".")[0] not in (FOLLOWER, segmenter) for text in settings)
     chosen = usual(options["source"][0], **named, train=options["train"], searched=searched)
     if left_out := options.pop("without_subject"):
         options["train"] = without_subjects(chosen.train, left_out)
-    return options | chosen.method | parse_settings(settings, **chosen.method)
+    parsed = parse_settings(settings, **chosen.method, segmenter=segmenter)
+    options["extraction"] = extraction_of(options, options["source"][0], parsed.pop("segmenter_settings", {}))
+    return options | chosen.method | parsed
 
 
-def extraction_of(options: dict[str, Any], source: str) -> Any:
+def extraction_of(options: dict[str, Any], source: str, settings: Mapping[str, Any] | None = None) -> Any:
     """Return how the person is taken out of a video, as options say, which are taken out of them; None by default.
+
+    `settings` are the segmenter's.
 
     Raises ValueError where they say it of another kind of source.
     """
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import kind_of, useless_for
 
-    given = _extraction_given(options)
+    given = _extraction_given(options) | ({"settings": settings} if settings else {})
     if given and (kind := kind_of(source)) != "video":
         name = next(iter(given))
         raise useless_for(kind, "extraction" if name == "method" else name, given[name], "video")

@@ -47,8 +47,11 @@ def label(_: click.Context, __: click.Parameter, value: str | None) -> int | Non
 
 
 EXTRACTION = (
-    click.option("--extraction", help="Of video: mixture, by default; median, mean, or masks: the frames are masks."),
-    click.option("--background", metavar="A:B|IMAGE", help="For mean: frames without the person, or an image."),
+    click.option(
+        "--extraction",
+        help="Of video: mixture, or mean with --background; else median, masks, or another of `posefit plugins`.",
+    ),
+    click.option("--background", metavar="A:B|IMAGE", help="Frames without the person, or an image."),
     click.option("--roi", callback=box, metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
     click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
     click.option("--width", type=int, help="Larger videos are scaled down to this; by default 640."),

@@ -11,7 +11,7 @@ from posefit.cli.output import json_line, results_alone
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
 def plugins(context: click.Context, as_json: bool) -> None:
-    """List the optimisers, priors and trackers that are installed, with their settings."""
+    """List the optimisers, priors, trackers and segmenters that are installed, with their settings."""
     if context.invoked_subcommand is not None:
         return
     from posefit.cli.inspection import described, listing
@@ -46,7 +46,7 @@ def doctor(context: click.Context, verbose: bool) -> None:
 
 @plugins.command()
 @click.argument("name")
-@click.option("--kind", default="optimiser", show_default=True, help="optimiser, prior, tracker or command.")
+@click.option("--kind", default="optimiser", show_default=True, help="optimiser, prior, tracker, segmenter or command.")
 @click.option("--out", metavar="DIR", help="The new folder; by default posefit-NAME.")
 @click.pass_context
 def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> None:
@@ -58,7 +58,7 @@ def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> Non
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["optimiser", "prior", "tracker"]))
+@click.argument("kind", type=click.Choice(["optimiser", "prior", "tracker", "segmenter"]))
 @click.argument("name")
 @click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Check it with this setting.")
 @click.option("--only", multiple=True, metavar="RULE", help="Check this rule alone; repeatable.")

@@ -43,7 +43,8 @@ def write_plugin(
         class_name += kind.capitalize()
     usage = [f"posefit {name}"]
     if kind != COMMAND:
-        usage = [f"posefit check {kind} {name}", f"posefit track walk --{kind} {name}"]
+        used = f"extract VIDEO --out masks --method {name}" if kind == "segmenter" else f"track walk --{kind} {name}"
+        usage = [f"posefit check {kind} {name}", f"posefit {used}"]
     words = {
         "name": name,
         "kind": kind,

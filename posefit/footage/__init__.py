@@ -16,7 +16,8 @@
 | masks read when their turn comes; those of an .npz file; pictures of strangers | masks.py, stacks.py, images.py |
 | what the values of masks mean; one person of them, whole | given/ |
 | video, read and written frame by frame | video.py |
-| the person told from a still background; the files of `posefit extract` | segmentation.py, extract.py |
+| the person taken out of a video; the files of `posefit extract` | segmentation.py, extract.py |
+| whether what was taken out can be a person | segmenting/ |
 
 A source is read once. From a mask to its cost it goes through `masks.py`, `silhouette/mask.py`, `fitting/tracker.py`,
 `fitting/problem.py`, `silhouette/cost.py` and `silhouette/kernels.py`.

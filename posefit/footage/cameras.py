@@ -48,9 +48,14 @@ def masks_of(path: Path, fps: float | None, frames: Range, label: int | None, ho
 
 
 def video_of(video: Video, found: Segmentation, folder: Path, listener: Listener) -> CameraView:
-    """Return what a video shows; its masks are written to a new folder, so that none has to stay in memory."""
+    """Return what a video shows; its masks are written to a new folder, so that none has to stay in memory.
+
+    Raises ValueError where they cannot be those of a person.
+    """
     folder.mkdir()
     masks = store(folder, found, listener.progress)
+    if found.verdict and found.verdict.refused:
+        raise ValueError(found.verdict.text)
     pictures = partial(video.frames, found.start, found.stop, found.size)
     return CameraView(masks, found.size, video.size, video.fps, pictures, found.warnings)
 

@@ -9,6 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Observation
 from posefit.footage.masks import Range, Views, span
+from posefit.footage.segmenting.agreement import disagreement, extent_of, meeting
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
@@ -109,34 +110,21 @@ def observed(
     """Return the sequence of masks seen by cameras, whose truth nobody knows.
 
     The person is first sought where the rays through the middles of the masks meet; a single camera finds it as far
-    away as its size asks.
+    away as its size asks. Raises ValueError where several cameras cannot see one person of this size.
     """
     seen = views[views.first].silhouettes
-    boxes = [_box(silhouette) for silhouette in seen]
+    boxes = [extent_of(silhouette) for silhouette in seen]
     if len(cameras) == 1:
         camera, (middle, tall) = cameras[0], boxes[0]
         depth = camera.focal[1] * body.stature / tall
         place = np.array([*((middle - camera.centre) / camera.focal * depth), depth])
         anchor = camera.rotation.T @ (place - camera.translation)
     else:
-        rays = [
-            camera.rotation.T @ np.array([*((middle - camera.centre) / camera.focal), 1.0])
-            for camera, (middle, _) in zip(cameras, boxes, strict=True)
-        ]
-        across = [np.eye(3) - np.outer(ray, ray) / (ray @ ray) for ray in rays]
-        positions = [camera.position for camera in cameras]
-        anchor = np.linalg.lstsq(
-            np.sum(across, axis=0), np.sum([a @ p for a, p in zip(across, positions, strict=True)], axis=0)
-        )[0]
+        if wrong := disagreement(views, cameras, body.stature):
+            raise ValueError(f"{name}: {wrong}")
+        anchor = meeting(cameras, [middle for middle, _ in boxes])[0]
     to_camera = -cameras[0].rotation[2]
     yaw = None
     if view_degrees is not None:
         yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
     return Scene(name, body, cameras, fps, len(views), yaw, anchor, None, views, placing, warnings, pictures)
-
-
-def _box(silhouette: Silhouette) -> tuple[Array, float]:
-    """Return the middle (2,) and the height in pixels of a silhouette's bounding box."""
-    rows, columns = np.flatnonzero(silhouette.mask.any(axis=1)), np.flatnonzero(silhouette.mask.any(axis=0))
-    middle = 0.5 * np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1])
-    return middle, float(rows[-1] + 1 - rows[0])

@@ -1,36 +1,31 @@
 """Goes through a video and tells the person in it from the background, frame by frame."""
 
-from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
+from inspect import Parameter
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, cast
 
 import cv2
 import numpy as np
 
+from posefit.fitting.guard import BrokenRuleError, blamed
 from posefit.footage.images import read_image
 from posefit.footage.masks import Range, span
+from posefit.footage.segmenting.film import Box, VideoFootage
+from posefit.footage.segmenting.signs import Watch
+from posefit.footage.segmenting.verdict import Verdict, advice, verdict
 from posefit.footage.video import Video
-from posefit.silhouette.foreground import (
-    SAMPLES,
-    Background,
-    Drawn,
-    Image,
-    Mixture,
-    Person,
-    mean_background,
-    median_background,
-    person,
-)
+from posefit.registry import registry
+from posefit.settings import check
+from posefit.silhouette.foreground import Footage, Image, Person, Segmenter, person
 from posefit.silhouette.mask import Mask
 
-Method = Literal["mixture", "mean", "median", "masks"]
-Box = tuple[int, int, int, int]  # x, y, width, height
+USUAL = "mixture"  # the segmenter of video, where nobody names another
+PICTURED = "mean"  # that of a background that is given
+NOBODY = "expected a person who moves before a still background, got none in any frame"
 WIDTH = 640  # pixels; larger videos are scaled down to it
-LATEST = 15  # frames that a frame's area is compared with
-CHANGE = 0.5  # a frame whose area is off by more than this share is not usable
 RIVAL = 0.4  # something else that is so large, as a share of the person, may be another person
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 LOST = 0.02  # the share of a file's frames that may be missing without a word
@@ -47,31 +42,56 @@ MOVED = 0.008  # of the width: a camera that moved by more since the first frame
 
 @dataclass(frozen=True)
 class Extraction:
-    """How the person is told from the background.
+    """How the person is told from the rest of a video.
 
-    `method` is a "mixture" of Gaussians or the "median", both learned from the whole video, or the "mean" of
-    `background`: frames without a person, as A:B, or an image; the frames may also be "masks" already. `roi` x, y,
-    width, height in the video's own pixels is where the person is looked for; `ignore` is an image whose bright pixels
-    are never known, such as a tree in front. Videos wider than `width` are scaled down to it.
+    `method` is a segmenter's name: by default a "mixture" of Gaussians learned from the whole video, or the "mean" of
+    `background` where that is given: frames without a person, as A:B, or an image. `settings` are the segmenter's own.
+    `roi` x, y, width, height in the video's own pixels is where the person is looked for; `ignore` is an image whose
+    bright pixels are never known, such as a tree in front. Videos wider than `width` are scaled down to it.
     """
 
-    method: Method = "mixture"
+    method: str | None = None
     background: str | None = None
     roi: Box | None = None
     ignore: str | Path | None = None
     width: int = WIDTH
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.method not in get_args(Method):
-            raise ValueError(f"extraction method must be one of {', '.join(get_args(Method))}, got {self.method!r}")
         if not 36 <= self.width <= 8192:
             raise ValueError(f"width must lie in 36 to 8192 pixels, got {self.width}")
-        if self.method == "mean" and self.background is None:
-            raise ValueError("background must be frames A:B or an image for the method mean, got none")
-        if self.method != "mean" and self.background is not None:
-            raise ValueError(
-                f"background must be given for the method mean only, got {self.background!r} with {self.method}"
-            )
+        object.__setattr__(self, "method", segmenter_name(self.method, self.background))
+        offer = registry().offer("segmenter", self.name)
+        needed = {setting.name: setting.default is Parameter.empty for setting in offer.settings}
+        if self.background is not None:
+            if "background" not in needed:
+                offers = registry().offers["segmenter"].values()
+                takers = [one.name for one in offers if any(setting.name == "background" for setting in one.settings)]
+                came = f"{self.background!r} with {self.name}"
+                raise ValueError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
+            object.__setattr__(self, "settings", {**self.settings, "background": self.background})
+        check(self.name, offer.factory, self.settings)
+        for name, must in needed.items():
+            if must and name not in self.settings:
+                given = "frames A:B or an image" if name == "background" else "given"
+                raise ValueError(f"{name} must be {given} for the method {self.name}, got none")
+
+    @property
+    def name(self) -> str:
+        """The segmenter's name."""
+        assert self.method is not None
+        return self.method
+
+    def segmenter(self, film: Footage) -> Segmenter:
+        """Return the segmenter, which has looked at a film. Raises ValueError where a setting does not fit it."""
+        offer = registry().offer("segmenter", self.name)
+        with blamed(offer.label, "it", passed=(ValueError, ImportError)):
+            return cast(Segmenter, offer.factory(film, **self.settings))
+
+
+def segmenter_name(method: str | None, background: str | None) -> str:
+    """Return the segmenter that is meant: the usual one, or that of a background, where none is named."""
+    return method or (USUAL if background is None else PICTURED)
 
 
 class Segmentation:
@@ -85,10 +105,12 @@ class Segmentation:
         scale = min(1.0, how.width / video.size[0])
         self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
         self.rows: list[dict[str, Any]] = []
-        self.name, self._video = video.path, video
+        self.name, self.method, self._video = video.path, how.name, video
         self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
-        self._learn = partial(_background, video, how, self.size)
-        self._model = self._learn() if how.method == "mean" else None  # what is given is checked now
+        self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
+        self._learn = partial(how.segmenter, self._film)
+        self._given = "background" in how.settings
+        self._segmenter = self._learn() if self._given else None  # what is given is checked now
         self._shifts: list[float] = []
 
     def __len__(self) -> int:
@@ -96,22 +118,42 @@ class Segmentation:
 
     def __iter__(self) -> Iterator[tuple[Image, Person]]:
         """Learn the background and yield each frame, scaled, with the person in it; `rows` tells what it is worth."""
-        model = self._model or self._learn()
-        latest: deque[int] = deque(maxlen=LATEST)
+        segmenter = self._segmenter or self._learn()
+        watch = Watch(self._video.fps, getattr(segmenter, "background", None))
         still = _Still(self.size)
         for k, image in enumerate(self._video.frames(self.start, self.stop, self.size)):
             if k % PERIOD == 0:
                 self._shifts.append(still.shift(image))
-            found = person(*model.classify(image), self._roi, self._ignored)
-            self.rows.append(_judged(found, self.start + k, latest))
+            found = person(*self._segmented(segmenter, image), self._roi, self._ignored)
+            part = replace(found, mask=self._film.cut(found.mask), valid=self._film.cut(found.valid))
+            self.rows.append(watch.look(self._film.cut(image), part, self.start + k))
             if not self._video.is_filmed(self.start + k):
                 self.rows[-1]["usable"] = 0
             yield image, found
-        if not any(row["usable"] for row in self.rows):
+        if not any(row["area"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
-            raise ValueError(
-                f"{self.name}: expected a person who moves before a still background, got none in any frame{damage}"
+            raise ValueError(f"{self.name}: {NOBODY}{damage or advice(self.method, learned=not self._given)}")
+
+    def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
+        """Return what a segmenter says of the part that it gets to see, at its place in the whole frame."""
+        x, y, wide, tall = self._film.part
+        with blamed(f"segmenter {self.method!r}", "segment"):
+            said = segmenter.segment(self._film.cut(image))
+            planes = [np.asarray(plane) for plane in said]
+        if len(planes) != 2 or any(one.shape != (tall, wide) or one.dtype != np.bool_ for one in planes):
+            came = ", ".join(f"{one.shape} {one.dtype}" for one in planes)
+            raise BrokenRuleError(
+                f"segmenter {self.method!r}: segment must return two boolean masks of shape {tall, wide}, got {came}"
             )
+        whole = np.zeros((2, *image.shape[:2]), dtype=bool)
+        whole[:, y : y + tall, x : x + wide] = planes
+        return whole[0], whole[1]
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """What is wrong with what was found, if anything; known when the pass has ended."""
+        said = verdict(self.rows, self.method, learned=not self._given)
+        return said and replace(said, text=f"{self.name}: {said.text}")
 
     @property
     def _damage(self) -> str:
@@ -121,6 +163,8 @@ class Segmentation:
     def warnings(self) -> list[str]:
         """What a user should look at before he trusts the masks."""
         said, name = [*self._video.warnings], self.name
+        if self.verdict:
+            said.append(self.verdict.text)
         if self._missing > LOST * len(self.rows):
             said.append(f"{name}: {self._damage}")
         seen = [row for row in self.rows if row["area"]]
@@ -192,33 +236,6 @@ def _away(before: Any, now: Any) -> float:
     return float(np.hypot(*np.subtract(cv2.minMaxLoc(likeness)[3], REACH)))
 
 
-def _background(video: Video, how: Extraction, size: tuple[int, int]) -> Background:
-    if how.method == "mean":
-        assert how.background is not None
-        return mean_background(_given_background(video, how.background, size))
-    if how.method == "masks":
-        return Drawn()
-    if how.method == "median":
-        step = max(1, video.count() // SAMPLES)
-        return median_background(list(video.frames(0, None, size, step))[:SAMPLES])
-    return Mixture(video.frames(0, None, size))
-
-
-def _given_background(video: Video, given: str, size: tuple[int, int]) -> Iterator[Image]:
-    start, colon, stop = given.partition(":")
-    if colon and (start + stop).isdigit() and stop:
-        first, last = span((int(start or 0), int(stop)), video.count())
-        yield from video.frames(first, last, size)
-        return
-    image = read_image(given, grey=False)
-    if image is None:
-        raise ValueError(f"background must be frames A:B or an image, got {given!r}")
-    if (image.shape[1], image.shape[0]) != video.size:
-        came = f"{image.shape[1]}x{image.shape[0]}"
-        raise ValueError(f"{given}: background must have the video's size {video.size[0]}x{video.size[1]}, got {came}")
-    yield np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-
-
 def _scaled_roi(roi: Box | None, video: Video, scale: float) -> Box | None:
     if roi is None:
         return None
@@ -236,22 +253,3 @@ def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
     if image is None:
         raise ValueError(f"{path}: expected an image of what to ignore, got a file that is none")
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > 127)
-
-
-def _judged(found: Person, frame: int, latest: deque[int]) -> dict[str, Any]:
-    """Return a frame's row: usable where the person is whole and about as large as in the frames before."""
-    usual = float(np.median(latest)) if latest else float(found.area)
-    jitter = abs(found.area / usual - 1.0) if usual else 0.0
-    whole = found.area > 0 and not found.touches_border
-    usable = whole and jitter <= CHANGE
-    if whole:
-        latest.append(found.area)
-    return {
-        "frame": frame,
-        "area": found.area,
-        "jitter": round(jitter, 4),
-        "pieces": found.pieces,
-        "rival": round(found.rival, 4),
-        "touches_border": int(found.touches_border),
-        "usable": int(usable),
-    }

@@ -3,7 +3,7 @@
 Frames and backgrounds are (height, width, 3) uint8. Nothing here keeps a frame, so a video may be as long as it likes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -27,14 +27,39 @@ PIECE = 0.05  # of the largest piece's area: a piece that is smaller is not coun
 BRIDGE = 0.15  # of the person's height: shadow between parts of the person that are no farther apart is clothing
 HOLE = 0.02  # of the person's area: a hole that is smaller is filled
 SAMPLES = 40  # frames that a median background looks at
+HISTORY = 500  # frames that a mixture remembers
+THRESHOLD = 25.0  # squared standard deviations from its nearest Gaussian, from which on a pixel is foreground
 
 
-class Background(Protocol):
-    """Tells a person from what was there before."""
+class Footage(Protocol):
+    """What a segmenter may look at before the first frame: a video at its working size, as far as the roi goes."""
 
-    def classify(self, image: Image) -> tuple[Mask, Mask]:
-        """Return what is foreground, and what may be its shadow, of an image."""
+    def __len__(self) -> int:
+        """How many frames the video has."""
         ...
+
+    def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Image]:
+        """Yield every `step`th frame of start to stop."""
+        ...
+
+    def picture(self, path: str) -> Image:
+        """Return a picture of the video's size as the video shows it. Raises ValueError where there is none."""
+        ...
+
+
+class Segmenter(Protocol):
+    """Tells a person from the rest of a picture. Frames come in their order, each once.
+
+    One that holds each frame against a still background may show that picture as `background` (height, width, 3), and
+    is then watched for a person who was learned into it.
+    """
+
+    def segment(self, image: Image) -> tuple[Mask, Mask]:
+        """Return where the person is in an image, and where his shadow may be, both (height, width)."""
+        ...
+
+
+SegmenterFactory = Callable[..., Segmenter]  # called with a `Footage`, and settings as keywords
 
 
 @dataclass(frozen=True)
@@ -44,9 +69,14 @@ class Still:
     middle: NDArray[np.float32] = field(repr=False)  # (height, width, 3)
     spread: NDArray[np.float32] = field(repr=False)  # (height, width)
 
-    def classify(self, image: Image) -> tuple[Mask, Mask]:
+    @property
+    def background(self) -> Image:
+        """The picture that frames are held against."""
+        return self.middle.round().astype(np.uint8)
+
+    def segment(self, image: Image) -> tuple[Mask, Mask]:
         """Return where an image differs from the background, and where it is only darker."""
-        away = cv2.absdiff(image, self.middle.round().astype(np.uint8))
+        away = cv2.absdiff(image, self.background)
         difference = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2])
         changed = np.asarray(difference > np.maximum(LEAST, SPREADS * self.spread))
         before, now = self.middle[changed], image[changed].astype(np.float32)  # the rest need not be looked at
@@ -86,8 +116,8 @@ def median_background(images: Iterable[Image]) -> Still:
 class Mixture:
     """OpenCV's adaptive mixture of Gaussians, learned from all frames first: what the SAPSO paper starts from."""
 
-    def __init__(self, images: Iterable[Image]) -> None:
-        self._model: Any = cv2.createBackgroundSubtractorMOG2(500, 25.0, True)
+    def __init__(self, images: Iterable[Image], history: int = HISTORY, threshold: float = THRESHOLD) -> None:
+        self._model: Any = cv2.createBackgroundSubtractorMOG2(history, threshold, True)
         count = 0
         for image in images:
             self._model.apply(image)
@@ -95,7 +125,12 @@ class Mixture:
         if not count:
             raise ValueError("background must hold at least one frame, got none")
 
-    def classify(self, image: Image) -> tuple[Mask, Mask]:
+    @property
+    def background(self) -> Image:
+        """The likeliest colour of each pixel."""
+        return np.asarray(self._model.getBackgroundImage(), dtype=np.uint8)
+
+    def segment(self, image: Image) -> tuple[Mask, Mask]:
         """Return what the mixture calls foreground, and what it calls shadow."""
         label = self._model.apply(image, learningRate=0.0)
         return np.asarray(label == 255), np.asarray(label == 127)
@@ -104,7 +139,7 @@ class Mixture:
 class Drawn:
     """What tells the person from the background where the frames are masks themselves: bright is the person."""
 
-    def classify(self, image: Image) -> tuple[Mask, Mask]:
+    def segment(self, image: Image) -> tuple[Mask, Mask]:
         """Return which pixels are bright, and that nothing is a shadow."""
         bright = np.asarray(image.max(axis=2) > 127)
         return bright, np.zeros_like(bright)

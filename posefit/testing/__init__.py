@@ -1,4 +1,4 @@
-"""Is a plugin right? Checks for optimisers, priors and trackers, for an author's own tests.
+"""Is a plugin right? Checks for optimisers, priors, trackers and segmenters, for an author's own tests.
 
     from posefit.testing import check_optimiser
     assert check_optimiser(Mine)
@@ -30,11 +30,13 @@ __all__ = [
     "Result",
     "check_optimiser",
     "check_prior",
+    "check_segmenter",
     "check_tracker",
     "optimiser_checks",
     "parametrize",
     "prior_checks",
     "run_checks",
+    "segmenter_checks",
     "tracker_checks",
 ]
 
@@ -79,6 +81,18 @@ def tracker_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | No
 def check_tracker(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
     """Return what the checks say of a tracker's factory: true where none failed."""
     return run_checks(_name(factory), tracker_checks(factory, settings=settings))
+
+
+def segmenter_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
+    """Return the checks of a segmenter's factory."""
+    from posefit.testing import segmenter_rules
+
+    return segmenter_rules.checklist.of(segmenter_rules.SegmenterCase(factory, settings or {}))
+
+
+def check_segmenter(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
+    """Return what the checks say of a segmenter's factory: true where none failed."""
+    return run_checks(_name(factory), segmenter_checks(factory, settings=settings))
 
 
 def _name(factory: Callable[..., Any]) -> str:

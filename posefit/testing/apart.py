@@ -153,22 +153,17 @@ def main() -> None:
 def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> tuple[str, list[Check]]:
     """Return how an error names a plugin, and its checks; here, as what they import takes its time."""
     from posefit.registry import registry
-    from posefit.settings import parse
+    from posefit.settings import parse_texts
 
     offer = registry().offer(kind, name)
-    given = {}
-    for text in texts:
-        setting, equals, value = text.partition("=")
-        if not equals:
-            raise ValueError(f"--set must be SETTING=VALUE such as particles=20, got {text!r}")
-        given[setting.rpartition(".")[2]] = value
-    settings = parse(offer.name, offer.factory, given)
+    settings = parse_texts(offer.name, offer.factory, texts)
     if kind == "prior" and settings:
         offer.factory(**settings)  # a value that makes no sense is one mistake, not one a check
     checks = {
         "optimiser": lambda: testing.optimiser_checks(offer.factory, next_frame=offer.next_frame, settings=settings),
         "prior": lambda: testing.prior_checks(offer.factory, settings=settings),
         "tracker": lambda: testing.tracker_checks(offer.factory, settings=settings),
+        "segmenter": lambda: testing.segmenter_checks(offer.factory, settings=settings),
     }[kind]()
     names = [check.name for check in checks]
     for one in only:

@@ -152,9 +152,13 @@ def prepare(choice: Choice, task: Task) -> Method:
 
 
 def parse_settings(
-    texts: Sequence[str], optimiser: str = "sapso", prior: str = "pca", tracker: str | None = None
+    texts: Sequence[str],
+    optimiser: str = "sapso",
+    prior: str = "pca",
+    tracker: str | None = None,
+    segmenter: str | None = None,
 ) -> dict[str, dict[str, Any]]:
-    """Return the settings of optimiser, prior and tracker that texts such as `sapso.cooling=0.9` give.
+    """Return the settings of optimiser, prior, tracker and segmenter that texts such as `sapso.cooling=0.9` give.
 
     The name before the dot is the plugin's, or its family's for `family:NAME`; `tracker` stands for what drives an
     optimiser and a prior. Raises ValueError where a text has another form, names a plugin that is not in use, or a
@@ -166,6 +170,8 @@ def parse_settings(
         places["tracker"] = "tracker", Prediction
     else:
         chosen = [("tracker", tracker)]
+    if segmenter is not None:
+        chosen.append(("segmenter", segmenter))
     for one, name in chosen:
         places[name.partition(":")[0]] = one, registry().offer(one, name).factory
     given: dict[str, dict[str, str]] = {name: {} for name in places}

@@ -117,7 +117,7 @@ def test_a_shadow_is_darker_but_has_the_grounds_colour() -> None:
     still = Still(np.full((1, 4, 3), (80.0, 120.0, 160.0), dtype=np.float32), np.zeros((1, 4), dtype=np.float32))
     # the ground; its shadow at 60 %; another colour; far darker than any shadow
     image = np.array([[[80, 120, 160], [48, 72, 96], [160, 60, 40], [8, 12, 16]]], dtype=np.uint8)
-    foreground, shadow = still.classify(image)
+    foreground, shadow = still.segment(image)
     assert foreground.tolist() == [[False, False, True, True]]
     assert shadow.tolist() == [[False, True, False, False]]
 
@@ -166,14 +166,21 @@ def test_the_command_prints_what_it_found(filmed: tuple[Path, list[Any]], tmp_pa
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--extraction", "magic"], "extraction method must be one of mixture, mean, median, masks, got 'magic'"),
+        (["--extraction", "magic"], "segmenter must be one of masks, mean, median, mediapipe, mixture, got 'magic'"),
         (["--extraction", "mean"], "background must be frames A:B or an image for the method mean, got none"),
-        (["--background", "0:5"], "background must be given for the method mean only, got '0:5' with mixture"),
+        (
+            ["--extraction", "mixture", "--background", "0:5"],
+            "background must be given for the method mean only, got '0:5' with mixture",
+        ),
         (
             ["--extraction", "mean", "--background", "nothing.png"],
             "background must be frames A:B or an image, got 'nothing.png'",
         ),
         (["--extraction", "mean", "--background", "90:99"], "frames must choose some of the 60 frames, got 90:99"),
+        (["--set", "mixture.colour=3"], "a setting of mixture must be one of history, threshold, got 'colour'"),
+        (["--set", "threshold=low"], "mixture.threshold must be float, got 'low'"),
+        (["--set", "threshold"], "--set must be SETTING=VALUE such as particles=20, got 'threshold'"),
+        (["--set", "threshold=-1"], "threshold must be above 0, got -1"),
         (["--frames", "90:"], "frames must choose some of the 60 frames, got 90:"),
         (["--roi", "1,2,3"], "expected X,Y,WIDTH,HEIGHT in pixels"),
         (["--roi", "100,0,100,100"], "roi must lie within the video's 160x120 pixels"),

@@ -140,7 +140,9 @@ def test_two_calibrated_cameras_find_the_person_where_he_is(filmed: tuple[Path, 
     assert np.median(metrics.mpjpe_mm(*joints)) < 50.0
     assert metrics.swap_rate(*joints) < 0.2
     other = film(tmp_path / "front.avi", [NOBODY] * EMPTY + truth(0.6))
-    filmed_twice = posefit.track([filmed[0], other], camera=calibration, up="y", **QUICK)
+    # coming nearer he covers the same place all the time, which a mixture would learn
+    how = Extraction("median")
+    filmed_twice = posefit.track([filmed[0], other], camera=calibration, up="y", extraction=how, **QUICK)
     assert filmed_twice.summary["views"] == 2
     assert filmed_twice.summary["iou"] > 0.4
 
@@ -426,7 +428,7 @@ def test_a_video_that_changes_its_size_is_named(tmp_path: Path, monkeypatch: pyt
         (["VIDEO", "--view-degrees", "0", "--view-degrees", "90"], "view_degrees must be one for footage"),
         (
             ["VIDEO", "--extraction", "magic"],
-            "extraction method must be one of mixture, mean, median, masks, got 'magic'",
+            "segmenter must be one of masks, mean, median, mediapipe, mixture, got 'magic'",
         ),
         (["VIDEO", "--translation", "known"], "translation must be searched or aligned where only masks are given"),
         (["VIDEO", "--first-pose", "given"], "first_pose must be searched where only masks are given"),

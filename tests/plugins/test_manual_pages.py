@@ -7,9 +7,11 @@ from importlib.util import find_spec
 import pytest
 
 PACKAGES = (
+    "posefit_background",
     "posefit_evolution",
     "posefit_filters",
     "posefit_imm",
+    "posefit_mediapipe",
     "posefit_nevergrad",
     "posefit_optuna",
     "posefit_priors",

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from posefit.footage.masks import Range
-from posefit.footage.segmentation import Box
+from posefit.footage.segmenting.film import Box
 from posefit.footage.video import Video
 from posefit.silhouette.foreground import Image, median_background
 from posefit.silhouette.mask import Mask

@@ -13,7 +13,8 @@ from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace
 from posefit.fitting.tracker import Task
 from posefit.footage.masks import Range
 from posefit.footage.scene import Scene
-from posefit.footage.segmentation import Box, Extraction, Segmentation
+from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.segmenting.film import Box
 from posefit.footage.source import Viewing, scene_of
 from posefit.footage.video import Video
 from posefit.motion import built_in

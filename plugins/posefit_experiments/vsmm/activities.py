@@ -88,7 +88,7 @@ def film_of(seed: int) -> Film:
     camera = Camera.around(np.array([0.0, 1.05, 0.0]), rng.uniform(-SIDEWAYS, SIDEWAYS), DISTANCE, SIZE)
     empty, film = _images(truth, body, camera, rng)
     background = mean_background(empty)
-    masks = (person(*background.classify(image), None, None) for image in film)
+    masks = (person(*background.segment(image), None, None) for image in film)
     return Film(truth, body, camera, [Observation([Silhouette.of(one.mask)]) for one in masks], labels)
 
 

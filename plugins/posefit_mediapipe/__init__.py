@@ -1,0 +1,92 @@
+"""The segmenter `mediapipe`: the person as MediaPipe's pose model sees him in each frame, moving or not.
+
+C. Lugaresi et al., MediaPipe: a framework for building perception pipelines, 2019; V. Bazarevsky et al., BlazePose:
+on-device real-time body pose tracking, 2020. Version 0.10.14 carries the weights, so nothing is downloaded.
+`pip install 'posefit[mediapipe]'`; how to install it without what posefit does not need is told in the handbook,
+"How do I follow a video?".
+
+>>> from posefit.registry import registry
+>>> offer = registry().offers["segmenter"]["mediapipe"]
+>>> [setting.name for setting in offer.settings]
+['confidence', 'threshold']
+"""
+
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from posefit import hookimpl
+from posefit.fitting.check import between
+from posefit.hooks import RegisterSegmenter
+from posefit.silhouette.foreground import Footage, Image
+from posefit.silhouette.mask import Mask
+
+
+class MediaPipe:
+    """One person by MediaPipe's pose model: found in the picture, then followed from frame to frame.
+
+    Of several people it takes the one that is found most surely, and stays with him; a roi says whom. It needs no still
+    background and no still camera.
+
+    Settings:
+        confidence: how sure it has to be that somebody is there, 0 to 1; lower finds people who are small or far away.
+        threshold: of the soft mask, from which on a pixel is the person's, between 0 and 1.
+    """
+
+    def __init__(self, film: Footage, *, confidence: float = 0.3, threshold: float = 0.5) -> None:
+        between("confidence", confidence, 0.0, 1.0)
+        between("threshold", threshold, 0.0, 1.0, ends=False)
+        self._threshold = threshold
+        self._model = _model(confidence)
+
+    def segment(self, image: Image) -> tuple[Mask, Mask]:
+        """Return where the soft mask of the person is above the threshold, and that nothing is a shadow."""
+        nobody = np.zeros(image.shape[:2], dtype=bool)
+        with warnings.catch_warnings():  # of its own use of protobuf
+            warnings.simplefilter("ignore")
+            soft = self._model.process(np.ascontiguousarray(image[..., ::-1])).segmentation_mask
+        return (nobody if soft is None else np.asarray(soft > self._threshold)), nobody.copy()
+
+
+def _model(confidence: float) -> Any:
+    """Return MediaPipe's pose model."""
+    with _silent(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from mediapipe.python.solutions.pose import Pose
+
+        # smoothing mixes a frame with those before it, and silhouettes would lag behind
+        model = Pose(
+            model_complexity=1,
+            enable_segmentation=True,
+            smooth_segmentation=False,
+            smooth_landmarks=False,
+            min_detection_confidence=confidence,
+            min_tracking_confidence=confidence,
+        )
+        model.process(np.zeros((64, 64, 3), dtype=np.uint8))  # what it has to say, it says of its first picture
+    return model
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep what is written to stderr from users: the model's libraries greet their own developers there."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+@hookimpl
+def posefit_register_segmenters(register: RegisterSegmenter) -> None:
+    """Register `mediapipe`."""
+    register("mediapipe", MediaPipe, needs=("mediapipe", "posefit[mediapipe]"))

@@ -1,0 +1,199 @@
+"""Is a segmenter right: two masks of the picture's size, the same again, and do they show the person?"""
+
+import inspect
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any, Literal, get_origin
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.motion import built_in
+from posefit.settings import settings_of
+from posefit.silhouette.cost import project
+from posefit.silhouette.foreground import Image, Segmenter
+from posefit.silhouette.mask import Mask
+from posefit.testing.randomness import left_alone
+from posefit.testing.results import Checklist, SkippedError, expect, refusal
+
+SIZE = (320, 240)
+EMPTY, FRAMES = 8, 40  # frames without anybody, then frames of somebody who walks through
+OVERLAP = 0.3  # of the person and the mask: half of what a poor background model reaches
+SECONDS = 1.0  # for a picture of that size
+SKIN, SHIRT, TROUSERS = (150.0, 175.0, 225.0), (235.0, 235.0, 235.0), (200.0, 150.0, 130.0)  # blue, green, red
+checklist = Checklist()
+
+
+@dataclass(frozen=True)
+class PaintedFilm:
+    """A film in memory: somebody in light clothes walks through before a dark wall."""
+
+    images: list[Image] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.images)
+
+    def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Image]:
+        """Yield every `step`th frame of start to stop."""
+        return (image.copy() for image in self.images[start:stop:step])
+
+    def picture(self, _path: str) -> Image:
+        """Return the first frame, where nobody is to be seen yet, whatever the path."""
+        return self.images[0].copy()
+
+
+@lru_cache(maxsize=1)
+def painted() -> tuple[PaintedFilm, list[Mask]]:
+    """Return a film and the true mask of each of its frames."""
+    rng = np.random.default_rng(0)
+    motion = built_in.motion("walk", frames=FRAMES)
+    places = motion.translations.copy()
+    places[:, 2] = np.linspace(-1.2, 1.2, FRAMES)
+    motion = replace(motion, translations=places)
+    camera, body = Camera.around(np.array([0.0, 0.9, 0.0]), np.pi / 2, 4.0, SIZE), Body.of(motion.skeleton)
+    wall = cv2.GaussianBlur(rng.uniform(0.0, 1.0, SIZE[::-1]), (0, 0), 30.0)
+    wall = 60.0 + 15.0 * (wall - wall.mean())[..., None] / wall.std()
+    nobody = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
+    masks = [nobody] * EMPTY + [
+        project(body, camera, pose, place) for pose, place in zip(motion.poses, motion.translations, strict=True)
+    ]
+    images = []
+    for mask in masks:
+        rows = np.flatnonzero(mask.any(axis=1))
+        down = ((np.arange(SIZE[1]) - rows.min(initial=SIZE[1])) / max(1, len(rows)))[:, None, None]
+        colour = np.where(down < 0.14, SKIN, np.where(down < 0.5, SHIRT, TROUSERS))
+        depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)[..., None]
+        person = colour * (0.7 + 0.3 * np.minimum(1.0, depth / 6.0))  # rounded, as a body is
+        image = np.where(mask[..., None], person, wall) + rng.normal(0.0, 2.0, (*mask.shape, 3))
+        images.append(np.clip(cv2.GaussianBlur(image, (0, 0), 0.6), 0.0, 255.0).astype(np.uint8))
+    return PaintedFilm(images), masks
+
+
+@dataclass(frozen=True)
+class SegmenterCase:
+    """A factory with its settings."""
+
+    factory: Callable[..., Any]
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    def build(self) -> Segmenter:
+        """Return a segmenter that has looked at the painted film."""
+        segmenter: Segmenter = self.factory(painted()[0], **self.settings)
+        return segmenter
+
+    @cached_property
+    def said(self) -> list[tuple[Mask, Mask]]:
+        """What a segmenter says of every fourth frame, in their order."""
+        segmenter = self.build()
+        return [_pair(segmenter.segment(image)) for image in painted()[0].frames(step=4)]
+
+
+def _pair(said: object) -> tuple[NDArray[Any], NDArray[Any]]:
+    expect(isinstance(said, tuple) and len(said) == 2, f"segment must return two masks, got {type(said).__name__}")
+    assert isinstance(said, tuple)
+    return np.asarray(said[0]), np.asarray(said[1])
+
+
+@checklist
+def construction(case: SegmenterCase) -> None:
+    """A factory takes the film and keyword-only settings."""
+    kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
+    plain = [kind for kind in kinds if kind is not inspect.Parameter.KEYWORD_ONLY]
+    expect(len(plain) == 1, f"a factory must take (film) and keyword-only settings, got {len(plain)} others")
+    expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
+    case.build()
+
+
+@checklist
+def masks(case: SegmenterCase) -> None:
+    """The method segment returns two boolean masks of the picture's size."""
+    for mask in (mask for pair in case.said for mask in pair):
+        expect(mask.shape == SIZE[::-1], f"a mask must have shape {SIZE[::-1]}, got {mask.shape}")
+        expect(mask.dtype == np.bool_, f"a mask must be boolean, got {mask.dtype}")
+
+
+@checklist
+def finds(case: SegmenterCase) -> str:
+    """Somebody who walks through is seen in half of the frames at least."""
+    true = painted()[1][::4]
+    overlaps = [
+        float((said & mask).sum() / (said | mask).sum())
+        for (said, _), mask in zip(case.said, true, strict=True)
+        if mask.any()
+    ]
+    middle = float(np.median(overlaps))
+    expect(middle > OVERLAP, f"the mask must show the person, got an overlap of {middle:.2f} in half of the frames")
+    return f"overlap {middle:.2f}"
+
+
+@checklist
+def same_again(case: SegmenterCase) -> None:
+    """The same film gives the same masks."""
+    segmenter = case.build()
+    again = [_pair(segmenter.segment(image)) for image in painted()[0].frames(step=4)]
+    same = all(np.array_equal(one, two) for one, two in zip(case.said, again, strict=True))
+    expect(same, "two segmenters of one film must say the same, got two answers")
+
+
+@checklist
+def inputs(case: SegmenterCase) -> None:
+    """A picture stays as it was."""
+    image = painted()[0].images[20].copy()
+    case.build().segment(image)
+    expect(np.array_equal(image, painted()[0].images[20]), "a picture must stay as it is, got another")
+
+
+@checklist
+def background(case: SegmenterCase) -> str:
+    """A background that is shown is a picture of the film's size."""
+    shown = getattr(case.build(), "background", None)
+    if shown is None:
+        raise SkippedError("it shows no background")
+    expect(np.shape(shown) == (*SIZE[::-1], 3), f"background must have shape {*SIZE[::-1], 3}, got {np.shape(shown)}")
+    expect(shown.dtype == np.uint8, f"background must be uint8, got {shown.dtype}")
+    return ""
+
+
+@checklist
+def global_randomness(case: SegmenterCase) -> None:
+    """The global random generators are left alone."""
+    segmenter = case.build()
+    with left_alone():
+        segmenter.segment(painted()[0].images[20])
+
+
+@checklist
+def nonsense_settings(case: SegmenterCase) -> str:
+    """Nonsense in a setting is refused."""
+    refused = []
+    for setting in settings_of(case.factory):
+        kind = setting.annotation if setting.annotation is not inspect.Parameter.empty else type(setting.default)
+        choice = get_origin(kind) is Literal or setting.name == "variant"
+        if not (choice or kind in (int, float)):
+            continue
+        nonsense: object = "no such choice" if choice else -1 if kind is int else float("nan")
+        with refusal(ValueError) as refusals:
+            self_made = {**case.settings, setting.name: nonsense}
+            case.factory(painted()[0], **self_made)
+        expect(refusals, f"{setting.name}={nonsense} must raise ValueError, got a segmenter")
+        refused.append(setting.name)
+    if not refused:
+        raise SkippedError("it has no settings that could be nonsense")
+    return f"refused: {', '.join(refused)}"
+
+
+@checklist
+def speed(case: SegmenterCase) -> str:
+    """A picture of 320 x 240 takes less than a second."""
+    segmenter = case.build()
+    began = time.perf_counter()
+    for image in painted()[0].images[16:20]:
+        segmenter.segment(image)
+    spent = (time.perf_counter() - began) / 4
+    expect(spent < SECONDS, f"a picture must take less than {SECONDS:g} s, got {spent:.3g}")
+    return f"{1e3 * spent:.1f} ms a picture"

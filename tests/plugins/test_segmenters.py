@@ -1,0 +1,132 @@
+"""Segmenters come in by the door that all plugins use, and the kit tells right ones from wrong ones."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.metadata import EntryPoint
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.registry import Registry, registry, registry_of
+from posefit.silhouette.foreground import Footage, Mixture
+from posefit.testing import check_segmenter, segmenter_checks
+
+BUILT_IN = ("masks", "mean", "median", "mixture")
+
+
+def test_the_built_in_ones_come_through_the_hook() -> None:
+    offers = registry().offers["segmenter"]
+    assert set(BUILT_IN) < set(offers)
+    assert all(offers[name].distribution == "posefit" for name in BUILT_IN)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_the_kit_passes_the_built_in_ones(name: str) -> None:
+    settings = {"background": "0:6"} if name == "mean" else {}
+    result = check_segmenter(registry().offer("segmenter", name).factory, settings=settings)
+    assert result, str(result)
+    assert len(result.of("passed")) >= 7
+
+
+@pytest.mark.skipif(find_spec("mediapipe") is None, reason="without mediapipe")
+def test_the_kit_passes_mediapipe() -> None:
+    result = check_segmenter(registry().offer("segmenter", "mediapipe").factory)
+    assert result, str(result)
+
+
+def test_an_absent_mediapipe_is_named_with_the_extra_to_install() -> None:
+    plugin = registry_of([EntryPoint("mediapipe", "posefit_mediapipe", "posefit")]).plugins[0]
+    assert plugin.offers[0].needs == ("mediapipe", "posefit[mediapipe]")
+    absent = tuple(replace(offer, needs=("no_such_library", "posefit[mediapipe]")) for offer in plugin.offers)
+    with pytest.raises(ImportError, match=r"^segmenter mediapipe needs the library .* 'posefit\[mediapipe\]'$"):
+        Registry((plugin._replace(offers=absent),)).offer("segmenter", "mediapipe")
+
+
+def test_listing_segmenters_does_not_import_mediapipe() -> None:
+    script = "import sys; from posefit.registry import registry; registry(); print('mediapipe' in sys.modules)"
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert ran.stdout.splitlines()[-1] == "False"
+
+
+class Sound(Mixture):
+    """Nothing is wrong with it, and the others each spoil one thing."""
+
+    def __init__(self, footage: Footage) -> None:
+        super().__init__(footage.frames())
+
+
+class OneMask(Sound):
+    def segment(self, image: Any) -> Any:
+        return super().segment(image)[0]
+
+
+class SoftMasks(Sound):
+    def segment(self, image: Any) -> Any:
+        person, shadow = super().segment(image)
+        return person.astype(np.float32), shadow
+
+
+class Smaller(Sound):
+    def segment(self, image: Any) -> Any:
+        person, shadow = super().segment(image)
+        return person[::2], shadow[::2]
+
+
+class Blind(Sound):
+    def segment(self, image: Any) -> Any:
+        return np.zeros(image.shape[:2], dtype=bool), np.zeros(image.shape[:2], dtype=bool)
+
+
+class Draws(Sound):
+    def segment(self, image: Any) -> Any:
+        person, shadow = super().segment(image)
+        return person & (np.random.random(person.shape) < 0.95), shadow  # noqa: NPY002
+
+
+class Paints(Sound):
+    def segment(self, image: Any) -> Any:
+        said = super().segment(image)
+        image[said[0]] = 0
+        return said
+
+
+class WrongBackground(Sound):
+    background = np.zeros((3, 3), dtype=np.uint8)  # type: ignore[assignment]
+
+
+class Swallows(Sound):
+    def __init__(self, footage: Footage, **settings: Any) -> None:
+        super().__init__(footage)
+
+
+class TakesNonsense(Sound):
+    def __init__(self, footage: Footage, *, levels: int = 3) -> None:
+        super().__init__(footage)
+
+
+@pytest.mark.parametrize(
+    ("factory", "broken"),
+    [
+        (Sound, set()),
+        (OneMask, {"masks", "finds"}),
+        (SoftMasks, {"masks"}),
+        (Smaller, {"masks"}),
+        (Blind, {"finds"}),
+        (Draws, {"same_again", "global_randomness"}),
+        (Paints, {"inputs"}),
+        (WrongBackground, {"background"}),
+        (Swallows, {"construction"}),
+        (TakesNonsense, {"nonsense_settings"}),
+    ],
+)
+def test_the_kit_finds_what_was_planted(factory: Any, broken: set[str]) -> None:
+    failed = {result.name for result in check_segmenter(factory).of("failed")}
+    assert broken <= failed if broken else not failed
+    assert failed <= broken | ({"finds"} if factory in (SoftMasks, Smaller) else set())
+
+
+def test_the_kit_has_nine_checks() -> None:
+    assert len(segmenter_checks(Sound)) == 9
