@@ -10,7 +10,7 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import areas
-from posefit.steadying.path import Sighting, steadied
+from posefit.steadying.path import SeenFrames, steadied
 
 
 def steadied_frames(scene: Scene, found: Sequence[Frame], beta: float) -> list[Frame]:
@@ -19,7 +19,7 @@ def steadied_frames(scene: Scene, found: Sequence[Frame], beta: float) -> list[F
     motion = Motion(scene.name, scene.body.skeleton, poses, np.array([frame.translation for frame in found]), scene.fps)
     usable = np.array([observation.usable for observation in scene.observations])
     eye = scene.cameras[0].position if len(scene.cameras) == 1 else None
-    told = steadied(motion, Sighting(usable, eye))
+    told = steadied(motion, SeenFrames(usable, eye))
     return [_told(scene, k, frame, told, beta) for k, frame in enumerate(found)]
 
 

@@ -38,14 +38,14 @@ LEGS = tuple(
 
 
 @dataclass(frozen=True, eq=False)
-class Sighting:
+class SeenFrames:
     """How well each frame of a motion was seen."""
 
     usable: NDArray[np.bool_]  # (T,)
     eye: Array | None  # (3,) metres: where the only camera stands; None where there are several
 
 
-def steadied(motion: Motion, seen: Sighting) -> Motion:
+def steadied(motion: Motion, seen: SeenFrames) -> Motion:
     """Return a motion whose root goes smoothly and whose feet do not slide where they stand.
 
     Only the root's way and the angles of the legs change. A motion of fewer than 3 frames is returned as it is.
@@ -72,7 +72,7 @@ def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
     return np.column_stack([np.interp(np.arange(len(places)), known, line) for line in places[known].T])
 
 
-def _window(motion: Motion, seen: Sighting) -> Motion:
+def _window(motion: Motion, seen: SeenFrames) -> Motion:
     """Return a motion steadied: first its root alone, which tells who stands, then the legs as well."""
     if len(motion) < 3:
         return motion
@@ -81,7 +81,7 @@ def _window(motion: Motion, seen: Sighting) -> Motion:
     return _solved(motion, seen, stands)
 
 
-def _solved(motion: Motion, seen: Sighting, stands: NDArray[np.bool_]) -> Motion:
+def _solved(motion: Motion, seen: SeenFrames, stands: NDArray[np.bool_]) -> Motion:
     """Return the motion of the least sum of squares, with what stands told."""
     skeleton, fps, count = motion.skeleton, motion.fps, len(motion)
     angles = [angle for angle in LEGS if skeleton.free[angle]]
@@ -107,7 +107,7 @@ def _solved(motion: Motion, seen: Sighting, stands: NDArray[np.bool_]) -> Motion
     return Motion(motion.name, skeleton, poses, places, fps)
 
 
-def _precisions(motion: Motion, seen: Sighting) -> Array:
+def _precisions(motion: Motion, seen: SeenFrames) -> Array:
     """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance."""
     across = np.where(seen.usable, ACROSS, UNSEEN)
     precise = np.eye(3) / across[:, None, None] ** 2

@@ -10,7 +10,7 @@ from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.steadying import path
-from posefit.steadying.path import Sighting, steadied
+from posefit.steadying.path import SeenFrames, steadied
 from posefit.steadying.squares import Squares
 from posefit.steadying.stance import stances
 
@@ -45,8 +45,8 @@ def joints_of(motion: Motion) -> np.ndarray:
     return motion.skeleton.joints(motion.poses, motion.translations)
 
 
-def all_seen(motion: Motion) -> Sighting:
-    return Sighting(np.ones(len(motion), dtype=bool), EYE)
+def all_seen(motion: Motion) -> SeenFrames:
+    return SeenFrames(np.ones(len(motion), dtype=bool), EYE)
 
 
 def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
@@ -111,7 +111,7 @@ def test_frames_that_show_too_little_are_bridged_and_strange_places_are_not_beli
     places = motion.translations.copy()
     places[~usable] += [200.0, 30.0, -500.0]
     places[40, 2] -= 20.0
-    told = steadied(replace(motion, translations=places), Sighting(usable, EYE))
+    told = steadied(replace(motion, translations=places), SeenFrames(usable, EYE))
     off = np.linalg.norm(told.translations - motion.translations, axis=1)
     assert off[20:25].max() < 0.05
     assert off[40] < 0.1
