@@ -59,6 +59,14 @@ SAID = {
     ),
     "unknown_sides": ("", "numbers of the frames whose left and right are called unknown; where a method says"),
     "lost_frames": ("", "numbers of the frames that are called lost; where a method says"),
+    "looked_again": (
+        "",
+        "numbers of the frames in which it was looked all around again, after a gap or where costs stayed high",
+    ),
+    "backwards_share": (
+        "",
+        "share of frames in which the root faces away from its way over half a second, faster than 0.3 m/s",
+    ),
     "gait": ("", "[figures of the walk](../howto/measuring.md), or `why` there are none"),
 }
 CELL = {

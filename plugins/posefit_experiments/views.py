@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from posefit.searching.starts import RESTARTS, begun
 from posefit.tracking.measures import BASELINES
 from posefit.tracking.method import Choice, prepare
-from posefit.tracking.opening import RESTARTS, begun, following
+from posefit.tracking.opening import following
 from posefit_experiments.columns import labelled, number
 from posefit_experiments.grid import Progress, check_seeds, each
 from posefit_experiments.known import follow_known, known_errors, known_scene, known_task, mean_pose_degrees

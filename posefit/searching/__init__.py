@@ -12,4 +12,6 @@
 | other poses that a silhouette hardly tells from one, as proposals | twins.py |
 | how likely a frame is lost | doubt.py |
 | those of every frame that an optimiser follows | tracker.py |
+| several starts of a track, and the best of them | starts.py |
+| a track that looks all around again after a gap | again.py |
 """

@@ -62,7 +62,7 @@ class WeighingTracker:
             particles, costs = record.found[-1]
             weights = likelihoods(costs, how.posterior_temperature)
             return told(problem, *_few(particles, weights)), 0
-        own = _other(rng)  # the track itself is what it is without
+        own = beside(rng)  # the track itself is what it is without
         first, more = gathered(record.found), round(how.modes_share * evaluations)
         return further(problem, self.tracker.make, first, more, own, how.modes - 1, how.posterior_temperature)
 
@@ -74,7 +74,7 @@ def _few(particles: Array, weights: Array) -> tuple[Array, Array]:
     return particles[systematic_rows(weights, 0.5, KEPT)], np.full(KEPT, 1.0 / KEPT)
 
 
-def _other(rng: np.random.Generator) -> np.random.Generator:
+def beside(rng: np.random.Generator) -> np.random.Generator:
     """Return a generator that is seeded by what another one would draw next, which stays as it is."""
     bits = type(rng.bit_generator)(0)
     bits.state = rng.bit_generator.state

@@ -116,6 +116,7 @@ class Method:
     beta: float  # of the silhouette cost
     settings: dict[str, dict[str, Any]]
     audit: Audit  # of what the trackers made of it say
+    look_again: int | None  # frames of a gap after which it looks all around, 0 for never; None where nobody says
     _make: Callable[[Task, float], Tracker] = field(repr=False)
 
     def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
@@ -148,7 +149,7 @@ def prepare(choice: Choice, task: Task) -> Method:
         return WeighingTracker(tracker) if prediction.modes else tracker
 
     made_of = {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)}
-    return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, Audit(), make)
+    return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, Audit(), prediction.look_again, make)
 
 
 def parse_settings(
@@ -200,7 +201,7 @@ def _tracker(choice: Choice) -> Method:
             tracker = offer.factory(task, **mine)
         return GuardedTracker(tracker, task, offer.label, beta, audit)
 
-    return Method(offer.name, None, beta, {"tracker": mine}, audit, make)
+    return Method(offer.name, None, beta, {"tracker": mine}, audit, None, make)
 
 
 def _beta(offer: Offer, given: Settings) -> float:

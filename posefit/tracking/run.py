@@ -8,18 +8,20 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from posefit.fitting.shape import NAMES, Shape
-from posefit.fitting.tracker import Frame, Task
+from posefit.fitting.tracker import Frame, Task, Tracker
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
 from posefit.listening import QUIET, Listener
 from posefit.measuring.gait import gait_of
+from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
+from posefit.searching.again import GAP, LOOKED, LookingTracker
 from posefit.steadying.frames import steadied_frames
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
-from posefit.tracking.opening import Opening, opened, task_of
+from posefit.tracking.opening import Opening, following, opened, task_of
 from posefit.tracking.outputs import Nowhere, Output
 from posefit.tracking.tracks import (
     SEARCHED,
@@ -106,6 +108,11 @@ def follow(
             np.array([frame.translation for frame in found]),
             scene.fps,
         )
+        back = backwards(estimate, unseen(rows))
+        warnings = [*scene.warnings, *method.audit.warnings]
+        if scene.truth is None and (warning := warned(back)):
+            listener.say(f"warning: {warning}")
+            warnings.append(warning)
         summary = {
             "motion": scene.name,
             **(source or {}),
@@ -131,8 +138,10 @@ def follow(
             "none_of_modes": _none_right(found),
             "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
             "lost_frames": _numbers(rows, "lost", LOST),
+            "looked_again": [k for k, frame in enumerate(found) if LOOKED in frame.details],
+            "backwards_share": round(float(back.mean()), 6),
             "gait": gait_of(estimate, unseen(rows)).as_dict(),
-            "warnings": [*scene.warnings, *method.audit.warnings],
+            "warnings": warnings,
         }
         output.finish(scene, estimate, found, rows, summary)
     return Track(estimate, scene.truth, measures, rows, summary, found, modes)
@@ -205,10 +214,18 @@ def _found(
         found.append((begun, frames))
         if len(frames) < scene.count:
             rest = (scene.observations[k] for k in range(len(frames), scene.count))
-            for frame in listener.progress(method.tracker(mine).track(rest, rng), scene.count - len(frames)):
+            for frame in listener.progress(_tracker(scene, method, mine).track(rest, rng), scene.count - len(frames)):
                 output.record(frame, dict(rng.bit_generator.state))
                 frames.append(frame)
     return found
+
+
+def _tracker(scene: Scene, method: Method, task: Task) -> Tracker:
+    """Return the method's tracker, which in footage looks all around again after gaps; not one that looks ahead."""
+    tracker, gap = method.tracker(task), method.look_again
+    if gap is None:
+        gap = GAP if scene.truth is None and getattr(tracker, "lag", None) is None else 0
+    return LookingTracker(task, following(method), gap) if gap else tracker
 
 
 def _kept(

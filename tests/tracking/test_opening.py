@@ -14,9 +14,10 @@ import posefit
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import synthetic
 from posefit.motion import built_in
+from posefit.searching.starts import begun
 from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
-from posefit.tracking.opening import Opening, begun, built, task_of
+from posefit.tracking.opening import Opening, built, task_of
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
