@@ -31,6 +31,7 @@ from posefit.tracking.tracks import (
     usual_speed,
     whole_cost,
 )
+from posefit.tracking.trust.evidence import trust_of
 from posefit.version import __version__
 
 
@@ -89,6 +90,7 @@ def follow(
         usable = [observation.usable for observation in scene.observations] if tracks > 1 else []
         each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
         found, told = _kept(scene, each, usable, training)
+        raw = found
         if steady:
             found = steadied_frames(scene, found, method.beta)
         found = [_moded(frame, scene.body.skeleton) for frame in found]
@@ -131,6 +133,7 @@ def follow(
             "none_of_modes": _none_right(found),
             "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
             "lost_frames": _numbers(rows, "lost", LOST),
+            "trust": None if scene.truth is not None else trust_of(scene, raw, found, rows, measures),
             "gait": gait_of(estimate, unseen(rows)).as_dict(),
             "warnings": [*scene.warnings, *method.audit.warnings],
         }
