@@ -37,7 +37,7 @@ SIGNS = (
     Sign("lost", _as_it_is, 0.15, 0.5, lambda f: f"the person is lost in {f['lost']:.0%} of the frames"),
     Sign("held", _as_it_is, 0.25, 0.6, lambda f: f"{f['held']:.0%} of the frames show too little of the person"),
     Sign("unknown", _as_it_is, 0.1, 1.0, lambda f: f"left and right are unknown in {f['unknown']:.0%} of the frames"),
-    Sign("iou", _missing, 0.25, 0.5, lambda f: f"the body and the mask overlap by {f['iou']:.0%} only"),
+    Sign("iou", _missing, 0.35, 0.55, lambda f: f"the body and the mask overlap by {f['iou']:.0%} only"),
     Sign(
         "size_ratio",
         lambda ratio: abs(ratio - 1.0),
@@ -46,7 +46,7 @@ SIGNS = (
         lambda f: f"the person seems to be {f['size_m']:.2f} m tall, not {f['height_m']:.2f} m",
     ),
     Sign("depth_scatter", _as_it_is, 0.04, 0.2, lambda f: f"the distance jumps by {f['depth_scatter']:.0%}"),
-    Sign("foot_share", _missing, 0.7, 1.0, lambda f: f"a foot stands in {f['foot_share']:.0%} of the frames only"),
+    Sign("foot_share", _missing, 0.8, 1.0, lambda f: f"a foot stands in {f['foot_share']:.0%} of the frames only"),
     Sign(
         "stance_spread_m", _as_it_is, 0.15, 0.6, lambda f: f"feet stand at heights {f['stance_spread_m']:.2f} m apart"
     ),
