@@ -133,7 +133,7 @@ def follow(
             "none_of_modes": _none_right(found),
             "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
             "lost_frames": _numbers(rows, "lost", LOST),
-            "trust": None if scene.truth is not None else trust_of(scene, raw, found, rows, measures),
+            "trust": None if scene.truth is not None else trust_of(scene, raw, found, rows, measures.iou),
             "gait": gait_of(estimate, unseen(rows)).as_dict(),
             "warnings": [*scene.warnings, *method.audit.warnings],
         }

@@ -13,24 +13,21 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion.steadiness import BALLS
-from posefit.tracking.measures import Measures
 from posefit.tracking.table import table
 from posefit.tracking.trust.evidence import ONE_CAMERA, trust_line, trust_of
 from posefit.tracking.trust.moving import covered
-from posefit.tracking.trust.signs import depth_scatter, foot_share, longer_side, size_ratio, stance_spread
+from posefit.tracking.trust.signs import (
+    depth_scatter,
+    foot_share,
+    held_share,
+    jerks,
+    longer_side,
+    size_ratio,
+    stance_spread,
+)
 from posefit.tracking.trust.verdict import SIGNS, against, grade_of, sentence
 from tests.tracking.viewing import right, viewed, walk
 
-WORTH: dict[str, Any] = {
-    "iou": 0.9,
-    "cost": 1.0,
-    "held_frames": 0,
-    "seconds_per_frame": 0.1,
-    "cpu_seconds_per_frame": None,
-    "evaluations": 1,
-    "evaluations_per_second": 1.0,
-    "acceleration": 6.0,
-}
 ALL = np.ones(60, dtype=bool)
 FINE: dict[str, Any] = {
     "frames": 100,
@@ -108,6 +105,19 @@ def test_stances_at_two_heights_are_half_of_that_apart() -> None:
     assert spread == pytest.approx(0.015)  # the standard deviation of 0 and 3 cm
 
 
+def test_frames_before_somebody_comes_and_after_he_has_gone_are_not_held() -> None:
+    assert held_share(np.array([0, 0, 1, 0, 1, 1, 0, 0], dtype=bool)) == 0.25
+    assert held_share(np.zeros(4, dtype=bool)) == 1.0
+
+
+def test_joints_that_speed_up_evenly_accelerate_by_that() -> None:
+    joints = np.zeros((60, len(JOINTS), 3))
+    joints[:, :, 2] = 2.0 * (np.arange(60) / 30.0)[:, None] ** 2  # half of 4 m/s2 times the time squared
+    joints[40:] += 9.0  # a jump where nobody is seen
+    assert jerks(joints, np.arange(60) < 39, 30.0) == pytest.approx(4.0)
+    assert jerks(joints, ~ALL, 30.0) is None
+
+
 def test_a_single_stance_says_nothing_of_heights() -> None:
     assert stance_spread(standing_body([0.0]), np.ones(8, dtype=bool), 5.0) is None
 
@@ -138,7 +148,7 @@ def test_a_track_without_a_sign_against_it_is_good_and_says_why() -> None:
     [
         ({"unknown": 0.92}, "doubtful: left and right are unknown in 92% of the frames"),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
-        ({"held": 0.4}, "doubtful: 40% of the frames show too little of the person"),
+        ({"held": 0.4}, "doubtful: the person is gone, or nearly, in 40% of the frames in between"),
         ({"iou": 0.41}, "do not use: the body and the mask overlap by 41% only"),
         ({"size_ratio": 0.8, "size_m": 1.44}, "doubtful: the person seems to be 1.44 m tall, not 1.80 m"),
         ({"size_ratio": 1.5, "size_m": 2.7}, "do not use: the person seems to be 2.70 m tall, not 1.80 m"),
@@ -147,7 +157,7 @@ def test_a_track_without_a_sign_against_it_is_good_and_says_why() -> None:
         ({"stance_spread_m": 0.3}, "doubtful: feet stand at heights 0.30 m apart"),
         ({"explained": 0.35}, "do not use: the body covers 35% of what moves only"),
         ({"acceleration": 30.0}, "doubtful: joints jerk, by 30 m/s2"),
-        ({"frames": 2}, "doubtful: 2 frames are too few to judge by"),
+        ({"frames": 2}, "doubtful: 2 frames that show the person are too few to judge by"),
     ],
 )
 def test_each_sign_alone_is_named_in_plain_words(figures: dict[str, Any], words: str) -> None:
@@ -179,7 +189,7 @@ def rows_of(count: int, **told: float) -> list[dict[str, float]]:
 
 
 def judged(scene: Scene, frames: list[Frame], **told: float) -> dict[str, Any]:
-    return trust_of(scene, frames, frames, rows_of(len(frames), **told), Measures(**WORTH))
+    return trust_of(scene, frames, frames, rows_of(len(frames), **told), 0.9)
 
 
 def test_several_cameras_tell_the_size_of_a_right_track() -> None:
@@ -214,7 +224,7 @@ def test_depth_is_that_of_what_was_found_before_it_was_steadied() -> None:
         replace(frame, translation=eye + (frame.translation - eye) * (1.0 + 0.1 * (-1.0) ** k))
         for k, frame in enumerate(told)
     ]
-    trust = trust_of(scene, shaken, told, rows_of(30), Measures(**WORTH))
+    trust = trust_of(scene, shaken, told, rows_of(30), 0.9)
     assert trust["depth_scatter"] == pytest.approx(0.1, rel=0.3)
     assert "the distance jumps by 1" in trust["sentence"]
 
@@ -229,7 +239,7 @@ def test_the_sentence_stands_on_top_of_everything_that_is_told(tmp_path: Path) -
     scene = walk(3)
     page = viewed(tmp_path / "seen", replace(scene, truth=None), right(scene))
     summary = json.loads((tmp_path / "seen" / "summary.json").read_text())
-    told = "Trust: doubtful: 3 frames are too few to judge by."
+    told = "Trust: doubtful: 3 frames that show the person are too few to judge by."
     assert summary["trust"]["sentence"] == told
     assert table(summary).splitlines()[0] == told
     assert f'"told":"{told} The method does not say' in page.read_text("utf-8").replace('": "', '":"')

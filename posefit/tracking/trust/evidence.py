@@ -10,9 +10,16 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.silhouette.cost import project
 from posefit.tracking.evaluation import LOST
-from posefit.tracking.measures import Measures
 from posefit.tracking.trust.moving import explained
-from posefit.tracking.trust.signs import depth_scatter, foot_share, longer_side, size_ratio, stance_spread
+from posefit.tracking.trust.signs import (
+    depth_scatter,
+    foot_share,
+    held_share,
+    jerks,
+    longer_side,
+    size_ratio,
+    stance_spread,
+)
 from posefit.tracking.trust.verdict import FEWEST, against, grade_of, sentence
 
 COMPARED = 60  # frames whose sizes are compared, spread over the footage
@@ -28,19 +35,21 @@ def trust_of(
     found: Sequence[Frame],
     told: Sequence[Frame],
     rows: Sequence[Mapping[str, float]],
-    measures: Measures,
+    iou: float,
 ) -> dict[str, Any]:
     """Return whether a track can be trusted: the sentence, the grade, every figure, and why some are not known.
 
-    `found` is what the tracker found, and `told` what is told of it, which may be steadier.
+    `found` is what the tracker found, and `told` what is told of it, which may be steadier; `iou` is its overlap with
+    the masks. Shares are of the frames that show enough of the person.
     """
     skeleton, fps = scene.body.skeleton, scene.fps
     usable = np.array([row["usable"] == 1.0 for row in rows])
+    seen = [row for row, ok in zip(rows, usable, strict=True) if ok]
     joints = skeleton.joints(np.array([one.pose for one in told]), np.array([one.translation for one in told]))
-    many = int(usable.sum()) >= FEWEST
+    many = len(seen) >= FEWEST
     ratio = _size(scene, told, usable) if len(scene.cameras) > 1 else None
     figures: dict[str, Any] = {
-        "frames": len(rows),
+        "frames": len(seen),
         "size_ratio": ratio,
         "size_m": None if ratio is None else ratio * scene.body.stature,
         "height_m": scene.body.stature,
@@ -48,11 +57,11 @@ def trust_of(
         "foot_share": foot_share(joints, usable, fps) if many else None,
         "stance_spread_m": stance_spread(joints, usable, fps) if many else None,
         "explained": explained(scene, told, usable.tolist()),
-        "lost": _share(rows, "lost", LOST),
-        "unknown": _share(rows, "unknown_sides", 1.0),
-        "held": 1.0 - float(usable.mean()),
-        "iou": measures.iou,
-        "acceleration": measures.acceleration if many else None,
+        "lost": _share(seen, "lost", LOST),
+        "unknown": _share(seen, "unknown_sides", 1.0),
+        "held": held_share(usable),
+        "iou": iou,
+        "acceleration": jerks(joints, usable, fps) if many else None,
     }
     signs = against(figures)
     reasons = {

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.motion.steadiness import BALLS, standing
+from posefit.motion.steadiness import BALLS, acceleration, standing
 from posefit.silhouette.mask import Mask
 
 AROUND = 0.5  # seconds before and after a frame, which say where a steady way passes
@@ -43,6 +43,22 @@ def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float
         way = np.polynomial.Polynomial.fit(near - k, depths[near], 2)
         away.append(abs(depths[k] - way(0.0)) / depths[k])
     return float(np.quantile(away, USUAL)) if away else None
+
+
+def held_share(usable: NDArray[np.bool_]) -> float:
+    """Return the share of frames that are not usable (T,) between the first and the last that are; 1 where none is.
+
+    Before somebody comes and after he has gone nothing is to be seen, which says nothing against a track.
+    """
+    known = np.flatnonzero(usable)
+    return 1.0 - len(known) / float(known[-1] + 1 - known[0]) if len(known) else 1.0
+
+
+def jerks(joints: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
+    """Return how fast joints (T, 27, 3) accelerate, the mean over usable frames, in m/s2; None where none tells."""
+    found = acceleration(joints, fps)[usable]
+    found = found[np.isfinite(found)]
+    return float(found.mean()) if len(found) else None
 
 
 def foot_share(joints: Array, usable: NDArray[np.bool_], fps: float) -> float | None:

@@ -32,10 +32,20 @@ def _missing(value: float) -> float:
 # The limits are ours, from footage made from the truth and the demonstration video: docs/howto/trust.md has them.
 SIGNS = (
     Sign(
-        "frames", lambda count: FEWEST - count, 0.0, FEWEST, lambda f: f"{f['frames']} frames are too few to judge by"
+        "frames",
+        lambda count: FEWEST - count,
+        0.0,
+        FEWEST,
+        lambda f: f"{f['frames']} frames that show the person are too few to judge by",
     ),
     Sign("lost", _as_it_is, 0.15, 0.5, lambda f: f"the person is lost in {f['lost']:.0%} of the frames"),
-    Sign("held", _as_it_is, 0.25, 0.6, lambda f: f"{f['held']:.0%} of the frames show too little of the person"),
+    Sign(
+        "held",
+        _as_it_is,
+        0.25,
+        0.6,
+        lambda f: f"the person is gone, or nearly, in {f['held']:.0%} of the frames in between",
+    ),
     Sign("unknown", _as_it_is, 0.1, 1.0, lambda f: f"left and right are unknown in {f['unknown']:.0%} of the frames"),
     Sign("iou", _missing, 0.35, 0.55, lambda f: f"the body and the mask overlap by {f['iou']:.0%} only"),
     Sign(
