@@ -59,6 +59,7 @@ SAID = {
     ),
     "unknown_sides": ("", "numbers of the frames whose left and right are called unknown; where a method says"),
     "lost_frames": ("", "numbers of the frames that are called lost; where a method says"),
+    "trust": ("", "of footage, whether the track [can be trusted](../howto/trust.md), and why"),
     "gait": ("", "[figures of the walk](../howto/measuring.md), or `why` there are none"),
 }
 CELL = {

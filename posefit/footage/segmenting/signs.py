@@ -84,7 +84,7 @@ class Watch:
             max(0, rows[0] - far) : rows[-1] + 1 + far,
             max(0, columns[0] - far) : columns[-1] + 1 + far,
         ]
-        changed = moved(image, then)[window] & found.valid[window]
+        changed = changed_pixels(image, then)[window] & found.valid[window]
         width = 2 * max(1, round(SLACK * reach)) + 1
         near = cv2.dilate(mine[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
         beside = int((changed & ~near).sum())
@@ -103,7 +103,7 @@ class Watch:
         return bool((before > EDGE * now + STEP).sum() > (now > EDGE * before + STEP).sum())
 
 
-def moved(image: Image, then: Image) -> Mask:
+def changed_pixels(image: Image, then: Image) -> Mask:
     """Return which pixels (height, width) changed from one picture to another, but for single ones, which are noise."""
     changed = np.asarray(cv2.absdiff(image, then).max(axis=2) > MOVING, dtype=np.uint8)
     return np.asarray(cv2.medianBlur(changed, 5) > 0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.footage.segmenting.signs import AROUND, LAG, moved
+from posefit.footage.segmenting.signs import AROUND, LAG, changed_pixels
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
@@ -46,7 +46,7 @@ def covered(image: Image, then: Image, body: Mask, seen: Mask, reach: float) -> 
         max(0, rows[0] - far) : rows[-1] + 1 + far,
         max(0, columns[0] - far) : columns[-1] + 1 + far,
     ]
-    changed = moved(image, then)[window]
+    changed = changed_pixels(image, then)[window]
     count = int(changed.sum())
     if count <= FEW * body.sum():
         return 0, 0
