@@ -67,6 +67,7 @@ SAID = {
         "",
         "share of frames in which the root faces away from its way over half a second, faster than 0.3 m/s",
     ),
+    "trust": ("", "of footage, whether the track [can be trusted](../howto/trust.md), and why"),
     "gait": ("", "[figures of the walk](../howto/measuring.md), or `why` there are none"),
 }
 CELL = {

@@ -205,7 +205,8 @@ class OutputFolder:
             writer.write(image)
         assert writer is not None
         writer.close()
-        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, radii, undetermined(summary))):
+        trust = "" if summary["trust"] is None else summary["trust"]["sentence"]
+        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, radii, undetermined(summary), trust)):
             raise OSError("no room for summary.png")
         page = viewer_document(track_data(scene, estimate, frames, rows, summary, sure, album))
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")

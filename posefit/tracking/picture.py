@@ -21,7 +21,7 @@ from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
 from posefit.tracking.drawing.body import draw_body, draw_stick, opacities, side_camera, side_view, solid_map
 from posefit.tracking.drawing.chart import curve, doubts, says_doubts
-from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, OTHER, SPILLED, write
+from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, OTHER, SPILLED, width_of, write
 from posefit.tracking.evaluation import LOST
 
 PANEL = 480  # pixels high
@@ -115,19 +115,29 @@ class Painter:
             panels.append(panel)
         return _grid(panels, columns)
 
-    def summary(self, rows: Sequence[Mapping[str, float]], radii: Array | None = None, told: str = "") -> Image:
+    def summary(
+        self, rows: Sequence[Mapping[str, float]], radii: Array | None = None, told: str = "", trust: str = ""
+    ) -> Image:
         """Return stills of the track above a curve of its error, or of its cost where there is no truth.
 
         Where a method says how sure it is, a chart of that stands below: of the radii (T, levels, 27) of the joints'
-        intervals, and of `told`, which says in words what was not determined.
+        intervals, and of `told`, which says in words what was not determined. `trust` is a sentence at the top.
         """
         stills = self._stills + [np.full_like(self._stills[0], BACKGROUND[0])] * (-len(self._stills) % 3)
         grid = np.vstack([np.hstack(stills[k : k + 3]) for k in range(0, len(stills), 3)])
         name, width = "error_degrees" if "error_degrees" in rows[0] else "cost", grid.shape[1]
-        parts = [grid, curve([row[name] for row in rows], name.replace("_", " "), width, 160)]
+        parts = [] if not trust else [_headed(trust, width)]
+        parts += [grid, curve([row[name] for row in rows], name.replace("_", " "), width, 160)]
         if says_doubts(rows, radii):
             parts.append(doubts(rows, radii, told, width, 240))
         return np.vstack(parts)
+
+
+def _headed(text: str, width: int) -> Image:
+    """Return a line of text as wide as a picture."""
+    line = np.full((BAND, width, 3), BACKGROUND, dtype=np.uint8)
+    write(line, text, (12, 26), scale=min(0.6, 0.6 * (width - 24) / width_of(text, 0.6)))
+    return line
 
 
 def _overlay(mask: Mask, fitted: Mask) -> Image:

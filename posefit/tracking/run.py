@@ -33,6 +33,7 @@ from posefit.tracking.tracks import (
     usual_speed,
     whole_cost,
 )
+from posefit.tracking.trust.evidence import trust_of
 from posefit.version import __version__
 
 
@@ -91,6 +92,7 @@ def follow(
         usable = [observation.usable for observation in scene.observations] if tracks > 1 else []
         each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
         found, told = _kept(scene, each, usable, training)
+        raw = found
         if steady:
             found = steadied_frames(scene, found, method.beta)
         found = [_moded(frame, scene.body.skeleton) for frame in found]
@@ -140,6 +142,7 @@ def follow(
             "lost_frames": _numbers(rows, "lost", LOST),
             "looked_again": [k for k, frame in enumerate(found) if LOOKED in frame.details],
             "backwards_share": round(float(back.mean()), 6),
+            "trust": None if scene.truth is not None else trust_of(scene, raw, found, rows, measures.iou),
             "gait": gait_of(estimate, unseen(rows)).as_dict(),
             "warnings": warnings,
         }

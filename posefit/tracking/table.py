@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from posefit.tracking.measures import BASELINES, MEASURES
+from posefit.tracking.trust.evidence import trust_line
 
 NOTABLE = 0.05  # a part of the build that is off the average by less is not worth a word
 
@@ -13,7 +14,9 @@ NAMED = 8  # motions that were learned from, and are named
 
 def table(summary: Mapping[str, Any]) -> str:
     """Return the lines that `posefit track` prints."""
-    lines = [
+    trust = summary["trust"]
+    lines = [] if trust is None else [trust["sentence"], trust_line(trust)]
+    lines += [
         f"{summary['motion']}: {summary['frames']} frames, {summary['method']}, seed {summary['seed']}, "
         f"translation {summary['translation']}, trained on {_training(summary['train'])}"
     ]

@@ -76,7 +76,6 @@ class Watch:
         if not self._before or not found.area:
             return 0.0
         then, mask = self._before[0]
-        moved = np.asarray(cv2.absdiff(image, then).max(axis=2) > MOVING, dtype=np.uint8)
         mine = found.mask | mask
         reach = max(side, *self._sides) if self._sides else side
         rows, columns = np.flatnonzero(mine.any(axis=1)), np.flatnonzero(mine.any(axis=0))
@@ -85,7 +84,7 @@ class Watch:
             max(0, rows[0] - far) : rows[-1] + 1 + far,
             max(0, columns[0] - far) : columns[-1] + 1 + far,
         ]
-        changed = (cv2.medianBlur(moved, 5)[window] > 0) & found.valid[window]
+        changed = changed_pixels(image, then)[window] & found.valid[window]
         width = 2 * max(1, round(SLACK * reach)) + 1
         near = cv2.dilate(mine[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
         beside = int((changed & ~near).sum())
@@ -102,6 +101,12 @@ class Watch:
         outline = mask & ~inner
         now, before = _edges(image)[outline], self._edges[outline]
         return bool((before > EDGE * now + STEP).sum() > (now > EDGE * before + STEP).sum())
+
+
+def changed_pixels(image: Image, then: Image) -> Mask:
+    """Return which pixels (height, width) changed from one picture to another, but for single ones, which are noise."""
+    changed = np.asarray(cv2.absdiff(image, then).max(axis=2) > MOVING, dtype=np.uint8)
+    return np.asarray(cv2.medianBlur(changed, 5) > 0)
 
 
 def _edges(image: Image) -> NDArray[np.float32]:

@@ -95,7 +95,12 @@ def track_data(
 
 
 def _told(summary: State) -> str:
-    """Return the sentence that says what was not determined."""
+    """Return whether the track can be trusted, where nobody knows the truth, and what was not determined."""
+    trust = summary["trust"]
+    return _determined(summary) if trust is None else f"{trust['sentence']} {_determined(summary)}"
+
+
+def _determined(summary: State) -> str:
     if told := undetermined(summary):
         return f"Not determined: {told}."
     silent = [
