@@ -21,7 +21,7 @@ from posefit.tracking.measures import Measures
 from posefit.tracking.run import Track
 from posefit_experiments.composites import experiment, ways
 from posefit_experiments.composites.clothes import TROUSERS, outfit
-from posefit_experiments.composites.experiment import Shot, asked, earlier, extraction
+from posefit_experiments.composites.experiment import Shot, asked, earlier, extraction_named
 from posefit_experiments.composites.figures import extraction_figures, steadiness, track_figures, uncut
 from posefit_experiments.composites.filming import BEFORE, film
 from posefit_experiments.composites.plates import Plate, check_video, plate
@@ -140,11 +140,11 @@ def test_a_quick_look_is_two_rows_of_each_extraction_and_all_is_every_one() -> N
 
 
 def test_an_extraction_is_a_segmenter_by_its_name_with_settings_behind() -> None:
-    assert extraction("median") == Extraction("median")
-    assert extraction("mean").settings == {"background": f"0:{BEFORE}"}
-    assert extraction("mean background=0:5").settings == {"background": "0:5"}
+    assert extraction_named("median") == Extraction("median")
+    assert extraction_named("mean").settings == {"background": f"0:{BEFORE}"}
+    assert extraction_named("mean background=0:5").settings == {"background": "0:5"}
     text = "mixture history=90 threshold=16.0"
-    told = extraction(text)
+    told = extraction_named(text)
     assert (told.name, told.settings) == ("mixture", {"history": 90, "threshold": 16.0})
     (shot,) = asked(["two"], [1], [text], 1, False)
     assert shot.extraction == text

@@ -80,7 +80,7 @@ def asked(
     for place in grid:
         check_situation(*place)
     for method in extractions:
-        extraction(method)
+        extraction_named(method)
     places = [place for place in grid if not quick or place in QUICK]
     return [Shot(*place, method, seed) for seed in range(seeds) for method in extractions for place in places]
 
@@ -91,7 +91,7 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
         folder = Path(name)
         scene = situation(shot.situation, shot.views, shot.seed)
         plates = [plate(video, number, SIZE) for number in range(shot.views)]
-        how = extraction(shot.extraction)
+        how = extraction_named(shot.extraction)
         made = film(scene, plates, shot.seed, how.name == GIVEN, folder)
         frames = (made.first, None)
         row: dict[str, Any] = {**shot._asdict(), "people": scene.people, "frames": len(scene)}
@@ -125,7 +125,7 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
         return row
 
 
-def extraction(text: str) -> Extraction:
+def extraction_named(text: str) -> Extraction:
     """Return how people are taken out: a segmenter's name, and settings behind such as `mixture history=90`.
 
     Raises ValueError where there is no segmenter of that name, or a setting does not fit it.
