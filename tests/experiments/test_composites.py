@@ -21,7 +21,7 @@ from posefit.tracking.measures import Measures
 from posefit.tracking.run import Track
 from posefit_experiments.composites import experiment, ways
 from posefit_experiments.composites.clothes import TROUSERS, outfit
-from posefit_experiments.composites.experiment import Shot, asked, earlier
+from posefit_experiments.composites.experiment import Shot, asked, earlier, extraction_named
 from posefit_experiments.composites.figures import extraction_figures, steadiness, track_figures, uncut
 from posefit_experiments.composites.filming import BEFORE, film
 from posefit_experiments.composites.plates import Plate, check_video, plate
@@ -76,6 +76,12 @@ def run(*words: object) -> Result:
         (("no.mp4", "--views", "3"), "views must be one of 1, 2, 4, got 3"),
         (("no.mp4", "--seeds", "0"), "seeds must be at least 1, got 0"),
         (("no.mp4", "--extraction", "magic"), "magic"),
+        (("no.mp4", "--extraction", ""), "extraction must name a segmenter such as mixture, got ''"),
+        (("no.mp4", "--extraction", "mixture soft"), "must be SETTING=VALUE such as particles=20, got 'soft'"),
+        (
+            ("no.mp4", "--extraction", "mixture softness=1"),
+            "a setting of mixture must be one of history, threshold, got 'softness'",
+        ),
     ],
 )
 def test_a_mistake_is_one_line_and_status_2(words: tuple[str, ...], said: str) -> None:
@@ -131,6 +137,17 @@ def test_a_quick_look_is_two_rows_of_each_extraction_and_all_is_every_one() -> N
     assert len(asked([], [], ["mixture", "median"], 1, True)) == 4
     assert len(asked([], [], ["mixture"], 2, False)) == 2 * 3 * len(SHOWS)
     assert asked(["two"], [4], ["mean"], 1, False) == [Shot("two", 4, "mean", 0)]
+
+
+def test_an_extraction_is_a_segmenter_by_its_name_with_settings_behind() -> None:
+    assert extraction_named("median") == Extraction("median")
+    assert extraction_named("mean").settings == {"background": f"0:{BEFORE}"}
+    assert extraction_named("mean background=0:5").settings == {"background": "0:5"}
+    text = "mixture history=90 threshold=16.0"
+    told = extraction_named(text)
+    assert (told.name, told.settings) == ("mixture", {"history": 90, "threshold": 16.0})
+    (shot,) = asked(["two"], [1], [text], 1, False)
+    assert shot.extraction == text
 
 
 def test_a_walk_goes_on_without_a_jump() -> None:

@@ -113,7 +113,7 @@ def footage_command(as_json: bool, **asked: Any) -> None:
     multiple=True,
     default=("mixture", "median", "mean"),
     show_default=True,
-    help="How people are taken out, as in `posefit track`. Again for more of them.",
+    help="How people are taken out, as in `posefit track`, settings behind: 'mixture history=90'. Again for more.",
 )
 @seeds(1, "Tracks of each, of other people in other clothes.")
 @click.option("--quick", is_flag=True, help="One camera, somebody who passes and somebody who stands: a look.")

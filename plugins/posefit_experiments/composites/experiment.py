@@ -15,6 +15,8 @@ from posefit.footage.extract import extract
 from posefit.footage.segmentation import Extraction
 from posefit.motion import recorded
 from posefit.reading import parsed_json, read_text
+from posefit.registry import registry
+from posefit.settings import parse_texts
 from posefit.tracking.front import track
 from posefit_experiments.composites.figures import extraction_figures, track_figures
 from posefit_experiments.composites.filming import BEFORE, film
@@ -30,7 +32,10 @@ QUICK = (("through", 1), ("stands", 1))  # situations and numbers of cameras of 
 
 
 class Shot(NamedTuple):
-    """One row: what happens, before how many cameras, how the person is taken out, and which people it is."""
+    """One row: what happens, before how many cameras, how the person is taken out, and which people it is.
+
+    `extraction` is a segmenter's name, with settings of it behind.
+    """
 
     situation: str
     views: int
@@ -75,7 +80,7 @@ def asked(
     for place in grid:
         check_situation(*place)
     for method in extractions:
-        _extraction(method)
+        extraction_named(method)
     places = [place for place in grid if not quick or place in QUICK]
     return [Shot(*place, method, seed) for seed in range(seeds) for method in extractions for place in places]
 
@@ -86,8 +91,9 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
         folder = Path(name)
         scene = situation(shot.situation, shot.views, shot.seed)
         plates = [plate(video, number, SIZE) for number in range(shot.views)]
-        made = film(scene, plates, shot.seed, shot.extraction == GIVEN, folder)
-        how, frames = _extraction(shot.extraction), (made.first, None)
+        how = extraction_named(shot.extraction)
+        made = film(scene, plates, shot.seed, how.name == GIVEN, folder)
+        frames = (made.first, None)
         row: dict[str, Any] = {**shot._asdict(), "people": scene.people, "frames": len(scene)}
         try:
             masks, usable = _taken_out(made.videos, how, frames, folder)
@@ -117,6 +123,21 @@ def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
         if pictures is not None:
             stills(Path(pictures) / f"{_named(shot)}.jpg", made, scene, masks, result, radii)
         return row
+
+
+def extraction_named(text: str) -> Extraction:
+    """Return how people are taken out: a segmenter's name, and settings behind such as `mixture history=90`.
+
+    Raises ValueError where there is no segmenter of that name, or a setting does not fit it.
+    """
+    name, *given = text.split() or [""]
+    if not name:
+        raise ValueError(f"extraction must name a segmenter such as mixture, got {text!r}")
+    offer = registry().offer("segmenter", name)
+    settings = parse_texts(offer.name, offer.factory, given)
+    if name == GIVEN:
+        settings = {"background": f"0:{BEFORE}", **settings}
+    return Extraction(name, settings=settings)
 
 
 def earlier(path: str | None) -> dict[Shot, dict[str, Any]]:
@@ -158,12 +179,6 @@ def _kept(
             with Path(path).open("a", encoding="utf-8") as file:
                 file.write(f"{json.dumps(row)}\n")
         yield shot, row
-
-
-def _extraction(method: str) -> Extraction:
-    """Return how people are taken out. Raises ValueError where there is no method of that name."""
-    told: dict[str, Any] = {"method": method, "background": f"0:{BEFORE}" if method == GIVEN else None}
-    return Extraction(**told)
 
 
 def _taken_out(videos: Sequence[Path], how: Extraction, frames: Any, folder: Path) -> tuple[Any, Any]:
