@@ -102,7 +102,7 @@ def test_settings_say_whose_they_are(masks: Path, words: list[str], method: str)
     quick = ["--train", "walk-a", "--frames", "0:2", "--evaluations", "400", "--restarts", "1", "--body-frames", "0"]
     done = CliRunner().invoke(main, ["track", str(masks), *quick, *words])
     assert done.exit_code == 0, done.output
-    assert f": 2 frames, {method}, " in done.stdout.splitlines()[0]
+    assert f": 2 frames, {method}, " in done.stdout
 
 
 def test_somebody_is_left_out_of_the_library_that_is_learned_from_by_default(masks: Path) -> None:

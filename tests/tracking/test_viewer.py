@@ -286,7 +286,8 @@ def test_names_are_text_and_what_nobody_says_is_not_shown(chromium: Any, filmed:
         assert page.locator("#title").text_content() == EVIL
         assert page.locator("#notes").text_content().endswith(EVIL)
         told = page.locator("#told").inner_text()
-        assert told.startswith("The method does not say which side is left or which frames are lost: that nothing is")
+        assert told.startswith("Trust: ")
+        assert "The method does not say which side is left or which frames are lost: that nothing is" in told
         for hidden in ("#sure", "#doubtful", "#truth-label", "#camera-label"):
             assert not page.locator(hidden).is_visible()
         assert "MPJPE" not in page.locator("body").inner_text()
