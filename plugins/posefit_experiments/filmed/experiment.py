@@ -18,6 +18,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Mask
+from posefit.steadying.path import SeenFrames, steadied
 from posefit.tracking.front import track
 from posefit_experiments.filmed.gait import gait
 from posefit_experiments.filmed.reference import references
@@ -54,12 +55,16 @@ def filmed_lines(told: dict[str, Any]) -> Iterator[str]:
 
 
 def filmed_figures(source: str | Path, roi: Box, frames: Range, seed: int) -> dict[str, Any]:
-    """Return what the track of a seed is worth."""
+    """Return what the track of a seed is worth: its overlap as a search of each frame finds it, its gait as steadied.
+
+    What is steady overlaps less, by about 0.02; and what is found in each frame goes to and fro in depth, so that it
+    tells little of which way somebody goes in a moment.
+    """
     video = Video.of(source)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "track"
-        how = Extraction(roi=roi)
-        result = track(source, extraction=how, frames=frames, optimiser="sapso", prior="loose", seed=seed, out=out)
+        method: dict[str, Any] = {"optimiser": "sapso", "prior": "loose", "steady": False, "seed": seed}
+        result = track(source, extraction=Extraction(roi=roi), frames=frames, out=out, **method)
         camera = Camera.from_json(out / "camera.json")
         with np.load(out / "poses.npz") as stored:
             radii = stored["radii"]
@@ -74,7 +79,7 @@ def filmed_figures(source: str | Path, roi: Box, frames: Range, seed: int) -> di
         "iou_masks": result.summary["iou"],
         "iou_reference": float(np.mean(_overlaps(motion, radii, camera, seen)[usable])),
         "lowest_iou_masks": min(row["iou"] for row, ok in zip(result.frames, usable, strict=True) if ok),
-        **gait(motion, camera, seen),
+        **gait(steadied(motion, SeenFrames(usable, camera.position)), camera, seen),
     }
 
 
