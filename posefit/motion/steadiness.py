@@ -44,7 +44,7 @@ def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
     lowest = np.array([feet[max(k - reach, 0) : k + reach + 1, :, 1].min() for k in around])
     stands = (speed < SLOW) & (feet[:, :, 1] < lowest[:, None] + LOW)
     for side in range(2):
-        for start, stop in _runs(stands[:, side]):
+        for start, stop in runs(stands[:, side]):
             stands[start:stop, side] &= stop - start >= SHORTEST * fps
     return np.asarray(stands)
 
@@ -56,13 +56,13 @@ def slides(joints: Array, stands: NDArray[np.bool_]) -> Array:
     """
     found = []
     for side, ball in enumerate(BALLS):
-        for start, stop in _runs(stands[:, side]):
+        for start, stop in runs(stands[:, side]):
             places = joints[start:stop, ball][:, [0, 2]]
             found.append(float(np.linalg.norm(places - places[0], axis=1).max()))
     return np.array(found)
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first frame of each run of true flags, and the frame after its last."""
+def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the first frame of each run of true flags (T,), and the frame after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.motion.steadiness import BALLS
+from posefit.motion.steadiness import BALLS, runs
 
 SLOW = 0.25  # metres a second that a standing foot may seem to move
 SHARE = 0.45  # of the root's speed, which it may seem to move where that is more
@@ -46,8 +46,7 @@ def _speeds(places: Array, sights: Array | None, fps: float) -> Array:
 def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     """Return flags (T,) of which runs shorter than `least` frames are taken back; those at an end stay."""
     kept = flags.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8))).reshape(-1, 2)
-    for start, stop in edges:
+    for start, stop in runs(flags):
         if stop - start < least and start > 0 and stop < len(flags):
             kept[start:stop] = False
     return kept

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.motion.steadiness import BALLS, acceleration, standing
+from posefit.motion.steadiness import BALLS, acceleration, runs, standing
 from posefit.silhouette.mask import Mask
 
 AROUND = 0.5  # seconds before and after a frame, which say where a steady way passes
@@ -75,6 +75,5 @@ def stance_spread(joints: Array, usable: NDArray[np.bool_], fps: float) -> float
     stands = standing(joints, fps) & usable[:, None]
     heights = []
     for side, ball in enumerate(BALLS):
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], stands[:, side], [False]]).astype(np.int8)))
-        heights += [float(joints[start:stop, ball, 1].mean()) for start, stop in edges.reshape(-1, 2)]
+        heights += [float(joints[start:stop, ball, 1].mean()) for start, stop in runs(stands[:, side])]
     return float(np.std(heights)) if len(heights) > 1 else None
