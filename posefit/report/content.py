@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.claims import claimed_orders
+from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
 from posefit.report.answer.claimed import claim_results
 from posefit.report.answer.lead import lead_sentence, three_tracks
@@ -50,6 +50,7 @@ def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str,
         **compared,
         "rows": _rows(runs),
         **_warned(runs),
+        "live": None,
         "seeds": [_exact(seed) for seed in runs.seeds],
         "heads": runs.heads,
         "gallery": pictures,

@@ -19,7 +19,7 @@ FRAMES = 90  # of a picture at most; of longer tracks every second, third, ... f
 def gallery(
     ledger: Ledger, runs: Runs, say: Callable[[str], None], largest: int = LARGEST, first: Sequence[int] = ()
 ) -> dict[str, Any]:
-    """Return the pictures of as many runs as there is room for: the rows `first`, then the first seeds of every instance.
+    """Return the pictures of as many runs as there is room for: `first`, then the first seeds of every instance.
 
     `scenes` holds of each instance, by its index, the true joints and the cameras; `tracks` of each row, by its index,
     the estimated joints, each frame's MPJPE in mm, and which frames are lost and which swapped. Joints are millimetres

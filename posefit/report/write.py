@@ -65,7 +65,7 @@ def write_report(
 
 
 def leaderboard_lines(found: dict[str, Any]) -> list[str]:
-    """Return the lines that the command prints: who leads, what is not in it, the leaderboard, and where the page is."""
+    """Return the lines that the command prints: who leads, what is left out, the leaderboard, and where the page is."""
     lines = []
     for row in found["leaderboard"] or []:
         ends = "" if row["low"] is None else f"{row['low']:.2f} to {row['high']:.2f}"

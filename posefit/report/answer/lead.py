@@ -51,7 +51,9 @@ def _others(contest: Contest, first: Mapping[str, Any], tests: Mapping[str, Any]
     if tests is None:
         return "; one shared run is too few to tell it apart from any other method"
     mine = contest.methods.index(first["method"])
-    alike, worse, better = [], [], []
+    alike: list[str] = []
+    worse: list[str] = []
+    better: list[str] = []
     for one, other, difference, _, adjusted, *_ in tests["pairs"]:
         if mine not in (one, other):
             continue

@@ -7,8 +7,8 @@ once for each. Three ways of choosing are told apart:
 - the *oracle* takes the best method of each instance. It looks at the very errors that it is scored by, so it is also
   told what it is where each seed is scored by the method that was best on the other seeds;
 - a *selector* knows what a plan says of an instance: its motion, views, damage and the like. It is a regression tree of
-  all methods' errors, trained on other instances alone; how deep it is has been chosen on these too, by their own folds.
-  A tree of depth 0 is the single best method, so whoever has learnt nothing is not worse off for it.
+  all methods' errors, trained on other instances alone; how deep it is has been chosen on these too, by folds of their
+  own. A tree of depth 0 is the single best method: that is what a selector falls back to that has learnt nothing.
 """
 
 from collections import Counter
@@ -178,7 +178,7 @@ def _where(contest: Contest, errors: Array, best: int) -> list[dict[str, Any]]:
             label = f"{kind} {share:g}" if share else kind
             parts.setdefault(("damage", label), []).append(k)
     kinds = Counter(kind for kind, _ in parts)
-    found = []
+    found: list[dict[str, Any]] = []
     for (kind, label), held in parts.items():
         if kinds[kind] > 1:
             means = errors[held].mean(axis=0)
@@ -186,5 +186,5 @@ def _where(contest: Contest, errors: Array, best: int) -> list[dict[str, Any]]:
             row = {"part": f"{kind}: {label}", "instances": len(held), "method": contest.methods[first]}
             found.append({**row, "error": float(means[first]), "behind": float(means[best] - means[first])})
     order = {kind: rank for rank, kind in enumerate(("damage", "view", "motion"))}
-    found.sort(key=lambda one: (order[str(one["part"]).partition(":")[0]], -int(one["instances"])))
+    found.sort(key=lambda one: (order[one["part"].partition(":")[0]], -one["instances"]))
     return found[:PARTS]

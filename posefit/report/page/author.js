@@ -24,21 +24,11 @@ function dots(errors, mine, most) {
   );
   errors.forEach((error, m) => {
     if (given(error) && m !== mine)
-      svg.append(
-        draw(
-          "circle",
-          { cx: x(error), cy: 9, r: 3, style: "fill: var(--truth)", opacity: 0.6 },
-          draw("title", {}, `${METHODS[m]}: ${number(error, 2)}°`),
-        ),
-      );
+      svg.append(mark(m, x(error), 9, 3, {}, draw("title", {}, `${METHODS[m]}: ${number(error, 2)}°`)));
   });
   if (given(errors[mine]))
     svg.append(
-      draw(
-        "circle",
-        { cx: x(errors[mine]), cy: 9, r: 5.5, style: `fill: ${colour(mine)}` },
-        draw("title", {}, `${METHODS[mine]}: ${number(errors[mine], 2)}°`),
-      ),
+      mark(mine, x(errors[mine]), 9, 6, {}, draw("title", {}, `${METHODS[mine]}: ${number(errors[mine], 2)}°`)),
     );
   return svg;
 }
