@@ -56,13 +56,18 @@ def runs_of(ledger: "Ledger") -> Runs:
 
     Where every cell failed there are no rows, but the reasons. Raises ValueError where there is neither.
     """
+    found = runs_so_far(ledger)
+    if not found.keys and not found.failures:
+        raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+    return found
+
+
+def runs_so_far(ledger: "Ledger") -> Runs:
+    """Return the same of a ledger that may hold nothing yet."""
     found = _Table()
     for row in ledger.rows():
         found.add(row)
-    quarantined = ledger.quarantined()
-    if not found.keys and not quarantined:
-        raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
-    return found.runs(ledger.version, quarantined)
+    return found.runs(ledger.version, ledger.quarantined())
 
 
 def shown_of(runs: Runs) -> list[str]:

@@ -125,7 +125,7 @@ function line({ m, values, low, high }, order, { x, y, most, used, stepped, from
     const [px, py] = [x(used[k]), y(Math.min(value, most))];
     const to = [px.toFixed(1), py.toFixed(1)];
     path += path ? (stepped ? `H${to[0]}V${to[1]}` : `L${to.join(",")}`) : `M${to.join(",")}`;
-    if (px < free) return;
+    if (px < free || value === 0) return;
     marks.push(mark(m, px, py, 3.6));
     free = px + 85;
   });

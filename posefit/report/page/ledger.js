@@ -58,17 +58,17 @@ function mark(m, x, y, radius, about, ...children) {
 function swatch(m) {
   return draw(
     "svg",
-    { width: 28, height: 12, "aria-hidden": "true" },
+    { width: 20, height: 12, "aria-hidden": "true" },
     draw("line", {
       x1: 0,
-      x2: 28,
+      x2: 20,
       y1: 6,
       y2: 6,
       style: `stroke: ${colour(m)}`,
       "stroke-width": 2.5,
       "stroke-dasharray": dash(m),
     }),
-    mark(m, 14, 6, 4),
+    mark(m, 10, 6, 4),
   );
 }
 

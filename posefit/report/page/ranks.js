@@ -1,11 +1,11 @@
 // Who is better than whom: mean ranks with the critical difference, and paired tests of one method with all others.
-function differenceDiagram(P) {
+function differenceDiagram(P, room) {
   const order = P.ranks.map((rank, k) => [rank, k]).sort((a, b) => a[0] - b[0]);
   const count = order.length;
   const half = Math.ceil(count / 2);
-  const width = 760;
-  const left = 250;
-  const right = width - 250;
+  const width = Math.max(330, Math.min(760, room));
+  const side = Math.min(250, 0.36 * width);
+  const [left, right] = [side, width - side];
   const step = 20;
   const x = (rank) => left + ((right - left) * (rank - 1)) / Math.max(count - 1, 1);
   const axis = 62;
@@ -54,7 +54,7 @@ function differenceDiagram(P) {
     const best = place < half;
     const at = names + step * (best ? place : count - 1 - place) + 6;
     const edge = best ? left - 14 : right + 14;
-    const name = shortened(METHODS[m], 30);
+    const name = shortened(METHODS[m], Math.floor((side - 20) / 6.6) - 5);
     svg.append(
       draw("polyline", {
         points: `${x(rank)},${axis} ${x(rank)},${at} ${edge},${at}`,
@@ -107,7 +107,7 @@ function comparison() {
     `${P.friedman >= 0.05 ? "; what follows means little then" : ""}. Below are mean ranks, 1 is best; ` +
     "bars join methods whose ranks differ by less than Nemenyi's critical difference at 5 %. " +
     "Seeds of one instance are not independent: all of it holds for these instances.";
-  $("difference").append(differenceDiagram(P));
+  drawn($("difference"), (width) => differenceDiagram(P, width));
   const first = D.leaderboard[0].method;
   choose(
     $("against"),

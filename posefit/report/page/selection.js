@@ -9,24 +9,22 @@ function selection() {
   const best = METHODS[S.best];
   const degrees = (value) => `${number(value, 2)}°`;
   const gap = S.single - S.oracle;
-  const said = [
-    `${best} is the best single method, with a mean error of ${degrees(S.single)} over ${counted(S.instances, "instance")}; ` +
-      `taking the best method of each instance would have given ${degrees(S.oracle)}, ${number(Math.max(gap, 0), 2)}° less`,
-  ];
-  if (given(S.oracle_apart))
-    said.push(
-      S.oracle_apart < S.single
-        ? `, of which ${number(S.single - S.oracle_apart, 2)}° remain where the choice is made on other seeds than it is scored on`
-        : `, of which nothing remains where the choice is made on other seeds than it is scored on (${degrees(S.oracle_apart)}): ` +
-            "most of it is chance",
-    );
-  if (given(S.selector)) {
-    const closed = given(S.closed) ? `${number(100 * S.closed, 0)} % of the gap` : "nothing: there is no gap";
-    said.push(
-      `; a selector that knows ${S.features.join(", ")} and has never seen the instance has ${degrees(S.selector)} and closes ${closed}.`,
-    );
-  } else said.push(`. There is no selector: ${S.why}.`);
-  $("selection-said").textContent = said.join("");
+  const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ");
+  const pays =
+    given(S.closed) && S.closed >= 0.05
+      ? "pays here"
+      : given(S.oracle_apart) && S.oracle_apart >= S.single
+        ? "does not pay here"
+        : "might pay, but nothing here knows how";
+  const apart = given(S.oracle_apart) ? `, or ${degrees(S.oracle_apart)} where it is picked on other seeds` : "";
+  const learnt = given(S.selector)
+    ? `, and a selector that knows ${listed(S.features)} ${degrees(S.selector)}` +
+      (given(S.closed) ? `, ${number(100 * S.closed, 0)} % of the gap between them` : "")
+    : "";
+  $("selection-said").textContent =
+    `Choosing a method by its instance ${pays}: ${best} alone has a mean error of ${degrees(S.single)} over ` +
+    `${counted(S.instances, "instance")}, the best method of each instance ${degrees(S.oracle)} in hindsight${apart}${learnt}.` +
+    (S.why ? ` There is no selector: ${S.why}.` : "");
   const ways = [
     { name: `single best: ${best}`, error: S.single },
     ...(given(S.selector) ? [{ name: "selector, on instances it has not seen", error: S.selector }] : []),
