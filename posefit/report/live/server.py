@@ -13,10 +13,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from posefit.report.content import data_of
 from posefit.report.live.progress import progress_so_far
-from posefit.report.page.webpage import document
-from posefit.report.runs import runs_so_far
 from posefit.sweep.ledger import Ledger
 
 LOOPBACK = "127.0.0.1"
@@ -37,6 +34,10 @@ class Showing:
 
     def page(self) -> str:
         """Return the page as it is now."""
+        from posefit.report.content import data_of
+        from posefit.report.page.webpage import document
+        from posefit.report.runs import runs_so_far
+
         with self._lock:
             progress = progress_so_far(self._ledger)
             state = len(self._ledger), len(self._ledger.sentenced())
@@ -59,7 +60,6 @@ def serving(path: str | Path, port: int, say: Callable[[str], None]) -> Iterator
     if not 0 <= port <= LARGEST_PORT:
         raise ValueError(f"--port must be 0 to {LARGEST_PORT}, got {port}")
     showing = Showing(path, say)
-    showing.page()  # what is wrong with the ledger is said before anybody is told an address
 
     class Handler(_Handler):
         shown = showing
