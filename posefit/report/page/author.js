@@ -110,7 +110,7 @@ function author(m) {
       { title: "seed", value: (k) => R.seed[k], show: (k) => String(D.seeds[R.seed[k]]) },
       ...["lost", "swapped"].map((name) => ({ ...figure(name, (k) => R[name][k]), down: true })),
       { ...figure("error", (k) => R.error[k]), down: true },
-      { title: "", text: true, show: (k) => [...watch(k), again(k)] },
+      { unseen: "watch, or run again", text: true, show: (k) => [...watch(k), again(k)] },
     ],
     lost,
     { by: 2, down: true, name: "Lost and swapped tracks" },

@@ -132,29 +132,28 @@ const FRONT = {
   translation: [0, 0, 10],
 };
 
-// What moves in a small picture: the frames of a track as its camera sees them, and what part of it they fill.
+// What moves in a small picture: the frames of a track as its camera sees them, and how many pixels about the root.
 function cutOut(row) {
   const scene = sceneOf(D.rows.instance[row]);
   const track = D.gallery.tracks[row];
   track.joints = track.joints || decoded(track.estimate);
   const camera = scene.cameras[0] ?? FRONT;
-  const points = range(scene.frames).flatMap((k) => [
-    ...seen(camera, scene.joints(k)),
-    ...seen(camera, track.joints(k)),
-  ]);
-  const [xs, ys] = [0, 1].map((axis) => points.filter((one) => one[2] > NEAR).map((one) => one[axis]));
-  const [x, y] = [xs, ys].map((values) => (Math.min(...values) + Math.max(...values)) / 2);
-  const size = 1.25 * Math.max(...[xs, ys].map((values) => Math.max(...values) - Math.min(...values)), 1);
-  return { scene, track, camera, x, y, size };
+  const far = range(scene.frames).flatMap((k) => {
+    const [there, here] = [scene.joints(k), track.joints(k)].map((points) => seen(camera, points));
+    return [...there, ...here]
+      .filter((one) => one[2] > NEAR)
+      .flatMap((one) => [0, 1].map((axis) => Math.abs(one[axis] - there[0][axis])));
+  });
+  return { scene, track, camera, size: 2.2 * Math.max(...far, 1) };
 }
 
-function paintCutOut(canvas, { scene, track, camera, x, y, size }, time) {
+function paintCutOut(canvas, { scene, track, camera, size }, time) {
   const frame = time % scene.frames;
   const { pen, width, height } = sheet(canvas, 1);
   const scale = width / size;
-  pen.translate(width / 2 - scale * x, height / 2 - scale * y);
-  pen.scale(scale, scale);
   const [there, here] = [scene.joints(frame), track.joints(frame)].map((points) => seen(camera, points));
+  pen.translate(width / 2 - scale * there[0][0], height / 2 - scale * there[0][1]);
+  pen.scale(scale, scale);
   if (scene.radii.length) {
     pen.globalAlpha = 0.35;
     pen.fillStyle = ink("--truth");

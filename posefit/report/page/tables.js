@@ -1,4 +1,5 @@
-// A table that any column sorts. A column: title, value(row), and what is shown of it; text to the left.
+// A table that any column sorts. A column: title, or one for readers of screens alone, value(row), and what is shown of
+// it; text to the left.
 const PAGE = 50;
 
 function table(box, columns, rows, how) {
@@ -12,7 +13,7 @@ function table(box, columns, rows, how) {
       { scope: "col", class: column.text ? "text" : null },
       column.value
         ? make("button", { type: "button", title: column.about, on: { click: () => sort(k) } }, column.title)
-        : column.title,
+        : (column.title ?? make("span", { class: "unseen" }, column.unseen)),
     ),
   );
   const pager = make("div", { class: "row pager" });
@@ -184,7 +185,7 @@ function allRows() {
   table(
     $("all-rows"),
     [
-      { title: "", text: true, show: (k) => [...watch(k), again(k)] },
+      { unseen: "watch, or run again", text: true, show: (k) => [...watch(k), again(k)] },
       {
         title: "method",
         text: true,
@@ -224,7 +225,7 @@ function failures() {
         show: (row) => row.reasons.join("; "),
       },
       {
-        title: "",
+        unseen: "run again",
         text: true,
         show: (row) =>
           make("button", { type: "button", on: { click: () => showCommand(row.name, row.command) } }, "command"),
