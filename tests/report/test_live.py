@@ -39,9 +39,9 @@ def begun(tmp_path: Path) -> Path:
     return more
 
 
-def page_of(path: str | Path, **more: str) -> tuple[int, str]:
+def page_of(folder: str | Path, **more: str) -> tuple[int, str]:
     """Return the status and the text of a server's page."""
-    with serving(path, 0, lambda _: None) as server:
+    with serving(folder, 0, lambda _: None) as server:
         thread = threading.Thread(target=server.serve_forever, daemon=True)
         thread.start()
         try:
