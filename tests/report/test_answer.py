@@ -121,7 +121,7 @@ def test_a_selector_closes_the_gap_where_the_plan_tells_who_wins(tmp_path: Path)
     assert sorted(found["wins"]) == [[0, 4, 4], [1, 4, 4]]
     parts = {one["part"]: (one["method"], one["behind"]) for one in found["where"]}
     clean, tough = (["clean", "tough"].index(name) for name in ("clean", "tough"))
-    assert parts["damage: undamaged"] == (clean, pytest.approx(0.0))
+    assert parts["damage: none"] == (clean, pytest.approx(0.0))
     assert parts["damage: holes 0.3"] == (tough, pytest.approx(1.5))
 
 

@@ -174,8 +174,7 @@ def _where(contest: Contest, errors: Array, best: int) -> list[dict[str, Any]]:
         views = ", ".join(f"{view:g}" for view in place["view_degrees"])
         parts.setdefault(("motion", str(place["motion"])), []).append(k)
         parts.setdefault(("view", f"{views}°"), []).append(k)
-        for kind, share in sorted(place["corruption"].items()) or [("undamaged", 0.0)]:
-            label = f"{kind} {share:g}" if share else kind
+        for label in [f"{kind} {share:g}" for kind, share in sorted(place["corruption"].items())] or ["none"]:
             parts.setdefault(("damage", label), []).append(k)
     kinds = Counter(kind for kind, _ in parts)
     found: list[dict[str, Any]] = []

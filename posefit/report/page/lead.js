@@ -32,7 +32,7 @@ function standing(width) {
   const alike = new Set(
     D.pairs ? duelsOf(rows[0].method).flatMap((row) => (row.adjusted >= 0.05 ? [row.other] : [])) : [],
   );
-  const narrow = width < 560;
+  const narrow = width < 480;
   const step = narrow ? 38 : 26;
   const longest = Math.min(27, Math.max(...rows.map((row) => row.name.length)));
   const [left, right] = [narrow ? 10 : 7.4 * longest + 24, width - (narrow ? 12 : 66)];
@@ -144,7 +144,7 @@ function cutOut(row) {
       .filter((one) => one[2] > NEAR)
       .flatMap((one) => [0, 1].map((axis) => Math.abs(one[axis] - there[0][axis])));
   });
-  return { scene, track, camera, size: 2.2 * Math.max(...far, 1) };
+  return { scene, track, camera, size: 2.08 * Math.max(...far, 1) };
 }
 
 function paintCutOut(canvas, { scene, track, camera, size }, time) {
