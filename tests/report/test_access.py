@@ -152,3 +152,16 @@ def test_on_paper_the_answer_and_what_was_run_are_there(chromium: Any, page: Pat
             assert seen.page.locator(part_of).is_visible(), part_of
         for part_of in ("#moving", "nav"):
             assert seen.page.locator(part_of).is_hidden(), part_of
+
+
+def test_intervals_show_where_a_curve_is_pointed_at_or_all_are_asked_for(chromium: Any, page: Path) -> None:
+    with opened(chromium, page) as seen:
+        band = seen.page.locator("#convergence [data-method='0'] .band")
+        shown_as = "one => Number(getComputedStyle(one).opacity)"
+        assert band.evaluate(shown_as) == 0.0
+        seen.page.locator("#toggles button[data-method='0']").hover()
+        assert band.evaluate(shown_as) > 0.1
+        seen.page.locator("h1").hover()
+        assert band.evaluate(shown_as) == 0.0
+        seen.page.locator("#bands").check()
+        assert band.evaluate(shown_as) > 0.1

@@ -49,7 +49,8 @@ function standing(width) {
   const height = bottom + 40;
   const said = [...rows, ...bases].map((row) => {
     const name = row.name ?? `baseline, ${D.trivial[row.baseline]}`;
-    return `${name} ${number(row.error, 2)}${given(row.low) ? ` from ${number(row.low, 2)} to ${number(row.high, 2)}` : ""}`;
+    const ends = given(row.low) ? ` from ${number(row.low, 2)} to ${number(row.high, 2)}` : "";
+    return `${name} ${number(row.error, 2)}${ends}`;
   });
   const svg = draw("svg", {
     width,

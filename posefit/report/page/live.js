@@ -15,9 +15,10 @@ function live() {
       ? `${whole(L.running)} running, ${lasting(L.seconds) ?? "some time"} left`
       : "nobody works on it now"
     : "finished";
+  const sums = `${whole(L.done)} done, ${whole(L.quarantined)} quarantined`;
   $("live-said").textContent = given(L.cells)
-    ? `${whole(settled)} of ${whole(L.cells)} cells: ${whole(L.done)} done, ${whole(L.quarantined)} quarantined; ${state}.`
-    : `${whole(L.done)} cells done, ${whole(L.quarantined)} quarantined; no plan is known, so nobody knows how many are left.`;
+    ? `${whole(settled)} of ${whole(L.cells)} cells: ${sums}; ${state}.`
+    : `Cells: ${sums}. No plan is known, so nobody knows how many are left.`;
   if (given(L.cells)) {
     $("live-bar").max = L.cells;
     $("live-bar").value = settled;

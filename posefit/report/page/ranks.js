@@ -3,7 +3,7 @@ function differenceDiagram(P, room) {
   const order = P.ranks.map((rank, k) => [rank, k]).sort((a, b) => a[0] - b[0]);
   const count = order.length;
   const half = Math.ceil(count / 2);
-  const width = Math.max(330, Math.min(760, room));
+  const width = Math.max(290, Math.min(760, room));
   const side = Math.min(250, 0.36 * width);
   const [left, right] = [side, width - side];
   const step = 20;
@@ -166,12 +166,13 @@ function claims() {
   D.claims.forEach((C) => {
     const names = C.methods.map((m) => METHODS[m]);
     const errors = C.errors.map((value) => `${number(value, 2)}°`);
-    const seen = C.steps.flatMap(({ seen: one }, k) => (one ? [`from ${names[k]} to ${names[k + 1]}`] : []));
+    const between = (k) => `from ${names[k]} to ${names[k + 1]}`;
+    const held = C.steps.flatMap((one, k) => (one.seen ? [between(k)] : []));
     const said =
-      seen.length === C.steps.length
+      held.length === C.steps.length
         ? `${C.steps.length > 1 ? "Every step is" : "It is"} seen here`
-        : seen.length
-          ? `Only the step ${seen.join(" and ")} is seen here`
+        : held.length
+          ? `Only the step ${held.join(" and ")} is seen here`
           : `${C.steps.length > 1 ? "No step is" : "It is not"} seen here`;
     $("claims").append(
       make(

@@ -23,7 +23,7 @@ function selection() {
     : "";
   $("selection-said").textContent =
     `Choosing a method by its instance ${pays}: ${best} alone has a mean error of ${degrees(S.single)} over ` +
-    `${counted(S.instances, "instance")}, the best method of each instance ${degrees(S.oracle)} in hindsight${apart}${learnt}.` +
+    `${counted(S.instances, "instance")}, the best method of each ${degrees(S.oracle)} in hindsight${apart}${learnt}.` +
     (S.why ? ` There is no selector: ${S.why}.` : "");
   const ways = [
     { name: `single best: ${best}`, error: S.single },
