@@ -1,7 +1,7 @@
 """`posefit sweep` and `posefit report`."""
 
 from collections.abc import Iterator
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from itertools import islice
 from typing import Any
 
@@ -63,18 +63,42 @@ def _next(lines: Iterator[str], as_json: bool) -> str:
 
 @click.command()
 @click.argument("ledger", metavar="DIR")
-@click.option("--out", required=True, metavar="FILE.html", help="The page; an earlier report is replaced.")
+@click.option("--out", metavar="FILE.html", help="The page; an earlier report is replaced.")
+@click.option(
+    "--serve", is_flag=True, help="Show the report on this machine alone while the sweep goes on; write none."
+)
+@click.option("--port", type=int, help="Of --serve, where it is shown; one that is free where nothing is said.")
 @click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def report(ledger: str, out: str, as_json: bool, **others: Any) -> None:
+def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json: bool, **others: Any) -> None:
     """Write what a sweep to DIR found as one page that any browser opens, offline.
 
-    It may be written while the sweep goes on, of the cells that are done.
+    It may be written while the sweep goes on, of the cells that are done. With --serve a page shows how far it is, what
+    failed and the report so far, and loads itself anew until Ctrl-C ends it.
     """
+    if serve:
+        given = {"out": out, **others, "json": as_json or None}
+        if twice := [name for name, value in given.items() if value is not None]:
+            raise click.UsageError(f"--serve must be given without --{twice[0]}, which it does not write")
+        return _serve(ledger, port or 0)
+    if out is None:
+        raise click.UsageError("--out must name a file for the page, got none; --serve shows one without a file")
+    if port is not None:
+        raise click.UsageError("--port must be given with --serve, got it without")
     from posefit.report.write import leaderboard_lines, write_report
 
     found = write_report(ledger, out, say=say, **others)
     for line in [json_line(found)] if as_json else leaderboard_lines(found):
         click.echo(line)
+
+
+def _serve(ledger: str, port: int) -> None:
+    """Show the report of a ledger until somebody presses Ctrl-C."""
+    from posefit.report.live.server import address_of, serving
+
+    with serving(ledger, port, say) as server:
+        click.echo(f"showing {ledger} at {address_of(server)} until Ctrl-C")
+        with suppress(KeyboardInterrupt):
+            server.serve_forever()

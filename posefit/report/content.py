@@ -7,14 +7,17 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.claims import claimed_orders
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
+from posefit.report.answer.claimed import claim_results
+from posefit.report.answer.lead import lead_sentence, three_tracks
+from posefit.report.answer.selection import selection_of
 from posefit.report.colours import METHODS
 from posefit.report.columns import COLUMNS
 from posefit.report.contest import (
     Contest,
     baseline_rows,
-    claim,
     contest_of,
     dropped,
     leaderboard,
@@ -32,7 +35,8 @@ REASONS = 5  # of failures, the most frequent ones, that are named at the top
 def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str, Any]:
     """Return everything that the page shows of a ledger's runs."""
     contest = contest_of(runs)
-    pictures = gallery(ledger, runs, say)
+    compared = _compared(contest) if contest is not None else {}
+    pictures = gallery(ledger, runs, say, first=[row for _, row in compared.get("tracks", [])])
     return {
         "header": _header(runs, contest, pictures),
         "methods": [{"name": name, **about} for name, about in zip(runs.methods, runs.variants, strict=True)],
@@ -43,8 +47,10 @@ def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str,
         "colours": len(METHODS),
         "columns": {name: COLUMNS[name].about() for name in shown_of(runs)},
         "trivial": BASELINES,
-        **(_compared(contest) if contest is not None else {}),
+        **compared,
         "rows": _rows(runs),
+        **_warned(runs),
+        "live": None,
         "seeds": [_exact(seed) for seed in runs.seeds],
         "heads": runs.heads,
         "gallery": pictures,
@@ -95,11 +101,16 @@ def _compared(contest: Contest) -> dict[str, Any]:
     some = _some(contest)
     evaluations = curves.grid(some)
     enough = len(contest.methods) > 1 and contest.rows[0].size > 1
+    board, bases = leaderboard(contest), baseline_rows(contest)
+    tests = paired_tests(contest) if enough else None
     return {
-        "leaderboard": leaderboard(contest),
-        "baselines": baseline_rows(contest),
-        "pairs": paired_tests(contest) if enough else None,
-        "claim": claim(contest),
+        "answer": lead_sentence(contest, board, bases, tests),
+        "tracks": three_tracks(contest, board[0]["method"]),
+        "leaderboard": board,
+        "baselines": bases,
+        "pairs": tests,
+        "claims": claim_results(contest, claimed_orders()),
+        "selection": selection_of(contest),
         "taking_part": contest.methods,
         "evaluations": evaluations,
         "convergence": [curves.shown(one) for one in curves.convergence(some, evaluations)],
@@ -138,6 +149,13 @@ def _by_instance(runs: Runs, figure: str) -> Array:
     total = np.bincount(runs.instance[known], values[known], minlength=count)
     met = np.bincount(runs.instance[known], minlength=count)
     return np.where(met > 0, total / np.maximum(met, 1), np.nan)
+
+
+def _warned(runs: Runs) -> dict[str, Any]:
+    """Return the warnings that rows have, each once, and of each row that has any which."""
+    texts = list(dict.fromkeys(text for found in runs.warnings.values() for text in found))
+    place = {text: k for k, text in enumerate(texts)}
+    return {"warnings": texts, "warned": {row: [place[one] for one in found] for row, found in runs.warnings.items()}}
 
 
 def _rows(runs: Runs) -> dict[str, Any]:

@@ -21,7 +21,6 @@ SEED = 2013  # of every bootstrap
 WORK = 1e8  # numbers that the resamples of one study may come to
 LEAST_SEEDS = 3  # below, a probability of improvement has no interval: two seeds say too little
 LEAST_SHARE = 0.5  # of the runs of all methods but one, that are shared with it; below, it does not take part
-CLAIM = ("particle@full", "sapso@full", "sapso@pca")  # worst first, as the SAPSO paper has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,33 +202,6 @@ def paired_tests(contest: Contest) -> dict[str, Any]:
         "critical_difference": ranking.critical_difference,
         "cliques": ranking.cliques,
         "pairs": listed,
-    }
-
-
-def claim(contest: Contest) -> dict[str, Any] | None:
-    """Return what the SAPSO paper claims of three methods, and how they did; None where one does not take part.
-
-    Each of its two steps, to the full space's SAPSO and to the compact space, has a paired test, Holm's over both: on
-    instances with their seeds, and on instances alone, each by the mean over its seeds.
-    """
-    known = [contest.runs.variants[m]["method"] for m in contest.methods]
-    if not all(name in known for name in CLAIM):
-        return None
-    chosen = [known.index(name) for name in CLAIM]
-    errors = contest.of("error")[chosen]
-    if errors[0].size < 2:
-        return None
-    steps = [(0, 1), (1, 2)]
-    by_instance = wilcoxon(errors.mean(axis=2, keepdims=True), steps)
-    return {
-        "methods": [contest.methods[m] for m in chosen],
-        "errors": [middle(one.ravel()) for one in errors],
-        "steps": [
-            {"difference": one.difference, "p": one.p_value, "adjusted": one.adjusted, "by_instance": other.adjusted}
-            for one, other in zip(wilcoxon(errors, steps), by_instance, strict=True)
-        ],
-        "blocks": errors[0].size,
-        "instances": errors.shape[1],
     }
 
 

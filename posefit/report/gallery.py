@@ -1,6 +1,6 @@
 """The moving pictures of a report: joints of some runs, as few bytes as they need."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,10 @@ LARGEST = 5_500_000  # characters of all pictures together
 FRAMES = 90  # of a picture at most; of longer tracks every second, third, ... frame is shown
 
 
-def gallery(ledger: Ledger, runs: Runs, say: Callable[[str], None], largest: int = LARGEST) -> dict[str, Any]:
-    """Return the pictures of as many runs as there is room for, the first seeds of every instance first.
+def gallery(
+    ledger: Ledger, runs: Runs, say: Callable[[str], None], largest: int = LARGEST, first: Sequence[int] = ()
+) -> dict[str, Any]:
+    """Return the pictures of as many runs as there is room for: `first`, then the first seeds of every instance.
 
     `scenes` holds of each instance, by its index, the true joints and the cameras; `tracks` of each row, by its index,
     the estimated joints, each frame's MPJPE in mm, and which frames are lost and which swapped. Joints are millimetres
@@ -27,7 +29,7 @@ def gallery(ledger: Ledger, runs: Runs, say: Callable[[str], None], largest: int
     origins: dict[int, Array] = {}
     tracks: dict[int, dict[str, Any]] = {}
     used = 0
-    for row in _chosen(runs):
+    for row in dict.fromkeys([*first, *_chosen(runs)]):
         instance = int(runs.instance[row])
         try:
             joints = ledger.joints(runs.keys[row])

@@ -41,6 +41,7 @@ class Runs:
     figures: dict[str, Array] = field(repr=False)  # of each of FIGURES (n,), nan where a row has none
     joint_errors: Array = field(repr=False)  # (n, 27) mm
     modes: Array = field(repr=False)  # (n, bins, 3) by bins of how likely a frame's likeliest mode is: see `_binned`
+    warnings: Mapping[int, tuple[str, ...]] = field(repr=False)  # of the rows that have any
     traces: tuple[tuple[Array, Array], ...] = field(repr=False)  # evaluations and best costs (k,) of each row
     failures: tuple[dict[str, Any], ...] = field(repr=False)  # cells in quarantine: name, method, reasons, command
     failed: tuple[int, ...] = field(repr=False)  # how many cells of each method are in quarantine
@@ -55,13 +56,18 @@ def runs_of(ledger: "Ledger") -> Runs:
 
     Where every cell failed there are no rows, but the reasons. Raises ValueError where there is neither.
     """
+    found = runs_so_far(ledger)
+    if not found.keys and not found.failures:
+        raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+    return found
+
+
+def runs_so_far(ledger: "Ledger") -> Runs:
+    """Return the same of a ledger that may hold nothing yet."""
     found = _Table()
     for row in ledger.rows():
         found.add(row)
-    quarantined = ledger.quarantined()
-    if not found.keys and not quarantined:
-        raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
-    return found.runs(ledger.version, quarantined)
+    return found.runs(ledger.version, ledger.quarantined())
 
 
 def shown_of(runs: Runs) -> list[str]:
@@ -83,6 +89,7 @@ class _Table:
         self.figures: list[list[float]] = []
         self.joints: list[Array] = []
         self.modes: list[Array] = []
+        self.warnings: dict[int, tuple[str, ...]] = {}
         self.traces: list[tuple[Array, Array]] = []
 
     def add(self, row: Mapping[str, Any]) -> None:
@@ -96,6 +103,8 @@ class _Table:
             self.places,
             _text({name: value for name, value in in_full(spec).items() if name not in (*_VARIANT, "seed")}),
         )
+        if row.get("warnings"):
+            self.warnings[len(self.keys)] = tuple(row["warnings"])
         self.numbers.append((variant, place, begun))
         self.seeds.append(spec["seed"])
         self.keys.append(row["key"])
@@ -142,6 +151,7 @@ class _Table:
             figures=dict(zip(FIGURES, figures[order].T, strict=True)),
             joint_errors=np.asarray(np.reshape(self.joints, (-1, len(JOINTS)))[order]),
             modes=np.asarray(np.reshape(self.modes, (-1, BINS, 3))[order]),
+            warnings={row: self.warnings[k] for row, k in enumerate(order.tolist()) if k in self.warnings},
             traces=tuple(self.traces[k] for k in order),
             failures=tuple(_failure(one) for one in quarantined),
             failed=tuple(lost[text] for text in (list(self.variants)[m] for m in best)),

@@ -28,7 +28,7 @@ def write_report(
     csv: str | None = None,
     say: Say,
 ) -> dict[str, Any]:
-    """Write the report of a ledger to a file, and return its leaderboard, baselines and claim.
+    """Write the report of a ledger to a file, and return its answer, leaderboard, baselines, claims and selection.
 
     An earlier report of that name is replaced; nothing else is. `figures` is a new folder for figures (PNG, PDF) and
     tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new file of all rows. Raises ValueError
@@ -56,7 +56,7 @@ def write_report(
         from posefit.sweep.table import flat
 
         write_csv(map(flat, ledger.all_rows()), csv)
-    said = {name: data.get(name) for name in ("header", "leaderboard", "baselines", "claim")}
+    said = {name: data.get(name) for name in ("header", "answer", "leaderboard", "baselines", "claims", "selection")}
     gaps = [
         {"instance": runs.instances[one["instance"]], "missing": [runs.methods[m] for m in one["missing"]]}
         for one in data["header"]["dropped"]
@@ -65,7 +65,7 @@ def write_report(
 
 
 def leaderboard_lines(found: dict[str, Any]) -> list[str]:
-    """Return the lines that the command prints: what is not in it, the leaderboard, and where the page is."""
+    """Return the lines that the command prints: who leads, what is left out, the leaderboard, and where the page is."""
     lines = []
     for row in found["leaderboard"] or []:
         ends = "" if row["low"] is None else f"{row['low']:.2f} to {row['high']:.2f}"
@@ -76,7 +76,8 @@ def leaderboard_lines(found: dict[str, Any]) -> list[str]:
         lettered = any(row["letters"] for row in found["leaderboard"])
         head = f"{'':32} {'error deg':>9} {'95 % interval':>15} {'skill':>7}"
         lines = [f"{head}  alike" if lettered else head, *lines, *([ALIKE] if lettered else [])]
-    return [*_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
+    answer = [found["answer"]] if found["answer"] else []
+    return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
 
 
 def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:

@@ -5,7 +5,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -51,6 +51,8 @@ def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quaran
             lost = driver.ledger.sentenced()
             again = sum(driver.pardon(key) for key in keys_of(cells) if key in lost)
             say(f"{again} {'cell is' if again == 1 else 'cells are'} out of quarantine, to be tried again")
+        with suppress(OSError, ValueError):  # no room: the sweep will say so, if it needs any
+            driver.ledger.begin(keys_of(cells))
         bar = tqdm(total=len(cells), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
 
         def beside(message: str) -> None:

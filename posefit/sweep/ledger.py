@@ -5,19 +5,23 @@ rows/NAME.jsonl      finished rows, one log a driver; those of drivers that ende
 rows/NAME.joints     the joints of the rows' frames
 claims/KEY.n         the nth attempt at a cell: who runs it, or why it failed
 quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
+plans/NAME.cells     which cells a plan has that was begun here, when, and how many were done then
 aside/               damaged lines and files that were found; their cells are run again
 """
 
+import hashlib
 import io
 import json
 import os
+import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from posefit.files import appear
+from posefit.files import appear, replaced_file
 from posefit.reading import cut, parsed_json, quoted, read_text
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, joints_at, lines
 from posefit.sweep.table import dataframe
@@ -29,9 +33,20 @@ if TYPE_CHECKING:
     from posefit.arrays import Array
 
 INDEX = "ledger.json"
-ROWS, CLAIMS, QUARANTINE, ASIDE = FOLDERS = ("rows", "claims", "quarantine", "aside")
+ROWS, CLAIMS, QUARANTINE, ASIDE, PLANS = FOLDERS = ("rows", "claims", "quarantine", "aside", "plans")
 FORMAT = 1
 LARGEST_INDEX = 10_000  # bytes
+PLANNED, SHORT = b'{"cells": ', 8  # how the file of a plan begins; bytes of each key that it holds
+
+
+@dataclass(frozen=True)
+class BegunPlan:
+    """A plan that a sweep began here, with the first 8 bytes of the key of each of its cells, one after the other."""
+
+    cells: int
+    begun: float  # seconds since 1970
+    settled: int  # cells that were done or in quarantine then
+    keys: bytes
 
 
 class Ledger:
@@ -73,9 +88,38 @@ class Ledger:
     def __contains__(self, key: str) -> bool:
         return key in self._places
 
+    def keys(self) -> Iterator[str]:
+        """Return the keys of all finished cells."""
+        return iter(self._places)
+
     def place(self, key: str) -> tuple[str, int] | None:
         """Return the log that a cell's row is in, and where; None where it has none."""
         return self._places.get(key)
+
+    def begin(self, keys: Iterable[str]) -> None:
+        """Take note of the cells of a plan that is begun, or gone on with, for whoever wants to know how far it is."""
+        settled, lost, short = 0, self.sentenced(), bytearray()
+        for key in keys:
+            settled += key in self or key in lost
+            short += bytes.fromhex(key[: 2 * SHORT])
+        (self.path / PLANS).mkdir(exist_ok=True)  # a ledger of earlier days has none
+        head = {"cells": len(short) // SHORT, "begun": time.time(), "settled": settled}
+        path = self.path / PLANS / f"{hashlib.sha256(short).hexdigest()[:16]}.cells"
+        with replaced_file(path, PLANNED) as building:
+            building.write_bytes(json.dumps(head).encode() + b"\n" + short)
+
+    def plans(self) -> list[BegunPlan]:
+        """Return the plans that were begun here, the latest first; a damaged one is left out."""
+        found = []
+        for path in (self.path / PLANS).glob("*.cells"):
+            try:
+                head, _, short = path.read_bytes().partition(b"\n")
+                plan = BegunPlan(**json.loads(head), keys=short)
+            except (OSError, ValueError, TypeError):
+                continue
+            if plan.cells == len(plan.keys) // SHORT:
+                found.append(plan)
+        return sorted(found, key=lambda plan: -plan.begun)
 
     def in_quarantine(self, key: str) -> bool:
         """Return whether a cell is in quarantine."""

@@ -45,15 +45,15 @@ def browser() -> Iterator[Any]:
 
 
 @contextmanager
-def opened(chromium: Any, path: Path, width: int = 1280, **how: Any) -> Iterator[Watched]:
-    """Give a file's page in a window so many pixels wide, offline."""
-    context = chromium.new_context(viewport={"width": width, "height": 900}, offline=True, **how)
+def opened(chromium: Any, path: Path | str, width: int = 1280, **how: Any) -> Iterator[Watched]:
+    """Give a file's page, or that of an address, in a window so many pixels wide; offline if nothing else is said."""
+    context = chromium.new_context(viewport={"width": width, "height": 900}, **{"offline": True, **how})
     watched = Watched(context.new_page())
     watched.page.on("console", lambda message: watched.complaints.append(message.text))
     watched.page.on("pageerror", lambda error: watched.complaints.append(str(error)))
     watched.page.on("request", lambda request: watched.requests.append(request.url))
     try:
-        watched.page.goto(path.as_uri())
+        watched.page.goto(path if isinstance(path, str) else path.as_uri())
         yield watched
     finally:
         context.close()

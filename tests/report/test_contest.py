@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.report.contest import CLAIM, Contest, baseline_rows, claim, contest_of, leaderboard, paired_tests
+from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard, paired_tests
 from posefit.report.curves import certainty, convergence, grid, joint_errors, reached
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
@@ -92,18 +92,6 @@ def test_pairs_say_who_is_better_and_how_surely(tmp_path: Path) -> None:
     assert (first, second, better, low, high) == (0, 1, 1.0, 1.0, 1.0)
     assert difference == pytest.approx(-1.0)
     assert p == adjusted == pytest.approx(2.0 / 2**9)  # all nine differences have one sign, either of two
-
-
-def test_the_paper_is_compared_step_by_step(tmp_path: Path) -> None:
-    errors = full(dict(zip(CLAIM, (3.0, 2.0, 1.0), strict=True)) | {"cma@pca": 0.5}, instances=3, seeds=2)
-    found = claim(contest(tmp_path, errors))
-    assert found is not None
-    assert [step["difference"] for step in found["steps"]] == pytest.approx([1.0, 1.0])
-    assert [step["p"] for step in found["steps"]] == pytest.approx([2.0 / 2**6] * 2)
-    assert [step["adjusted"] for step in found["steps"]] == pytest.approx([4.0 / 2**6] * 2)  # Holm's, of two
-    assert [step["by_instance"] for step in found["steps"]] == pytest.approx([4.0 / 2**3] * 2)
-    assert found["errors"] == pytest.approx([3.105, 2.105, 1.105])
-    assert claim(contest(tmp_path / "two", full({"sapso@pca": 1.0, "sapso@full": 2.0}))) is None
 
 
 def test_curves_start_and_end_with_the_traces(tmp_path: Path) -> None:

@@ -32,11 +32,11 @@ print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))
 """
 
 
-def rows(instances: int, seeds: int) -> Iterator[CellResult]:
+def rows(instances: int, seeds: int, methods: int = METHODS) -> Iterator[CellResult]:
     """Yield results as large as those of real cells; of one picture, whatever the row."""
     first, rng = replace(cells(1)[0], frames=60), np.random.default_rng(0)
     picture = result(first, 1.0).joints
-    for m in range(METHODS):
+    for m in range(methods):
         for i in range(instances):
             for s, error in enumerate(rng.gamma(2.0, 1.0, seeds).tolist()):
                 cost = [float(f"{20.0 / k + error:.6g}") for k in range(1, 62)]

@@ -63,8 +63,9 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     done = run("report", results, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert done.stdout.splitlines()[-1] == f"written to {out}: open it in any browser"
-    assert done.stdout.startswith("1 cell failed, left out of all figures: random@pca 1\n")
-    assert [line.split()[:2] for line in done.stdout.splitlines()[3:-2]] == [
+    assert done.stdout.startswith("sapso@pca leads with an error of 1.06° on 2 instances of walk with 2 seeds each; ")
+    assert done.stdout.splitlines()[1] == "1 cell failed, left out of all figures: random@pca 1"
+    assert [line.split()[:2] for line in done.stdout.splitlines()[4:-2]] == [
         ["sapso@pca", "1.06"],
         ["random@pca", "2.06"],
     ]
@@ -99,7 +100,7 @@ def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_abo
     ]
     lost = [(replace(FIRST, method="sapso@pca", instance=1, seed=s), ["its process died of SIGSEGV"]) for s in range(2)]
     done = run("report", ledger(tmp_path / "results", found, lost), "--out", tmp_path / "report.html")
-    assert done.stdout.splitlines()[:5] == [
+    assert done.stdout.splitlines()[1:6] == [
         "2 cells failed, left out of all figures: sapso@pca 2",
         "  2 x its process died of SIGSEGV",
         "left out of the comparison, for every method: 1 instance",
@@ -186,7 +187,13 @@ def test_a_ledger_from_before_there_were_posteriors_has_no_such_columns(results:
     [
         (["NONE", "--out", "OUT.html"], "expected a ledger, a folder that posefit sweep wrote, got none"),
         (["EMPTY", "--out", "OUT.html"], "expected a ledger with finished rows, got one with none"),
-        (["RESULTS"], "Missing option '--out'"),
+        (["RESULTS"], "--out must name a file for the page, got none; --serve shows one without a file"),
+        (["RESULTS", "--out", "OUT.html", "--port", "1"], "--port must be given with --serve, got it without"),
+        (["RESULTS", "--serve", "--out", "OUT.html"], "--serve must be given without --out, which it does not write"),
+        (["RESULTS", "--serve", "--csv", "OUT.csv"], "--serve must be given without --csv, which it does not write"),
+        (["RESULTS", "--serve", "--json"], "--serve must be given without --json, which it does not write"),
+        (["NONE", "--serve"], "expected a ledger, a folder that posefit sweep wrote, got none"),
+        (["RESULTS", "--serve", "--port", "70000"], "--port must be 0 to 65535, got 70000"),
         (["RESULTS", "--out", "OUT.txt"], "--out must be a file that ends in .html, got "),
         (["RESULTS", "--out", "OTHER.html"], "expected a new name or an earlier report, got something else"),
         (["RESULTS", "--out", "DIR.html"], "expected a new name or an earlier report, got something else"),
@@ -202,7 +209,10 @@ def test_mistakes_are_one_line_and_write_nothing(words: list[str], message: str,
     (tmp_path / "OTHER.html").write_text("<p>mine</p>")
     (tmp_path / "DIR.html").mkdir()
     before = sorted(tmp_path.rglob("*"))
-    places = [word if word.startswith("--") else tmp_path / word.replace("RESULTS", "results") for word in words]
+    places = [
+        word if word.startswith("--") or word.isdigit() else tmp_path / word.replace("RESULTS", "results")
+        for word in words
+    ]
     assert message in fails("report", *places)
     assert sorted(tmp_path.rglob("*")) == before
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"

@@ -24,21 +24,11 @@ function dots(errors, mine, most) {
   );
   errors.forEach((error, m) => {
     if (given(error) && m !== mine)
-      svg.append(
-        draw(
-          "circle",
-          { cx: x(error), cy: 9, r: 3, style: "fill: var(--truth)", opacity: 0.6 },
-          draw("title", {}, `${METHODS[m]}: ${number(error, 2)}°`),
-        ),
-      );
+      svg.append(mark(m, x(error), 9, 3, {}, draw("title", {}, `${METHODS[m]}: ${number(error, 2)}°`)));
   });
   if (given(errors[mine]))
     svg.append(
-      draw(
-        "circle",
-        { cx: x(errors[mine]), cy: 9, r: 5.5, style: `fill: ${colour(mine)}` },
-        draw("title", {}, `${METHODS[mine]}: ${number(errors[mine], 2)}°`),
-      ),
+      mark(mine, x(errors[mine]), 9, 6, {}, draw("title", {}, `${METHODS[mine]}: ${number(errors[mine], 2)}°`)),
     );
   return svg;
 }
@@ -120,7 +110,7 @@ function author(m) {
       { title: "seed", value: (k) => R.seed[k], show: (k) => String(D.seeds[R.seed[k]]) },
       ...["lost", "swapped"].map((name) => ({ ...figure(name, (k) => R[name][k]), down: true })),
       { ...figure("error", (k) => R.error[k]), down: true },
-      { title: "", text: true, show: (k) => [...watch(k), again(k)] },
+      { unseen: "watch, or run again", text: true, show: (k) => [...watch(k), again(k)] },
     ],
     lost,
     { by: 2, down: true, name: "Lost and swapped tracks" },

@@ -37,11 +37,7 @@ function joined({ svg, at, up }, m, points) {
       "data-method": m,
     }),
     ...points.map((dot) =>
-      draw(
-        "circle",
-        { cx: at(dot.x), cy: up(dot.y), r: dot.size, style: `fill: ${colour(m)}`, "fill-opacity": 0.75 },
-        draw("title", {}, `${METHODS[m]}: ${dot.said}`),
-      ),
+      mark(m, at(dot.x), up(dot.y), dot.size, {}, draw("title", {}, `${METHODS[m]}: ${dot.said}`)),
     ),
   );
 }

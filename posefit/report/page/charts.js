@@ -1,35 +1,44 @@
 // Curves over evaluations with their intervals, and the legend whose buttons show and hide methods everywhere.
+const CURVES = 4; // that are shown at first
+const LABELLED = 8; // curves that have their names at their ends
 const hidden = new Set();
 const redraws = [];
-let banded = true;
 
 function legend() {
   const order = D.leaderboard.map((row) => row.method).filter((m) => D.taking_part.includes(m));
-  const shown = new Set([...order.slice(0, 6), ...(D.claim ? D.claim.methods : [])]);
-  order.filter((m) => !shown.has(m)).forEach((m) => hidden.add(m));
+  order.slice(CURVES).forEach((m) => hidden.add(m));
+  const lit = (m, on) =>
+    document.querySelectorAll(`.series[data-method="${m}"]`).forEach((one) => one.classList.toggle("lit", on));
   const buttons = order.map((m) =>
     make(
       "button",
-      { type: "button", "data-method": m, on: { click: () => set([m], hidden.has(m)) } },
+      {
+        type: "button",
+        "data-method": m,
+        on: {
+          click: () => set([m], hidden.has(m)),
+          pointerenter: () => lit(m, true),
+          pointerleave: () => lit(m, false),
+          focus: () => lit(m, true),
+          blur: () => lit(m, false),
+        },
+      },
       swatch(m),
       METHODS[m],
     ),
   );
-  const set = (methods, visible) => {
-    methods.forEach((m) => (visible ? hidden.delete(m) : hidden.add(m)));
-    mark();
+  const set = (methods, seenNow) => {
+    methods.forEach((m) => (seenNow ? hidden.delete(m) : hidden.add(m)));
+    pressed();
     redraws.forEach((redraw) => redraw());
   };
-  const mark = () =>
+  const pressed = () =>
     buttons.forEach((button) => button.setAttribute("aria-pressed", String(!hidden.has(+button.dataset.method))));
   $("toggles").replaceChildren(...buttons);
   $("all").onclick = () => set(order, true);
   $("none").onclick = () => set(order, false);
-  $("bands").onchange = () => {
-    banded = $("bands").checked;
-    redraws.forEach((redraw) => redraw());
-  };
-  mark();
+  $("bands").onchange = () => $("bands").closest("main").classList.toggle("banded", $("bands").checked);
+  pressed();
 }
 
 const visible = () => D.taking_part.map((m, place) => [m, place]).filter(([m]) => !hidden.has(m));
@@ -40,7 +49,8 @@ function chart(width, series, most, label, stepped) {
   const left = 46;
   const bottom = 40;
   const top = 8;
-  const right = 10;
+  const named = width >= 420 && series.length > 0 && series.length <= LABELLED;
+  const right = named ? 124 : 12;
   const used = D.evaluations;
   const from = Math.log(used[0]);
   const to = Math.log(used.at(-1)) || from + 1;
@@ -67,7 +77,7 @@ function chart(width, series, most, label, stepped) {
   for (const value of range(24)
     .map((k) => [1, 2, 5][k % 3] * 10 ** Math.floor(k / 3))
     .filter((one) => one >= used[0] && one <= used.at(-1))) {
-    if (x(value) - free < 44 || x(value) > width - 12) continue;
+    if (x(value) - free < 44 || x(value) > width - right + 4) continue;
     free = x(value);
     svg.append(
       draw("line", { class: "axis", x1: free, x2: free, y1: y(0), y2: y(0) + 4 }),
@@ -78,61 +88,68 @@ function chart(width, series, most, label, stepped) {
     draw("line", { class: "axis", x1: left, x2: width - right, y1: y(0), y2: y(0) }),
     draw(
       "text",
-      { x: (left + width) / 2, y: height - 5, "text-anchor": "middle", class: "soft" },
+      { x: (left + width - right) / 2, y: height - 5, "text-anchor": "middle", class: "soft" },
       "evaluations of a frame",
     ),
   );
-  for (const { m, low, high } of banded ? series : []) {
-    const known = range(used.length).filter((k) => low && given(low[k]) && given(high[k]));
-    if (!known.length) continue;
+  series.forEach((one, k) => svg.append(line(one, k, { x, y, most, used, stepped, from: left })));
+  if (named)
+    spread(
+      series.map(({ values }) => y(Math.min(values.findLast(given), most))),
+      14,
+      top + 6,
+      height - bottom - 2,
+    ).forEach((at, k) => {
+      const { m } = series[k];
+      svg.append(draw("text", { x: width - right + 8, y: at + 4, class: "name" }, shortened(METHODS[m], 17)));
+    });
+  return svg;
+}
+
+// A curve with its band, which shows where it is pointed at, and some of its method's marks.
+function line({ m, values, low, high }, order, { x, y, most, used, stepped, from }) {
+  const group = draw("g", { class: "series", "data-method": m });
+  const known = range(used.length).filter((k) => low && given(low[k]) && given(high[k]));
+  if (known.length) {
     const there = known.map((k) => `${x(used[k]).toFixed(1)},${y(Math.min(high[k], most)).toFixed(1)}`);
     const back = known.reverse().map((k) => `${x(used[k]).toFixed(1)},${y(Math.min(low[k], most)).toFixed(1)}`);
-    svg.append(draw("polygon", { points: [...there, ...back].join(" "), style: `fill: ${colour(m)}`, opacity: 0.13 }));
-  }
-  for (const { m, values } of series) {
-    if (values.filter(given).length === 1) {
-      const k = values.findIndex(given);
-      svg.append(
-        draw(
-          "circle",
-          { cx: x(used[k]) - 3, cy: y(Math.min(values[k], most)), r: 4, style: `fill: ${colour(m)}` },
-          draw("title", {}, `${METHODS[m]}: ${number(values[k], 3)}`),
-        ),
-      );
-    }
-    let path = "";
-    values.forEach((value, k) => {
-      if (!given(value)) return;
-      const [px, py] = [x(used[k]).toFixed(1), y(Math.min(value, most)).toFixed(1)];
-      path += path ? (stepped ? `H${px}V${py}` : `L${px},${py}`) : `M${px},${py}`;
-    });
-    svg.append(
-      draw(
-        "path",
-        {
-          d: path,
-          fill: "none",
-          style: `stroke: ${colour(m)}`,
-          "stroke-width": 2,
-          "stroke-dasharray": dash(m),
-          "data-method": m,
-        },
-        draw("title", {}, `${METHODS[m]}: ${number(values.filter(given).at(-1), 3)} at the end`),
-      ),
+    group.append(
+      draw("polygon", { class: "band", points: [...there, ...back].join(" "), style: `fill: ${colour(m)}` }),
     );
   }
-  return svg;
+  let path = "";
+  let free = from + 24 + 17 * (order % 5);
+  const marks = [];
+  values.forEach((value, k) => {
+    if (!given(value)) return;
+    const [px, py] = [x(used[k]), y(Math.min(value, most))];
+    const to = [px.toFixed(1), py.toFixed(1)];
+    path += path ? (stepped ? `H${to[0]}V${to[1]}` : `L${to.join(",")}`) : `M${to.join(",")}`;
+    if (px < free || value === 0) return;
+    marks.push(mark(m, px, py, 3.6));
+    free = px + 85;
+  });
+  const title = draw("title", {}, `${METHODS[m]}: ${number(values.findLast(given), 3)} at the end`);
+  const style = `stroke: ${colour(m)}`;
+  group.append(
+    draw("path", { class: "near", d: path }, title),
+    draw("path", { class: "curve", d: path, style, "stroke-dasharray": dash(m) }),
+    ...marks,
+  );
+  return group;
 }
 
 function curves() {
   if (!D.evaluations.length) return ["convergence", "ecdf"].forEach((id) => $(id).append("no run has a trace"));
   redraws.push(
     drawn($("convergence"), (width) => {
-      const series = visible()
-        .map(([m, place]) => D.convergence[place] && { m, ...D.convergence[place] })
-        .filter(Boolean);
+      const all = visible().map(([m, place]) => ({ m, ...(D.convergence[place] ?? { values: [] }) }));
+      // one point is no curve
+      const series = all.filter((one) => one.values.filter(given).length > 1);
+      const without = all.filter((one) => !series.includes(one)).map(({ m }) => METHODS[m]);
+      $("no-curve").textContent = without.length ? `Without a curve: ${without.join(", ")}.` : "";
       const values = series
-        .flatMap((one) => [...one.values, ...(banded ? one.high : [])])
+        .flatMap((one) => one.values)
         .filter(given)
         .sort((a, b) => a - b);
       return chart(width, series, 1.05 * (values[Math.floor(0.98 * (values.length - 1))] || 1), "best cost");
@@ -160,15 +177,7 @@ function jointErrors() {
       const row = 20;
       const height = row * D.joints.length + 40;
       const shown = visible();
-      const most =
-        1.05 *
-        Math.max(
-          1,
-          ...shown.flatMap(([, place]) => [
-            ...D.joint_errors[place].values,
-            ...(banded ? D.joint_errors[place].high.filter(given) : []),
-          ]),
-        );
+      const most = 1.05 * Math.max(1, ...shown.flatMap(([, place]) => [...D.joint_errors[place].values]));
       const x = (value) => left + ((width - left - right) * Math.min(value, most)) / most;
       const svg = draw("svg", {
         width,
@@ -189,24 +198,14 @@ function jointErrors() {
         shown.forEach(([m, place], k) => {
           const one = D.joint_errors[place];
           const at = row * j + 7 + (shown.length > 1 ? (13 * k) / (shown.length - 1) : 6);
-          if (banded && given(one.low[j]))
-            svg.append(
-              draw("line", {
-                x1: x(one.low[j]),
-                x2: x(one.high[j]),
-                y1: at,
-                y2: at,
-                style: `stroke: ${colour(m)}`,
-                opacity: 0.35,
-              }),
-            );
-          svg.append(
-            draw(
-              "circle",
-              { cx: x(one.values[j]), cy: at, r: 3.2, style: `fill: ${colour(m)}`, "data-method": m },
-              draw("title", {}, `${METHODS[m]}, ${joint}: ${number(one.values[j], 1)} mm`),
-            ),
-          );
+          const group = draw("g", { class: "series", "data-method": m });
+          if (given(one.low[j])) {
+            const ends = { x1: x(one.low[j]), x2: x(one.high[j]), y1: at, y2: at };
+            group.append(draw("line", { class: "band", ...ends, style: `stroke: ${colour(m)}`, "stroke-width": 2 }));
+          }
+          const said = `${METHODS[m]}, ${joint}: ${number(one.values[j], 1)} mm`;
+          group.append(mark(m, x(one.values[j]), at, 3.6, {}, draw("title", {}, said)));
+          svg.append(group);
         });
       });
       return svg;

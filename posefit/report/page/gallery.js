@@ -125,8 +125,8 @@ function paint() {
   const said = [`frame ${show.frame * scene.step}: MPJPE ${track.mpjpe[show.frame]} mm`, ...state].join(", ");
   $("reading").textContent = said;
   $("overlay").setAttribute("aria-label", said);
-  const mark = $("strip").querySelector(".now");
-  if (mark) mark.setAttribute("transform", `translate(${mark.dataset.step * show.frame},0)`);
+  const now = $("strip").querySelector(".now");
+  if (now) now.setAttribute("transform", `translate(${now.dataset.step * show.frame},0)`);
 }
 
 // Every frame's error as a bar: lost ones red, a line below those that are swapped.

@@ -1,4 +1,4 @@
-// What every part of the report uses: names and colours of methods, and the command that runs a row again.
+// What every part of the report uses: names, colours and marks of methods, and the command that runs a row again.
 const METHODS = D.methods.map((one) => one.name);
 const INSTANCES = D.instances.map((one) => one.name);
 const DASHES = ["", "7 3", "2 3", "8 3 2 3"];
@@ -9,21 +9,85 @@ const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixe
 // A probability in a sentence.
 const stated = (p) => `p ${p < 0.001 ? "" : "= "}${probability(p)}`;
 
+// Corners of marks about 0, 0, of which a disc has the area: seven colours and eight marks make 56 pairs.
+const polygon = (count, radius, turn = 0) =>
+  range(count).map((k) => {
+    const [angle, size] = [
+      2 * Math.PI * (k / count + turn) - Math.PI / 2,
+      Array.isArray(radius) ? radius[k % 2] : radius,
+    ];
+    return [size * Math.cos(angle), size * Math.sin(angle)];
+  });
+const CROSS = [
+  [-0.45, -1.3],
+  [0.45, -1.3],
+  [0.45, -0.45],
+  [1.3, -0.45],
+  [1.3, 0.45],
+  [0.45, 0.45],
+  [0.45, 1.3],
+  [-0.45, 1.3],
+  [-0.45, 0.45],
+  [-1.3, 0.45],
+  [-1.3, -0.45],
+  [-0.45, -0.45],
+];
+const MARKS = [
+  polygon(24, 1),
+  polygon(4, 1.25, 0.125),
+  polygon(3, 1.5),
+  polygon(4, 1.35),
+  polygon(3, 1.5, 0.5),
+  CROSS,
+  polygon(10, [1.6, 0.7]),
+  polygon(6, 1.15),
+];
+
+// A method's mark at a place; what else is said of it stands in `about`, and in its children.
+function mark(m, x, y, radius, about, ...children) {
+  const corners = MARKS[m % MARKS.length].map(
+    ([a, b]) => `${(x + radius * a).toFixed(1)},${(y + radius * b).toFixed(1)}`,
+  );
+  return draw(
+    "polygon",
+    { class: "mark", points: corners.join(" "), style: `fill: ${colour(m)}`, ...about },
+    ...children,
+  );
+}
+
 function swatch(m) {
   return draw(
     "svg",
-    { width: 24, height: 10, "aria-hidden": "true" },
+    { width: 20, height: 12, "aria-hidden": "true" },
     draw("line", {
       x1: 0,
-      x2: 24,
-      y1: 5,
-      y2: 5,
+      x2: 20,
+      y1: 6,
+      y2: 6,
       style: `stroke: ${colour(m)}`,
-      "stroke-width": 3,
+      "stroke-width": 2.5,
       "stroke-dasharray": dash(m),
     }),
+    mark(m, 10, 6, 4),
   );
 }
+
+// Places as near to what is wanted as they can be, at least a gap apart, in the same order.
+function spread(wanted, gap, low, high) {
+  const order = range(wanted.length).sort((a, b) => wanted[a] - wanted[b]);
+  const found = [];
+  order.forEach((k, rank) => {
+    found[k] = Math.max(wanted[k], rank ? found[order[rank - 1]] + gap : low);
+  });
+  let most = high;
+  for (const k of order.reverse()) {
+    found[k] = Math.min(found[k], most);
+    most = found[k] - gap;
+  }
+  return found;
+}
+
+const shortened = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}…` : name);
 
 // The command that runs a row again: the beginning that it shares with others, then its instance and seed.
 function commandOf(row) {

@@ -1,5 +1,18 @@
 // Puts the page together.
 const NAMED = 20; // instances that a note names
+const REASONS = 5; // warnings that it names
+// what there is not where nothing can be compared
+const ABSENT = [
+  "overview",
+  "leaderboard",
+  "comparison",
+  "selection",
+  "to-selection",
+  "curves",
+  "joints",
+  "certainty",
+  "to-certainty",
+];
 
 function header() {
   const H = D.header;
@@ -47,14 +60,21 @@ function header() {
   if (H.budgets.length > 1) notes.push("Budgets differ: compare methods of one budget only.");
   if (H.versions.length > 1) notes.push("Commands run rows again where the same versions are installed.");
   $("notes").append(...notes.map((text) => make("p", { class: "note" }, text)));
+  trouble(H, words);
+  $("foot").textContent = `posefit ${H.version}. This file holds everything it shows and asks the network for nothing.`;
+}
+
+// What failed and what is left out, with the reasons.
+function trouble(H, words) {
   if (H.failed) {
     const by = Object.entries(H.failed_by).map(([method, count]) => `${method} ${whole(count)}`);
-    $("notes").append(
+    $("trouble").append(
       make(
         "div",
         { class: "note warn" },
-        `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join(", ")}.`,
-        make("ul", {}, ...H.reasons.map(([reason, count]) => make("li", {}, `${count} × ${reason}`))),
+        `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join(", ")}. `,
+        make("a", { href: "#failures" }, "Which ones"),
+        make("ul", {}, ...H.reasons.map(([reason, count]) => make("li", {}, `${whole(count)} × ${reason}`))),
       ),
     );
   }
@@ -64,7 +84,7 @@ function header() {
       return make("li", {}, `${INSTANCES[instance]}: ${why}`);
     });
     if (H.dropped.length > NAMED) named.push(make("li", {}, `and ${whole(H.dropped.length - NAMED)} more`));
-    $("notes").append(
+    $("trouble").append(
       make(
         "div",
         { class: "note warn" },
@@ -74,25 +94,44 @@ function header() {
     );
   }
   if (H.unfinished.length)
-    $("notes").append(
+    $("trouble").append(
       make("p", { class: "note warn" }, `No cell finished, so not on the leaderboard: ${words(H.unfinished)}.`),
     );
-  $("foot").textContent = `posefit ${H.version}. This file holds everything it shows and asks the network for nothing.`;
+  const warned = Object.keys(D.warned).length;
+  if (warned)
+    $("trouble").append(
+      make(
+        "div",
+        { class: "note" },
+        `${counted(warned, "run")} with a warning, marked ⚠ below:`,
+        make("ul", {}, ...D.warnings.slice(0, REASONS).map((text) => make("li", {}, text))),
+      ),
+    );
 }
 
 header();
+live();
 if (D.leaderboard) {
-  claim();
+  lead();
   leaderboard();
+  claims();
   legend();
   comparison();
+  selection();
   curves();
   jointErrors();
   certainty();
-} else ["leaderboard", "comparison", "curves", "joints", "certainty", "to-certainty"].forEach((id) => $(id).remove());
+} else {
+  $("answer").textContent = D.header.failed
+    ? "Every cell failed."
+    : "No run has an error yet: there is nothing to compare.";
+  ABSENT.forEach((id) => $(id).remove());
+}
 if (METHODS.length) runs();
 else ["gallery", "author", "rows"].forEach((id) => $(id).remove());
 failures();
+for (const link of document.querySelectorAll("nav a")) if (!document.querySelector(link.hash)) link.remove();
+addEventListener("beforeprint", () => $("what").setAttribute("open", ""));
 $("copy").onclick = copy;
 document.querySelectorAll("dialog .close").forEach((button) => {
   button.onclick = () => button.closest("dialog").close();

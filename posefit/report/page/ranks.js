@@ -1,11 +1,11 @@
 // Who is better than whom: mean ranks with the critical difference, and paired tests of one method with all others.
-function differenceDiagram(P) {
+function differenceDiagram(P, room) {
   const order = P.ranks.map((rank, k) => [rank, k]).sort((a, b) => a[0] - b[0]);
   const count = order.length;
   const half = Math.ceil(count / 2);
-  const width = 760;
-  const left = 250;
-  const right = width - 250;
+  const width = Math.max(290, Math.min(760, room));
+  const side = Math.min(250, 0.36 * width);
+  const [left, right] = [side, width - side];
   const step = 20;
   const x = (rank) => left + ((right - left) * (rank - 1)) / Math.max(count - 1, 1);
   const axis = 62;
@@ -54,7 +54,7 @@ function differenceDiagram(P) {
     const best = place < half;
     const at = names + step * (best ? place : count - 1 - place) + 6;
     const edge = best ? left - 14 : right + 14;
-    const name = METHODS[m].length > 30 ? `${METHODS[m].slice(0, 29)}…` : METHODS[m];
+    const name = shortened(METHODS[m], Math.floor((side - 20) / 6.6) - 5);
     svg.append(
       draw("polyline", {
         points: `${x(rank)},${axis} ${x(rank)},${at} ${edge},${at}`,
@@ -62,7 +62,7 @@ function differenceDiagram(P) {
         style: `stroke: ${colour(m)}`,
         "stroke-dasharray": dash(m),
       }),
-      draw("circle", { cx: x(rank), cy: axis, r: 3.5, style: `fill: ${colour(m)}` }),
+      mark(m, x(rank), axis, 4),
       draw(
         "text",
         { x: best ? edge - 5 : edge + 5, y: at + 4, "text-anchor": best ? "end" : "start" },
@@ -107,7 +107,7 @@ function comparison() {
     `${P.friedman >= 0.05 ? "; what follows means little then" : ""}. Below are mean ranks, 1 is best; ` +
     "bars join methods whose ranks differ by less than Nemenyi's critical difference at 5 %. " +
     "Seeds of one instance are not independent: all of it holds for these instances.";
-  $("difference").append(differenceDiagram(P));
+  drawn($("difference"), (width) => differenceDiagram(P, width));
   const first = D.leaderboard[0].method;
   choose(
     $("against"),
@@ -156,33 +156,32 @@ function comparison() {
 
 const verdict = (row) => (row.adjusted >= 0.05 ? "not told apart" : row.difference < 0 ? "better" : "worse");
 
-function claim() {
-  const C = D.claim;
-  if (!C) return;
-  const names = C.methods.map((m) => METHODS[m]);
-  const errors = C.errors.map((value) => `${number(value, 2)}°`);
-  const step = ({ difference, adjusted, by_instance }) =>
+// How the orders came out that publications claim.
+function claims() {
+  const stepped = (C, names, { difference, adjusted, by_instance }, k) =>
+    `${names[k + 1]} is ` +
     (difference < 0 ? "worse" : difference > 0 ? "better" : "the same") +
-    ` by a median of ${number(Math.abs(difference), 2)}° (paired Wilcoxon with Holm over both, ` +
+    ` by a median of ${number(Math.abs(difference), 2)}° than ${names[k]} (paired Wilcoxon with Holm over all steps, ` +
     `${C.blocks} pairs: ${stated(adjusted)}; over ${C.instances} instances alone: ${stated(by_instance)})`;
-  const holds = C.steps.map((one) => one.difference > 0 && one.adjusted < 0.05);
-  const said = holds.every(Boolean)
-    ? "Both steps are seen here"
-    : holds[1]
-      ? "The second step is seen here, the first is not"
-      : holds[0]
-        ? "The first step is seen here, the second is not"
-        : "Neither step is seen here";
-  $("claim").append(
-    make(
-      "div",
-      { class: "note", id: "paper" },
-      make("strong", {}, "What the SAPSO paper claims"),
-      ": the swarm beats a particle filter in the full space of angles, " +
-        "and is better again in the compact space of principal components. " +
-        `Here ${names.map((name, k) => `${name} ${k ? "" : "has "}${errors[k]}`).join(", ")}. ` +
-        `${names[1]} is ${step(C.steps[0])} than ${names[0]}; ` +
-        `${names[2]} is ${step(C.steps[1])} than ${names[1]}. ${said}, at 5 %.`,
-    ),
-  );
+  D.claims.forEach((C) => {
+    const names = C.methods.map((m) => METHODS[m]);
+    const errors = C.errors.map((value) => `${number(value, 2)}°`);
+    const between = (k) => `from ${names[k]} to ${names[k + 1]}`;
+    const held = C.steps.flatMap((one, k) => (one.seen ? [between(k)] : []));
+    const said =
+      held.length === C.steps.length
+        ? `${C.steps.length > 1 ? "Every step is" : "It is"} seen here`
+        : held.length
+          ? `Only the step ${held.join(" and ")} is seen here`
+          : `${C.steps.length > 1 ? "No step is" : "It is not"} seen here`;
+    $("claims").append(
+      make(
+        "div",
+        { class: "note claim" },
+        make("strong", {}, `What ${C.source} claims`),
+        `: ${C.said}. Here ${names.map((name, k) => `${name} ${k ? "" : "has "}${errors[k]}`).join(", ")}. ` +
+          `${C.steps.map((step, k) => stepped(C, names, step, k)).join("; ")}. ${said}, at 5 %.`,
+      ),
+    );
+  });
 }

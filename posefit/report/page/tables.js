@@ -1,4 +1,5 @@
-// A table that any column sorts. A column: title, value(row), and what is shown of it; text to the left.
+// A table that any column sorts. A column: title, or one for readers of screens alone, value(row), and what is shown of
+// it; text to the left.
 const PAGE = 50;
 
 function table(box, columns, rows, how) {
@@ -12,7 +13,7 @@ function table(box, columns, rows, how) {
       { scope: "col", class: column.text ? "text" : null },
       column.value
         ? make("button", { type: "button", title: column.about, on: { click: () => sort(k) } }, column.title)
-        : column.title,
+        : (column.title ?? make("span", { class: "unseen" }, column.unseen)),
     ),
   );
   const pager = make("div", { class: "row pager" });
@@ -99,7 +100,13 @@ const figure = (name, of) => ({
 const FIGURES = Object.keys(D.columns);
 
 function leaderboard() {
-  const shown = D.leaderboard.map((row) => ({ ...row, interval: given(row.low) ? row.high - row.low : null }));
+  const warned = METHODS.map(() => 0);
+  for (const row of Object.keys(D.warned)) warned[D.rows.method[row]] += 1;
+  const shown = D.leaderboard.map((row) => ({
+    ...row,
+    interval: given(row.low) ? row.high - row.low : null,
+    warned: warned[row.method],
+  }));
   const bases = D.baselines.map((row) => ({
     ...row,
     name: `baseline: ${D.trivial[row.baseline]}`,
@@ -113,7 +120,9 @@ function leaderboard() {
         text: true,
         value: (row) => row.name,
         show: (row) =>
-          row.base ? row.name : [row.name, make("small", {}, D.methods[row.method].settings || "default settings")],
+          row.base
+            ? row.name
+            : [swatch(row.method), row.name, make("small", {}, D.methods[row.method].settings || "default settings")],
       },
       figure("error", (row) => row.error),
       {
@@ -144,11 +153,27 @@ function leaderboard() {
         value: (row) => row.failed,
         show: (row) => (row.base ? "" : make("span", { class: row.failed ? "bad" : null }, String(row.failed))),
       },
+      ...(D.warnings.length
+        ? [
+            {
+              title: "warned",
+              about: "Runs with a warning",
+              value: (row) => row.warned,
+              show: (row) => (row.base ? "" : make("span", { class: row.warned ? "bad" : null }, String(row.warned))),
+            },
+          ]
+        : []),
     ],
     [...shown, ...bases],
     { by: 1, name: "Leaderboard", kind: (row) => (row.base ? "base" : null) },
   );
 }
+
+// The mark of a row with warnings, which says them.
+const warning = (row) => {
+  const said = D.warned[row].map((k) => D.warnings[k]).join("; ");
+  return make("span", { class: "bad", role: "img", title: said, "aria-label": `warning: ${said}` }, " ⚠");
+};
 
 function allRows() {
   const R = D.rows;
@@ -160,8 +185,13 @@ function allRows() {
   table(
     $("all-rows"),
     [
-      { title: "", text: true, show: (k) => [...watch(k), again(k)] },
-      { title: "method", text: true, value: (k) => R.method[k], show: (k) => METHODS[R.method[k]] },
+      { unseen: "watch, or run again", text: true, show: (k) => [...watch(k), again(k)] },
+      {
+        title: "method",
+        text: true,
+        value: (k) => R.method[k],
+        show: (k) => [METHODS[R.method[k]], ...(D.warned[k] ? [warning(k)] : [])],
+      },
       {
         title: "settings",
         text: true,
@@ -195,7 +225,7 @@ function failures() {
         show: (row) => row.reasons.join("; "),
       },
       {
-        title: "",
+        unseen: "run again",
         text: true,
         show: (row) =>
           make("button", { type: "button", on: { click: () => showCommand(row.name, row.command) } }, "command"),

@@ -5,7 +5,10 @@ from typing import Any
 from posefit.page.document import as_one, assembled, part
 from posefit.report import colours
 
-SCRIPTS = ("ledger", "tables", "charts", "certainty", "ranks", "scene", "gallery", "author", "main")  # in this order
+SCRIPTS = (  # in this order
+    *("ledger", "tables", "charts", "certainty", "ranks", "scene", "gallery"),
+    *("lead", "selection", "author", "live", "main"),
+)
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
 
 

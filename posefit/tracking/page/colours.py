@@ -3,7 +3,7 @@
 from posefit.tracking.drawing.colours import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
 
 # of tracks, on any page: the limbs of a body, and the truth
-BODY_LIGHT = {"left": "#d55e00", "right": "#0072b2", "truth": "#7a8794"}
+BODY_LIGHT = {"left": "#b84500", "right": "#0063a6", "truth": "#5d6975"}
 BODY_DARK = {"left": hexadecimal(LEFT), "right": hexadecimal(RIGHT), "truth": "#98a5b3"}
 
 LIGHT = {

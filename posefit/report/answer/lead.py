@@ -1,0 +1,93 @@
+"""Who leads a sweep, who cannot be told apart from him, on what, and how sure that is: in one sentence."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from posefit.report.contest import Contest
+from posefit.statistics.ranks import LEVEL
+from posefit.tracking.measures import BASELINES
+
+NAMED = 4  # methods of a kind that the sentence names; of more it says how many
+EXAMPLES = ("best", "median", "worst")  # tracks of the leader, in this order
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+def lead_sentence(contest: Contest, board: Rows, bases: Rows, tests: Mapping[str, Any] | None) -> str:
+    """Return what a report says first, a sentence or two.
+
+    `board` is the leaderboard, best first, `bases` the baselines' rows, and `tests` the paired tests; None where there
+    are too few methods or runs for any. Whoever leads has the lowest interquartile mean of errors. Others cannot be
+    told apart from it where Wilcoxon's signed ranks over paired runs have a p of 0.05 or more, after Holm.
+    """
+    _, instances, seeds = contest.rows.shape
+    first = board[0]
+    error, low, high = first["error"], first["low"], first["high"]
+    sure = "" if low is None or not np.isfinite(low) else f" (95 % interval {low:.2f}° to {high:.2f}°)"
+    motions = sorted({str(contest.runs.places[i]["motion"]) for i in contest.instances})
+    of = f" of {_listed(motions)}" if len(motions) <= NAMED else f" of {len(motions)} motions"
+    each = "one seed" if seeds == 1 else f"{seeds} seeds each"
+    on = f"{_count(instances, 'instance')}{of} with {each}"
+    said = f"{first['name']} leads with an error of {error:.2f}°{sure} on {on}{_others(contest, first, tests)}."
+    return said + _held_against(error, bases)
+
+
+def three_tracks(contest: Contest, method: int) -> list[tuple[str, int]]:
+    """Return the rows of a method's best, median and worst run by error, with these names; fewer of fewer runs."""
+    rows = contest.rows[contest.methods.index(method)].ravel()
+    ranked = rows[np.argsort(contest.runs.figures["error"][rows], kind="stable")].tolist()
+    places = dict.fromkeys((0, (len(ranked) - 1) // 2, len(ranked) - 1))
+    if len(places) == 2:  # of two runs there is no median
+        return list(zip(EXAMPLES[::2], ranked, strict=True))
+    return [(name, ranked[place]) for name, place in zip(EXAMPLES, places, strict=False)]
+
+
+def _others(contest: Contest, first: Mapping[str, Any], tests: Mapping[str, Any] | None) -> str:
+    """Return what the sentence says of all other methods."""
+    if len(contest.methods) == 1:
+        return "; no other method shares its runs"
+    if tests is None:
+        return "; one shared run is too few to tell it apart from any other method"
+    mine = contest.methods.index(first["method"])
+    alike: list[str] = []
+    worse: list[str] = []
+    better: list[str] = []
+    for one, other, difference, _, adjusted, *_ in tests["pairs"]:
+        if mine not in (one, other):
+            continue
+        name = contest.runs.methods[contest.methods[other if one == mine else one]]
+        ahead = (difference if one == mine else -difference) < 0.0
+        (alike if adjusted >= LEVEL else worse if ahead else better).append(name)
+    how = f"(Wilcoxon's signed ranks over {tests['blocks']} paired runs, after Holm, at 5 %)"
+    told = f"; {_listed(alike)} cannot be told apart from it" if alike else "; every other method can be told apart"
+    if better:
+        told += f", and on most runs {_listed(better)} {'is' if len(better) == 1 else 'are'} better"
+    if worse and (alike or better):
+        told += f", and {_count(len(worse), 'other')} {'is' if len(worse) == 1 else 'are'} worse"
+    elif worse:
+        told += " and is worse"
+    return f"{told} {how}"
+
+
+def _held_against(error: float, bases: Rows) -> str:
+    """Return a sentence of the strongest baseline, if anybody reaches one."""
+    known = [one for one in bases if one["error"] is not None]
+    if not known:
+        return ""
+    best = min(known, key=lambda one: float(one["error"]))
+    said = f"the best baseline, the {BASELINES[best['baseline']]}, has {best['error']:.2f}°"
+    if best["error"] > error:
+        return f" {said[0].upper()}{said[1:]}."
+    return f" It does not beat the baselines: {said}."
+
+
+def _listed(names: Sequence[str]) -> str:
+    if len(names) > NAMED:
+        return f"{', '.join(names[: NAMED - 1])} and {len(names) - NAMED + 1} others"
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def _count(count: int, word: str) -> str:
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"

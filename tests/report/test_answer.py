@@ -1,0 +1,179 @@
+"""What the first screen of a report says, worked by hand."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.claims import ClaimedOrder
+from posefit.report.answer.claimed import claim_results
+from posefit.report.answer.lead import lead_sentence, three_tracks
+from posefit.report.answer.selection import features_of, selected, selection_of
+from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard, paired_tests
+from posefit.report.runs import runs_of
+from posefit.sweep.ledger import Ledger
+from tests.report.browser import ledger, result
+from tests.report.test_contest import FIRST, Errors, contest, full
+
+ORDER = ClaimedOrder("a paper", "c beats b, and b beats a", ("a", "b", "c"))
+
+
+def sentence(found: Contest) -> str:
+    enough = len(found.methods) > 1 and found.rows[0].size > 1
+    tests = paired_tests(found) if enough else None
+    return lead_sentence(found, leaderboard(found), baseline_rows(found), tests)
+
+
+def test_who_leads_and_who_cannot_be_told_apart_is_one_sentence(tmp_path: Path) -> None:
+    # as in the letters of a leaderboard: b is behind a in each of 12 pairs; a and c differ by chance alone
+    errors = full({"a": 1.0, "b": 2.0}, instances=6)
+    errors |= {("c", i, s): error + 0.001 * (-1) ** i for (_, i, s), error in full({"a": 1.0}, instances=6).items()}
+    found = contest(tmp_path, errors)
+    first = leaderboard(found)[0]
+    assert sentence(found) == (
+        f"a leads with an error of 1.26° (95 % interval {first['low']:.2f}° to {first['high']:.2f}°) on 6 instances of "
+        "walk with 2 seeds each; c cannot be told apart from it, and 1 other is worse (Wilcoxon's signed ranks over 12 "
+        "paired runs, after Holm, at 5 %). The best baseline, the mean training pose, has 4.00°."
+    )
+
+
+def test_where_all_others_are_worse_it_says_so(tmp_path: Path) -> None:
+    said = sentence(contest(tmp_path, full({"a": 1.0, "b": 2.0}, instances=6)))
+    assert "; every other method can be told apart and is worse (" in said
+
+
+def test_whoever_leads_by_the_middle_may_lose_most_runs_and_that_is_said(tmp_path: Path) -> None:
+    # a is a little worse than b in 9 of 12 instances, and far better in 3: the middle half of b has one of them
+    worse = {("a", i, 0): 1.5 + 0.01 * i for i in range(12)}
+    better = {("b", i, 0): 1.4 + 0.01 * i if i < 11 else 1.7 for i in range(12)}
+    said = sentence(contest(tmp_path, worse | better))
+    assert said.startswith("b leads")
+    assert "a cannot be told apart" not in said
+
+
+def test_one_method_alone_and_one_run_alone_are_not_compared(tmp_path: Path) -> None:
+    alone = sentence(contest(tmp_path / "a", full({"a": 1.0})))
+    assert alone.startswith("a leads with an error of 1.06° on 2 instances of walk with 2 seeds each; no other method")
+    once = sentence(contest(tmp_path / "b", full({"a": 1.0, "b": 2.0}, instances=1, seeds=1)))
+    assert "on 1 instance of walk with one seed; one shared run is too few" in once
+
+
+def test_a_leader_behind_the_baselines_is_not_praised(tmp_path: Path) -> None:
+    said = sentence(contest(tmp_path, full({"a": 5.0, "b": 6.0})))
+    assert said.endswith("It does not beat the baselines: the best baseline, the mean training pose, has 4.00°.")
+
+
+def test_the_best_the_median_and_the_worst_track_of_a_method_are_shown(tmp_path: Path) -> None:
+    found = contest(tmp_path, {("a", i, 0): error for i, error in enumerate([3.0, 1.0, 2.0, 9.0])})
+    shown = [(name, found.runs.figures["error"][row]) for name, row in three_tracks(found, 0)]
+    assert shown == [("best", 1.0), ("median", 2.0), ("worst", 9.0)]
+    two = contest(tmp_path / "two", {("a", i, 0): error for i, error in enumerate([3.0, 1.0])})
+    assert [name for name, _ in three_tracks(two, 0)] == ["best", "worst"]
+    one = contest(tmp_path / "one", {("a", 0, 0): 1.0})
+    assert [name for name, _ in three_tracks(one, 0)] == ["best"]
+
+
+def test_a_claimed_order_is_tested_step_by_step(tmp_path: Path) -> None:
+    found = contest(tmp_path, full({"a": 3.0, "b": 2.0, "c": 1.0, "d": 0.5}, instances=3, seeds=2))
+    (one,) = claim_results(found, [ORDER])
+    assert [step["difference"] for step in one["steps"]] == pytest.approx([1.0, 1.0])
+    assert [step["p"] for step in one["steps"]] == pytest.approx([2.0 / 2**6] * 2)
+    assert [step["adjusted"] for step in one["steps"]] == pytest.approx([4.0 / 2**6] * 2)  # Holm's, of two
+    assert [step["by_instance"] for step in one["steps"]] == pytest.approx([4.0 / 2**3] * 2)
+    assert [step["seen"] for step in one["steps"]] == [False, False]  # 0.0625 is above 5 %
+    assert one["errors"] == pytest.approx([3.105, 2.105, 1.105])
+    assert (one["source"], one["said"]) == ("a paper", "c beats b, and b beats a")
+    assert claim_results(contest(tmp_path / "two", full({"a": 1.0, "b": 2.0})), [ORDER]) == []
+
+
+def test_a_step_is_seen_where_it_is_better_and_not_where_it_is_worse(tmp_path: Path) -> None:
+    found = contest(tmp_path, full({"a": 2.0, "b": 1.0, "c": 3.0}, instances=6))
+    (one,) = claim_results(found, [ORDER])
+    assert [step["seen"] for step in one["steps"]] == [True, False]
+
+
+def damaged(path: Path, errors: dict[str, tuple[float, float]], seeds: int = 2) -> Contest:
+    """Return a contest on eight instances, of which the last four are damaged, with each method's error on either."""
+    made = [
+        result(
+            replace(FIRST, method=name, instance=i, seed=s, corruption={"holes": 0.3} if i >= 4 else {}),
+            both[i // 4] + 0.01 * s,
+        )
+        for name, both in errors.items()
+        for i in range(8)
+        for s in range(seeds)
+    ]
+    found = contest_of(runs_of(Ledger(ledger(path / "results", made))))
+    assert found is not None
+    return found
+
+
+def test_a_selector_closes_the_gap_where_the_plan_tells_who_wins(tmp_path: Path) -> None:
+    found = selection_of(damaged(tmp_path, {"clean": (1.0, 4.0), "tough": (3.0, 2.5)}))
+    assert found is not None
+    # means over seeds are 0.005 more: clean has 1 and 4, tough 3 and 2.5, the best of each instance 1 and 2.5
+    assert (found["single"], found["oracle"], found["oracle_apart"]) == pytest.approx((2.505, 1.755, 1.755))
+    assert found["selector"] == pytest.approx(1.755)
+    assert found["closed"] == pytest.approx(1.0)
+    assert found["features"] == ["holes"]
+    assert sorted(found["wins"]) == [[0, 4, 4], [1, 4, 4]]
+    parts = {one["part"]: (one["method"], one["behind"]) for one in found["where"]}
+    clean, tough = (["clean", "tough"].index(name) for name in ("clean", "tough"))
+    assert parts["damage: none"] == (clean, pytest.approx(0.0))
+    assert parts["damage: holes 0.3"] == (tough, pytest.approx(1.5))
+
+
+def test_a_selector_that_learns_nothing_takes_the_single_best() -> None:
+    rng = np.random.default_rng(0)
+    errors = rng.uniform(1.0, 2.0, (40, 3)) - np.array([0.5, 0.0, 0.0])
+    assert selected(rng.uniform(size=(40, 1)), errors).tolist().count(0) >= 36
+
+
+def test_an_instance_has_no_say_in_what_is_chosen_for_it() -> None:
+    # each is alone with its feature: whoever had seen it would take its best method; nobody else can know that
+    errors = np.ones((12, 2))
+    errors[:, 1] += 0.1
+    errors[5] = [9.0, 0.0]
+    errors[0, 0] = 0.0  # so that the first is the best on average without the sixth, and with it is not
+    assert selected(np.arange(12.0)[:, None] == 5.0, errors)[5] == 0
+
+
+def test_an_oracle_is_told_apart_from_chance(tmp_path: Path) -> None:
+    # on seed 0 a is better, on seed 1 b: who is best on the other seed is worse on this one
+    errors: Errors = {}
+    for i in range(3):
+        errors |= {("a", i, 0): 1.0, ("a", i, 1): 2.0, ("b", i, 0): 2.0, ("b", i, 1): 1.1}
+    found = selection_of(contest(tmp_path, errors))
+    assert found is not None
+    assert found["oracle_apart"] == pytest.approx(2.0)
+    assert found["oracle"] == pytest.approx(1.5)
+    assert found["selector"] is None
+    assert found["why"] == "3 instances are too few to train a selector: at least 8"
+
+
+def test_one_method_or_one_instance_leaves_nothing_to_choose(tmp_path: Path) -> None:
+    assert selection_of(contest(tmp_path / "a", full({"a": 1.0}))) is None
+    assert selection_of(contest(tmp_path / "b", full({"a": 1.0, "b": 2.0}, instances=1))) is None
+
+
+def test_where_the_plan_says_the_same_of_all_there_is_no_selector(tmp_path: Path) -> None:
+    found = selection_of(contest(tmp_path, full({"a": 1.0, "b": 2.0}, instances=9)))
+    assert found is not None
+    assert (found["selector"], found["closed"]) == (None, None)
+    assert found["why"].startswith("the plan says the same of every instance")
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [({"view_degrees": (90.0,)}, "view"), ({"motion": "run"}, "motion"), ({"frames": 9}, "frames"),
+     ({"view_degrees": (45.0, 90.0)}, "cameras"), ({"size": (80, 60)}, "size")],
+)  # fmt: skip
+def test_what_a_plan_says_of_instances_is_told_by_name(tmp_path: Path, change: dict[str, Any], name: str) -> None:
+    other = replace(FIRST, **change)
+    made = [result(replace(cell, instance=i), 1.0) for cell in (FIRST, other) for i in range(3)]
+    runs = runs_of(Ledger(ledger(tmp_path / "results", made)))
+    names, values = features_of(runs, range(6))
+    assert names == [name]
+    assert len(np.unique(values, axis=0)) == 2

@@ -1,0 +1,164 @@
+"""A report while the sweep goes on: how far it is, what failed, and the report so far, on this machine alone."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from posefit.report.live.progress import Progress, progress_so_far
+from posefit.report.live.server import LOOPBACK, address_of, serving
+from posefit.sweep.driver import Claim, Driver
+from posefit.sweep.ledger import PLANS, Ledger
+from tests.cli.test_command_line import fails
+from tests.report.browser import browser, ledger, opened, result
+from tests.sweep.fake import cells
+
+PLAN = [replace(cell, frames=4) for cell in cells(6)]
+
+
+@pytest.fixture
+def begun(tmp_path: Path) -> Path:
+    """Return a ledger in which three of six cells were run, of which one was there before, and one failed for good."""
+    path = ledger(tmp_path / "results", [result(PLAN[0], 1.0)])
+    with Driver(path) as driver:
+        driver.ledger.begin(cell.key for cell in PLAN)
+    more = ledger(path, [result(cell, 2.0) for cell in PLAN[1:3]], [(PLAN[3], ["ValueError: it had to"])])
+    return more
+
+
+def page_of(folder: str | Path, **more: str) -> tuple[int, str]:
+    """Return the status and the text of a server's page."""
+    with serving(folder, 0, lambda _: None) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        try:
+            connection = HTTPConnection(LOOPBACK, server.server_address[1], timeout=60)
+            connection.request("GET", more.pop("path", "/"), headers=more)
+            answer = connection.getresponse()
+            return answer.status, answer.read().decode()
+        finally:
+            connection.close()
+            server.shutdown()
+            thread.join()
+
+
+def data_in(page: str) -> dict[str, Any]:
+    found = re.search(r'id="data">(.*?)</script>', page, re.DOTALL)
+    assert found is not None
+    data: dict[str, Any] = json.loads(found[1])
+    return data
+
+
+def test_progress_is_of_the_plan_that_was_begun_last(begun: Path) -> None:
+    (plan,) = Ledger(begun).plans()
+    assert (plan.cells, plan.settled) == (6, 1)
+    found = progress_so_far(Ledger(begun), now=plan.begun + 30.0)
+    assert found == Progress(6, 3, 1, 2, 0, None)  # nobody works on it
+    with Driver(begun) as driver:
+        assert isinstance(driver.claim(PLAN[4]), Claim)
+        # three cells were settled in half a minute, so the two that are left take twenty seconds
+        assert progress_so_far(Ledger(begun), now=plan.begun + 30.0) == Progress(6, 3, 1, 2, 1, 20.0)
+
+
+def test_a_plan_that_is_gone_on_with_is_one_plan_and_a_later_one_comes_first(begun: Path) -> None:
+    with Driver(begun) as driver:
+        driver.ledger.begin(cell.key for cell in PLAN)
+        assert [(plan.cells, plan.settled) for plan in driver.ledger.plans()] == [(6, 4)]
+        driver.ledger.begin(cell.key for cell in PLAN[4:])
+    assert [plan.cells for plan in Ledger(begun).plans()] == [2, 6]
+    assert progress_so_far(Ledger(begun)) == Progress(2, 0, 0, 2, 0, None)
+
+
+def test_a_ledger_of_earlier_days_has_no_plan_and_a_damaged_one_is_none(begun: Path) -> None:
+    (path,) = (begun / PLANS).iterdir()
+    path.write_bytes(path.read_bytes()[:-3])
+    assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, None)
+    path.unlink()
+    (begun / PLANS).rmdir()
+    assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, None)
+    with Driver(begun) as driver:
+        driver.ledger.begin(cell.key for cell in PLAN)
+        assert len(driver.ledger.plans()) == 1
+
+
+def test_the_page_is_the_report_with_the_progress_and_reasons(begun: Path) -> None:
+    status, text = page_of(begun)
+    data = data_in(text)
+    assert status == 200
+    assert data["live"] == {"cells": 6, "done": 3, "quarantined": 1, "left": 2, "running": 0, "seconds": None,
+                            "rows": 3, "again": data["live"]["again"]}  # fmt: skip
+    assert data["live"]["again"] >= 5.0
+    assert data["failures"][0]["reasons"] == ["ValueError: it had to"]
+
+
+def test_before_the_first_cell_is_done_there_is_a_page_too(tmp_path: Path) -> None:
+    path = ledger(tmp_path / "results", [])
+    status, text = page_of(path)
+    assert status == 200
+    assert data_in(text)["rows"]["key"] == []
+
+
+@pytest.mark.parametrize(
+    ("asked", "status"), [({"Host": "evil.example"}, 403), ({"path": "/../etc/passwd"}, 404), ({"path": "/?x"}, 200)]
+)
+def test_it_answers_to_this_machine_and_with_one_page(tmp_path: Path, asked: dict[str, str], status: int) -> None:
+    assert page_of(ledger(tmp_path / "results", []), **asked)[0] == status
+
+
+def test_a_port_that_is_taken_is_told_in_one_line(begun: Path) -> None:
+    with socket.create_server((LOOPBACK, 0)) as taken:
+        port = taken.getsockname()[1]
+        assert f"--port must be one that is free, got {port}: " in fails("report", begun, "--serve", "--port", port)
+
+
+def test_ctrl_c_ends_it_with_status_0_after_one_line_with_the_address(begun: Path) -> None:
+    before = sorted(begun.rglob("*"))
+    words = [sys.executable, "-c", "from posefit.cli import main; main()", "report", str(begun), "--serve"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        line = process.stdout.readline()
+        assert re.fullmatch(rf"showing {re.escape(str(begun))} at http://127\.0\.0\.1:\d+/ until Ctrl-C\n", line)
+        time.sleep(0.3)
+        os.kill(process.pid, signal.SIGINT)
+        assert process.wait(60) == 0
+        assert process.stdout.read() == process.stderr.read() == ""
+    assert sorted(begun.rglob("*")) == before
+
+
+@contextmanager
+def shown(path: Path) -> Iterator[str]:
+    with serving(path, 0, lambda _: None) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        yield address_of(server)
+        server.shutdown()
+        thread.join()
+
+
+def test_a_browser_shows_how_far_it_is_and_loads_the_page_anew(begun: Path) -> None:
+    with browser() as chromium, shown(begun) as address, Driver(begun) as driver:
+        driver.claim(PLAN[4])
+        with opened(chromium, address, offline=False) as seen:
+            said = seen.page.locator("#live-said")
+            assert said.inner_text().startswith("4 of 6 cells: 3 done, 1 quarantined; 1 running, about ")
+            assert "ValueError: it had to" in seen.page.inner_text("#trouble")
+            claim = driver.claim(PLAN[5])
+            assert isinstance(claim, Claim)
+            driver.finish(claim, result(PLAN[5], 3.0))
+            seen.page.get_by_text("5 of 6 cells").wait_for(timeout=60_000)
+            seen.page.locator("#live-stop").check()
+            assert seen.complaints == []
