@@ -1,8 +1,8 @@
 """Numbered instances: a person of the library, a pose, cameras, and what they see.
 
 A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose; only the
-ambiguous one draws until a pose's mirror image is near enough. Instances below 10,000 are of seven people, the others of
-three whom nothing for training has ever seen.
+ambiguous one draws until a pose's mirror image is near enough. Instances below 10,000 are of seven people, the others
+of three whom nothing for training has ever seen.
 """
 
 from collections.abc import Callable
@@ -61,10 +61,11 @@ class SuiteInstance:
     def repaired(self, proposals: Array) -> Array:
         """Return proposals (n, d), those that are not feasible moved: into the box, then towards its middle."""
         space = self.posed.space
+        allowed = space.feasible(proposals)
         inside = np.clip(proposals, -1.0, 1.0)
         latents = space.centre[3:] + space.half[3:] * inside[:, 3:]
         inside[:, 3:] = np.clip((self.box.within_reach(latents) - space.centre[3:]) / space.half[3:], -1.0, 1.0)
-        return inside
+        return np.where(allowed[:, None], proposals, inside)
 
 
 @lru_cache(maxsize=256)

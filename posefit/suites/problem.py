@@ -47,6 +47,7 @@ class Problem:
     number_of_objectives = 1
     number_of_constraints = 0
     number_of_integer_variables = 0
+    evaluations_constraints = 0
 
     def __init__(
         self,
@@ -99,10 +100,19 @@ class Problem:
         """d."""
         return len(self.made.truth)
 
+    number_of_variables = dimension
+
     @property
     def instance(self) -> int:
         """The instance's number."""
         return self.made.number
+
+    id_instance = instance
+
+    @property
+    def id_function(self) -> int:
+        """The function's number."""
+        return self.function.number
 
     @property
     def id(self) -> str:
@@ -140,7 +150,8 @@ class Problem:
         """Return the proposal (d,) to start from at first, and others, drawn, for each restart."""
         if not restart:
             return self.initial_solution
-        return self.space.draw(np.random.default_rng([self.instance, restart]), 1)[0]
+        drawn: Array = self.space.draw(np.random.default_rng([self.instance, restart]), 1)[0]
+        return drawn
 
     @property
     def optimum(self) -> float | None:
@@ -220,7 +231,7 @@ class Problem:
         if self._limit is not None and self.seconds > self._limit:
             raise BudgetSpentError(f"{self.id}: its {self._limit:g} seconds are over")
         allowed = self.space.feasible(asked)
-        mended = asked if allowed.all() else np.where(allowed[:, None], asked, self.made.repaired(asked))
+        mended = asked if allowed.all() else self.made.repaired(asked)
         costs = self.made.posed.evaluate(mended)
         if self.infeasible == "reject":
             costs[~allowed] = np.inf
