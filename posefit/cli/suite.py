@@ -1,0 +1,130 @@
+"""`posefit suite`."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from posefit.cli.options import frame_range
+from posefit.cli.output import json_line, progress, results_alone, say
+
+if TYPE_CHECKING:
+    from posefit.suites.running import SuiteRun
+
+NAME = "posefit-2026.1"
+
+
+@click.group(invoke_without_command=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
+@click.pass_context
+def suite(context: click.Context, as_json: bool) -> None:
+    """List the functions of the numbered benchmark, and their dimensions."""
+    if context.invoked_subcommand is not None:
+        return
+    from dataclasses import asdict
+
+    from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
+
+    if as_json:
+        click.echo(json_line([asdict(one) for one in FUNCTIONS]))
+        return
+    click.echo(f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100")
+    click.echo(f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out\n")
+    for one in FUNCTIONS:
+        dimensions = ", ".join(map(str, one.dimensions))
+        click.echo(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
+
+
+@suite.command()
+@click.argument("optimiser")
+@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
+@click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
+@click.option(
+    "--instances", callback=frame_range, default="10000:10005", show_default=True, metavar="A:B", help="A to B - 1."
+)
+@click.option("--budget", type=int, help="Evaluations of a run; by default 100 for each dimension.")
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
+@click.option("--infeasible", default="repair", show_default=True, help="repair, reject or penalise.")
+@click.option("--name", default=NAME, show_default=True, help="Of the suite.")
+@click.option("--out", metavar="DIR", help="New folder for IOHprofiler's files.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
+def run(
+    optimiser: str,
+    functions: tuple[int, ...],
+    dimensions: tuple[int, ...],
+    instances: tuple[int | None, int | None],
+    budget: int | None,
+    seed: int,
+    texts: tuple[str, ...],
+    infeasible: Any,
+    name: str,
+    out: str | None,
+    as_json: bool,
+) -> None:
+    """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
+    from posefit import settings
+    from posefit.fitting.check import whole
+    from posefit.registry import registry
+    from posefit.suites.front import Suite
+    from posefit.suites.functions import INSTANCES
+    from posefit.suites.running import run_on
+    from posefit.suites.tally import score_lines, suite_scores
+
+    with results_alone():
+        if budget is not None:
+            whole("budget", budget, 1)
+        whole("seed", seed, 0)
+        if out is not None:
+            _check_new(out)
+        first, last = instances[0] or 0, INSTANCES.stop if instances[1] is None else instances[1]
+        if not 0 <= first < last <= INSTANCES.stop:
+            raise ValueError(f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}")
+        problems = Suite(
+            name,
+            functions=functions or None,
+            dimensions=dimensions or (9,),
+            instances=range(first, last),
+            infeasible=infeasible,
+        )
+        chosen = settings.parse_texts(optimiser, registry().optimiser(optimiser), texts)
+        asked = (run_on(problem, optimiser, chosen, evaluations=budget, seed=seed) for problem in problems)
+        runs = list(progress(asked, len(problems), "run"))
+        scores = suite_scores(runs)
+        if out is not None:
+            write_runs(runs, out)
+            say(f"written to {out}: IOHprofiler's files")
+    for line in [json_line([one.as_dict() for one in scores])] if as_json else score_lines(scores):
+        click.echo(line)
+
+
+def write_runs(runs: "list[SuiteRun]", out: str) -> None:
+    """Write runs to a new folder, as IOHprofiler has them."""
+    from posefit.report.export import LoggedRun, write_iohprofiler
+    from posefit.suites.functions import suite_function
+
+    write_iohprofiler(
+        (
+            LoggedRun(
+                run.method,
+                run.settings,
+                f"f{run.function} {suite_function(run.function).name}",
+                run.dimension,
+                run.instance,
+                run.seed,
+                run.evaluations,
+                run.costs,
+            )
+            for run in runs
+        ),
+        out,
+    )
+
+
+def _check_new(out: str) -> None:
+    """Return nothing. Raises ValueError where a folder is there already, before anything runs for it."""
+    from pathlib import Path
+
+    if Path(out).exists():
+        raise ValueError(f"{out}: expected a new name to write to, got one that exists")
+    if not Path(out).resolve().parent.is_dir():
+        raise ValueError(f"{out}: expected a place to write to, got one in {Path(out).resolve().parent}, which is none")
