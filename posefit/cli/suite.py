@@ -97,6 +97,30 @@ def run(
         click.echo(line)
 
 
+@suite.command()
+@click.argument("ledger", metavar="DIR")
+@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
+def table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
+    """Print what a sweep of a plan of single searches to DIR found, by dimension, function and method."""
+    from posefit.suites.tally import score_lines, suite_scores
+    from posefit.sweep.ledger import Ledger
+    from posefit.sweep.single.rows import search_runs
+
+    if iohprofiler is not None:
+        _check_new(iohprofiler)
+    kept = Ledger(ledger, say)
+    runs = list(search_runs(kept))
+    scores = suite_scores(runs)
+    if iohprofiler is not None:
+        write_runs(runs, iohprofiler)
+        say(f"written to {iohprofiler}: IOHprofiler's files")
+    if failed := len(kept.quarantined()):
+        say(f"{failed} {'cell' if failed == 1 else 'cells'} failed, left out of all figures")
+    for line in [json_line([one.as_dict() for one in scores])] if as_json else score_lines(scores):
+        click.echo(line)
+
+
 def write_runs(runs: "list[SuiteRun]", out: str) -> None:
     """Write runs to a new folder, as IOHprofiler has them."""
     from posefit.report.export import LoggedRun, write_iohprofiler

@@ -26,6 +26,7 @@ class SuiteRun:
     dimension: int
     instance: int
     seed: int
+    budget: int  # evaluations that there could have been
     best_known: float
     targets: Array = field(repr=False)  # (t,) costs, falling
     evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
@@ -74,6 +75,7 @@ def run_on(
         problem.dimension,
         problem.instance,
         seed,
+        evaluations,
         problem.best_known,
         problem.targets,
         *problem.trace,

@@ -31,7 +31,7 @@ class SuiteScore:
     runs: int
     above: float  # median of the best costs above the best known
     reached: float  # share of runs and targets, at the end
-    shares: dict[int, float]  # the same after so many evaluations for each dimension, as far as every run goes
+    shares: dict[int, float]  # the same after so many evaluations for each dimension, as far as budgets go
     running_times: dict[float, float | None]  # expected evaluations to so much above the best known; None for never
 
     def as_dict(self) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def _score(method: str, function: int, dimension: int, runs: Sequence[SuiteRun])
     reached = np.array([hits((run.evaluations, run.costs), run.targets) for run in runs])
     spent = np.array([run.evaluations[-1] for run in runs])
     times = expected_running_time(reached, spent)
-    points = [point for point in POINTS if point * dimension <= spent.min()]
+    points = [point for point in POINTS if point * dimension <= min(run.budget for run in runs)]
     shares = attained(reached, [*(point * dimension for point in points), float(spent.max())])
     return SuiteScore(
         method,
@@ -83,7 +83,7 @@ def _finite(value: Array | float) -> float | None:
 
 
 def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
-    """Return the lines of a table of scores, for a terminal."""
+    """Return the lines of two tables of scores, for a terminal: where runs end, and how soon they reach targets."""
     heads = [f"ERT +{above:g}" for above in SHOWN]
     wide = max(24, *(len(one.method) for one in scores)) if scores else 24
     lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
@@ -92,6 +92,13 @@ def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
         label = f"{one.function} {one.name}"
         start = f"{one.dimension:>3} {label:22} {one.method:{wide}} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}"
         lines.append(start + _cells(times))
+    points = sorted({point for one in scores for point in one.shares})
+    lines += ["", f"share of targets reached after d x{'':{wide - 1}}" + _cells([str(point) for point in points])]
+    for one in scores:
+        shares = [f"{one.shares[point]:.1%}" if point in one.shares else "" for point in points]
+        lines.append(
+            (f"{one.dimension:>3} {f'{one.function} {one.name}':22} {one.method:{wide}}" + _cells(shares)).rstrip()
+        )
     return lines
 
 
