@@ -66,7 +66,6 @@ def run(
     from posefit.fitting.check import whole
     from posefit.registry import registry
     from posefit.suites.front import Suite
-    from posefit.suites.functions import INSTANCES
     from posefit.suites.running import run_on
     from posefit.suites.tally import score_lines, suite_scores
 
@@ -76,14 +75,11 @@ def run(
         whole("seed", seed, 0)
         if out is not None:
             _check_new(out)
-        first, last = instances[0] or 0, INSTANCES.stop if instances[1] is None else instances[1]
-        if not 0 <= first < last <= INSTANCES.stop:
-            raise ValueError(f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}")
         problems = Suite(
             name,
             functions=functions or None,
             dimensions=dimensions or (9,),
-            instances=range(first, last),
+            instances=_numbers(instances),
             infeasible=infeasible,
         )
         chosen = settings.parse_texts(optimiser, registry().optimiser(optimiser), texts)
@@ -119,6 +115,58 @@ def table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
         say(f"{failed} {'cell' if failed == 1 else 'cells'} failed, left out of all figures")
     for line in [json_line([one.as_dict() for one in scores])] if as_json else score_lines(scores):
         click.echo(line)
+
+
+@suite.command()
+@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
+@click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
+@click.option(
+    "--instances", callback=frame_range, default="10000:10003", show_default=True, metavar="A:B", help="A to B - 1."
+)
+@click.option("--method", "methods", multiple=True, help="Searches with the usual budget; repeatable.")
+@click.option("--times", type=int, default=100, show_default=True, help="How much longer CMA-ES searches; 0 for not.")
+@click.option("--write", metavar="FILE", help="New file of the best costs found, as the suite has one.")
+@click.pass_context
+def audit(
+    context: click.Context,
+    functions: tuple[int, ...],
+    dimensions: tuple[int, ...],
+    instances: tuple[int | None, int | None],
+    methods: tuple[str, ...],
+    times: int,
+    write: str | None,
+) -> None:
+    """Search problems with each method, and check what is reported; exit status 1 where something is not true."""
+    import json
+
+    from posefit.files import new_file
+    from posefit.fitting.check import whole
+    from posefit.suites.audit import METHODS, STRONGEST, audit_lines, audited, known_json
+    from posefit.suites.front import Suite
+
+    with results_alone():
+        whole("times", times, 0)
+        if write is not None:
+            _check_new(write)
+        problems = Suite(functions=functions or None, dimensions=dimensions or (9,), instances=_numbers(instances))
+        asked = audited(problems, methods or METHODS, times=times)
+        rows = list(progress(asked, len(problems), "problem"))
+        if write is not None:
+            with new_file(write) as building:
+                building.write_text(json.dumps(known_json(rows, times, STRONGEST), indent=1) + "\n", encoding="utf-8")
+    for line in audit_lines(rows):
+        click.echo(line)
+    context.exit(1 if any(row.faults for row in rows) else 0)
+
+
+def _numbers(instances: tuple[int | None, int | None]) -> range:
+    """Return the instances of a range A:B. Raises ValueError where there are none."""
+    from posefit.suites.functions import INSTANCES
+
+    first, last = instances[0] or 0, INSTANCES.stop if instances[1] is None else instances[1]
+    if not 0 <= first < last <= INSTANCES.stop:
+        raise ValueError(f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}")
+    return range(first, last)
 
 
 def write_runs(runs: "list[SuiteRun]", out: str) -> None:
