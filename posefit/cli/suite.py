@@ -34,7 +34,7 @@ def suite(context: click.Context, as_json: bool) -> None:
         click.echo(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
 
 
-@suite.command()
+@suite.command("run")
 @click.argument("optimiser")
 @click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
 @click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
@@ -48,7 +48,7 @@ def suite(context: click.Context, as_json: bool) -> None:
 @click.option("--name", default=NAME, show_default=True, help="Of the suite.")
 @click.option("--out", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
-def run(
+def suite_run(
     optimiser: str,
     functions: tuple[int, ...],
     dimensions: tuple[int, ...],
@@ -93,11 +93,11 @@ def run(
         click.echo(line)
 
 
-@suite.command()
+@suite.command("table")
 @click.argument("ledger", metavar="DIR")
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
-def table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
+def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     """Print what a sweep of a plan of single searches to DIR found, by dimension, function and method."""
     from posefit.suites.tally import score_lines, suite_scores
     from posefit.sweep.ledger import Ledger
@@ -117,7 +117,7 @@ def table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
         click.echo(line)
 
 
-@suite.command()
+@suite.command("audit")
 @click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
 @click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
 @click.option(
@@ -127,7 +127,7 @@ def table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
 @click.option("--times", type=int, default=100, show_default=True, help="How much longer CMA-ES searches; 0 for not.")
 @click.option("--write", metavar="FILE", help="New file of the best costs found, as the suite has one.")
 @click.pass_context
-def audit(
+def suite_audit(
     context: click.Context,
     functions: tuple[int, ...],
     dimensions: tuple[int, ...],
