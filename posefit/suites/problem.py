@@ -40,8 +40,8 @@ class Problem:
     cost is infinite; with "penalise" it is that of the repaired one, and 100 for each half-side of the box between the
     two. It is the same for every method, whoever wrote it.
 
-    `budget` is how many evaluations there may be, and `seconds` how long they may go on after the first: whatever would
-    go beyond is not evaluated and raises BudgetSpentError. Without them there is no end.
+    `budget` is how many evaluations there may be, and `seconds` how long after the first a call may
+    begin: whatever goes beyond is not evaluated and raises BudgetSpentError. Without them there is no end.
     """
 
     number_of_objectives = 1
@@ -185,8 +185,8 @@ class Problem:
         return np.inf if self.budget is None else self.budget - self.evaluations
 
     @property
-    def seconds(self) -> float:
-        """How long ago the first evaluation began."""
+    def elapsed(self) -> float:
+        """Seconds since the first evaluation began."""
         return 0.0 if self._began is None else time.perf_counter() - self._began
 
     @property
@@ -228,7 +228,7 @@ class Problem:
             self._began = time.perf_counter()
         if len(asked) > self.left:
             raise BudgetSpentError(f"{self.id}: {self.left:g} of {self.budget} evaluations are left, got {len(asked)}")
-        if self._limit is not None and self.seconds > self._limit:
+        if self._limit is not None and self.elapsed > self._limit:
             raise BudgetSpentError(f"{self.id}: its {self._limit:g} seconds are over")
         allowed = self.space.feasible(asked)
         mended = asked if allowed.all() else self.made.repaired(asked)

@@ -16,6 +16,7 @@ from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SuiteRun
 
+ALL = 0  # the number that stands for all functions together
 SHOWN = (16.0, 4.0, 1.0, 0.25)  # of the targets above the best known, those with an expected running time
 POINTS = (1, 3, 10, 30, 100, 300, 1000)  # evaluations for each dimension at which shares are told
 
@@ -42,14 +43,21 @@ class SuiteScore:
 def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
     """Return the scores of runs, by dimension, function and method, the best method first.
 
-    Methods with other settings are other methods. Raises ValueError where there is no run.
+    In a dimension with several functions those of all together come first, as function 0. Methods with other settings
+    are other methods. Raises ValueError where there is no run.
     """
     groups: dict[tuple[int, int, str], list[SuiteRun]] = {}
     for run in runs:
-        groups.setdefault((run.dimension, run.function, method_name(run)), []).append(run)
+        for function in (run.function, ALL):
+            groups.setdefault((run.dimension, function, method_name(run)), []).append(run)
     if not groups:
         raise ValueError("runs must be at least one, got none")
-    found = [_score(method, function, dimension, mine) for (dimension, function, method), mine in groups.items()]
+    several = {dimension for dimension, _, _ in groups if len({f for d, f, _ in groups if d == dimension}) > 2}
+    found = [
+        _score(method, function, dimension, mine)
+        for (dimension, function, method), mine in groups.items()
+        if function != ALL or dimension in several
+    ]
     return sorted(found, key=lambda one: (one.dimension, one.function, -one.reached, one.above, one.method))
 
 
@@ -68,7 +76,7 @@ def _score(method: str, function: int, dimension: int, runs: Sequence[SuiteRun])
     return SuiteScore(
         method,
         function,
-        suite_function(function).name,
+        "all functions" if function == ALL else suite_function(function).name,
         dimension,
         len(runs),
         float(np.median([run.cost - run.best_known for run in runs])),
@@ -89,17 +97,20 @@ def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
     lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
     for one in scores:
         times = ["-" if one.running_times[above] is None else f"{one.running_times[above]:.0f}" for above in SHOWN]
-        label = f"{one.function} {one.name}"
-        start = f"{one.dimension:>3} {label:22} {one.method:{wide}} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}"
-        lines.append(start + _cells(times))
+        figures = f"{one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}"
+        lines.append(f"{_start(one, wide)} {figures}{_cells(times)}")
     points = sorted({point for one in scores for point in one.shares})
     lines += ["", f"share of targets reached after d x{'':{wide - 1}}" + _cells([str(point) for point in points])]
     for one in scores:
         shares = [f"{one.shares[point]:.1%}" if point in one.shares else "" for point in points]
-        lines.append(
-            (f"{one.dimension:>3} {f'{one.function} {one.name}':22} {one.method:{wide}}" + _cells(shares)).rstrip()
-        )
+        lines.append(f"{_start(one, wide)}{_cells(shares)}".rstrip())
     return lines
+
+
+def _start(score: SuiteScore, wide: int) -> str:
+    """Return the columns that both tables begin with."""
+    label = score.name if score.function == ALL else f"{score.function} {score.name}"
+    return f"{score.dimension:>3} {label:22} {score.method:{wide}}"
 
 
 def _cells(texts: Sequence[str]) -> str:

@@ -105,7 +105,16 @@ def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path, tmp_pa
     assert np.array_equal(mine.targets, expected.targets)
     done = run("suite", "table", results, "--iohprofiler", tmp_path / "ioh", "--json")
     assert done.exit_code == 0, done.stderr
-    assert len(json.loads(done.stdout)) == 6
+    scores = json.loads(done.stdout)
+    assert [(one["dimension"], one["function"]) for one in scores] == [
+        *2 * [(9, 1)], *2 * [(24, 0)], *2 * [(24, 1)], *2 * [(24, 7)]
+    ]  # fmt: skip
+    together, *others = [
+        next(one for one in scores if (one["method"], one["function"], one["dimension"]) == ("random", function, 24))
+        for function in (0, 1, 7)
+    ]
+    assert together["runs"] == 4
+    assert together["reached"] == pytest.approx(np.mean([one["reached"] for one in others]))
     assert sorted(path.name.rpartition("_")[2] for path in (tmp_path / "ioh").rglob("*.dat")) == sorted(
         2 * ["DIM9.dat", "DIM24.dat", "DIM24.dat"]
     )
