@@ -132,6 +132,7 @@ def test_the_ledger_is_a_table_and_no_report_of_tracks(results: Path, tmp_path: 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_sweep_runs_a_plan_of_searches_and_goes_on(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN.replace("[1, 7]", "[1]").replace("[9, 24]", "[9]"), "utf-8")
     shown = run("sweep", tmp_path / "plan.toml", "--dry-run")
