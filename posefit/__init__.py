@@ -5,7 +5,8 @@
     print(result.summary["error_degrees"])
 
 The pieces: `Skeleton`, `Body` and `Camera` describe the person and the view; `Silhouette` what was seen; `SearchSpace`
-the box that optimisers search; `PoseProblem` the cost; `minimise` the loop; `SynthesisTracker` follows a sequence.
+the box that optimisers search; `PoseProblem` the cost; `minimise` the loop; `SynthesisTracker` follows a sequence;
+`suite` numbers problems for a benchmark.
 Plugins add optimisers and priors: see `posefit.hooks`. Each name is imported when it is first used.
 """
 
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
     from posefit.geometry.skeleton import Skeleton as Skeleton
     from posefit.motion.motion import Motion as Motion
     from posefit.silhouette.mask import Silhouette as Silhouette
+    from posefit.suites.front import Suite as Suite
+    from posefit.suites.front import suite as suite
+    from posefit.suites.problem import Problem as Problem
     from posefit.tracking.front import Fit as Fit
     from posefit.tracking.front import fit as fit
     from posefit.tracking.front import track as track
@@ -56,6 +60,8 @@ _HOMES = {
     "fitting.problem": ("PoseProblem",),
     "fitting.space": ("SearchSpace",),
     "fitting.tracker": ("Frame", "Observation", "SynthesisTracker", "Task", "Tracker"),
+    "suites.front": ("Suite", "suite"),
+    "suites.problem": ("Problem",),
     "tracking.front": ("Fit", "fit", "track"),
     "tracking.run": ("Track",),
     "footage.segmentation": ("Extraction",),

@@ -32,6 +32,7 @@ ASKED = {
     "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
     "size": ("pixels", "width and height of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
+    "dimensions": ("", "coordinates of a proposal: the root's three or six, and the prior's; `null` of a tracker of its own"),
     "settings": ("", "what was set, or follows from the budget, of optimiser, prior and tracker"),
     "body": (
         "m",
@@ -48,6 +49,7 @@ ROW = {
     "status": ("", "`done` or `quarantined`, after three failed attempts"),
     "reason": ("", "why a quarantined cell failed"),
     "evaluations_used": ("", "poses whose cost was computed, in all frames together"),
+    "dimensions": ("", "coordinates of a proposal; none of a tracker that searches no box"),
     "seconds": ("s", "wall time of the whole cell"),
     "warnings": ("", "what to look at before the result is trusted"),
 }
@@ -121,7 +123,7 @@ def page() -> str:
         "What it measured:",
         _table(
             "column",
-            [*_measured(_of_rows()), *_told({name: ROW[name] for name in ("evaluations_used", "seconds", "warnings")})],
+            [*_measured(_of_rows()), *_told({name: ROW[name] for name in ("evaluations_used", "dimensions", "seconds", "warnings")})],
         ),
         _table(
             "column",

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import cores, swept
+from posefit.sweep.engines.engine import Run
 from posefit.sweep.engines.limits import Limits
 from posefit.sweep.engines.processes import Processes
 from posefit.sweep.ledger import Ledger
@@ -34,7 +35,8 @@ def rows(plan: Plan, workers: int | None, ledger: str | None, say: Say) -> list[
     """
     _check(workers)
     with nullcontext(ledger) if ledger else TemporaryDirectory() as folder:
-        with closing(Processes(workers or cores(), Limits(), run_cell)) as engine:
+        run: Run = run_cell
+        with closing(Processes(workers or cores(), Limits(), run)) as engine:
             tally = swept(plan.cells, folder, engine, say)
         if tally.stopped:
             again = f": the same command goes on from {ledger}" if ledger else ""

@@ -1,6 +1,6 @@
 """The command line. Messages and progress go to stderr, results to stdout; a mistake is one line and exit status 2.
 
-The commands stand in `following`, `doubt`, `sweeping`, `motions` and `plugins`; plugins add others, see
+The commands stand in `following`, `doubt`, `sweeping`, `motions`, `suite` and `plugins`; plugins add others, see
 `posefit.commands`. What each does is imported when it runs.
 """
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from posefit.cli import following, plugins, sweeping
+from posefit.cli import following, plugins, suite, sweeping
 from posefit.cli.doubt import ambiguity
 from posefit.cli.motions import motions
 from posefit.limits import exits_told
@@ -25,6 +25,7 @@ BUILT_IN = (
     sweeping.sweep,
     sweeping.report,
     motions,
+    suite.suite,
     plugins.plugins,
     plugins.check,
 )

@@ -31,7 +31,7 @@ def sweep(
     as_json: bool,
     **places: Any,
 ) -> None:
-    """Run the cells of PLAN: methods, motions, views, corruptions and seeds.
+    """Run the cells of PLAN: methods, motions, views, corruptions and seeds; or single searches of a suite.
 
     PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment, and any number of
     them may work on one DIR: the same command goes on where it was.
@@ -50,8 +50,8 @@ def sweep(
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
-        tally, status = command.run_plan(plan, out, where=where, retry_quarantined=retry_quarantined, say=say)
-    click.echo(json_line({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
+        tally, status, shown = command.run_plan(plan, out, where=where, retry_quarantined=retry_quarantined, say=say)
+    click.echo(json_line({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out, shown))
     context.exit(status)
 
 

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posefit.files import new_file, new_folder
-from posefit.silhouette.cost import SCALE
 from posefit.statistics.profiles import Trace, trace
 from posefit.version import __version__
 
@@ -45,9 +44,9 @@ def write_iohprofiler(runs: Iterable[LoggedRun], path: str | Path) -> None:
 
     A method with other settings is another algorithm: its settings stand in its `info` and, where one name has several,
     are numbered in the name. Problems are numbered in the order of their names. A row is written wherever the cost
-    falls, and at a run's end. Readers tell runs apart by evaluation 1: a trace that starts later, as a population does,
-    has the highest cost there is, 100, in that row. Raises ValueError where a run is senseless or comes twice, and
-    where the folder exists or cannot be written.
+    falls, and at a run's end. Readers tell runs apart by evaluation 1: a trace that starts later, as where a whole
+    population was the first thing measured, has `inf` in that row, as nothing was known yet. Raises ValueError where a
+    run is senseless or comes twice, and where the folder exists or cannot be written.
     """
     algorithms = _grouped(runs)
     numbers = {
@@ -108,7 +107,7 @@ def _rows(run: Trace) -> tuple[list[int], list[float]]:
     """Return evaluations and costs from evaluation 1 on, wherever the cost falls, and at the end."""
     used, best = run
     if used[0] > 1.0:
-        used, best = np.append(1.0, used), np.append(max(SCALE, best[0]), best)
+        used, best = np.append(1.0, used), np.append(np.inf, best)
     kept = np.append(True, np.diff(best) < 0.0)
     kept[-1] = True
     return [int(value) for value in used[kept]], [float(value) for value in best[kept]]

@@ -14,6 +14,7 @@ from posefit.posterior.calibration import BINS
 from posefit.report.columns import COLUMNS, FIGURES, SHOWN
 from posefit.report.repeat import LAST, command_head
 from posefit.sweep.cell import in_full, settings_text
+from posefit.sweep.table import is_search
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
@@ -66,6 +67,8 @@ def runs_so_far(ledger: "Ledger") -> Runs:
     """Return the same of a ledger that may hold nothing yet."""
     found = _Table()
     for row in ledger.rows():
+        if is_search(row["spec"]):
+            raise ValueError(f"{ledger.path}: expected a ledger of tracks, got one of searches: posefit suite table")
         found.add(row)
     return found.runs(ledger.version, ledger.quarantined())
 

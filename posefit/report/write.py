@@ -136,7 +136,7 @@ def _write_iohprofiler(ledger: Ledger, path: str) -> None:
                 spec["method"],
                 {**spec["settings"], **{one: spec[one] for one in ("evaluations", "tracks", "version") if one in spec}},
                 f"{spec['motion']} view {views}{damage} frames {spec['frames']} {spec['translation']}",
-                ANGLES if spec["translation"] == "known" else ANGLES + 3,  # of the pose, whatever a method searches
+                row.get("dimensions") or ANGLES,  # a tracker that searches no box has the pose's
                 spec["instance"],
                 spec["seed"],
                 trace["evaluations"],

@@ -17,6 +17,7 @@
 | a process's right to write to a ledger: claims, attempts, quarantine | driver.py |
 | the folder of finished rows; the log of one driver, and what a damaged line is | ledger.py, log.py |
 | the logs of dead drivers become one; how it is seen that a driver lives | fold.py, locks.py |
+| single searches of a numbered benchmark, instead of tracks | single/ |
 | rows as a table of pandas | table.py |
 | how long a plan will take | estimate.py |
 | where cells run: processes, a Dask cluster, their limits | engines/ |

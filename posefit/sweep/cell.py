@@ -130,6 +130,7 @@ def run_cell(cell: Cell) -> CellResult:
         **{name: measured[name] for name in MEASURES if name not in UNLIKE},
         "warnings": result.summary["warnings"],
         "evaluations_used": result.measures.evaluations,
+        "dimensions": result.summary["dimensions"],
         "joint_errors_mm": [round(float(error), 3) for error in errors],
         "mode_reliability": _mode_reliability(result.found, truth, result.motion.skeleton),
         "trace": anytime_trace(result.found),

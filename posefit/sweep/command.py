@@ -12,10 +12,12 @@ from pathlib import Path
 from posefit.sweep.cell import Cell, run_cell, settings_text
 from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of, progress_of
 from posefit.sweep.driver import Driver
-from posefit.sweep.engines.engine import Engine
+from posefit.sweep.engines.engine import Engine, Run
 from posefit.sweep.engines.limits import Limits
 from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.plan import Plan
+from posefit.sweep.single.plan import read_plan, search_json, search_line
+from posefit.sweep.single.search import SearchCell, run_search
 
 DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 
@@ -33,13 +35,14 @@ class Where:
     limits: Limits = field(default_factory=Limits)
 
 
-def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = False, say: Say) -> tuple[Tally, int]:
-    """Return how the sweep of a plan to a folder ended, and the exit status that says so."""
-    cells = Plan.read(plan)
-    start = engine(where)
+def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = False, say: Say) -> tuple[Tally, int, str]:
+    """Return how the sweep of a plan to a folder ended, the exit status that says so, and what shows what it found."""
+    cells = read_plan(plan)
+    start = engine(where, run_cell if isinstance(cells, Plan) else run_search)
     with closing(start()) as running:  # without an engine there is no folder either
         tally = swept(cells, out, running, say, retry_quarantined)
-    return tally, STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
+    status = STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
+    return tally, status, _showing(cells, out)
 
 
 def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quarantined: bool = False) -> Tally:
@@ -70,7 +73,10 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
     """
     from posefit.sweep.estimate import SECONDS, Amounts, Estimate, estimate_of
 
-    cells = Plan.read(plan)
+    cells = read_plan(plan)
+    if not isinstance(cells, Plan):
+        yield from _searches(cells, out, as_json)
+        return
     start = engine(replace(where, limits=replace(where.limits, seconds=min(where.limits.seconds, SECONDS))))
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
     left, count = Amounts(), 0
@@ -99,7 +105,18 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
     yield f"{len(cells)} cells, {len(left)} of them to run{takes}"
 
 
-def engine(where: Where) -> Callable[[], Engine]:
+def _searches(cells: list[SearchCell], out: str | None, as_json: bool) -> Iterator[str]:
+    """Yield the lines that show the cells of a plan of single searches; how long they take is not tried."""
+    ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
+    done = {cell.key for cell in cells if ledger is not None and cell.key in ledger}
+    if as_json:
+        yield json.dumps({"cells": list(search_json(cells, done))})
+        return
+    yield from (search_line(cell, cell.key in done) for cell in cells)
+    yield f"{len(cells)} cells, {len(cells) - len(done)} of them to run"
+
+
+def engine(where: Where, run: Run = run_cell) -> Callable[[], Engine]:
     """Return what starts the engine that was asked for. Raises ValueError where more than one was."""
     places = (("workers", where.workers), ("scheduler", where.scheduler), ("dask-local", where.dask_local))
     given = [name for name, value in places if value]
@@ -115,24 +132,30 @@ def engine(where: Where) -> Callable[[], Engine]:
         if where.scheduler is not None or where.dask_local is not None:
             from posefit.sweep.engines.cluster import Cluster
 
-            return Cluster(where.scheduler, where.dask_local, where.limits, run_cell, dashboard=where.dask_dashboard)
+            return Cluster(where.scheduler, where.dask_local, where.limits, run, dashboard=where.dask_dashboard)
         from posefit.sweep.engines.processes import Processes
 
-        return Processes(where.workers or cores(), where.limits, run_cell)
+        return Processes(where.workers or cores(), where.limits, run)
 
     return start
 
 
-def tally_text(tally: Tally, out: str) -> str:
-    """Return how a sweep ended, and the command that shows what it found."""
+def _showing(cells: Cells, out: str) -> str:
+    """Return the command that shows what a sweep found."""
+    if not isinstance(cells, Plan):
+        return f"posefit suite table {shlex.quote(out)}"
+    return f"posefit report {shlex.quote(out)} --out {shlex.quote(f'{out.rstrip(os.sep)}.html')}"
+
+
+def tally_text(tally: Tally, out: str, shown: str) -> str:
+    """Return how a sweep ended, and the command `shown` that shows what it found."""
     line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
     if tally.quarantined:
         line += f"; {tally.quarantined} quarantined: the reasons are in {Path(out) / 'quarantine'}"
     if tally.stopped:
         line += "; stopped: the same command goes on from there"
     elif tally.done:
-        page = shlex.quote(f"{out.rstrip(os.sep)}.html")
-        line += f"\nwhat was found: posefit report {shlex.quote(out)} --out {page}"
+        line += f"\nwhat was found: {shown}"
     return line
 
 

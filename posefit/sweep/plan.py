@@ -71,14 +71,7 @@ class Plan:
 
         Raises ValueError naming the file.
         """
-        if str(path) == DEFAULT:
-            text = (files("posefit.sweep") / "default.toml").read_text(encoding="utf-8")
-        elif str(path) == INPUT:
-            text = _stdin()
-        elif not Path(path).is_file():
-            raise ValueError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {_what(Path(path))}")
-        else:
-            text = read_text(path, LARGEST_FILE, "a plan in TOML")
+        text = plan_text(path)
         try:
             return cls.of(parsed_toml(text))
         except ValueError as error:
@@ -126,6 +119,17 @@ class Plan:
     def cells(self) -> tuple[Cell, ...]:
         """All cells, where there are few enough."""
         return tuple(self)
+
+
+def plan_text(path: str | Path) -> str:
+    """Return the text of a plan: of a file, posefit's own for `default`, or what standard input has for `-`."""
+    if str(path) == DEFAULT:
+        return (files("posefit.sweep") / "default.toml").read_text(encoding="utf-8")
+    if str(path) == INPUT:
+        return _stdin()
+    if not Path(path).is_file():
+        raise ValueError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {_what(Path(path))}")
+    return read_text(path, LARGEST_FILE, "a plan in TOML")
 
 
 class _Shared:

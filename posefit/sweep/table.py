@@ -21,6 +21,11 @@ ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings
 _TEXTS = ("key", "version", "status", "reason", "method", "motion", "train", "settings", "view_degrees", "corruption")
 
 
+def is_search(spec: Mapping[str, Any]) -> bool:
+    """Return whether a spec is that of a single search, which has no motion: see `posefit.sweep.single`."""
+    return "suite" in spec
+
+
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
     try:
@@ -51,12 +56,12 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     spec = row["spec"]
     flat: dict[str, Any] = {"key": row["key"], "version": spec["version"], "status": row["status"]}
     flat["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
-    flat |= {name: value for name, value in in_full(spec).items() if name not in ("files", "version")}
+    searched = is_search(spec)
+    full = spec if searched else in_full(spec)
+    flat |= {name: value for name, value in full.items() if name not in ("files", "version")}
     flat["settings"] = ", ".join(settings_text(spec["settings"]))
-    flat["corruption"] = ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items()))
-    flat["train"] = ", ".join(spec["train"])
-    flat["view_degrees"] = ", ".join(f"{view:g}" for view in spec["view_degrees"])
-    flat["size"] = "x".join(map(str, spec["size"]))
+    if not searched:
+        flat |= _told_of_track(spec)
     for name, value in row.items():
         if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability", "joints"):
             continue
@@ -67,3 +72,13 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         else:
             flat[name] = "; ".join(value) if isinstance(value, list) else value
     return flat
+
+
+def _told_of_track(spec: Mapping[str, Any]) -> dict[str, str]:
+    """Return those columns of a track's spec that are texts."""
+    return {
+        "corruption": ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items())),
+        "train": ", ".join(spec["train"]),
+        "view_degrees": ", ".join(f"{view:g}" for view in spec["view_degrees"]),
+        "size": "x".join(map(str, spec["size"])),
+    }

@@ -123,6 +123,12 @@ class Method:
         """Return a tracker for a task, whose plugin may take so many seconds longer to propose a population."""
         return self._make(task, patience)
 
+    def dimensions(self, task: Task) -> int | None:
+        """Return how many coordinates a proposal has; None of a tracker of its own, which need not have any."""
+        if self.prior is None:
+            return None
+        return 3 + 3 * (task.translation == "searched") + len(self.prior.low)
+
 
 def prepare(choice: Choice, task: Task) -> Method:
     """Return the method that was chosen, its prior learned from a task's training motions.

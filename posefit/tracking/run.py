@@ -124,6 +124,7 @@ def follow(
             **measures.as_dict(),
             **({"history": found[0].history.tolist()} if len(found) == 1 else {}),
             "evaluations_per_frame": task.evaluations,
+            "dimensions": method.dimensions(task),
             "tracks": told,
             "version": __version__,
             "train": [motion.name for motion in training],

@@ -81,6 +81,7 @@ def row_of(cell: Cell, error: float, **more: Any) -> dict[str, Any]:
         "cpu_seconds_per_frame": 0.008,
         "seconds": 0.01 * cell.frames,
         "evaluations_used": cell.evaluations * cell.frames,
+        "dimensions": 9,
         "joint_errors_mm": [error * joint for joint in range(27)],
         "trace": {"evaluations": [40, 80, 120], "cost": [4.0 * error, 2.0 * error, error]},
     } | more

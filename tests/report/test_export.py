@@ -67,7 +67,7 @@ def test_iohinspector_reads_every_cost_to_the_last_bit(tmp_path):
         rows = data.filter(data["data_id"] == key[float(one.costs[-1])])
         used, costs = list(one.evaluations), list(one.costs)
         if used[0] > 1:
-            used, costs = [1, *used], [100.0, *costs]
+            used, costs = [1, *used], [np.inf, *costs]
         assert rows["evaluations"].to_list() == used
         assert rows["raw_y"].to_list() == costs
 
@@ -127,15 +127,35 @@ def test_rows_stand_where_the_cost_falls_and_at_the_end(tmp_path):
     assert text.split("evaluations raw_y\n") == [
         "",
         "1 9.0\n3 7.0\n5 7.0\n",
-        "1 100.0\n40 9.0\n80 9.0\n",
-        "1 120.0\n40 120.0\n",
+        "1 inf\n40 9.0\n80 9.0\n",
+        "1 inf\n40 120.0\n",
     ]
     runs = json.loads(next(tmp_path.rglob("*.json")).read_text())["scenarios"][0]["runs"]
     assert [(one["evals"], one["best"]["evals"], one["best"]["y"]) for one in runs] == [
         (5, 3, 7.0),
         (80, 40, 9.0),
-        (40, 1, 120.0),
+        (40, 40, 120.0),
     ]
+
+
+def test_no_cost_stands_in_a_file_that_nobody_measured(tmp_path):
+    runs = [run(seed=k, evaluations=(40, 80), costs=(20.0 + k, 4.0)) for k in range(3)]
+    write_iohprofiler(runs, tmp_path / "ioh")
+    manager = opened(tmp_path / "ioh")
+    data = manager.load(monotonic=False)
+    measured = {cost for one in runs for cost in one.costs}
+    assert {cost for cost in data["raw_y"].to_list() if np.isfinite(cost)} == measured
+    assert data.filter(data["raw_y"] == np.inf)["evaluations"].to_list() == [1, 1, 1]
+    assert sorted(manager.overview["best_y"]) == [4.0, 4.0, 4.0]
+
+
+def test_iohinspectors_expected_running_time_bears_a_trace_that_starts_with_a_population(tmp_path):
+    from iohinspector.metrics.fixed_target import aggregate_running_time
+
+    write_iohprofiler([run(seed=k, evaluations=(40, 80), costs=(20.0, 4.0)) for k in range(3)], tmp_path / "ioh")
+    data = opened(tmp_path / "ioh").load(include_meta_data=True)
+    table = aggregate_running_time(data, f_min=5.0, f_max=19.0, scale_f_log=False)
+    assert set(table["ERT"].to_list()) == {80.0}
 
 
 def test_one_method_and_problem_in_two_dimensions_are_two_scenarios(tmp_path):

@@ -151,6 +151,8 @@ def test_figures_tables_rows_and_iohprofiler_on_demand(results: Path, tmp_path: 
     assert len(rows) == 8 + 1
     assert {row["status"] for row in rows} == {"done", "quarantined"}
     assert sorted(path.name for path in places["iohprofiler"].iterdir()) == ["random@pca", "sapso@pca"]
+    dimensions = [path.name.rpartition("DIM")[2] for path in places["iohprofiler"].rglob("*.dat")]
+    assert set(dimensions) == {"9.dat"}  # three of the root and six components
 
 
 def test_methods_that_say_how_sure_they_are_have_figures_of_it(tmp_path: Path) -> None:

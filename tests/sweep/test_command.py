@@ -58,6 +58,7 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(pla
     assert sum(sapso["joint_errors_mm"]) / 27 == pytest.approx(sapso["mpjpe_mm"], abs=1e-3)
     assert set(sapso["skill"]) == {"mean_pose", "persistence", "nearest"}
     assert sapso["evaluations_used"] == 2 * 80
+    assert sapso["dimensions"] == 9
     assert Ledger(out).joints(sapso["key"])["estimate"].shape == (2, 27, 3)
 
 

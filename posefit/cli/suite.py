@@ -1,0 +1,202 @@
+"""`posefit suite`."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from posefit.cli.options import frame_range
+from posefit.cli.output import json_line, progress, results_alone, say
+
+if TYPE_CHECKING:
+    from posefit.suites.running import SuiteRun
+
+NAME = "posefit-2026.1"
+
+
+@click.group(invoke_without_command=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
+@click.pass_context
+def suite(context: click.Context, as_json: bool) -> None:
+    """List the functions of the numbered benchmark, and their dimensions."""
+    if context.invoked_subcommand is not None:
+        return
+    from dataclasses import asdict
+
+    from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
+
+    if as_json:
+        click.echo(json_line([asdict(one) for one in FUNCTIONS]))
+        return
+    click.echo(f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100")
+    click.echo(f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out\n")
+    for one in FUNCTIONS:
+        dimensions = ", ".join(map(str, one.dimensions))
+        click.echo(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
+
+
+@suite.command("run")
+@click.argument("optimiser")
+@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
+@click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
+@click.option(
+    "--instances", callback=frame_range, default="10000:10005", show_default=True, metavar="A:B", help="A to B - 1."
+)
+@click.option("--budget", type=int, help="Evaluations of a run; by default 100 for each dimension.")
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
+@click.option("--infeasible", default="repair", show_default=True, help="repair, reject or penalise.")
+@click.option("--name", default=NAME, show_default=True, help="Of the suite.")
+@click.option("--out", metavar="DIR", help="New folder for IOHprofiler's files.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
+def suite_run(
+    optimiser: str,
+    functions: tuple[int, ...],
+    dimensions: tuple[int, ...],
+    instances: tuple[int | None, int | None],
+    budget: int | None,
+    seed: int,
+    texts: tuple[str, ...],
+    infeasible: Any,
+    name: str,
+    out: str | None,
+    as_json: bool,
+) -> None:
+    """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
+    from posefit import settings
+    from posefit.fitting.check import whole
+    from posefit.registry import registry
+    from posefit.suites.front import Suite
+    from posefit.suites.running import run_on
+    from posefit.suites.tally import score_lines, suite_scores
+
+    with results_alone():
+        if budget is not None:
+            whole("budget", budget, 1)
+        whole("seed", seed, 0)
+        if out is not None:
+            _check_new(out)
+        problems = Suite(
+            name,
+            functions=functions or None,
+            dimensions=dimensions or (9,),
+            instances=_numbers(instances),
+            infeasible=infeasible,
+        )
+        chosen = settings.parse_texts(optimiser, registry().optimiser(optimiser), texts)
+        asked = (run_on(problem, optimiser, chosen, evaluations=budget, seed=seed) for problem in problems)
+        runs = list(progress(asked, len(problems), "run"))
+        scores = suite_scores(runs)
+        if out is not None:
+            write_runs(runs, out)
+            say(f"written to {out}: IOHprofiler's files")
+    for line in [json_line([one.as_dict() for one in scores])] if as_json else score_lines(scores):
+        click.echo(line)
+
+
+@suite.command("table")
+@click.argument("ledger", metavar="DIR")
+@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
+def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
+    """Print what a sweep of a plan of single searches to DIR found, by dimension, function and method."""
+    from posefit.suites.tally import score_lines, suite_scores
+    from posefit.sweep.ledger import Ledger
+    from posefit.sweep.single.rows import search_runs
+
+    if iohprofiler is not None:
+        _check_new(iohprofiler)
+    kept = Ledger(ledger, say)
+    runs = list(search_runs(kept))
+    scores = suite_scores(runs)
+    if iohprofiler is not None:
+        write_runs(runs, iohprofiler)
+        say(f"written to {iohprofiler}: IOHprofiler's files")
+    if failed := len(kept.quarantined()):
+        say(f"{failed} {'cell' if failed == 1 else 'cells'} failed, left out of all figures")
+    for line in [json_line([one.as_dict() for one in scores])] if as_json else score_lines(scores):
+        click.echo(line)
+
+
+@suite.command("audit")
+@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
+@click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
+@click.option(
+    "--instances", callback=frame_range, default="10000:10003", show_default=True, metavar="A:B", help="A to B - 1."
+)
+@click.option("--method", "methods", multiple=True, help="Searches with the usual budget; repeatable.")
+@click.option("--times", type=int, default=100, show_default=True, help="How much longer CMA-ES searches; 0 for not.")
+@click.option("--write", metavar="FILE", help="New file of the best costs found, as the suite has one.")
+@click.pass_context
+def suite_audit(
+    context: click.Context,
+    functions: tuple[int, ...],
+    dimensions: tuple[int, ...],
+    instances: tuple[int | None, int | None],
+    methods: tuple[str, ...],
+    times: int,
+    write: str | None,
+) -> None:
+    """Search problems with each method, and check what is reported; exit status 1 where something is not true."""
+    import json
+
+    from posefit.files import new_file
+    from posefit.fitting.check import whole
+    from posefit.suites.audit import METHODS, STRONGEST, audit_lines, audited, known_json
+    from posefit.suites.front import Suite
+
+    with results_alone():
+        whole("times", times, 0)
+        if write is not None:
+            _check_new(write)
+        problems = Suite(functions=functions or None, dimensions=dimensions or (9,), instances=_numbers(instances))
+        asked = audited(problems, methods or METHODS, times=times)
+        rows = list(progress(asked, len(problems), "problem"))
+        if write is not None:
+            with new_file(write) as building:
+                building.write_text(json.dumps(known_json(rows, times, STRONGEST), indent=1) + "\n", encoding="utf-8")
+    for line in audit_lines(rows):
+        click.echo(line)
+    context.exit(1 if any(row.faults for row in rows) else 0)
+
+
+def _numbers(instances: tuple[int | None, int | None]) -> range:
+    """Return the instances of a range A:B. Raises ValueError where there are none."""
+    from posefit.suites.functions import INSTANCES
+
+    first, last = instances[0] or 0, INSTANCES.stop if instances[1] is None else instances[1]
+    if not 0 <= first < last <= INSTANCES.stop:
+        raise ValueError(f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}")
+    return range(first, last)
+
+
+def write_runs(runs: "list[SuiteRun]", out: str) -> None:
+    """Write runs to a new folder, as IOHprofiler has them."""
+    from posefit.report.export import LoggedRun, write_iohprofiler
+    from posefit.suites.functions import suite_function
+
+    write_iohprofiler(
+        (
+            LoggedRun(
+                run.method,
+                run.settings,
+                f"f{run.function} {suite_function(run.function).name}",
+                run.dimension,
+                run.instance,
+                run.seed,
+                run.evaluations,
+                run.costs,
+            )
+            for run in runs
+        ),
+        out,
+    )
+
+
+def _check_new(out: str) -> None:
+    """Return nothing. Raises ValueError where a folder is there already, before anything runs for it."""
+    from pathlib import Path
+
+    if Path(out).exists():
+        raise ValueError(f"{out}: expected a new name to write to, got one that exists")
+    if not Path(out).resolve().parent.is_dir():
+        raise ValueError(f"{out}: expected a place to write to, got one in {Path(out).resolve().parent}, which is none")

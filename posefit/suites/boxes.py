@@ -1,0 +1,148 @@
+"""The boxes that a suite searches: joint angles as few numbers, read from `boxes.npz` so that nobody learns them anew.
+
+A box never knows the person whose silhouette is sought. Of the ten people of the library seven are for training; for an
+instance of one of them, the box was learned from the six others. The three others are held out: their boxes were
+learned from the seven. `make_boxes.py` made the file. Its numbers are rounded, and sums are taken in one order, so that
+a proposal means the same pose on every machine.
+"""
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import NoReturn, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+
+HELD_OUT_PEOPLE = ("16", "49", "135")
+TRAINING_PEOPLE = ("02", "05", "09", "14", "17", "29", "127")
+STEP = 1e-4  # radians, and what a stored component is a whole multiple of
+SIZES = (6, 13, 21, 37)  # components of the boxes of 9, 16, 24 and 40 dimensions
+NOBODY_ELSE = "held out"  # the name of the box learned from all people for training
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What the file holds of one group of people."""
+
+    mean: Array  # (63,) radians
+    components: Array = field(repr=False)  # (37, 63)
+    spread: Array  # (37,) standard deviation along each, radians
+    half: Array  # (37,) of the box along each, radians
+    reach: Array  # (4,) by `SIZES`: how far from the mean poses are, in spreads
+    low: Array  # (63,) the range of each joint angle
+    high: Array  # (63,)
+    order: NDArray[np.int64]  # (63,) joint angles, those that move the most first
+
+
+@lru_cache(maxsize=1)
+def _stored() -> dict[str, Learned]:
+    with (files("posefit.suites") / "boxes.npz").open("rb") as file, np.load(file) as stored:
+        names = stored["names"].tolist()
+        arrays = {name: stored[name] for name in Learned.__dataclass_fields__}
+    return {
+        name: Learned(**{key: value[k] if key == "order" else STEP * value[k] for key, value in arrays.items()})
+        for k, name in enumerate(names)
+    }
+
+
+def learned_without(subject: str) -> Learned:
+    """Return what was learned from other people than this one, who is one of the library."""
+    return _stored()[subject if subject in TRAINING_PEOPLE else NOBODY_ELSE]
+
+
+class _Stored:
+    """What both kinds of box have in common: they are read, not learned."""
+
+    def fit(self, angles: Array, skeleton: object = None) -> NoReturn:  # noqa: ARG002, as of any prior
+        """Raise TypeError: a suite's box is what its file says."""
+        raise TypeError("the box of a suite must stay as it is, got something to learn from")
+
+    def save(self, path: str | Path) -> NoReturn:  # noqa: ARG002, as of any prior
+        """Raise TypeError: a suite's box is in its file."""
+        raise TypeError("the box of a suite must stay in its file, got a path to write to")
+
+
+@final
+class ComponentBox(_Stored):
+    """A prior of principal components; latents are poses within an ellipsoid that holds 98 % of the poses learned."""
+
+    def __init__(self, learned: Learned, count: int) -> None:
+        self.mean, self.components = learned.mean, learned.components[:count]
+        self.low, self.high = -learned.half[:count], learned.half[:count]
+        self._spread, self._reach = learned.spread[:count], float(learned.reach[SIZES.index(count)])
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63)."""
+        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        angles = np.tile(self.mean, (len(latents), 1))
+        for k, direction in enumerate(self.components):  # no matrix product: its last bits hang on the machine
+            angles += latents[:, k, None] * direction
+        return angles
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return which latents (n, m) are within the ellipsoid (n,)."""
+        return self._beyond(latents) <= 1.0
+
+    def within_reach(self, latents: Array) -> Array:
+        """Return latents (n, m), those out of the ellipsoid moved onto it, straight towards its middle."""
+        beyond = self._beyond(latents)
+        share = np.where(beyond > 1.0, (1.0 - 1e-9) / np.maximum(beyond, 1.0), 1.0)
+        return np.asarray(latents * share[:, None])
+
+    def _beyond(self, latents: Array) -> Array:
+        """Return how far latents (n, m) are from the middle (n,): 1 on the ellipsoid."""
+        total = np.zeros(len(latents))
+        for k, spread in enumerate(self._spread):
+            total += (latents[:, k] / spread) ** 2
+        return np.asarray(np.sqrt(total) / self._reach)
+
+
+@final
+class AngleBox(_Stored):
+    """A prior whose latents are joint angles themselves, those that move the most; the others stay at their mean."""
+
+    def __init__(self, learned: Learned, count: int) -> None:
+        self.angles = np.sort(learned.order[:count])
+        self.mean, self.low, self.high = learned.mean, learned.low[self.angles], learned.high[self.angles]
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63)."""
+        return np.asarray(angles, dtype=np.float64)[:, self.angles]
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        angles = np.tile(self.mean, (len(latents), 1))
+        angles[:, self.angles] = latents
+        return angles
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return that all latents (n, m) are poses (n,)."""
+        return np.ones(len(latents), dtype=bool)
+
+    def within_reach(self, latents: Array) -> Array:
+        """Return the latents (n, m) as they are."""
+        return np.asarray(latents)
+
+
+SuiteBox = ComponentBox | AngleBox
+
+
+@lru_cache(maxsize=64)
+def box_without(subject: str, dimension: int, angles: bool) -> SuiteBox:
+    """Return the box of so many dimensions, the root's three among them, that never knew a person of the library."""
+    made: type[SuiteBox] = AngleBox if angles else ComponentBox
+    return made(learned_without(subject), dimension - 3)
+
+
+def is_upright(pose: Array) -> bool:
+    """Return whether a wrapped pose (66,) is one that boxes are learned from: upright, no joint turned right round."""
+    tilts, joints = np.abs(pose[1:3]), np.abs(pose[3:])
+    return bool(tilts.max() < math.radians(20.0) and joints.max() < 2.6)

@@ -1,0 +1,56 @@
+"""The functions of a suite, and which numbers and dimensions there are. None of this changes under one name."""
+
+from dataclasses import dataclass
+
+from posefit.fitting.check import one_of, whole
+
+SUITE = "posefit-2026.1"
+SUITES = (SUITE,)
+TRAINING = range(10_000)  # instances to learn from and to tune on
+HELD_OUT = range(10_000, 20_000)  # instances of other people
+INSTANCES = range(20_000)
+DIMENSIONS = (9, 16, 24, 40, 66)
+
+
+@dataclass(frozen=True)
+class SuiteFunction:
+    """One kind of problem, in some dimensions."""
+
+    number: int
+    name: str
+    summary: str
+    exact: bool  # whether the box holds a proposal of cost 0: what is seen was drawn from it
+    dimensions: tuple[int, ...] = (9, 16, 24, 40)
+
+
+FUNCTIONS = (
+    SuiteFunction(1, "single image", "one silhouette, the yaw known to within 20 degrees", True),
+    SuiteFunction(2, "next frame", "a tenth of a second after two poses of a track; starts at a prediction", True),
+    SuiteFunction(3, "two views", "as 1, seen by two cameras at right angles", True),
+    SuiteFunction(4, "corrupted", "as 1, the silhouette spoilt in two ways", False),
+    SuiteFunction(5, "mismatched body", "as 1, bones and radii up to 8 % off the person's", False),
+    SuiteFunction(6, "ambiguous", "seen from the side and afar: the mirrored stride is nearly as good", True),
+    SuiteFunction(7, "high-dimensional", "as 1, joint angles themselves instead of components", True, (24, 40, 66)),
+    SuiteFunction(8, "aligned translation", "as 1, the place unknown and taken from the silhouette's borders", False),
+)
+
+
+def suite_function(number: object) -> SuiteFunction:
+    """Return the function of a number. Raises ValueError where there is none."""
+    found = {one.number: one for one in FUNCTIONS}
+    if isinstance(number, bool) or number not in found:
+        raise ValueError(f"function must be a whole number from 1 to {len(FUNCTIONS)}, got {number!r}")
+    return found[int(number)]  # type: ignore[call-overload,no-any-return]
+
+
+def checked_address(name: object, function: object, instance: object, dimension: object) -> tuple[int, int, int]:
+    """Return function, instance and dimension as ints. Raises ValueError where a suite has no such problem."""
+    one_of("suite", name, SUITES)
+    chosen = suite_function(function)
+    number = whole("instance", instance, 0)
+    if number not in INSTANCES:
+        raise ValueError(f"instance must be at most {INSTANCES[-1]}, got {number}")
+    if isinstance(dimension, bool) or dimension not in chosen.dimensions:
+        known = ", ".join(map(str, chosen.dimensions))
+        raise ValueError(f"dimension of function {chosen.number} must be one of {known}, got {dimension!r}")
+    return chosen.number, number, int(dimension)  # type: ignore[call-overload]

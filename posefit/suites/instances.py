@@ -1,0 +1,240 @@
+"""Numbered instances: a person of the library, a pose, cameras, and what they see.
+
+A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose; only the
+ambiguous one draws until a pose's mirror image is near enough. Instances below 10,000 are of seven people, the others
+of three whom nothing for training has ever seen.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.fitting.box import Start
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.geometry.alike import facing, reflected_poses
+from posefit.geometry.body import Body, varied
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import Skeleton
+from posefit.motion import recorded
+from posefit.motion.recorded import RecordedClip
+from posefit.silhouette.corruption import corrupted
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
+from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, SuiteBox, box_without, is_upright
+from posefit.suites.functions import TRAINING, suite_function
+
+SALT = 2026  # part of the seed of every instance
+SIZE = (120, 160)  # pixels
+PLACE = np.array([0.0, 0.9, 0.0])  # metres: where the root is, and cameras aim
+NEAR = (3.5, np.radians(40.0))  # metres to a camera; radians it sees across the larger side
+FAR = (40.0, 0.0637)  # as large in the picture, but depth does not show
+ROOT_RANGE = np.radians([45.0, 20.0, 20.0])  # radians to either side: yaw, pitch, roll
+YAW_OFF = np.radians(20.0)  # from the box's middle to the true yaw, at most
+STEP = 3  # frames, at 30 a second, from one pose of a track to the next
+SPREAD = 0.02  # of a start, beside how far the last two poses are apart: in half-sides of the box
+MISMATCH_PERCENT = 8.0
+DAMAGES, STRENGTHS = ("blobs", "holes", "occluder", "shadow"), (0.3, 0.6)  # two of these; how strong each is
+ANCHOR_OFF = 0.3  # metres along each axis that the anchor of an alignment is off
+DECOY_COST, APART_MM, ATTEMPTS = 4.0, 60.0, 20  # of an ambiguous instance: see `_ambiguous`
+DIGITS = 4  # of a truth in the box, so that every machine has the same one
+
+
+@dataclass(frozen=True, eq=False)
+class SuiteInstance:
+    """What a problem of a suite is made of."""
+
+    function: int
+    number: int
+    subject: str
+    posed: PoseProblem = field(repr=False)
+    box: SuiteBox = field(repr=False)
+    truth: Array = field(repr=False)  # (d,) the proposal whose pose was seen
+    truth_cost: float  # of that proposal; 0 where the function is exact
+    decoy: Array | None = field(default=None, repr=False)  # (d,) of function 6, the mirrored pose
+
+    def repaired(self, proposals: Array) -> Array:
+        """Return proposals (n, d), those that are not feasible moved: into the box, then towards its middle."""
+        space = self.posed.space
+        allowed = space.feasible(proposals)
+        inside = np.clip(proposals, -1.0, 1.0)
+        latents = space.centre[3:] + space.half[3:] * inside[:, 3:]
+        inside[:, 3:] = np.clip((self.box.within_reach(latents) - space.centre[3:]) / space.half[3:], -1.0, 1.0)
+        return np.where(allowed[:, None], proposals, inside)
+
+
+@lru_cache(maxsize=256)
+def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
+    """Return an instance; the same for the same numbers everywhere, which `checked_address` has checked."""
+    rng = np.random.default_rng([SALT, function, number])
+    people = TRAINING_PEOPLE if number in TRAINING else HELD_OUT_PEOPLE
+    subject = people[int(rng.integers(len(people)))]
+    box = box_without(subject, dimension, angles=suite_function(function).name == "high-dimensional")
+    return _MAKERS[function](_Draft(function, number, subject, box, rng))
+
+
+@dataclass(frozen=True, eq=False)
+class _Draft:
+    """What the makers of instances share."""
+
+    function: int
+    number: int
+    subject: str
+    box: SuiteBox
+    rng: np.random.Generator
+
+    def poses(self, count: int = 1) -> Array:
+        """Return poses (count, 66) of the person, `STEP` frames apart."""
+        clips = recorded.clips([self.subject])
+        last = np.zeros(66)
+        while True:
+            clip = clips[int(self.rng.integers(len(clips)))]
+            first = int(self.rng.integers(max(int(clip.times[-1]) + 1 - STEP * (count - 1), 1)))
+            poses = wrapped(_poses_at(clip, first + STEP * np.arange(count, dtype=np.int64)))
+            last = poses[-1]
+            if is_upright(last) and np.abs(np.diff(poses, axis=0)).max(initial=0.0) < 1.0:
+                return np.asarray(poses)
+
+    def space(self, yaw: float) -> SearchSpace:
+        """Return the box around a yaw in radians."""
+        return SearchSpace(self.box, np.array([yaw, 0.0, 0.0]), ROOT_RANGE, PLACE)
+
+    def held(self, space: SearchSpace, poses: Array) -> Array:
+        """Return the proposals (n, d) nearest to poses (n, 66), feasible, of few digits."""
+        latents = self.box.within_reach(self.box.transform(poses[:, 3:]))
+        found = np.round(space.proposals(np.column_stack([poses[:, :3], latents])), DIGITS)
+        bad = ~space.feasible(found)
+        found[bad] = np.round(0.999 * found[bad], DIGITS)  # rounding took it out of the ellipsoid again
+        return np.asarray(found)
+
+    def camera(self, azimuth: float, away: tuple[float, float] = NEAR) -> Camera:
+        return Camera.around(PLACE, azimuth, away[0], SIZE, away[1])
+
+    def made(self, problem: PoseProblem, truth: Array, decoy: Array | None = None) -> SuiteInstance:
+        cost = float(problem.evaluate(truth[None])[0])
+        return SuiteInstance(self.function, self.number, self.subject, problem, self.box, truth, cost, decoy)
+
+
+def _poses_at(clip: RecordedClip, frames: NDArray[np.int64]) -> Array:
+    """Return the poses (n, 66) of some frames of a clip; its ends are held."""
+    frames = np.minimum(frames, clip.times[-1])
+    before = np.minimum(np.searchsorted(clip.times, frames, "right") - 1, max(len(clip) - 2, 0))
+    after = np.minimum(before + 1, len(clip) - 1)
+    share = ((frames - clip.times[before]) / np.maximum(clip.times[after] - clip.times[before], 1))[:, None]
+    return np.asarray((1.0 - share) * clip.poses[before] + share * clip.poses[after])
+
+
+@lru_cache(maxsize=16)
+def _body(skeleton: Skeleton) -> Body:
+    return Body.of(skeleton)
+
+
+def _person(draft: _Draft) -> Body:
+    return _body(recorded.clips([draft.subject])[0].skeleton)
+
+
+def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
+    """Return a pose of the box, seen from anywhere by one camera or more at right angles."""
+    pose, body, rng = draft.poses()[0], _person(draft), draft.rng
+    space = draft.space(pose[0] + YAW_OFF * rng.uniform(-1.0, 1.0))
+    azimuth = rng.uniform(-np.pi, np.pi)
+    pose = _still(draft, pose)
+    truth = draft.held(space, pose[None])[0]
+    cameras = [draft.camera(azimuth + 0.5 * np.pi * k) for k in range(views)]
+    seen = space.decode(truth[None])[0][0]
+    return draft.made(PoseProblem(body, cameras, [_seen(body, camera, seen) for camera in cameras], space), truth)
+
+
+def _still(draft: _Draft, pose: Array) -> Array:
+    """Return a pose (66,) whose angles that nobody moves are drawn, so that the true ones are not the box's middle."""
+    offs = draft.rng.uniform(-0.5, 0.5, 66)
+    if draft.function != 7:
+        return pose
+    moved = pose.copy()
+    reach = 0.5 * (draft.box.high - draft.box.low)
+    still = 3 + draft.box.angles[np.abs(reach - np.radians(10.0)) < 1e-3]  # type: ignore[union-attr]
+    moved[still] += np.radians(10.0) * offs[still]
+    return moved
+
+
+def _next_frame(draft: _Draft) -> SuiteInstance:
+    """Return the third of three poses of a track, as the box holds them, with a start where the first two lead."""
+    poses, body, rng = draft.poses(3), _person(draft), draft.rng
+    space = draft.space(float(poses[1, 0]) + 0.25 * YAW_OFF * rng.uniform(-1.0, 1.0))
+    camera = draft.camera(rng.uniform(-np.pi, np.pi))
+    before, last, truth = draft.held(space, poses)
+    step, seen = last - before, space.decode(truth[None])[0][0]
+    mean = draft.held(space, space.decode(np.clip(last + step, -1.0, 1.0)[None])[0])[0]
+    space = replace(space, start=Start(mean, np.abs(step) + SPREAD, step))
+    return draft.made(PoseProblem(body, [camera], [_seen(body, camera, seen)], space), truth)
+
+
+def _corrupted(draft: _Draft) -> SuiteInstance:
+    """Return a pose of the box whose silhouette is spoilt in two ways."""
+    made, rng = _single(draft), draft.rng
+    kinds = rng.choice(len(DAMAGES), 2, replace=False)
+    noise = {DAMAGES[k]: float(rng.uniform(*STRENGTHS)) for k in kinds}
+    spoilt = corrupted(made.posed.silhouettes[0].mask, noise, rng)
+    return draft.made(replace(made.posed, silhouettes=[Silhouette.of(spoilt)]), made.truth)
+
+
+def _mismatched(draft: _Draft) -> SuiteInstance:
+    """Return a pose of the box, sought with a body that is not the person's."""
+    made = _single(draft)
+    return draft.made(replace(made.posed, body=varied(made.posed.body, MISMATCH_PERCENT, draft.rng)), made.truth)
+
+
+def _ambiguous(draft: _Draft) -> SuiteInstance:
+    """Return a pose of the box whose mirror image, `APART_MM` away, costs `DECOY_COST` or less.
+
+    Where no draw has one, it is the draw whose mirror image costs the least.
+    """
+    best, least = None, np.inf
+    for _ in range(ATTEMPTS):
+        pose, body, rng = draft.poses()[0], _person(draft), draft.rng
+        space = draft.space(pose[0] + 0.5 * YAW_OFF * rng.uniform(-1.0, 1.0))
+        side = rng.choice([-1.0, 1.0]) * 0.5 * np.pi + np.radians(10.0) * rng.uniform(-1.0, 1.0)
+        camera = draft.camera(pose[0] + side, FAR)
+        truth = draft.held(space, pose[None])
+        seen = space.decode(truth)[0]
+        problem = PoseProblem(body, [camera], [_seen(body, camera, seen[0])], space)
+        decoy = draft.held(space, wrapped(reflected_poses(body.skeleton, seen, facing(camera, PLACE))))
+        joints = body.skeleton.joints(np.concatenate([seen, space.decode(decoy)[0]]), np.zeros((2, 3)))
+        cost = float(problem.evaluate(decoy)[0])
+        apart = 1e3 * float(np.linalg.norm(joints[0] - joints[1], axis=-1).mean()) >= APART_MM
+        if best is None or cost + 100.0 * (not apart) < least:
+            best, least = (problem, truth[0], decoy[0]), cost + 100.0 * (not apart)
+        if least <= DECOY_COST:
+            break
+    assert best is not None
+    return draft.made(*best)
+
+
+def _aligned(draft: _Draft) -> SuiteInstance:
+    """Return a pose of the box whose place is taken from the silhouette's borders."""
+    made = _single(draft)
+    anchor = PLACE + ANCHOR_OFF * draft.rng.uniform(-1.0, 1.0, 3)
+    return draft.made(
+        replace(made.posed, space=replace(made.posed.space, anchor=anchor, translation="aligned")), made.truth
+    )
+
+
+def _seen(body: Body, camera: Camera, pose: Array) -> Silhouette:
+    return Silhouette.of(project(body, camera, pose, PLACE))
+
+
+_MAKERS: dict[int, Callable[[_Draft], SuiteInstance]] = {
+    1: _single,
+    2: _next_frame,
+    3: partial(_single, views=2),
+    4: _corrupted,
+    5: _mismatched,
+    6: _ambiguous,
+    7: _single,
+    8: _aligned,
+}

@@ -1,0 +1,65 @@
+"""Learns the boxes of the suite from the library of recorded motions, and writes `boxes.npz` beside this file.
+
+    python -m posefit.suites.make_boxes
+
+The file of a suite is never made anew: its numbers would change. This says how it was made.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.alike import mirrored_poses
+from posefit.geometry.rotation import wrapped
+from posefit.motion import built_in, recorded
+from posefit.suites.boxes import NOBODY_ELSE, SIZES, STEP, TRAINING_PEOPLE, is_upright
+
+BOX, ELLIPSOID = 0.99, 0.98  # quantiles of the poses learned: of each latent, and of the distance from the mean
+RANGE, MARGIN = 0.005, np.radians(5.0)  # of a joint angle: quantile left out at either end, and what is added then
+STILL = np.radians(10.0)  # to either side, of joint angles that nobody moves
+
+
+def learned_from(poses: Array) -> dict[str, Array]:
+    """Return what the file holds of poses (n, 66), as whole multiples of `STEP`."""
+    angles = poses[:, 3:]
+    mean = np.round(angles.mean(axis=0) / STEP) * STEP
+    directions = np.linalg.svd(angles - mean, full_matrices=False)[2][: SIZES[-1]]
+    directions *= np.sign(directions[np.arange(len(directions)), np.abs(directions).argmax(axis=1)])[:, None]
+    components = np.round(directions / STEP) * STEP
+    latents = (angles - mean) @ components.T
+    spread = latents.std(axis=0)
+    low, high = np.quantile(angles, [RANGE, 1.0 - RANGE], axis=0)
+    moved = high > low
+    found = {
+        "mean": mean,
+        "components": components,
+        "spread": spread,
+        "half": np.quantile(np.abs(latents), BOX, axis=0),
+        "reach": np.array(
+            [np.sqrt(np.quantile(((latents[:, :m] / spread[:m]) ** 2).sum(axis=1), ELLIPSOID)) for m in SIZES]
+        ),
+        "low": np.where(moved, low - MARGIN, mean - STILL),
+        "high": np.where(moved, high + MARGIN, mean + STILL),
+    }
+    rounded = {name: np.round(value / STEP).astype(np.int32) for name, value in found.items()}
+    return {**rounded, "order": np.argsort(-angles.std(axis=0), kind="stable").astype(np.int32)}
+
+
+def _poses(subjects: tuple[str, ...]) -> Array:
+    """Return the upright poses (n, 66) of people, and their mirror images."""
+    poses = wrapped(np.concatenate([clip.poses for clip in recorded.clips(subjects)]))
+    poses = poses[[is_upright(pose) for pose in poses]]
+    return wrapped(np.concatenate([poses, mirrored_poses(built_in.average_skeleton(), poses)]))
+
+
+def main() -> None:
+    """Write the file."""
+    groups = {name: tuple(one for one in TRAINING_PEOPLE if one != name) for name in (*TRAINING_PEOPLE, NOBODY_ELSE)}
+    found = [learned_from(_poses(people)) for people in groups.values()]
+    arrays = {name: np.stack([one[name] for one in found]) for name in found[0]}
+    np.savez_compressed(Path(__file__).parent / "boxes.npz", names=np.array(list(groups)), **arrays)  # type: ignore[arg-type]
+
+
+if __name__ == "__main__":
+    main()

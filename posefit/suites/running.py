@@ -1,0 +1,82 @@
+"""An optimiser of a plugin on a problem of a suite, and what came of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from posefit import settings
+from posefit.arrays import Array
+from posefit.fitting.guard import Guarded, blamed
+from posefit.fitting.optimiser import BudgetError, minimise
+from posefit.registry import registry
+from posefit.suites.problem import EVALUATIONS, Problem
+
+SALT = 2027  # part of the seed of every search
+
+
+@dataclass(frozen=True, eq=False)
+class SuiteRun:
+    """What a method did with a problem."""
+
+    method: str
+    settings: Mapping[str, Any]
+    function: int
+    dimension: int
+    instance: int
+    seed: int
+    budget: int  # evaluations that there could have been
+    best_known: float
+    targets: Array = field(repr=False)  # (t,) costs, falling
+    evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
+    costs: Array = field(repr=False)  # (k,)
+
+    @property
+    def cost(self) -> float:
+        """The best cost."""
+        return float(self.costs[-1])
+
+
+def usual_budget(dimension: int) -> int:
+    """Return the evaluations of a run where nobody says: a hundred for each dimension."""
+    return EVALUATIONS * dimension
+
+
+def run_on(
+    problem: Problem,
+    method: str,
+    chosen: Mapping[str, Any] | None = None,
+    *,
+    evaluations: int | None = None,
+    seed: int = 0,
+    ask_seconds: float | None = None,
+) -> SuiteRun:
+    """Return what an optimiser, by its name, finds on a problem within a budget; the same for the same seed.
+
+    Raises ValueError where there is no such optimiser or setting, where the budget does not hold one population, and
+    where the plugin breaks a rule of optimisers; ImportError where a library it needs is not installed.
+    """
+    evaluations = usual_budget(problem.dimension) if evaluations is None else evaluations
+    chosen, space = dict(chosen or {}), problem.space
+    rng = np.random.default_rng([SALT, seed, problem.id_function, problem.instance, problem.dimension])
+    factory = registry().optimiser(method)
+    settings.check(method, factory, chosen)
+    with blamed(f"optimiser {method}", "construction", ask_seconds, (BudgetError, ImportError)):
+        optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
+    guarded = Guarded(optimiser, space, f"optimiser {method}", ask_seconds, evaluations)
+    minimise(problem.evaluate, guarded, evaluations, told=True)
+    if not len(problem.trace[0]):
+        raise ValueError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")
+    return SuiteRun(
+        method,
+        chosen,
+        problem.id_function,
+        problem.dimension,
+        problem.instance,
+        seed,
+        evaluations,
+        problem.best_known,
+        problem.targets,
+        *problem.trace,
+    )

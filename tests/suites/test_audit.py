@@ -1,0 +1,77 @@
+"""No method reports what is not true, and the best costs of the file are costs of proposals that there are."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import posefit
+from posefit.cli import main
+from posefit.suites.audit import METHODS, audited, reported_faults
+from posefit.suites.front import Suite
+from posefit.suites.known import best_known_of, known_file
+from posefit.suites.running import run_on
+
+
+def test_no_built_in_method_reports_below_the_optimum_or_another_cost_than_its_proposal_has() -> None:
+    problems = Suite(functions=[1, 2, 4, 5, 8], dimensions=[9], instances=[10_001])
+    rows = list(audited(problems, METHODS, times=0))
+    assert len(rows) == 5
+    assert all(set(row.found) == set(METHODS) for row in rows)
+    assert [fault for row in rows for fault in row.faults] == []
+
+
+def test_a_cost_that_is_not_true_is_found() -> None:
+    problem = posefit.suite("posefit-2026.1", 1, 10_000, 9)
+    run_on(problem, "random", evaluations=50)
+    assert reported_faults(problem) == []
+    problem.best_observed_fvalue1 -= 30.0
+    faults = reported_faults(problem)
+    assert re.match(r"the best proposal must cost what was reported, -?\d", faults[0])
+    assert any("no cost may be below the optimum, 0.0" in fault for fault in faults)
+    assert any("the trace must fall to the best cost" in fault for fault in faults)
+
+
+def test_the_file_names_problems_of_the_suite_and_costs_below_their_truths() -> None:
+    best = known_file()["best"]
+    for name, cost in list(best.items())[::9]:
+        function, instance, dimension = map(int, re.fullmatch(r"posefit-2026.1_f(\d+)_i(\d+)_d(\d+)", name).groups())  # type: ignore[union-attr]
+        problem = posefit.suite("posefit-2026.1", function, instance, dimension)
+        assert problem.id == name
+        assert 0.0 <= cost == best_known_of(name) == problem.best_known < problem.truth_cost
+        assert problem.targets[-1] == cost + 0.25
+    assert best_known_of("posefit-2026.1_f001_i00000_d09") is None
+
+
+def test_the_command_writes_what_it_found_and_keeps_what_is_there(tmp_path: Path) -> None:
+    words = ["suite", "audit", "--function", "5", "--instances", "3:5", "--method", "cma", "--times", "5"]
+    done = CliRunner().invoke(main, [*words, "--write", str(tmp_path / "known.json")])
+    assert done.exit_code == 0, done.output
+    assert done.stdout.splitlines()[-1] == "2 problems, 4 searches, 0 faults"
+    found = json.loads((tmp_path / "known.json").read_text("utf-8"))
+    truths = {f"posefit-2026.1_f005_i{n:05d}_d09": posefit.suite("posefit-2026.1", 5, n, 9).truth_cost for n in (3, 4)}
+    assert found["problems"] == 2
+    assert all(cost < truths[name] for name, cost in found["best"].items())
+    again = CliRunner().invoke(main, [*words, "--write", str(tmp_path / "known.json")])
+    assert again.exit_code == 2
+    assert "expected a new name to write to, got one that exists" in again.stderr
+
+
+def test_a_proposal_of_the_audit_may_be_counted_from_its_numbers_alone() -> None:
+    problem = posefit.suite("posefit-2026.1", 8, 10_000, 9)
+    run_on(problem, "cma", evaluations=200)
+    assert posefit.suite("posefit-2026.1", 8, 10_000, 9)(problem.best) == problem.best_observed_fvalue1
+    assert np.abs(problem.best).max() <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [(["--times", "-1"], "times must be 0 or more, got -1"), (["--method", "sapsoo"], "optimiser must be one of")],
+)
+def test_a_mistake_in_an_audit_is_one_line(words: list[str], message: str) -> None:
+    done = CliRunner().invoke(main, ["suite", "audit", "--instances", "3:4", "--function", "1", *words])
+    assert done.exit_code == 2
+    assert message in done.stderr.splitlines()[-1]

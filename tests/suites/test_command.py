@@ -1,0 +1,204 @@
+"""`posefit suite`, and plans of single searches; mistakes are one line and status 2."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import iohinspector
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import posefit
+from posefit.cli import main
+from posefit.suites.running import run_on
+from posefit.suites.tally import suite_scores
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.single.plan import search_cells
+from posefit.sweep.single.rows import search_runs
+from posefit.sweep.single.search import run_search
+
+PLAN = """
+suite = "posefit-2026.1"
+methods = ["random", { method = "pso", settings = { particles = 20 } }]
+functions = [1, 7]
+dimensions = [9, 24]
+instances = [10000, 3]
+budgets = [10]
+"""
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a ledger of the plan's cells, as a sweep writes it."""
+    from posefit.sweep.driver import Claim, Driver
+
+    folder = tmp_path_factory.mktemp("suite") / "results"
+    with Driver(folder) as driver:
+        for cell in search_cells(tomllib.loads(PLAN)):
+            claim = driver.claim(cell)
+            assert isinstance(claim, Claim)
+            driver.finish(claim, run_search(cell))
+    return folder
+
+
+def test_the_functions_are_listed() -> None:
+    done = run("suite")
+    assert done.exit_code == 0
+    assert "7  high-dimensional     d = 24, 40, 66" in done.stdout
+    assert [one["number"] for one in json.loads(run("suite", "--json").stdout)] == list(range(1, 9))
+
+
+def test_a_run_prints_what_it_reaches_and_writes_what_iohinspector_opens(tmp_path: Path) -> None:
+    words = ("run", "random", "--function", 2, "--instances", "10000:10003", "--budget", 50, "--out", tmp_path / "ioh")
+    done = run("suite", *words, "--json")
+    assert done.exit_code == 0, done.stderr
+    (score,) = json.loads(done.stdout)
+    assert (score["method"], score["function"], score["dimension"], score["runs"]) == ("random", 2, 9, 3)
+    manager = iohinspector.DataManager()
+    manager.add_folder(str(tmp_path / "ioh"))
+    assert set(manager.overview["dimension"]) == {9}
+    assert set(manager.overview["function_name"]) == {"f2 next frame"}
+    data = manager.load(monotonic=False)
+    problems = posefit.Suite(functions=[2], dimensions=[9], instances=range(10_000, 10_003))
+    runs = [run_on(problem, "random", evaluations=50) for problem in problems]
+    expected = sorted((int(used), cost) for one in runs for used, cost in zip(one.evaluations, one.costs, strict=True))
+    assert sorted(zip(data["evaluations"], data["raw_y"], strict=True)) == expected
+    assert [one.evaluations[0] for one in runs] == [1.0, 1.0, 1.0]
+
+
+def test_scores_are_what_the_traces_say() -> None:
+    problems = posefit.Suite(functions=[1], dimensions=[9], instances=[1, 2, 3])
+    runs = [run_on(problem, "random", evaluations=100, seed=4) for problem in problems]
+    (score,) = suite_scores(runs)
+    reached = [(run.costs[-1] <= run.best_known + 2.0 ** (5 - k / 4)) for run in runs for k in range(29)]
+    assert score.reached == pytest.approx(np.mean(reached))
+    assert score.above == np.median([run.costs[-1] - run.best_known for run in runs])
+    first = [next((u for u, c in zip(run.evaluations, run.costs, strict=True) if c <= run.best_known + 16.0), None) for run in runs]  # fmt: skip
+    hit = [one for one in first if one is not None]
+    expected = (sum(hit) + 100 * (3 - len(hit))) / len(hit) if hit else None
+    assert score.running_times[16.0] == (None if expected is None else pytest.approx(expected))
+    assert list(score.shares) == [1, 3, 10]
+
+
+def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not() -> None:
+    cells = search_cells(tomllib.loads(PLAN))
+    assert {(cell.function, cell.dimension) for cell in cells} == {(1, 9), (1, 24), (7, 24)}
+    assert len(cells) == len({cell.key for cell in cells}) == 3 * 2 * 2
+    assert {cell.evaluations for cell in cells if cell.dimension == 24} == {240}
+
+
+def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path, tmp_path: Path) -> None:
+    found = {(run.method, run.function, run.dimension, run.instance): run for run in search_runs(Ledger(results))}
+    assert len(found) == 12
+    problem = posefit.suite("posefit-2026.1", 1, 3, 9)
+    expected = run_on(problem, "pso", {"particles": 20}, evaluations=90)
+    mine = found["pso", 1, 9, 3]
+    assert np.array_equal(mine.evaluations, expected.evaluations)
+    assert np.array_equal(mine.costs, expected.costs)
+    assert np.array_equal(mine.targets, expected.targets)
+    done = run("suite", "table", results, "--iohprofiler", tmp_path / "ioh", "--json")
+    assert done.exit_code == 0, done.stderr
+    scores = json.loads(done.stdout)
+    assert [(one["dimension"], one["function"]) for one in scores] == [
+        *2 * [(9, 1)], *2 * [(24, 0)], *2 * [(24, 1)], *2 * [(24, 7)]
+    ]  # fmt: skip
+    together, *others = [
+        next(one for one in scores if (one["method"], one["function"], one["dimension"]) == ("random", function, 24))
+        for function in (0, 1, 7)
+    ]
+    assert together["runs"] == 4
+    assert together["reached"] == pytest.approx(np.mean([one["reached"] for one in others]))
+    assert sorted(path.name.rpartition("_")[2] for path in (tmp_path / "ioh").rglob("*.dat")) == sorted(
+        2 * ["DIM9.dat", "DIM24.dat", "DIM24.dat"]
+    )
+    assert "7 high-dimensional" in run("suite", "table", results).stdout
+
+
+def test_the_ledger_is_a_table_and_no_report_of_tracks(results: Path, tmp_path: Path) -> None:
+    table = Ledger(results).frame()
+    assert len(table) == 12
+    assert set(table["function"]) == {1, 7}
+    assert set(table["settings"]) == {"", "particles=20"}
+    done = run("report", results, "--out", tmp_path / "page.html")
+    assert done.exit_code == 2
+    assert done.stderr.strip().endswith("expected a ledger of tracks, got one of searches: posefit suite table")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_sweep_runs_a_plan_of_searches_and_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(PLAN.replace("[1, 7]", "[1]").replace("[9, 24]", "[9]"), "utf-8")
+    shown = run("sweep", tmp_path / "plan.toml", "--dry-run")
+    assert shown.stdout.splitlines()[-1] == "4 cells, 4 of them to run"
+    words = ("sweep", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", 1)
+    done = run(*words)
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == f"what was found: posefit suite table {tmp_path / 'out'}"
+    assert "4 of 4 cells done, 0 of them now" in run(*words).stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run", "sapsoo"], "optimiser must be one of .*, got 'sapsoo'; did you mean 'sapso'"),
+        (["run", "sapso", "--function", 9], "function must be a whole number from 1 to 8, got 9"),
+        (["run", "sapso", "--dimension", 10], "dimension must be one of 9, 16, 24, 40, 66, got 10"),
+        (["run", "sapso", "--function", 1, "--dimension", 66], r"at least one problem, got none in \[66\] dimensions"),
+        (["run", "sapso", "--instances", "5:2"], "--instances must be A:B with 0 <= A < B <= 20000, got 5:2"),
+        (["run", "sapso", "--instances", "19999:20001"], "got 19999:20001"),
+        (["run", "sapso", "--instances", "7"], "expected A:B such as"),
+        (["run", "sapso", "--budget", 0], "budget must be at least 1, got 0"),
+        (["run", "sapso", "--budget", 39], "evaluations must hold one population of 40, got 39"),
+        (["run", "sapso", "--seed", -1], "seed must be 0 or more, got -1"),
+        (["run", "sapso", "--set", "foo=1"], "a setting of sapso must be one of .*, got 'foo'"),
+        (["run", "sapso", "--infeasible", "ignore"], "infeasible must be one of repair, reject, penalise, got 'ignore'"),
+        (["run", "sapso", "--name", "posefit-2027"], "suite must be one of posefit-2026.1, got 'posefit-2027'"),
+        (["run", "sapso", "--out", "."], "expected a new name to write to, got one that exists"),
+        (["run", "sapso", "--out", "none/such"], "expected a place to write to"),
+        (["table", "nowhere"], "nowhere: expected a ledger"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_line_and_status_2(
+    words: list[Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = run("suite", *words)
+    assert done.exit_code == 2
+    assert done.stdout == ""
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("posefit: ")
+    assert re.search(message, last), last
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"motions": ["walk"]}, "a plan of a suite must hold suite, methods, .*, got 'motions'"),
+        ({"suite": "bbob"}, "suite must be one of posefit-2026.1, got 'bbob'"),
+        ({"methods": []}, r"methods must be a list of at least one, got \[\]"),
+        ({"methods": ["sapso@pca"]}, "optimiser must be one of .*, got 'sapso@pca'"),
+        ({"methods": [{"method": "pso", "seed": 1}]}, "an entry of methods must hold method and settings, got 'seed'"),
+        ({"methods": [{"method": "pso", "settings": {"particle": 2}}]}, "a setting of pso must be one of"),
+        ({"methods": [3]}, "an entry of methods must be a name, or a table of a name and settings, got 3"),
+        ({"functions": [0]}, "function must be a whole number from 1 to 8, got 0"),
+        ({"dimensions": [10]}, "dimensions must be one of 9, 16, 24, 40, 66, got 10"),
+        ({"instances": [20_000]}, "instance must be at most 19999, got 20000"),
+        ({"instances": 0}, "instances must be a list, or a whole number from 1 to"),
+        ({"budgets": [0]}, "budgets must be at least 1, got 0"),
+        ({"budgets": [4]}, "evaluations must hold one population of 40, got 36 of sapso"),
+        ({"seeds": [1, 1]}, "the cells of a plan must differ, got one twice"),
+        ({"infeasible": "drop"}, "infeasible must be one of repair, reject, penalise, got 'drop'"),
+        ({"dimensions": [66]}, r"a plan must hold at least one cell, got none in \[66\] dimensions"),
+    ],
+)
+def test_a_mistake_in_a_plan_is_named_before_anything_runs(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        search_cells({"suite": "posefit-2026.1", "methods": ["sapso"], "functions": [1], **change})

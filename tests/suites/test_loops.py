@@ -1,0 +1,103 @@
+"""Other people's loops run on a problem as they are: COCO's, IOHexperimenter's and Nevergrad's; and all see the same."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.suites.problem import Problem
+from tests.suites.jde import JDE
+
+ADDRESSES = [(1, 10_003, 9), (4, 12_345, 16), (7, 2, 66)]
+BUDGET = 400
+
+
+def problems() -> list[Problem]:
+    return [posefit.suite("posefit-2026.1", *one) for one in ADDRESSES]
+
+
+@pytest.fixture(scope="module")
+def traces() -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return jDE's trace on each problem, driven by posefit's own loop, in populations."""
+    found = []
+    for problem in problems():
+        result = posefit.minimise(problem.evaluate, JDE(problem.space, np.random.default_rng(1)), BUDGET)
+        assert result.cost == problem.best_observed_fvalue1 == problem.trace[1][-1]
+        assert problem.evaluations == BUDGET
+        found.append(problem.trace)
+    return found
+
+
+def one_by_one(function, optimiser, budget):
+    """Drive an optimiser as somebody does whose functions take one proposal at a time."""
+    for _ in range(budget // 20):
+        proposals = optimiser.ask()
+        optimiser.tell(proposals, np.array([function(one) for one in proposals]))
+
+
+def test_a_loop_like_cocos_sees_the_same_trace(traces) -> None:
+    numbers = [(problem.id_function, problem.id_instance, problem.dimension) for problem in problems()]
+    for (function, instance, dimension), expected in zip(numbers, traces, strict=True):
+        suite = posefit.Suite("posefit-2026.1", functions=[function], dimensions=[dimension], instances=[instance])
+        for problem in suite:  # as in COCO's example experiment
+            assert problem.evaluations == 0
+            assert len(problem.lower_bounds) == len(problem.upper_bounds) == problem.number_of_variables == dimension
+            one_by_one(problem, JDE(problem.space, np.random.default_rng(1)), BUDGET)
+            assert problem.evaluations == BUDGET
+            assert not problem.final_target_hit
+            assert np.array_equal(problem.trace, expected)
+
+
+def test_iohexperimenter_sees_and_logs_the_same_trace(traces, tmp_path: Path) -> None:
+    ioh = pytest.importorskip("ioh", reason="it has no wheels for every Python")
+    for problem, expected in zip(problems(), traces, strict=True):
+        wrapped = ioh.wrap_problem(
+            problem, problem.id, ioh.ProblemClass.REAL, problem.dimension, problem.instance, lb=-1, ub=1
+        )
+        logger = ioh.logger.Analyzer(root=str(tmp_path), folder_name=problem.id, algorithm_name="jDE")
+        wrapped.attach_logger(logger)
+        one_by_one(wrapped, JDE(problem.space, np.random.default_rng(1)), BUDGET)
+        wrapped.detach_logger()
+        logger.close()
+        assert np.array_equal(problem.trace, expected)
+        assert wrapped.state.evaluations == problem.evaluations == BUDGET
+        assert wrapped.state.current_best.y == problem.best_observed_fvalue1
+        rows = next((tmp_path / problem.id).rglob("*.dat")).read_text("ascii").splitlines()[1:]
+        logged = [(float(used), float(cost)) for used, cost in (row.split() for row in rows)]
+        falls = np.flatnonzero(np.diff(expected[1], prepend=np.inf) < 0.0)
+        assert logged[: len(falls)] == [
+            (expected[0][k], pytest.approx(expected[1][k], abs=1e-9)) for k in falls
+        ]  # it logs a row where the cost falls, and the last one
+
+
+def test_cocos_own_solver_and_printer_run_on_a_suite(capsys) -> None:
+    cocoex = pytest.importorskip("cocoex", reason="it is in the extra test")
+    suite = posefit.Suite(functions=[1, 7], dimensions=[9, 24], instances=[10_000])
+    printer = cocoex.utilities.MiniPrint()
+    for problem in suite:
+        cocoex.solvers.random_search(problem, problem.lower_bounds, problem.upper_bounds, 30)
+        printer(problem, final=problem.index == len(suite) - 1)
+        assert problem.evaluations == 30
+        assert problem.best_observed_fvalue1 < 60.0
+    assert "9D" in capsys.readouterr().out
+
+
+def test_nevergrads_own_loop_runs_on_a_problem() -> None:
+    ng = pytest.importorskip("nevergrad", reason="it is in the extra nevergrad")
+    problem = posefit.suite("posefit-2026.1", 1, 10_003, 9)
+    box = ng.p.Array(shape=(problem.dimension,), lower=-1.0, upper=1.0)
+    box.random_state = np.random.RandomState(3)
+    found = ng.optimizers.OnePlusOne(parametrization=box, budget=120).minimize(problem)
+    assert problem.evaluations == 120
+    assert problem.best_observed_fvalue1 == problem.trace[1][-1] <= problem(found.value)
+    assert problem.best_observed_fvalue1 < 30.0
+
+
+def test_a_library_that_asks_for_too_much_is_ended_by_the_budget() -> None:
+    from posefit.suites.problem import BudgetSpentError
+
+    problem = posefit.suite("posefit-2026.1", 1, 10_003, 9, budget=50)
+    with pytest.raises(BudgetSpentError, match="0 of 50 evaluations are left"):
+        one_by_one(problem, JDE(problem.space, np.random.default_rng(1)), 100)
+    assert problem.evaluations == 50
