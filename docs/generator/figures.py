@@ -32,7 +32,7 @@ ASKED = {
     "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
     "size": ("pixels", "width and height of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
-    "dimensions": ("", "coordinates of a proposal: the root's three or six, and the prior's; `null` of a tracker of its own"),
+    "dimensions": ("", "coordinates of a proposal, the root's and the prior's; `null` of a tracker of its own"),
     "settings": ("", "what was set, or follows from the budget, of optimiser, prior and tracker"),
     "body": (
         "m",
@@ -53,6 +53,7 @@ ROW = {
     "seconds": ("s", "wall time of the whole cell"),
     "warnings": ("", "what to look at before the result is trusted"),
 }
+SPENT = ("evaluations_used", "dimensions", "seconds", "warnings")
 SAID = {
     "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
     "none_of_modes": (
@@ -123,7 +124,7 @@ def page() -> str:
         "What it measured:",
         _table(
             "column",
-            [*_measured(_of_rows()), *_told({name: ROW[name] for name in ("evaluations_used", "dimensions", "seconds", "warnings")})],
+            [*_measured(_of_rows()), *_told({name: ROW[name] for name in SPENT})],
         ),
         _table(
             "column",
