@@ -196,7 +196,7 @@ def test_the_paper_is_tested(chromium: Any, swept: Path) -> None:
     with opened(chromium, swept / "report.html") as seen:
         said = seen.page.locator(".claim").inner_text()
         assert "particle@full" in said
-        assert said.count("paired Wilcoxon with Holm over all steps, 6 pairs: p ") == 2
+        assert said.count("paired Wilcoxon, Holm over all steps, 6 pairs: p ") == 2
 
 
 @pytest.fixture(scope="module")

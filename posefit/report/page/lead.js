@@ -187,23 +187,23 @@ function examples() {
   $("three").append(...parts.map((one) => one.node));
   let time = 0;
   let there = true;
-  const paint = () => there && parts.forEach(({ canvas, cut }) => paintCutOut(canvas, cut, time));
+  const repaint = () => there && parts.forEach(({ canvas, cut }) => paintCutOut(canvas, cut, time));
   const { step, fps } = parts[0].cut.scene;
   const run = clock(
     $("moving"),
     () => (1000 * step) / fps,
     (over) => {
       time += over;
-      paint();
+      repaint();
     },
   );
   new IntersectionObserver((seenNow) => {
     there = seenNow.at(-1).isIntersecting;
-    paint();
+    repaint();
   }).observe($("three"));
-  new ResizeObserver(paint).observe($("three"));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
-  paint();
+  new ResizeObserver(repaint).observe($("three"));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  repaint();
   run(!matchMedia("(prefers-reduced-motion: reduce)").matches);
 }
 

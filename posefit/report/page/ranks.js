@@ -161,7 +161,7 @@ function claims() {
   const stepped = (C, names, { difference, adjusted, by_instance }, k) =>
     `${names[k + 1]} is ` +
     (difference < 0 ? "worse" : difference > 0 ? "better" : "the same") +
-    ` by a median of ${number(Math.abs(difference), 2)}° than ${names[k]} (paired Wilcoxon with Holm over all steps, ` +
+    ` by a median of ${number(Math.abs(difference), 2)}° than ${names[k]} (paired Wilcoxon, Holm over all steps, ` +
     `${C.blocks} pairs: ${stated(adjusted)}; over ${C.instances} instances alone: ${stated(by_instance)})`;
   D.claims.forEach((C) => {
     const names = C.methods.map((m) => METHODS[m]);
