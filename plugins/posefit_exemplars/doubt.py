@@ -2,9 +2,7 @@
 
 How far off a pose is hangs on what is to be seen in its frame: what the silhouette costs, how far the ways are from
 each other, and by how many cameras. So a frame has a *doubt*, the error in metres that these let expect; the model's
-error of joints and angles is so many times that. How likely left and right are exchanged hangs on it, on the ways that
-have them so, and on the told pose's *twins*, which have them so, too: a path that is the wrong one throughout has no
-way beside it that is right, but its twin costs hardly more.
+error of joints and angles is so many times that.
 `posefit reproduce posterior --store` makes the numbers.
 """
 
@@ -27,7 +25,6 @@ from posefit_exemplars.look import Look
 FILE = "doubt.json"
 LEAST_COST = 0.1  # per cent
 LEAST_SPREAD = 0.002  # metres
-OF_TWINS = 1.0  # per cent that are added to costs of which one is divided by another
 
 
 def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float, cameras: int) -> Array:
@@ -37,23 +34,6 @@ def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float,
     return np.array([1.0, math.log(max(cost, LEAST_COST)), math.log(max(spread, LEAST_SPREAD)), float(cameras > 1)])
 
 
-def twin_signs(twins: Array, cost: float) -> Array:
-    """Return what twins say of the sides of a pose (2,): logarithms of how many times as much as it they cost.
-
-    `twins` are costs as `Look.twins` has them: of the reflected ones the cheapest counts, and then comes the mirrored
-    one. Where there are none, nothing was seen that would tell a twin from the pose.
-    """
-    if not len(twins):
-        return np.zeros(2)
-    costs = np.array([twins[1:].min(), twins[0]])
-    return np.asarray(np.log((costs + OF_TWINS) / (cost + OF_TWINS)))
-
-
-def side_signs(second: float, log: float, twins: Array) -> Array:
-    """Return what exchanged sides follow from (5,): 1, the second side's weight, the doubt's logarithm, twins (2,)."""
-    return np.array([1.0, second, log, *twins])
-
-
 def none_signs(log: float) -> Array:
     """Return what it follows from that no mode is right (3,): 1, the logarithm of the doubt, and its square."""
     return np.array([1.0, log, log * log])
@@ -61,7 +41,7 @@ def none_signs(log: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """What makes intervals and unknown sides of a frame mean what they say."""
+    """What makes intervals and weights of modes of a frame mean what they say."""
 
     slopes: Array  # (4,) of the logarithm of the doubt, over what is seen
     range: tuple[float, float]  # of that logarithm; there was nothing to learn beyond
@@ -69,31 +49,24 @@ class Doubt:
     angle_spreads: Array = field(repr=False)  # (66,) radians, for a doubt of a metre
     joint_factors: Array = field(repr=False)  # (levels, 27)
     angle_factors: Array = field(repr=False)  # (levels, 66)
-    sides: Array = field(repr=False)  # (5,) of the log-odds of exchanged sides, over `side_signs`
     sharpness: float  # the power of modes' weights
     none: Array = field(repr=False)  # (3,) of the log-odds that no mode is right, over powers of the doubt's logarithm
-    unknown: float  # the probability of exchanged sides from which they are unknown
 
     def log(self, seen: Array) -> float:
         """Return the logarithm of the doubt, by `evidence` (4,)."""
         return float(np.clip(self.slopes @ seen, *self.range))
-
-    def second_side(self, log: float, twins: Array) -> float:
-        """Return the second-side weight from which left and right are unknown: doubt's logarithm, twins (2,)."""
-        odds = math.log(self.unknown / (1.0 - self.unknown))
-        return float(np.clip((odds - self.sides @ side_signs(0.0, log, twins)) / self.sides[1], 0.0, 1.0))
 
     def none_right(self, log: float) -> float:
         """Return how likely no mode is right, at the logarithm of a doubt."""
         odds = self.none @ none_signs(log)
         return 1.0 / (1.0 + math.exp(-min(max(float(odds), -30.0), 30.0)))
 
-    def recalibration(self, log: float, twins: Array) -> Recalibration:
-        """Return what a frame does not know of its error, by the logarithm of its doubt and by its twins (2,)."""
+    def recalibration(self, log: float) -> Recalibration:
+        """Return what a frame does not know of its error, by the logarithm of its doubt."""
         doubt = math.exp(log)
         spreads = doubt * self.joint_spreads, doubt * self.angle_spreads
         factors = self.joint_factors, self.angle_factors
-        return Recalibration(*spreads, *factors, self.second_side(log, twins), self.sharpness, self.none_right(log))
+        return Recalibration(*spreads, *factors, sharpness=self.sharpness, none=self.none_right(log))
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it, to four digits."""
@@ -104,11 +77,11 @@ class Doubt:
         """Return what `as_dict` gave."""
         low, high = held["range"]
         arrays = {name: np.array(held[name]) for name in ARRAYS}
-        return cls(range=(low, high), sharpness=held["sharpness"], unknown=held["unknown"], **arrays)
+        return cls(range=(low, high), sharpness=held["sharpness"], **arrays)
 
 
 NAMES = tuple(one.name for one in fields(Doubt))
-ARRAYS = tuple(name for name in NAMES if name not in ("range", "sharpness", "unknown"))
+ARRAYS = tuple(name for name in NAMES if name not in ("range", "sharpness"))
 
 
 def _rounded(values: Array) -> Any:
@@ -123,11 +96,11 @@ def learned() -> Doubt:
     return Doubt.from_dict(json.loads(files("posefit_exemplars").joinpath(FILE).read_text("utf-8")))
 
 
-def recalibrated(posterior: Posterior, pose: Array, cost: float, look: Look, twins: Array) -> Posterior:
-    """Return a posterior with what it does not know of its error, where a pose (66,) was told at a cost, with twins.
+def recalibrated(posterior: Posterior, pose: Array, cost: float, look: Look) -> Posterior:
+    """Return a posterior with what it does not know of its error, where a pose (66,) was told at a cost.
 
     Where nothing is seen, no cost says anything, and the doubt is as great as any that was learned.
     """
     doubt = learned()
     seen = evidence(look.skeleton, posterior, pose, cost if look.usable else math.inf, look.cameras)
-    return replace(posterior, recalibration=doubt.recalibration(doubt.log(seen), twins))
+    return replace(posterior, recalibration=doubt.recalibration(doubt.log(seen)))

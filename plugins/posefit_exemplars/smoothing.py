@@ -11,7 +11,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.geometry.rotation import wrapped
-from posefit_exemplars.doubt import recalibrated, twin_signs
+from posefit_exemplars.doubt import recalibrated
 from posefit_exemplars.look import Look
 from posefit_exemplars.sampling import Ways
 
@@ -77,10 +77,9 @@ def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
     posterior, seconds, cpu_seconds = None, one.seconds, one.cpu_seconds
     if one.drawn is not None:
         began, begun = time.perf_counter(), time.process_time()
-        twins = one.look.twins(pose, place) if one.look.usable else np.empty(0)
-        used += len(twins)
-        details["twins"] = twin_signs(twins, cost)
-        posterior = recalibrated(one.drawn.about(pose, place), pose, cost, one.look, details["twins"])
+        details["twins"] = one.look.twins(pose, place) if one.look.usable else np.empty(0)
+        used += len(details["twins"])
+        posterior = recalibrated(one.drawn.about(pose, place), pose, cost, one.look)
         seconds, cpu_seconds = seconds + time.perf_counter() - began, cpu_seconds + time.process_time() - begun
     told: dict[str, Any] = {"details": details, "cpu_seconds": cpu_seconds, "posterior": posterior}
     return Frame(pose, place, cost, areas, used, seconds, history, **told)

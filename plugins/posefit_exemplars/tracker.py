@@ -27,7 +27,7 @@ from posefit_exemplars.beam import (
 from posefit_exemplars.codes import Rows
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.look import Look
-from posefit_exemplars.lost import doubted, stored_detector
+from posefit_exemplars.lost import doubted, stored_judge
 from posefit_exemplars.refinement import Make, refined, surroundings
 from posefit_exemplars.sampling import Sampler
 from posefit_exemplars.smoothing import SMOOTHED, Finding, smoothed
@@ -74,7 +74,7 @@ class ExemplarTracker:
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
         found = smoothed(self._refined(observations, rng), self.smoothing * self.task.fps / 30.0, self._ahead)
-        yield from doubted(found, self.task, stored_detector())
+        yield from doubted(found, self.task, stored_judge())
 
     @property
     def _ahead(self) -> int:

@@ -11,13 +11,12 @@ from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit.posterior.modes import Posterior
-from posefit_exemplars.doubt import evidence, learned, recalibrated, side_signs, twin_signs
+from posefit_exemplars.doubt import evidence, learned, recalibrated
 from posefit_exemplars.factory import exemplars
 from posefit_exemplars.look import Look
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
 SKELETON = average_skeleton()
-SIGNS = np.array([0.3, 0.5])  # of twins
 
 
 class Shown:
@@ -38,19 +37,18 @@ def test_evidence_is_of_cost_spread_and_cameras() -> None:
     assert np.isfinite(evidence(SKELETON, drawn(0.0), np.zeros(66), 0.0, 1)).all()
 
 
-def test_whoever_fits_badly_is_less_sure_and_sides_are_sooner_unknown() -> None:
-    good, bad = (recalibrated(drawn(0.1), np.zeros(66), cost, Shown(), SIGNS).recalibration for cost in (2.0, 20.0))  # type: ignore[arg-type]
+def test_whoever_fits_badly_is_less_sure() -> None:
+    good, bad = (recalibrated(drawn(0.1), np.zeros(66), cost, Shown()).recalibration for cost in (2.0, 20.0))  # type: ignore[arg-type]
     assert good is not None
     assert bad is not None
     assert (bad.joint_spreads[1:] > good.joint_spreads[1:]).all()
-    assert bad.second_side <= good.second_side
 
 
 def test_nobody_is_more_in_doubt_than_where_nothing_is_seen() -> None:
     blind = Shown()
     blind.usable = False  # type: ignore[misc]
     for cost in (0.0, 5.0):
-        told = recalibrated(drawn(0.1), np.zeros(66), cost, blind, np.zeros(2)).recalibration  # type: ignore[arg-type]
+        told = recalibrated(drawn(0.1), np.zeros(66), cost, blind).recalibration  # type: ignore[arg-type]
         assert told is not None
         most = math.exp(learned().range[1])
         np.testing.assert_allclose(told.joint_spreads, most * learned().joint_spreads)
@@ -61,7 +59,6 @@ def test_every_level_is_wider_than_the_one_before() -> None:
     assert doubt.joint_factors.shape == (3, 27)
     assert doubt.angle_factors.shape == (3, 66)
     assert (doubt.joint_factors[:, 1:] > 0.0).all()
-    assert doubt.sides[1] > 0.0
     assert doubt.slopes[1] > 0.0
     assert replace(doubt).as_dict() == doubt.as_dict()
 
@@ -74,36 +71,12 @@ def test_frames_are_told_with_their_recalibration(walker: Walk) -> None:
         assert frame.posterior.recalibration.sharpness == learned().sharpness
 
 
-@pytest.mark.parametrize("log", [-4.0, -2.0, -0.5])
-@pytest.mark.parametrize("twins", [(0.0, 0.0), (0.3, 1.0), (2.0, 2.0)])
-def test_sides_are_unknown_from_the_probability_on_that_is_held(log: float, twins: tuple[float, float]) -> None:
-    doubt = learned()
-    least = doubt.second_side(log, np.array(twins))
-    probable = 1.0 / (1.0 + math.exp(-(doubt.sides @ side_signs(least, log, np.array(twins)))))
-    assert 0.0 <= least <= 1.0
-    if 0.0 < least < 1.0:
-        assert probable == pytest.approx(doubt.unknown)
-
-
 def test_the_greater_the_doubt_the_likelier_no_mode_is_right() -> None:
     none = [learned().none_right(log) for log in np.linspace(learned().range[0], -1.0, 20)]
     assert np.all(np.diff(none) > 0.0)
     assert none[0] < 0.05
     assert none[-1] > 0.5
-    assert recalibrated(drawn(0.1), np.zeros(66), 5.0, Shown(), SIGNS).recalibration.none > 0.0  # type: ignore[arg-type, union-attr]
-
-
-def test_a_twin_that_costs_more_says_that_sides_are_known() -> None:
-    assert (learned().sides[3:] < 0.0).all()
-    alike, dear = (learned().second_side(-3.0, np.full(2, sign)) for sign in (0.0, 2.0))
-    assert alike < dear
-
-
-def test_signs_of_twins_are_how_many_times_as_much_the_cheapest_reflected_and_the_mirrored_one_cost() -> None:
-    # mirrored, then reflected along two lines of sight: (9 + 1) / (4 + 1) = 2 and (14 + 1) / (4 + 1) = 3
-    np.testing.assert_allclose(twin_signs(np.array([14.0, 30.0, 9.0]), 4.0), np.log([2.0, 3.0]))
-    np.testing.assert_array_equal(twin_signs(np.array([4.0, 4.0]), 4.0), 0.0)
-    np.testing.assert_array_equal(twin_signs(np.empty(0), 4.0), 0.0)
+    assert recalibrated(drawn(0.1), np.zeros(66), 5.0, Shown()).recalibration.none > 0.0  # type: ignore[arg-type, union-attr]
 
 
 @pytest.mark.parametrize("views", [(45.0,), (45.0, 135.0)])
@@ -140,7 +113,7 @@ def test_a_twin_of_a_pose_that_is_aligned_is_aligned_as_that_is() -> None:
     assert look.twins(pose, place)[0] == pytest.approx(look.measured(poses[1], moved)[0])
 
 
-def test_frames_say_what_their_twins_do_and_count_them(walker: Walk) -> None:
+def test_frames_say_what_their_twins_cost_and_count_them(walker: Walk) -> None:
     seen = [*walker.seen[:2], Observation(EMPTY, None, usable=False)]
     told, plain = (
         list(exemplars(walker.told(), samples=samples).track(seen, np.random.default_rng(0))) for samples in (4, 0)
@@ -149,9 +122,7 @@ def test_frames_say_what_their_twins_do_and_count_them(walker: Walk) -> None:
         np.testing.assert_array_equal(one.pose, other.pose)
         assert one.evaluations == other.evaluations + 2
         look = Look(walker.told(), seen[told.index(one)])
-        np.testing.assert_allclose(
-            one.details["twins"], twin_signs(look.twins(one.pose, one.translation), one.cost), atol=1e-9
-        )
+        np.testing.assert_allclose(one.details["twins"], look.twins(one.pose, one.translation), atol=1e-9)
         assert "twins" not in other.details
-    np.testing.assert_array_equal(told[2].details["twins"], 0.0)
+    assert len(told[2].details["twins"]) == 0
     assert told[2].evaluations == 1

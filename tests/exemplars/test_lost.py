@@ -9,38 +9,85 @@ import numpy as np
 import pytest
 
 from posefit.fitting.tracker import Frame
+from posefit.geometry.alike import mirrored_poses
+from posefit.geometry.camera import Camera
 from posefit.posterior.modes import Posterior
+from posefit.posterior.sides import unknown_sides
 from posefit_exemplars.factory import exemplars
 from posefit_exemplars.lost import (
     EVIDENCE,
+    FASTEST,
     FITTED,
     NAMES,
+    REACHES,
     Detector,
+    Judge,
     Memory,
+    across,
     doubted,
+    evidence_of,
     farthest,
-    stored_detector,
+    going,
+    stored_judge,
 )
 from tests.exemplars.conftest import EMPTY, Walk
 
 EVEN = Detector([], np.empty(0), 0.0)  # says a half of everything
+WAVERING = Judge(EVEN, EVEN, 0.6)
 
 
-def test_evidence_is_beside_its_mean_so_far_and_stays_where_it_is_not_told_again() -> None:
+def frame_of(walker: Walk, usable: bool = True, cost: float = 4.0) -> Frame:
+    """Return a frame that costs so much, whose mirror image costs 7 and whose reflections cost 9 and 6."""
+    pose = walker.motion.poses[0]
+    mirrored = mirrored_poses(walker.motion.skeleton, pose[None])[0]
+    posterior = Posterior(np.array([pose, mirrored]), np.zeros((2, 3)), np.array([0.75, 0.25]))
+    twins = np.array([7.0, 9.0, 6.0]) if usable else np.empty(0)
+    counts, details = np.array([[30, 10, 70]]), {"usable": usable, "twins": twins}
+    return Frame(pose, np.zeros(3), cost, counts, 1, 0.0, np.empty(0), posterior=posterior, details=details)
+
+
+def test_evidence_is_beside_its_means_and_stays_where_it_is_not_told_again() -> None:
     memory, at = Memory(30.0), [*EVIDENCE].index("views")
     first = memory.features({"views": 1.0})
-    assert (first[at], first[len(EVIDENCE) + at]) == (1.0, 1.0)
+    assert [first[k * len(EVIDENCE) + at] for k in range(3)] == [1.0, 1.0, 1.0]
     memory.features({"views": 0.0})
     third = memory.features({})
-    share = math.exp(-1.0 / 6.0)  # a fifth of a second is six frames
-    assert (third[at], third[len(EVIDENCE) + at]) == (0.0, pytest.approx(share**2))
+    shares = [math.exp(-1.0 / (30.0 * seconds)) for seconds in REACHES.values()]
+    means = [share**2 / (1.0 + share + share**2) for share in shares]  # what is older counts less
+    assert [third[k * len(EVIDENCE) + at] for k in range(3)] == pytest.approx([0.0, *means])
     assert first[[*EVIDENCE].index("cost")] == pytest.approx(math.log(1.0))  # nobody has told it
 
 
+def test_evidence_of_twins_is_how_many_times_as_much_the_cheapest_reflected_and_the_mirrored_one_cost(
+    walker: Walk,
+) -> None:
+    told = evidence_of(walker.motion.skeleton, frame_of(walker), walker.task.cameras)
+    # (6 + 1) / (4 + 1) and (7 + 1) / (4 + 1)
+    assert (told["cost"], told["reflected"], told["mirrored"]) == pytest.approx((4.0, 1.4, 1.6))
+    assert (told["second"], told["views"]) == pytest.approx((0.25, 1.0))
+
+
+def test_who_is_seen_from_his_side_faces_across_the_only_camera() -> None:
+    aside, oblique, ahead = (Camera.around(np.zeros(3), np.radians(view), 4.0, (64, 48)) for view in (90.0, 30.0, 0.0))
+    told = [across([camera], 0.0, np.zeros(3)) for camera in (aside, oblique, ahead)]
+    assert told == pytest.approx([1.0, 0.5, 0.0])
+    assert across([aside, ahead], 0.0, np.zeros(3)) == 0.0
+
+
+def test_who_goes_where_he_faces_goes_ahead() -> None:
+    places = [np.array([0.0, 0.9, 0.0]), np.array([0.01, 0.9, 0.03]), np.array([0.03, 0.8, 0.04])]
+    # 3 and 4 centimetres in two thirtieths of a second
+    assert going(places, 0.0, 30.0) == pytest.approx({"ahead": 0.6, "speed": 0.75})
+    assert going(places, np.pi, 30.0)["ahead"] == pytest.approx(-0.6)
+    assert going(places, np.pi / 2.0, 30.0)["ahead"] == pytest.approx(0.45)
+    assert going(places, 0.0, 300.0) == {"ahead": FASTEST, "speed": FASTEST}
+    assert going(places[:1], 0.0, 30.0) == {}
+
+
 def test_a_probability_is_that_of_a_logistic_model() -> None:
-    detector = Detector.from_dict({"weights": {"farthest": 2.0, "cost, so far": -1.0}, "bias": 0.5})
+    detector = Detector.from_dict({"weights": {"farthest": 2.0, "cost, lately": -1.0}, "bias": 0.5})
     features = np.zeros(len(NAMES))
-    features[NAMES.index("farthest")], features[NAMES.index("cost, so far")] = 1.0, 1.5
+    features[NAMES.index("farthest")], features[NAMES.index("cost, lately")] = 1.0, 1.5
     assert detector.probability(features) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
     features[NAMES.index("farthest")] = 1e9
     assert detector.probability(features) == pytest.approx(1.0)
@@ -51,11 +98,13 @@ def test_a_model_of_something_else_is_told() -> None:
         Detector.from_dict({"weights": {"weather": 1.0}, "bias": 0.0})
 
 
-def test_what_is_stored_is_such_a_model() -> None:
+def test_what_is_stored_is_such_models() -> None:
     told = json.loads(FITTED.read_text(encoding="utf-8"))
-    assert set(told["weights"]) <= set(NAMES)
-    assert np.isfinite([told["bias"], *told["weights"].values()]).all()
-    assert stored_detector().bias == told["bias"]
+    for name in ("lost", "sides"):
+        assert set(told[name]["weights"]) <= set(NAMES)
+        assert np.isfinite([told[name]["bias"], *told[name]["weights"].values()]).all()
+    assert stored_judge().lost.bias == told["lost"]["bias"]
+    assert 0.0 < stored_judge().unknown < 0.5
 
 
 def test_the_farthest_track_is_told_in_metres(walker: Walk) -> None:
@@ -66,14 +115,19 @@ def test_the_farthest_track_is_told_in_metres(walker: Walk) -> None:
     assert told == pytest.approx(max(off)) != 0.0
 
 
-def test_a_frame_in_which_nobody_is_seen_has_no_cost_of_its_own(walker: Walk) -> None:
-    pose = walker.motion.poses[0]
-    posterior = Posterior(pose[None], np.zeros((1, 3)), np.ones(1))
-    base = Frame(pose, np.zeros(3), 4.0, np.array([[30, 10, 70]]), 1, 0.0, np.empty(0), posterior=posterior)
-    frames = list(doubted((replace(base, details={"usable": one}) for one in (True, False)), walker.task, EVEN))
-    assert frames[0].details["evidence"] == {"cost": 4.0, "farthest": pytest.approx(0.0), "views": 1.0}
-    assert frames[1].details["evidence"].keys() == {"farthest", "views"}
+def test_a_frame_in_which_nobody_is_seen_has_no_cost_and_no_twins_of_its_own(walker: Walk) -> None:
+    frames = list(doubted((frame_of(walker, one) for one in (True, False)), walker.task, WAVERING))
+    assert frames[0].details["evidence"].keys() == EVIDENCE.keys() - {"ahead", "speed"}
+    assert frames[1].details["evidence"].keys() == EVIDENCE.keys() - {"cost", "reflected", "mirrored"}
     assert [frame.lost for frame in frames] == [0.5] * 2
+
+
+@pytest.mark.parametrize(("least", "unknown"), [(0.4, True), (0.6, False)])
+def test_sides_are_unknown_from_the_probability_on_that_is_held(walker: Walk, least: float, unknown: bool) -> None:
+    frame = next(doubted([frame_of(walker)], walker.task, replace(WAVERING, unknown=least)))
+    assert frame.details["exchanged"] == 0.5
+    assert frame.posterior is not None
+    assert unknown_sides(walker.motion.skeleton, frame.posterior, frame.pose) == unknown
 
 
 def test_nobody_says_where_no_tracks_are_drawn(walker: Walk) -> None:

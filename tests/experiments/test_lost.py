@@ -10,13 +10,16 @@ import pytest
 from click.testing import CliRunner, Result
 
 from posefit.cli import main
+from posefit.fitting.tracker import Observation
+from posefit.silhouette.mask import Mask, Silhouette
 from posefit.sweep.check import cell_of
-from posefit_exemplars.lost import EVIDENCE, NAMES, Detector
+from posefit_exemplars.lost import EVIDENCE, NAMES, Judge
 from posefit_experiments.lost import experiment
-from posefit_experiments.lost.design import CONDITIONS, TIMES, VIEWS, Turn, turns
-from posefit_experiments.lost.model import features, fit, judge
-from posefit_experiments.lost.tables import lost_lines, lost_tables
-from posefit_experiments.people.clips import GROUPS, Piece
+from posefit_experiments.lost.damage import HELD, Worn, worn
+from posefit_experiments.lost.design import CONDITIONS, EVERY, MASKS, USUAL, VIEWS, Turn, turns
+from posefit_experiments.lost.model import SWAPPED, Said, features, fit, judge
+from posefit_experiments.lost.tables import lost_lines, lost_tables, sides_table
+from posefit_experiments.people.clips import Piece
 
 CLIP = Piece("walk-a", 6, 0, "walks")
 TRACK = Turn("walks", CLIP, (45.0,), "as they are")
@@ -31,7 +34,8 @@ def row(subject: str, far: list[float], mpjpe: list[float], **told: Any) -> dict
     return {
         "subject": subject, "group": "walks", "clip": f"{subject}_01", "views_degrees": [45.0],
         "condition": "as they are", "fps": 30.0, "mpjpe_mm": mpjpe, "cost": [100.0 * one for one in far],
-        "evidence": [{"farthest": one} for one in far], **told,
+        "swapped": [int(one > 150.0) for one in mpjpe],
+        "evidence": [{"farthest": one, "mirrored": 1.0 / one} for one in np.maximum(far, 0.01)], **told,
     }  # fmt: skip
 
 
@@ -46,24 +50,67 @@ def rows() -> list[dict[str, Any]]:
     return found
 
 
-def test_every_clip_is_followed_alike_often_and_nobody_by_what_he_taught() -> None:
-    tracks = turns(TIMES, False)
-    assert Counter((track.group, track.clip) for track in tracks) == {
-        (group, clip): TIMES for group, clips in GROUPS.items() for clip in clips
-    }
+def test_every_clip_is_followed_with_clean_and_with_real_masks_and_nobody_by_what_he_taught() -> None:
+    tracks = turns(False)
+    for masks in (False, True):
+        counts = Counter((track.group, track.clip) for track in tracks if (track.condition == MASKS) == masks)
+        usual = 2 if masks else 1
+        assert counts == {
+            (group, clip): usual if group in USUAL else 1 for group, clips in EVERY.items() for clip in clips
+        }
     for track in tracks:
         cell = cell_of(track.spec("exemplars", 2440))
         assert cell.train == (f"library:-{track.clip.subject}",)
-        assert cell.frames <= 60
+        assert cell.frames <= 48
+        assert (track.condition == MASKS) <= (cell.translation == "aligned")
     assert len({track.clip.subject for track in tracks}) == 10
-    assert len(turns(1, True)) == 12
-    assert set(turns(1, False)) < set(tracks)
+    assert len(turns(True)) < len(tracks) / 3
 
 
-def test_views_and_conditions_go_round_in_all_pairs() -> None:
-    pairs = Counter((track.views, track.condition) for track in turns(TIMES, False))
-    assert set(pairs) == {(views, condition) for views in VIEWS for condition in CONDITIONS}
-    assert max(pairs.values()) - min(pairs.values()) <= 1
+def test_all_views_and_conditions_come_about() -> None:
+    tracks = turns(False)
+    assert {track.condition for track in tracks} == {*CONDITIONS, MASKS}
+    for masks in (False, True):
+        assert {track.views for track in tracks if (track.condition == MASKS) == masks} == set(VIEWS)
+
+
+def standing_mask() -> Mask:
+    """Return a mask of somebody: a head on a trunk on two legs, 100 pixels tall."""
+    mask = np.zeros((140, 90), dtype=bool)
+    mask[20:36, 38:52] = mask[34:75, 32:58] = mask[75:120, 32:42] = mask[75:120, 48:58] = True
+    return mask
+
+
+def test_a_worn_mask_is_another_but_much_the_same() -> None:
+    rng, mask = np.random.default_rng(0), standing_mask()
+    overlaps = []
+    for _ in range(30):
+        spoilt = worn(mask, 0.0, rng, rng)
+        overlaps.append((mask & spoilt).sum() / (mask | spoilt).sum())
+    assert max(overlaps) < 1.0
+    assert 0.8 < np.mean(overlaps) < 0.97
+
+
+def test_a_rim_makes_masks_larger_or_smaller() -> None:
+    areas = [worn(standing_mask(), rim, *(np.random.default_rng(5) for _ in "ab")).sum() for rim in (-0.01, 0.0, 0.01)]
+    assert areas[0] < areas[1] < areas[2]
+
+
+def test_a_mask_of_which_little_would_be_left_stays_and_so_does_an_empty_one() -> None:
+    rng = np.random.default_rng(0)
+    for mask in (standing_mask() & False, standing_mask()):
+        np.testing.assert_array_equal(worn(mask, -0.1, rng, rng), mask)
+
+
+def test_what_is_wrong_with_a_mask_stays_for_a_while_and_comes_again_the_same() -> None:
+    seen = [Observation([Silhouette.of(standing_mask())] * 2, None)] * (4 * HELD)
+    masks = [[one.mask for one in each.silhouettes] for each in Worn(seen, [3])]
+    again = Worn(seen, [3])[7].silhouettes
+    np.testing.assert_array_equal([one.mask for one in again], masks[7])
+    assert (masks[7][0] != masks[7][1]).any()  # each camera has its own
+    steps = np.array([(masks[k][0] ^ masks[k + 1][0]).sum() for k in range(len(masks) - 1)])
+    changes = np.sort(steps)[::-1]
+    assert changes[:3].min() > 1.5 * np.median(steps)  # three times another thing is wrong
 
 
 def test_a_person_is_judged_by_what_others_taught() -> None:
@@ -71,6 +118,7 @@ def test_a_person_is_judged_by_what_others_taught() -> None:
     found = rows()
     other = [row("49", one["evidence"][0]["farthest"] * np.ones(20), (320.0 - np.array(one["mpjpe_mm"])).tolist()) for one in found[:2]]  # fmt: skip
     told = judge([*found, *other])
+    told = [one.lost for one in told]
     figures = {one["subject"]: lost_tables([one, two], [a, b])["lost"][0]["auroc"] for one, two, a, b in (
         (*found[:2], *told[:2]), (*other, *told[-2:]))}  # fmt: skip
     assert figures["02"] == 1.0
@@ -79,10 +127,27 @@ def test_a_person_is_judged_by_what_others_taught() -> None:
 
 def test_the_model_that_is_fitted_is_one_that_the_tracker_reads() -> None:
     told = fit(rows())
-    assert set(told["weights"]) == {"farthest", "farthest, so far"}  # nothing else differs
-    detector, known = Detector.from_dict(told), features(rows()[1])
-    assert known.shape == (20, len(NAMES)) == (20, 2 * len(EVIDENCE))
-    assert all(detector.probability(one) > 0.5 for one in known)
+    assert set(told["lost"]["weights"]) == {"farthest", "farthest, lately"}  # nothing else differs
+    assert set(told["sides"]["weights"]) == {"farthest, in general", "mirrored", "mirrored, in general"}
+    models, known = Judge.from_dict(told), features(rows()[1])
+    assert known.shape == (20, len(NAMES)) == (20, 3 * len(EVIDENCE))
+    assert all(models.lost.probability(one) > 0.5 for one in known)
+    assert all(models.sides.probability(one) >= models.unknown for one in known)
+
+
+def test_where_signs_tell_swapped_frames_few_of_the_known_ones_are() -> None:
+    found = rows()
+    said = judge(found)
+    every = sides_table(found, said)[0]
+    assert every["auroc"] == 1.0
+    assert every["swapped_known"] <= SWAPPED
+    assert every["unknown"] == pytest.approx(0.5, abs=0.1)
+
+
+def test_where_nothing_tells_swapped_frames_nearly_all_are_unknown() -> None:
+    rng = np.random.default_rng(0)
+    found = [{**one, "swapped": (rng.random(20) < 0.3).astype(int).tolist()} for one in rows()]
+    assert sides_table(found, judge(found))[0]["unknown"] > 0.8
 
 
 @pytest.mark.parametrize(("mpjpe", "count"), [(60.0, 0), (200.0, 40)])
@@ -120,6 +185,16 @@ def test_tables_say_how_often_it_is_right() -> None:
     lines = list(lost_lines(told))
     assert lines[2].startswith("| all | 2 | 8 | 50.0 |")
     assert lines[-1].startswith("mean MPJPE, least doubted frames first: 25 % kept 50 mm")
+
+
+def test_a_table_of_sides_says_how_many_are_unknown_and_how_many_of_these_are_swapped() -> None:
+    one = row("02", [0.1] * 4, [200.0, 60.0, 60.0, 200.0])  # of which the first and the last are swapped
+    said = Said(np.zeros(4), np.array([0.9, 0.2, 0.1, 0.15]), np.array([True, True, False, False]))
+    every = sides_table([one], [said])[0]
+    assert (every["swapped"], every["unknown"], every["unknown_right"]) == (0.5, 0.5, 0.5)
+    assert (every["swapped_unknown"], every["swapped_known"]) == (0.5, 0.5)
+    assert every["auroc"] == 0.75  # of four pairs three are in order
+    assert list(lost_lines({"lost": [], "kept": {}, "sides": [every]}))[-1].startswith("| all | 1 | 4 | 50.0 | 0.750 |")
 
 
 def test_costs_alone_are_no_probabilities() -> None:
@@ -180,7 +255,6 @@ def test_without_evidence_it_is_the_cost_that_judges(tmp_path: Path) -> None:
         (("--rows", "FOLDER/none.jsonl"), "expected a row a track, got an empty file"),
         (("--rows", "FOLDER/bad.jsonl"), "line 1 must be a row of a track, got no JSON"),
         (("--rows", "FOLDER/other.jsonl"), "line 1 must be a row of a track, with condition, cost,"),
-        (("--times", "0"), "times must be at least 1, got 0"),
         (("--quick", "--workers", "0"), "workers must be at least 1, got 0"),
     ],
 )

@@ -3,7 +3,6 @@
 import inspect
 import json
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -21,9 +20,9 @@ from posefit_exemplars.factory import exemplars
 from posefit_experiments.people.clips import Piece
 from posefit_experiments.posterior.design import OTHERS, TEMPERATURES, OneTrack, pieces, planned_tracks
 from posefit_experiments.posterior.experiment import posterior
-from posefit_experiments.posterior.fit import MEMBERS, SWAPPED, Kept, doubt_of, frame_weights, logistic, signs_of
+from posefit_experiments.posterior.fit import MEMBERS, Kept, doubt_of, frame_weights, logistic
 from posefit_experiments.posterior.frames import Followed, load_tracks, save_tracks
-from posefit_experiments.posterior.tables import best_modes, coverages, judgement, posterior_lines, sides
+from posefit_experiments.posterior.tables import best_modes, coverages, judgement, posterior_lines
 
 PEOPLE = ("02", "16", "49")
 
@@ -41,8 +40,8 @@ def made(person: str, instance: int, off: float, method: str = "exemplars", temp
     told = 0.3 * rng.standard_normal((20, 66))
     drawn, noise = (off * rng.standard_normal(shape) for shape in ((20, 12, 66), (20, 66)))
     seen = OneTrack("walks", Piece(f"{person}_01", 20, instance, "walks"), (45.0,), "known", 20, method, temperature)
-    costs, twins = 100 * off + told[:, 0] ** 2, rng.random((20, 2))
-    return Followed(seen, wrapped(told + noise), told, told[:, None] + drawn, np.full((20, 12), 1 / 12), costs, twins)
+    costs = 100 * off + told[:, 0] ** 2
+    return Followed(seen, wrapped(told + noise), told, told[:, None] + drawn, np.full((20, 12), 1 / 12), costs)
 
 
 def crowd(more: bool = False) -> list[Followed]:
@@ -106,40 +105,6 @@ def test_intervals_hold_what_they_say_after_the_fit(kept: list[Kept], doubt: Dou
     assert held["angles"]["80"] == pytest.approx(0.8, abs=0.05)
 
 
-def test_sides_are_known_where_nobody_is_swapped(kept: list[Kept], doubt: Doubt) -> None:
-    still = [one for one in kept if not one.swapped.any()]
-    assert still
-    told = sides([judgement(doubt, one) for one in still])
-    assert told["all"]["swapped_known"] == 0.0
-
-
-def mixed(every: Sequence[Kept], seed: int, told: bool) -> list[Kept]:
-    """Return tracks of which a third of the frames are swapped, as twins tell, or tell nothing of."""
-    rng = np.random.default_rng(seed)
-    found = []
-    for one in every:
-        swapped = rng.random(len(one.track)) < 0.3
-        twins = rng.uniform(0.0, 0.2, (20, 2)) + (told & ~swapped)[:, None]
-        found.append(replace(one, track=replace(one.track, twins=twins), swapped=swapped, second=np.zeros(20)))
-    return found
-
-
-def test_twins_that_tell_swapped_frames_leave_few_of_them_outside(kept: list[Kept]) -> None:
-    tracks = mixed(kept, 0, True)
-    doubt = doubt_of(tracks)
-    assert (doubt.sides[3:] < 0.0).all()
-    said = sides([judgement(doubt, one) for one in tracks])["all"]
-    assert said["swapped_known"] <= SWAPPED
-    assert 0.25 < said["unknown"] < 0.4
-
-
-def test_where_nothing_tells_swapped_frames_all_are_unknown(kept: list[Kept]) -> None:
-    tracks = mixed(kept, 1, False)
-    doubt = doubt_of(tracks)
-    said = sides([judgement(doubt, one) for one in tracks])["all"]
-    assert said["unknown"] > 0.9
-
-
 def test_best_modes_are_right_where_they_are_nearest_and_as_near_as_one_mode_is(kept: list[Kept]) -> None:
     one = replace(kept[0], modes=[np.array([0.8, 0.2])] * 20, nearest=np.zeros((20, 2)))
     one.nearest[:] = [0.0, 0.05]
@@ -158,12 +123,6 @@ def test_where_no_mode_is_right_is_learned(kept: list[Kept], doubt: Doubt) -> No
     assert told["calibration_error"] < best_modes(kept)["calibration_error"]
 
 
-def test_signs_are_of_each_frame(kept: list[Kept], doubt: Doubt) -> None:
-    signs = signs_of(doubt, kept[0])
-    np.testing.assert_array_equal(signs[:, 1], kept[0].second)
-    np.testing.assert_array_equal(signs[:, 3:], kept[0].track.twins)
-
-
 def test_odds_are_found_again() -> None:
     rng = np.random.default_rng(0)
     design = np.column_stack([np.ones(20000), rng.standard_normal(20000)])
@@ -179,7 +138,6 @@ def test_tracks_come_back_from_a_file(tmp_path: Path) -> None:
         assert one.seen == other.seen
         np.testing.assert_allclose(one.drawn, other.drawn, atol=2e-3)
         np.testing.assert_allclose(one.truth, other.truth, atol=1e-6)
-        np.testing.assert_allclose(one.twins, other.twins, atol=1e-6)
 
 
 def test_tables_are_of_whoever_was_left_out_and_what_is_stored_is_of_all(tmp_path: Path) -> None:

@@ -161,7 +161,7 @@ def people_command(recovery: bool, others: bool, ledger: str | None, as_json: bo
 @workers(None)
 @JSON
 def posterior_command(as_json: bool, **asked: Any) -> None:
-    """How sure exemplars is of people whom it has never seen: intervals, unknown sides and modes."""
+    """How sure exemplars is of people whom it has never seen: intervals and modes."""
     from posefit_experiments.posterior import experiment, tables
 
     _print(experiment.posterior(**asked, progress=bar), tables.posterior_lines, as_json)
@@ -169,15 +169,14 @@ def posterior_command(as_json: bool, **asked: Any) -> None:
 
 @click.command("lost")
 @click.option("--method", default="exemplars", show_default=True, help="A tracker, or OPTIMISER@PRIOR: by its cost.")
-@click.option("--times", type=int, default=2, show_default=True, help="Tracks of each clip, each of another view.")
 @click.option("--quick", is_flag=True, help="Two clips of each group: a look, not a measurement.")
-@click.option("--store", metavar="FILE.json", help="New file for the detector that is fitted, for exemplars to read.")
+@click.option("--store", metavar="FILE.json", help="New file for the models that are fitted, for exemplars to read.")
 @click.option("--rows", metavar="FILE", help="Fit to what --out wrote, and follow nobody.")
 @click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")
 @workers(None)
 @JSON
 def lost_command(as_json: bool, **asked: Any) -> None:
-    """How well lost frames are told, of people whom neither the library nor the detector has seen."""
+    """How well lost frames and swapped sides are told, of people whom neither library nor model has seen."""
     from posefit_experiments.lost import experiment, tables
 
     _print(experiment.lost(**asked, progress=bar), tables.lost_lines, as_json)

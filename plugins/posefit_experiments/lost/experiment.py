@@ -1,8 +1,9 @@
-"""Tracks of people whom the library has never seen, the evidence of their frames, and the detector that is fitted."""
+"""Tracks of people whom the library has never seen, the evidence of their frames, and the models that are fitted."""
 
 import json
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,20 +16,20 @@ from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
 from posefit.tracking.run import follow
 from posefit_experiments.grid import Progress, each
-from posefit_experiments.lost.design import Turn, turns
+from posefit_experiments.lost.damage import Worn
+from posefit_experiments.lost.design import MASKS, Turn, turns
 from posefit_experiments.lost.model import fit, judge, judge_costs
-from posefit_experiments.lost.tables import lost_tables
+from posefit_experiments.lost.tables import lost_tables, sides_table
 
 METHOD = "exemplars"
 EVALUATIONS = 2440  # of a frame
 DIGITS = 6  # of numbers in a file of rows
 LARGEST = 200_000_000  # bytes of such a file
-NEEDED = {"subject", "group", "views_degrees", "condition", "fps", "mpjpe_mm", "cost"}
+NEEDED = {"subject", "group", "views_degrees", "condition", "fps", "mpjpe_mm", "swapped", "cost"}
 
 
 def lost(
     method: str,
-    times: int,
     quick: bool,
     store: str | None,
     workers: int | None,
@@ -36,17 +37,17 @@ def lost(
     out: str | None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Return how well a detector tells which frames are lost, of people whom neither it nor the library has seen.
+    """Return how well it is told which frames are lost and swapped, of people whom neither model nor library has seen.
 
-    `out` is a new file for a row a track, and `rows` such a file, from which the detector is fitted without following
-    anybody again. `store` is a new file for the detector that is fitted to all of them, for `exemplars` to read.
+    `out` is a new file for a row a track, and `rows` such a file, from which the models are fitted without following
+    anybody again. `store` is a new file for the models that are fitted to all of them, for `exemplars` to read.
     """
     if store and (method != METHOD or quick):
         raise ValueError(f"store must be asked for with all tracks of {METHOD}, got --store with a look at others")
     if rows is not None and out is not None:
         raise ValueError("out must be given for tracks that are followed, got --out with --rows")
     with new_file(out) if out else nullcontext() as file, new_file(store) if store else nullcontext() as kept:
-        found = _read(rows) if rows is not None else _followed(method, turns(times, quick), workers, progress)
+        found = _read(rows) if rows is not None else _followed(method, turns(quick), workers, progress)
         if file is not None:
             file.write_text("".join(f"{json.dumps(row)}\n" for row in found), encoding="utf-8")
         told = {"method": method, "tracks": len(found)}
@@ -57,7 +58,9 @@ def lost(
         model = fit(found)
         if kept is not None:
             kept.write_text(json.dumps(model, indent=1) + "\n", encoding="utf-8")
-    return told | {"model": model} | lost_tables(found, judge(found))
+    said = judge(found)
+    tables = lost_tables(found, [one.lost for one in said]) | {"sides": sides_table(found, said)}
+    return told | {"model": model} | tables
 
 
 def _followed(
@@ -72,6 +75,9 @@ def _followed(
 def _tracked(cell: Cell, track: Turn) -> dict[str, Any]:
     """Return a row of a track: its frames' errors, costs, and evidence where the tracker tells it."""
     scene = cell_scene(cell)
+    if track.condition == MASKS:
+        seed = [track.clip.instance, *track.clip.name.encode()]
+        scene = replace(scene, observations=Worn(scene.observations, seed))
     optimiser, prior, tracker = parts(cell.method)
     named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
     training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
@@ -85,6 +91,7 @@ def _tracked(cell: Cell, track: Turn) -> dict[str, Any]:
         "condition": track.condition,
         "fps": scene.fps,
         "mpjpe_mm": [round(one["mpjpe_mm"], 2) for one in told.frames],
+        "swapped": [int(one["swapped"]) for one in told.frames],
         "cost": [round(one["cost"], DIGITS) for one in told.frames],
     }
     evidence = [frame.details.get("evidence", {}) for frame in told.found]

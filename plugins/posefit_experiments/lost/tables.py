@@ -1,16 +1,17 @@
-"""What the tracks come to: how well lost frames are told, by group, number of views and condition."""
+"""What the tracks come to: how well lost frames and swapped sides are told, by group, number of views and condition."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.posterior.calibration import auroc, calibration_error, false_alarms, kept_errors
 from posefit.tracking.evaluation import LOST
-from posefit_experiments.lost.model import lost_frames
+from posefit_experiments.lost.model import Said, lost_frames, swapped_frames
 
 Row = Mapping[str, Any]
+T = TypeVar("T")
 
 RECALLS = (0.9, 0.95)
 SHARES = (0.25, 0.5, 0.75, 0.9, 1.0)  # of frames that are kept, the least doubted first
@@ -22,12 +23,7 @@ def lost_tables(rows: Sequence[Row], doubts: Sequence[Array]) -> dict[str, Any]:
     every = list(zip(rows, doubts, strict=True))
     return {
         "frames": sum(len(one) for one in doubts),
-        "lost": [
-            _figures("all", every),
-            *_split(every, lambda row: row["group"]),
-            *_split(every, lambda row: f"{len(row['views_degrees'])} camera{'s' * (len(row['views_degrees']) > 1)}"),
-            *_split(every, lambda row: row["condition"]),
-        ],
+        "lost": [_figures(name, part) for name, part in _parted(every)],
         "kept": {
             f"{share:g}": float(error)
             for share, error in zip(SHARES, kept_errors(_errors(rows), np.concatenate(doubts), SHARES), strict=True)
@@ -35,9 +31,25 @@ def lost_tables(rows: Sequence[Row], doubts: Sequence[Array]) -> dict[str, Any]:
     }
 
 
-def _split(every: Sequence[tuple[Row, Array]], of: Any) -> Iterator[dict[str, Any]]:
-    for name in dict.fromkeys(of(row) for row, _ in every):
-        yield _figures(name, [one for one in every if of(one[0]) == name])
+def _parted(every: Sequence[tuple[Row, T]]) -> Iterator[tuple[str, list[tuple[Row, T]]]]:
+    """Yield all rows with what is said of them; then those of each group, number of views and condition, by name."""
+    yield "all", list(every)
+    for of in (_group, _cameras, _condition):
+        for name in dict.fromkeys(of(row) for row, _ in every):
+            yield name, [one for one in every if of(one[0]) == name]
+
+
+def _group(row: Row) -> str:
+    return str(row["group"])
+
+
+def _cameras(row: Row) -> str:
+    count = len(row["views_degrees"])
+    return f"{count} camera{'s' * (count > 1)}"
+
+
+def _condition(row: Row) -> str:
+    return str(row["condition"])
 
 
 def _figures(name: str, found: Sequence[tuple[Row, Array]]) -> dict[str, Any]:
@@ -64,6 +76,33 @@ def _errors(rows: Sequence[Row]) -> Array:
     return np.concatenate([np.array(row["mpjpe_mm"]) for row in rows])
 
 
+def sides_table(rows: Sequence[Row], said: Sequence[Said]) -> list[dict[str, Any]]:
+    """Return how often sides are exchanged, called unknown, and both, of all rows and of parts of them."""
+    every = list(zip(rows, said, strict=True))
+    return [_sides_figures(name, part) for name, part in _parted(every)]
+
+
+def _sides_figures(name: str, found: Sequence[tuple[Row, Said]]) -> dict[str, Any]:
+    swapped = swapped_frames([row for row, _ in found])
+    exchanged, unknown = (np.concatenate([getattr(one, key) for _, one in found]) for key in ("exchanged", "unknown"))
+
+    def share(flags: Any, of: Any) -> float | None:
+        return float(flags[of].mean()) if of.any() else None
+
+    return {
+        "name": name,
+        "tracks": len(found),
+        "frames": len(swapped),
+        "swapped": float(swapped.mean()),
+        "auroc": auroc(exchanged, swapped),
+        "calibration_error": calibration_error(exchanged, swapped),
+        "unknown": float(unknown.mean()),
+        "unknown_right": share(unknown, ~swapped),
+        "swapped_unknown": share(swapped, unknown),
+        "swapped_known": share(swapped, ~unknown),
+    }
+
+
 def lost_lines(told: Mapping[str, Any]) -> Iterator[str]:
     """Yield the tables as they are printed."""
     heads = ["tracks", "frames", "lost %", "AUROC", "AUROC, clear cases"]
@@ -80,6 +119,22 @@ def lost_lines(told: Mapping[str, Any]) -> Iterator[str]:
     yield ""
     kept = (f"{100 * float(share):g} % kept {error:.0f} mm" for share, error in told["kept"].items())
     yield f"mean MPJPE, least doubted frames first: {', '.join(kept)}"
+    if "sides" in told:
+        yield ""
+        yield from _sides_lines(told["sides"])
+
+
+def _sides_lines(table: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the table as it is printed."""
+    heads = ["tracks", "frames", "swapped %", "AUROC", "calibration error", "unknown %", "unknown of right ones %"]
+    heads += ["swapped of unknown ones %", "swapped of known ones %"]
+    yield f"| {' | '.join(['', *heads])} |"
+    yield "|" + "---|" + "---:|" * len(heads)
+    for one in table:
+        cells = [one["name"], str(one["tracks"]), str(one["frames"]), _percent(one["swapped"])]
+        cells += [_number(one["auroc"]), _number(one["calibration_error"])]
+        cells += [_percent(one[key]) for key in ("unknown", "unknown_right", "swapped_unknown", "swapped_known")]
+        yield f"| {' | '.join(cells)} |"
 
 
 def _percent(value: float | None) -> str:

@@ -10,7 +10,7 @@ from posefit_experiments.grid import Progress, each
 from posefit_experiments.posterior.design import METHOD, OTHERS, TEMPERATURES, planned_tracks
 from posefit_experiments.posterior.fit import Kept, doubt_of
 from posefit_experiments.posterior.frames import followed, load_tracks, save_tracks
-from posefit_experiments.posterior.tables import best_modes, coverages, judgement, kept_table, searches_lost, sides
+from posefit_experiments.posterior.tables import best_modes, coverages, judgement, kept_table, searches_lost
 
 PEOPLE = 3  # at least, of which one is left out at a time
 
@@ -24,7 +24,7 @@ def posterior(
     workers: int | None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Return what intervals, sides and modes are worth on everybody who was left out of library and fit.
+    """Return what intervals and modes are worth on everybody who was left out of library and fit.
 
     `again` is a file of tracks that an earlier `out` wrote, in place of following. `out` is a new file .npz for the
     frames of all tracks, `store` a new one .json for what was fitted to all people.
@@ -63,7 +63,6 @@ def posterior(
     return {
         "temperature": temperature,
         "coverage": coverages(said),
-        "sides": sides(said),
         "modes": {"recalibrated": best_modes([one.kept for one in said], said), **_temperatures(mine, temperature)},
         "kept": kept_table(said, others) if others else {},
         "searches": searches_lost(others) if others else {},

@@ -13,7 +13,7 @@ from posefit.posterior.calibration import LEVELS, Recalibration, conformal_facto
 from posefit.posterior.intervals import angle_intervals, joint_intervals
 from posefit.posterior.modes import APART, modes_of
 from posefit.posterior.sides import nearer_mirrored, second_side
-from posefit_exemplars.doubt import Doubt, evidence, none_signs, side_signs
+from posefit_exemplars.doubt import Doubt, evidence, none_signs
 from posefit_experiments.posterior.frames import Followed
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -31,9 +31,6 @@ MEMBERS = {name: np.array([JOINTS.index(joint) for joint in joints]) for name, j
 ALONE = {str(angle): np.array([angle]) for angle in range(ANGLES)}  # some have no freedom, and so no error
 TRIED = np.geomspace(0.05, 2.0, 12)  # spreads, in doubts
 EVERY = 5  # of the frames that factors are found from; neighbours say the same
-SWAPPED = 0.03  # of the frames whose sides are not called unknown, at most
-BOUNDS = (0.01, 0.5)  # of how likely exchanged sides have to be for that; from a half on they are likelier than not
-LEAST = 0.1  # slope of log-odds over the second side's weight
 SHARPNESSES = np.geomspace(0.05, 1.0, 24)
 TINY = 1e-12
 RIDGE = 1e-3
@@ -72,14 +69,13 @@ class Kept:
 
 
 def doubt_of(tracks: Sequence[Kept]) -> Doubt:
-    """Return what makes the intervals and unknown sides of tracks mean what they say."""
+    """Return what makes the intervals and the weights of modes of tracks mean what they say."""
     doubt = _doubt(tracks)
     joints, angles = _spreads(doubt, tracks)
     doubt = replace(doubt, joint_spreads=joints, angle_spreads=angles)
     joint_factors, angle_factors = _factors(doubt, tracks)
     doubt = replace(doubt, joint_factors=joint_factors, angle_factors=angle_factors)
-    doubt = replace(doubt, sharpness=_sharpness(tracks), none=_none(doubt, tracks))
-    return _sided(doubt, tracks)
+    return replace(doubt, sharpness=_sharpness(tracks), none=_none(doubt, tracks))
 
 
 def sharpened(weights: Array, sharpness: float) -> Array:
@@ -122,7 +118,7 @@ def _doubt(tracks: Sequence[Kept]) -> Doubt:
     ones = Recalibration()
     return Doubt(
         slopes, (float(low), float(high)), ones.joint_spreads, ones.angle_spreads, ones.joint_factors,
-        ones.angle_factors, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), 1.0, np.zeros(3), 0.2,
+        ones.angle_factors, 1.0, np.zeros(3),
     )  # fmt: skip
 
 
@@ -186,54 +182,11 @@ def radii_of(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
     """Return the radii of joints (T, levels, 27) and the half intervals of angles (T, levels, 66)."""
     joints, angles, track = [], [], one.track
     for k in range(0, len(track), every):
-        recalibration = doubt.recalibration(doubt.log(one.seen[k]), track.twins[k])
+        recalibration = doubt.recalibration(doubt.log(one.seen[k]))
         posterior = replace(track.posterior(k), recalibration=recalibration)
         joints.append(joint_intervals(track.skeleton, posterior, track.told[k]).radii)
         angles.append(angle_intervals(posterior, track.told[k]).halves)
     return np.array(joints), np.array(angles)
-
-
-def signs_of(doubt: Doubt, one: Kept) -> Array:
-    """Return what exchanged sides of a track's frames follow from (T, 5)."""
-    each = zip(one.second, one.seen, one.track.twins, strict=True)
-    return np.array([side_signs(second, doubt.log(seen), twins) for second, seen, twins in each])
-
-
-def exchanged(sides: Array, signs: Array) -> Array:
-    """Return how likely left and right are exchanged (T,), by signs (T, 5)."""
-    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(signs @ sides, -30.0, 30.0))))
-
-
-def _sided(doubt: Doubt, tracks: Sequence[Kept]) -> Doubt:
-    """Return the doubt with the odds of exchanged sides, and with how likely they have to be to be called unknown.
-
-    That is judged on each person by the odds of the others, as whoever is followed is none of those it was found on.
-    """
-    signs = np.concatenate([signs_of(doubt, one) for one in tracks])
-    swapped, weights = np.concatenate([one.swapped for one in tracks]), frame_weights(tracks)
-    of = np.concatenate([[one.track.seen.clip.subject] * len(one.track) for one in tracks])
-    probable = np.zeros(len(signs))
-    for person in np.unique(of):
-        mine = of == person
-        probable[mine] = exchanged(_odds(signs[~mine], swapped[~mine], weights[~mine]), signs[mine])
-    return replace(doubt, sides=_odds(signs, swapped, weights), unknown=_unknown(probable, swapped, weights))
-
-
-def _odds(signs: Array, swapped: NDArray[np.bool_], weights: Array) -> Array:
-    """Return the coefficients (5,) of the log-odds of exchanged sides."""
-    weights = weights / max(weights.sum(), TINY)
-    sides = logistic(signs, swapped, weights)
-    if sides[1] < LEAST:  # too few swapped frames to say what the samples know of them
-        sides = np.insert(logistic(np.delete(signs, 1, axis=1), swapped, weights), 1, LEAST)
-    return sides
-
-
-def _unknown(probable: Array, swapped: NDArray[np.bool_], weights: Array) -> float:
-    """Return from which probability of exchanged sides on they are unknown: few of the other frames are swapped."""
-    order = np.argsort(probable, kind="stable")
-    shares = np.cumsum((weights * swapped)[order]) / np.maximum(np.cumsum(weights[order]), TINY)
-    few = np.flatnonzero(shares <= SWAPPED)
-    return float(np.clip(probable[order][few[-1]] if len(few) else 0.0, *BOUNDS))
 
 
 def logistic(design: Array, came: NDArray[np.bool_], weights: Array) -> Array:

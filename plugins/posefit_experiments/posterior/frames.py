@@ -33,7 +33,6 @@ class Followed:
     drawn: Array = field(repr=False)  # (T, K, 66)
     weights: Array = field(repr=False)  # (T, K)
     costs: Array = field(repr=False)  # (T,)
-    twins: Array = field(repr=False)  # (T, 2) what twins say of sides; 0 where a method has none
 
     def __len__(self) -> int:
         return len(self.told)
@@ -79,8 +78,7 @@ def followed(seen: OneTrack) -> Followed:
         assert one is not None
         drawn[k, : len(one)], weights[k, : len(one)] = one.poses, one.weights
     costs = np.array([one.cost for one in track.found])
-    twins = np.array([one.details.get("twins", np.zeros(2)) for one in track.found])
-    return Followed(seen, track.truth.poses, track.motion.poses, drawn, weights, costs, twins)
+    return Followed(seen, track.truth.poses, track.motion.poses, drawn, weights, costs)
 
 
 ARRAYS = tuple(one.name for one in fields(Followed) if one.name != "seen")

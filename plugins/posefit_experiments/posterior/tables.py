@@ -1,4 +1,4 @@
-"""What left-out people say: coverage, widths, sides, modes, and errors over the frames that are kept; and its print."""
+"""What left-out people say: coverage, widths, modes, and errors over the frames that are kept; and its print."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,19 +16,15 @@ from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
 from posefit_experiments.posterior.fit import (
     MEMBERS,
-    TINY,
     Kept,
-    exchanged,
     frame_weights,
     logistic,
     radii_and_angles_held,
     sharpened,
-    signs_of,
 )
 
 LOST_METRES = 1e-3 * LOST_MM
 KEPT = (0.25, 0.5, 0.75, 1.0)  # shares of frames, the most certain first
-LIKELY = (0.05, 0.1, 0.2)  # probabilities of exchanged sides from which they might be called unknown, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +35,6 @@ class Judged:
     doubts: Array = field(repr=False)  # (T,) metres
     sharpness: float
     none: Array = field(repr=False)  # (T,) probability that no mode is right
-    unknown: NDArray[np.bool_] = field(repr=False)  # (T,)
-    exchanged: Array = field(repr=False)  # (T,) probability of exchanged sides
     inside: NDArray[np.bool_] = field(repr=False)  # (T, levels, 27)
     radii: Array = field(repr=False)  # (T, levels, 27) metres
     turned: Array = field(repr=False)  # (levels,) share of angles that are inside
@@ -49,15 +43,12 @@ class Judged:
 def judgement(doubt: Doubt, kept: Kept) -> Judged:
     """Return what is said of a track."""
     logs = np.array([doubt.log(seen) for seen in kept.seen])
-    least = [doubt.second_side(log, twins) for log, twins in zip(logs, kept.track.twins, strict=True)]
     radii, angles = radii_and_angles_held(doubt, kept)
     return Judged(
         kept,
         np.exp(logs),
         doubt.sharpness,
         np.array([doubt.none_right(log) for log in logs]),
-        kept.second >= least,
-        exchanged(doubt.sides, signs_of(doubt, kept)),
         kept.track.off[:, None] <= radii,
         radii,
         angles.mean(axis=(0, 2)),
@@ -101,49 +92,12 @@ def seen_from(kept: Kept) -> str:
     return ", ".join(f"{view:03.0f}" for view in kept.track.seen.views)
 
 
-def sides(tracks: Sequence[Judged]) -> dict[str, Any]:
-    """Return how often left and right are said to be unknown, and swapped then and otherwise.
-
-    Of all tracks, at other probabilities too, by kind of motion, by how many cameras, and by translation.
-    """
-    told = {}
-    weights = frame_weights([one.kept for one in tracks])
-    probable = np.concatenate([one.exchanged for one in tracks])
-    swapped = np.concatenate([one.kept.swapped for one in tracks])
-    for least in LIKELY:
-        told[f"all, from {100 * least:g} % on"] = _sides(weights, probable >= least, swapped)
-    parts: dict[str, list[Judged]] = {"all": list(tracks)}
-    for name_of in (_group, _cameras, _translation):
-        for name in sorted({name_of(one) for one in tracks}):
-            parts[name] = [one for one in tracks if name_of(one) == name]
-    for name, mine in parts.items():
-        weights = frame_weights([one.kept for one in mine])
-        unknown = np.concatenate([one.unknown for one in mine])
-        swapped = np.concatenate([one.kept.swapped for one in mine])
-        told[name] = _sides(weights, unknown, swapped)
-    return told
-
-
 def _group(one: Judged) -> str:
     return one.kept.track.seen.group
 
 
-def _cameras(one: Judged) -> str:
-    return {1: "one camera"}.get(len(one.kept.track.seen.views), "two cameras")
-
-
 def _translation(one: Judged) -> str:
     return one.kept.track.seen.translation
-
-
-def _sides(weights: Array, unknown: NDArray[np.bool_], swapped: NDArray[np.bool_]) -> dict[str, float]:
-    inside, outside = (weights * some for some in (unknown, ~unknown))
-    return {
-        "swapped": float(weights @ swapped),
-        "unknown": float(inside.sum()),
-        "swapped_unknown": float(inside @ swapped / max(inside.sum(), TINY)),
-        "swapped_known": float(outside @ swapped / max(outside.sum(), TINY)),
-    }
 
 
 def best_modes(tracks: Sequence[Kept], said: Sequence[Judged] = ()) -> dict[str, Any]:
@@ -242,11 +196,6 @@ def posterior_lines(told: Mapping[str, Any]) -> Iterator[str]:
             widths = [f"{one['radius_mm']['80']:.0f}", f"{one['median_radius_mm']:.0f}"]
             yield _line([part, name, str(one["tracks"]), *shown, *widths])
     yield _line(["angles", "", "", *(f"{100 * held['angles'][level]:.1f}" for level in levels), "", ""])
-    yield ""
-    names = ("swapped", "unknown", "swapped_unknown", "swapped_known")
-    yield from _head(["frames of", "swapped %", "said unknown %", "swapped inside %", "swapped outside %"], 1)
-    for name, one in told["sides"].items():
-        yield _line([name, *(f"{100 * one[each]:.1f}" for each in names)])
     yield ""
     heads = ["best mode %", "right %", "error %", "several modes %", "error %", "none right %", "error %"]
     yield from _head(["modes", "tracks", *heads, "AUROC", "second side AUROC"], 1)
