@@ -79,6 +79,7 @@ class Task:
     first_pose: Array | None = None  # (63,) joint angles in the first frame, where somebody knows them
     before: Sequence[Frame] = field(default=(), repr=False)  # found earlier, where a track goes on that was interrupted
     threads: int = 1
+    fastest_turn: float | None = None  # radians a second that nobody's yaw turns faster than; None where nobody says
 
     @property
     def angles(self) -> Array:

@@ -13,7 +13,7 @@ UNEXPLAINED = 0.3  # more of what moves lies outside the masks, in half of the f
 TALLER, LARGER = 0.15, 0.25  # changes of the longer side and the area from frame to frame that one in ten exceeds
 GHOSTS = 0.1  # the share of frames with masks of an empty place that is worth a word,
 EMPTY = 0.5  # and that from which on nothing else is to be expected
-BROKEN = 0.5  # of the frames: masks that are in pieces more often, and unsteady, are parts of a person at best
+BROKEN = 0.3  # of the frames: masks that are in pieces more often, and unsteady, are parts of a person at best
 MOST = 0.5  # where fewer of the frames are usable and the masks are unsteady, there is nothing to follow
 
 
