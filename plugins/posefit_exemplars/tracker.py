@@ -41,6 +41,7 @@ GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are looked at;
 FIRST_GROUPS = 200
 OF_A_GROUP = 20  # poses, drawn at random, that stand for a group in a look everywhere
 FACING = np.radians(45.0)  # how far a yaw that was told may be off, to either side
+AWAY = 4.0  # cost of a state, over the temperature, that faces as far again from what is said of its frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,9 +123,10 @@ class ExemplarTracker:
             beams.append(stepped(self.exemplars, latest, seconds, self.steps, around, root))
         beam = self._at(look, joined_beams(*beams), latest is not None)
         costs = look.small(self._poses(beam), beam.places)
+        totals = beam.totals + costs / self.temperature + turned_away(beam.yaws, observation.yaw)
         used = (looked + len(beam)) * look.share
-        beam = beam.chosen(assorted(self.exemplars, beam, beam.totals + costs / self.temperature, full))
-        fits = look.full(self._poses(beam), beam.places) / self.temperature
+        beam = beam.chosen(assorted(self.exemplars, beam, totals, full))
+        fits = look.full(self._poses(beam), beam.places) / self.temperature + turned_away(beam.yaws, observation.yaw)
         used += len(beam)
         best = assorted(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used
@@ -214,3 +216,10 @@ class ExemplarTracker:
         seconds = oldest.seconds + time.perf_counter() - began
         cpu_seconds = oldest.cpu_seconds + time.process_time() - begun
         return Finding(pose, place, look, evaluations, seconds, cpu_seconds, drawn), off
+
+
+def turned_away(yaws: Array, told: float | None) -> Array:
+    """Return what it costs that states have yaws (n,), radians, where a frame's is said to be about `told`."""
+    if told is None:
+        return np.zeros(len(yaws))
+    return np.asarray(AWAY * np.clip(np.abs(wrapped(yaws - told)) / FACING - 1.0, 0.0, 1.0))

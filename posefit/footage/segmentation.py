@@ -1,5 +1,6 @@
 """Goes through a video and tells the person in it from the background, frame by frame."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -112,6 +113,7 @@ class Segmentation:
         self._given = "background" in how.settings
         self._segmenter = self._learn() if self._given else None  # what is given is checked now
         self._shifts: list[float] = []
+        self.facings: list[float] = []  # of each frame, as the segmenter says; nan where it does not
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -125,6 +127,7 @@ class Segmentation:
             if k % PERIOD == 0:
                 self._shifts.append(still.shift(image))
             found = person(*self._segmented(segmenter, image), self._roi, self._ignored)
+            self.facings.append(float(getattr(segmenter, "facing", math.nan)))
             part = replace(found, mask=self._film.cut(found.mask), valid=self._film.cut(found.valid))
             self.rows.append(watch.look(self._film.cut(image), part, self.start + k))
             if not self._video.is_filmed(self.start + k):

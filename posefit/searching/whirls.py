@@ -33,7 +33,9 @@ def whirling(yaws: Array, usable: NDArray[np.bool_], fps: float) -> NDArray[np.b
     return found
 
 
-def agreeing(frames: Sequence[Frame], cameras: Sequence[Camera], usable: NDArray[np.bool_], fps: float) -> Array:
+def agreeing(
+    frames: Sequence[Frame], cameras: Sequence[Camera], usable: NDArray[np.bool_], fps: float
+) -> NDArray[np.bool_]:
     """Return which frames (T,) face where the whole track does, as true flags, by the likeliest way without whirls.
 
     A frame may face where it was found, or where its reflection does; the latter goes against its votes, of which it
@@ -45,8 +47,11 @@ def agreeing(frames: Sequence[Frame], cameras: Sequence[Camera], usable: NDArray
     agrees = np.zeros(len(frames), dtype=bool)
     if not len(rows):
         return agrees
-    seeing = np.array([frames[k].areas.any(axis=1) for k in rows])
-    towards = [facing(cameras[int(seen.argmax())], frames[k].translation) for k, seen in zip(rows, seeing, strict=True)]
+    seen = [frames[k] for k in rows.tolist()]
+    seeing = np.array([frame.areas.any(axis=1) for frame in seen])
+    towards = [
+        facing(cameras[int(views.argmax())], frame.translation) for frame, views in zip(seen, seeing, strict=True)
+    ]
     found = np.column_stack([yaws[rows], 2.0 * np.array(towards) + np.pi - yaws[rows]])
     against = np.column_stack([np.zeros(len(rows)), seeing.sum(axis=1) * PACE / fps])
     totals, parents = against[0], np.zeros((len(rows), 2), dtype=np.int64)
