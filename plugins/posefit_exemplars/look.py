@@ -49,6 +49,11 @@ class Look:
         return None if only is None else only.position
 
     @property
+    def yaw(self) -> float | None:
+        """About which way the person is said to face, in radians; None where nobody says."""
+        return self._observation.yaw
+
+    @property
     def cameras(self) -> int:
         """How many see the person."""
         return len(self._task.cameras)

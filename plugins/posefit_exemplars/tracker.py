@@ -150,8 +150,9 @@ class ExemplarTracker:
         taken = min(GROUPS_TAKEN if before is not None else FIRST_GROUPS, max(most // (4 * OF_A_GROUP), 1))
         count = max(most - taken * OF_A_GROUP, 1)
         states, middle, reach = self.exemplars.drawn(count, rng), 0.0, np.pi
-        if before is None and self.task.yaw is not None:
-            middle, reach = self.task.yaw, FACING
+        told = self.task.yaw if before is None and look.yaw is None else look.yaw
+        if told is not None:
+            middle, reach = told, FACING
         yaws = middle + rng.uniform(-reach, reach, count)
         beam = self._at(look, self._begun(states, yaws, before), False)
         best = np.argsort(look.small(self._poses(beam), beam.places), kind="stable")[:taken]
