@@ -17,8 +17,6 @@ Views = list[tuple[Camera, Silhouette]]
 
 SMALL = 40  # pixels: no side of a small picture is shorter
 FACTORS = (4, 2, 1)
-TOUCHING = 0.03  # metres that the lowest point of a body may be off the ground, a standard deviation
-FLOATING = 6.0  # that it costs at most, over the temperature: people jump
 
 
 class Look:
@@ -89,14 +87,6 @@ class Look:
     def full(self, poses: Array, places: Array) -> Array:
         """Return the costs (n,) of poses."""
         return self._costs(self._full, poses, places)
-
-    def floating(self, poses: Array, places: Array) -> Array:
-        """Return what it costs (n,) that the lowest points of poses are off the ground; 0 where that is not known."""
-        ground, body = self._task.ground, self._task.body
-        if ground is None:
-            return np.zeros(len(poses))
-        lowest = (body.skeleton.joints(poses, places)[..., 1] - body.joint_radii()).min(axis=1)
-        return np.asarray(np.minimum(0.5 * ((lowest - ground) / TOUCHING) ** 2, FLOATING))
 
     def measured(self, pose: Array, place: Array) -> tuple[float, Areas]:
         """Return the cost of one pose, and its areas (views, 3)."""

@@ -41,8 +41,8 @@ GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are looked at;
 FIRST_GROUPS = 200
 OF_A_GROUP = 20  # poses, drawn at random, that stand for a group in a look everywhere
 FACING = np.radians(45.0)  # how far a yaw that was told may be off, to either side
-PACE = 30.0  # a second: how often costs that are no silhouette's are meant
-AWAY = 4.0  # cost of a state, over the temperature, that faces as far again from what is said of its frame
+AWAY = 4.0  # cost of a state, over the temperature, that faces as far again from what is said of its frame,
+PACE = 30.0  # where there are so many frames a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,20 +123,15 @@ class ExemplarTracker:
         if latest is not None:
             beams.append(stepped(self.exemplars, latest, seconds, self.steps, around, root))
         beam = self._at(look, joined_beams(*beams), latest is not None)
-        poses = self._poses(beam)
-        said = self._floating(look, poses, beam.places) + turned_away(beam.yaws, observation.yaw) * PACE / self.task.fps
-        totals = beam.totals + said + look.small(poses, beam.places) / self.temperature
+        away = turned_away(beam.yaws, observation.yaw) * PACE / self.task.fps
+        totals = beam.totals + away + look.small(self._poses(beam), beam.places) / self.temperature
         used = (looked + len(beam)) * look.share
         kept = assorted(self.exemplars, beam, totals, full)
         beam = beam.chosen(kept)
-        fits = said[kept] + look.full(poses[kept], beam.places) / self.temperature
+        fits = away[kept] + look.full(self._poses(beam), beam.places) / self.temperature
         used += len(beam)
         best = assorted(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used
-
-    def _floating(self, look: Look, poses: Array, places: Array) -> Array:
-        """Return what it costs (n,), over the temperature, that poses do not touch the ground."""
-        return look.floating(poses, places) * PACE / self.task.fps
 
     def _joined(self, beam: Beam, fits: Array, before: Seen | None, look: Look) -> Seen:
         """Return a frame, joined to the one before."""
@@ -214,8 +209,7 @@ class ExemplarTracker:
             space = surroundings(self.exemplars, path, code, off)
 
             def cost(poses: Array) -> Array:
-                places = look.placed(poses, np.repeat(place[None], len(poses), axis=0))
-                return look.full(poses, places) + self.temperature * self._floating(look, poses, places)
+                return look.full(poses, look.placed(poses, np.repeat(place[None], len(poses), axis=0)))
 
             pose, used = refined(space, cost, self.make, self.pull, count, rng)
             evaluations += used

@@ -108,9 +108,6 @@ TRACK = (
     click.option("--ask-seconds", type=float, help="How long a plugin may take to propose a population."),
     click.option("--translation", help="Root translation: known, searched or aligned."),
     *HEIGHT,
-    click.option(
-        "--ground", type=float, metavar="METRES", help="How high the ground is in the calibration's world, often 0."
-    ),
     click.option("--restarts", type=int, help="Searches of a first pose nobody knows: 8, or 0 for exemplars."),
     click.option(
         "--body-frames",

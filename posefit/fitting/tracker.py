@@ -53,7 +53,8 @@ class Frame:
     coordinates: Array | None = field(default=None, repr=False)  # (d,) where it was found in a search space
     spent: NDArray[np.int64] | None = field(default=None, repr=False)  # (populations,) evaluations so far after each
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
-    cpu_seconds: float | None = None  # of all threads: unlike `seconds` it does not grow on a busy machine
+    # of all threads of the process, where a tracker says: unlike `seconds` it does not grow on a busy machine
+    cpu_seconds: float | None = None
     posterior: Posterior | None = field(default=None, repr=False)  # what else it may be, where a tracker says
     modes: Sequence[Mode] = ()  # that are in the posterior, the likeliest first; a followed scene's frames have them
     lost: float | None = None  # how likely it is that the frame is lost, 0 to 1, where a tracker says
@@ -78,7 +79,6 @@ class Task:
     first_pose: Array | None = None  # (63,) joint angles in the first frame, where somebody knows them
     before: Sequence[Frame] = field(default=(), repr=False)  # found earlier, where a track goes on that was interrupted
     threads: int = 1
-    ground: float | None = None  # metres: how high the ground is, which somebody's lowest point touches, where known
     fastest_turn: float | None = None  # radians a second that nobody's yaw turns faster than; None where nobody says
 
     @property

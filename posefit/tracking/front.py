@@ -67,7 +67,6 @@ def track(
     restarts: int | None = None,
     body_frames: int | None = None,
     height: float | None = None,
-    ground: float | None = None,
     extraction: Extraction | None = None,
     label: int | None = None,
     holes: float | None = None,
@@ -101,8 +100,7 @@ def track(
     else from the built-in walks. Where it is not, it is the tracker `exemplars`, which learns from the library; or, if
     an optimiser or a prior is given, `sapso` with `loose`, which learns from the built-in walks. There the first frame
     is searched `restarts` times (8; 0 for a tracker that looks ahead), and the person's build is fitted to
-    `body_frames` (12; none where an .asf is given), as tall as `height` says. `ground` is how high the ground is in the
-    calibration's world, in metres: whoever touches it cannot be nearer, or farther. With several `tracks` the person is
+    `body_frames` (12; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
     followed so many times from different beginnings, each at the full budget, and the track is kept whose whole cost is
     least. A track is `steady` where nobody knows the truth: its root goes smoothly, and feet that stand stay where they
     are; False leaves what was found in each frame. `view_degrees` gives where the camera stands, several of them
@@ -162,15 +160,12 @@ def track(
         restarts=restarts,
         body_frames=0 if body_frames is None and asf is not None else body_frames,
         height=height,
-        ground=ground,
     )
     kind = kind_of(sources[0])
     viewing.check_used(kind)
     if kind == "motion":
         _check_known(asf, restarts, [*sources, *train])
     opening.check(kind == "motion")
-    if ground is not None and not viewing.cameras:
-        raise ValueError(f"ground must be given with a camera, in whose world it is, got {ground}")
     clips = training_clips(chosen.train, asf, followed=sources[0])  # before the work, as a name may be wrong
     if resume and out is None:
         raise ValueError("resume must be given with out, the folder of the track that goes on, got none")

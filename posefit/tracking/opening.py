@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from posefit.fitting.check import finite_number
 from posefit.fitting.shape import Shape, fit_shape
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Frame, Observation, Task
@@ -34,7 +33,6 @@ class Opening:
     restarts: int | None = None
     body_frames: int | None = None
     height: float | None = None  # metres
-    ground: float | None = None  # metres: how high it is in the calibration's world
 
     def __post_init__(self) -> None:
         if self.first_pose not in ("searched", "given"):
@@ -43,8 +41,6 @@ class Opening:
             value = getattr(self, name)
             if value is not None and value < 0:
                 raise ValueError(f"{name} must be 0 or more, got {value}")
-        if self.ground is not None:
-            finite_number("ground", self.ground)
 
     def check(self, known: bool) -> None:
         """Raise ValueError where something is taken for known although nobody knows the truth."""
@@ -52,8 +48,6 @@ class Opening:
             raise ValueError("translation must be searched or aligned where only masks are given, got known")
         if not known and self.first_pose == "given":
             raise ValueError("first_pose must be searched where only masks are given, got given")
-        if known and self.ground is not None:
-            raise ValueError(f"ground must be given for footage only, got {self.ground}")
 
 
 def task_of(scene: Scene, how: Opening, training: Sequence[Motion], evaluations: int, threads: int) -> Task:
@@ -71,7 +65,6 @@ def task_of(scene: Scene, how: Opening, training: Sequence[Motion], evaluations:
         training=training,
         first_pose=known,
         threads=threads,
-        ground=how.ground,
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from posefit.motion import built_in
 from posefit.silhouette.mask import Silhouette
-from posefit_exemplars.look import FLOATING, TOUCHING, Look
+from posefit_exemplars.look import Look
 from tests.exemplars.conftest import walk_of
 
 
@@ -23,14 +23,3 @@ def test_a_camera_that_sees_alone_cannot_tell_the_depth_however_many_there_are()
     assert only is not None
     np.testing.assert_array_equal(only, first.position)
     assert Look(walk.task, replace(one, silhouettes=[nothing, nothing])).eye is None
-
-
-def test_whoever_floats_costs_more_the_higher_he_is_up_to_what_a_jump_may_cost() -> None:
-    walk = walk_of(built_in.motion("walk", frames=1))
-    poses, places = walk.motion.poses[[0] * 5], walk.motion.translations[[0] * 5].copy()
-    body = walk.task.body
-    lowest = float((walk.motion.skeleton.joints(poses[0], places[0])[:, 1] - body.joint_radii()).min())
-    places[:, 1] += [0.0, TOUCHING, -TOUCHING, 2.0 * TOUCHING, 9.0]
-    found = Look(walk.told(ground=lowest), walk.seen[0]).floating(poses, places)
-    np.testing.assert_allclose(found, [0.0, 0.5, 0.5, 2.0, FLOATING], atol=1e-9)
-    np.testing.assert_array_equal(Look(walk.task, walk.seen[0]).floating(poses, places), np.zeros(5))
