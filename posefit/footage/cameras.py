@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.footage.extract import store
 from posefit.footage.given.settled import settled
 from posefit.footage.masks import FPS, FolderMasks, Masks, Range, Straight, Views
@@ -36,7 +37,7 @@ class CameraView:
     fps: float
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
     warnings: Sequence[str] = ()
-    facings: Sequence[float] = ()  # of each frame, as `Segmenter.facing`; nan where nobody knows
+    facings: Array | Sequence[float] = ()  # of each frame, as `Segmenter.facing`; nan where nobody knows
 
 
 def masks_of(path: Path, fps: float | None, frames: Range, label: int | None, holes: float | None) -> CameraView:

@@ -9,7 +9,7 @@ import pytest
 
 from posefit.footage import segmentation
 from posefit.footage.segmentation import Extraction
-from posefit.footage.segmenting.facing import yaws_of
+from posefit.footage.segmenting.facing import facings_on_the_spot, yaws_of
 from posefit.footage.source import Viewing, scene_of
 from posefit.geometry.camera import Camera
 from posefit.registry import Offer
@@ -44,6 +44,16 @@ def test_nobody_knows_where_nothing_is_said_or_it_contradicts_itself() -> None:
     assert np.isnan(nothing[:4]).all()
     assert nothing[4:] == [0.0] * 3
     assert np.isnan(degrees([0.0, 180.0] * 4)).all()
+
+
+def test_whoever_goes_along_is_not_told_how_he_faces() -> None:
+    still, going = [50.0] * 5, [50.0 + 20.0 * k for k in range(5)]
+    sides = [100.0] * 5
+    np.testing.assert_array_equal(facings_on_the_spot([0.5] * 5, still, sides, FPS), [0.5] * 5)
+    # two frames to either side count: 40 pixels at an end, 80 in the middle, of which 35 are too far
+    assert np.isnan(facings_on_the_spot([0.5] * 5, going, sides, FPS)).all()
+    np.testing.assert_array_equal(facings_on_the_spot([0.5] * 5, going, [200.0] * 5, FPS)[[0, 4]], [0.5, 0.5])
+    np.testing.assert_array_equal(facings_on_the_spot([0.5] * 2, [np.nan] * 2, [0.0] * 2, FPS), [0.5] * 2)
 
 
 class Knowing:

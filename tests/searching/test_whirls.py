@@ -13,7 +13,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.posterior.modes import Posterior
-from posefit.searching.anew import backwards, followed_anew
+from posefit.searching.anew import followed_anew, in_reverse
 from posefit.searching.whirls import FASTEST, agreeing, surest, whirling
 from posefit.silhouette.mask import Silhouette
 
@@ -158,6 +158,6 @@ def test_a_track_that_does_not_whirl_is_not_followed_again() -> None:
 
 
 def test_a_motion_that_goes_backwards_ends_where_it_began() -> None:
-    back: Array = backwards(WALK).translations
+    back: Array = in_reverse(WALK).translations
     np.testing.assert_array_equal(back[0], WALK.translations[-1])
-    np.testing.assert_array_equal(backwards(backwards(WALK)).poses, replace(WALK).poses)
+    np.testing.assert_array_equal(in_reverse(in_reverse(WALK)).poses, replace(WALK).poses)
