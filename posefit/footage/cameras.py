@@ -99,7 +99,8 @@ def combined(
         pictures = partial(_straightened, pictures, first)
     placing: Placing = "given" if cameras else "guessed"
     warnings = [warning for one in seen for warning in one.warnings]
-    yaws = yaws_of([one.facings for one in seen], placed, seen[0].fps)
+    # several cameras tell front from back themselves
+    yaws = yaws_of(seen[0].facings if len(seen) == 1 else (), placed[0], seen[0].fps)
     return observed(Views(masks, yaws), body, placed, name, seen[0].fps, view_degrees, pictures, placing, warnings)
 
 

@@ -30,23 +30,16 @@ def facings_on_the_spot(
     return told
 
 
-def yaws_of(facings: Sequence[Array | Sequence[float]], cameras: Sequence[Camera], fps: float) -> Array:
+def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Array:
     """Return about which way a person faces in each frame (T,), radians about the vertical; nan where nobody knows.
 
-    `facings` are what the segmenter says of each camera's frames, as `Segmenter.facing`, none where it says nothing.
-    Each frame is told the mean direction of all cameras in the second around it, so that a few wrong ones do not count.
+    `facings` (T,) are what the segmenter says of a camera's frames, as `Segmenter.facing`. Each frame is told the mean
+    direction of those in the second around it, so that a few wrong ones do not count.
     """
-    count = min((len(one) for one in facings if len(one)), default=0)
-    said = np.zeros(count, dtype=np.complex128)
-    known = np.zeros(count)
-    for one, camera in zip(facings, cameras, strict=True):
-        if len(one):
-            here = np.asarray(one, dtype=np.float64)[:count]
-            towards = np.arctan2(-camera.rotation[2, 0], -camera.rotation[2, 2])
-            said += np.where(np.isfinite(here), np.exp(1j * (np.nan_to_num(here) + towards)), 0.0)
-            known += np.isfinite(here)
-    reach = max(round(AROUND * fps), 1)
-    around = [slice(max(k - reach, 0), k + reach + 1) for k in range(count)]
+    here, reach = np.asarray(facings, dtype=np.float64), max(round(AROUND * fps), 1)
+    towards = np.arctan2(-camera.rotation[2, 0], -camera.rotation[2, 2])
+    known = np.isfinite(here)
+    said = np.where(known, np.exp(1j * (np.nan_to_num(here) + towards)), 0.0)
+    around = [slice(max(k - reach, 0), k + reach + 1) for k in range(len(here))]
     total, seen = (np.array([one[rows].sum() for rows in around]) for one in (said, known))
-    clear = np.abs(total) >= np.maximum(AGREED * seen, 1e-9)
-    return np.where(clear, np.angle(total), np.nan)
+    return np.where(np.abs(total) >= np.maximum(AGREED * seen, 1e-9), np.angle(total), np.nan)
