@@ -66,6 +66,11 @@ SAID = {
         "",
         "numbers of the frames in which it was looked all around again, after a gap or where costs stayed high",
     ),
+    "followed_anew": (
+        "",
+        "the frame from which footage was followed again, onward and backwards, because the body turned faster than "
+        "anybody does; null where it was not",
+    ),
     "backwards_share": (
         "",
         "share of frames in which the root faces away from its way over half a second, faster than 0.3 m/s",

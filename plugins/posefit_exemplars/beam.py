@@ -20,6 +20,7 @@ TURN = np.radians(7.0)  # how far a candidate turns away from its clip, to eithe
 NEAR = 4  # groups of poses that a state goes on to
 SHARES = 20  # of a beam: poses that are alike and face alike have one of them at most
 FACINGS = 4  # yaws, of which each may have its share of a beam to itself
+WHIRL = 100.0  # cost of a radian that somebody turns farther than anybody does
 HOPELESS = 8.0  # beyond the cost of a jump; what costs more is not looked at
 
 
@@ -33,6 +34,7 @@ class Steps:
     straying: float  # metres that an aligned root may be off where its clip goes on, across the line of sight
     depth: float  # and along it
     pace: float  # metres that a known root may be off where its clip goes on
+    fastest: float = np.inf  # radians that nobody turns by in a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,11 +219,15 @@ Transitions = Callable[[Transition], Array]
 
 
 def transition_costs(transition: Transition, *, steps: Steps) -> Array:
-    """Return what each step from a state of one frame to one of the next costs (n, m); none costs more than a jump."""
+    """Return what each step from a state of one frame to one of the next costs (n, m).
+
+    None costs more than a jump, unless it turns farther than anybody does.
+    """
     exemplars, before, beam, root = transition.exemplars, transition.before, transition.beam, transition.root
     ahead = Ahead.of(exemplars, before, transition.seconds, steps, root)
     costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)  # TOYAMA2001 (dynamics)
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
         costs += strayed(beam.places, ahead.places[:, None], transition.eye, steps)
-    return np.asarray(np.minimum(costs, steps.jump))
+    turned = np.abs(wrapped(beam.yaws - before.yaws[:, None]))
+    return np.asarray(np.minimum(costs, steps.jump) + WHIRL * np.maximum(turned - steps.fastest, 0.0))

@@ -82,7 +82,10 @@ def exemplars(
     intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
     temperature /= intervals
     slack = math.sqrt(intervals)
-    steps = Steps(spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals)
+    fastest = math.inf if task.fastest_turn is None else task.fastest_turn / task.fps
+    steps = Steps(
+        spread * slack, math.radians(turning_degrees) * slack, jump, straying, depth, pace * intervals, fastest
+    )
     states = exemplars_of(task.training, task.body.skeleton, mirrored)
     costs = partial(transition_costs, steps=steps) if transitions == "clips" else partial(_checked, _named(transitions))
     make = _maker(task, refiner)

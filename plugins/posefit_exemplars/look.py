@@ -4,7 +4,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.alignment import align
-from posefit.fitting.problem import over_views
+from posefit.fitting.problem import only_camera, over_views
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
 from posefit.geometry.camera import Camera
@@ -42,9 +42,14 @@ class Look:
 
     @property
     def eye(self) -> Array | None:
-        """Where the only camera stands (3,); None where there are several, which see from all sides how far it is."""
-        cameras = self._task.cameras
-        return cameras[0].position if len(cameras) == 1 else None
+        """Where the only camera stands that sees the person (3,); None where several do, which tell how far it is."""
+        only = only_camera(self._task.cameras, self._observation.silhouettes)
+        return None if only is None else only.position
+
+    @property
+    def yaw(self) -> float | None:
+        """About which way the person is said to face, in radians; None where nobody says."""
+        return self._observation.yaw
 
     @property
     def cameras(self) -> int:

@@ -41,6 +41,8 @@ GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are looked at;
 FIRST_GROUPS = 200
 OF_A_GROUP = 20  # poses, drawn at random, that stand for a group in a look everywhere
 FACING = np.radians(45.0)  # how far a yaw that was told may be off, to either side
+AWAY = 4.0  # cost of a state, over the temperature, that faces as far again from what is said of its frame,
+PACE = 30.0  # where there are so many frames a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +123,12 @@ class ExemplarTracker:
         if latest is not None:
             beams.append(stepped(self.exemplars, latest, seconds, self.steps, around, root))
         beam = self._at(look, joined_beams(*beams), latest is not None)
-        costs = look.small(self._poses(beam), beam.places)
+        away = turned_away(beam.yaws, observation.yaw) * PACE / self.task.fps
+        totals = beam.totals + away + look.small(self._poses(beam), beam.places) / self.temperature
         used = (looked + len(beam)) * look.share
-        beam = beam.chosen(assorted(self.exemplars, beam, beam.totals + costs / self.temperature, full))
-        fits = look.full(self._poses(beam), beam.places) / self.temperature
+        kept = assorted(self.exemplars, beam, totals, full)
+        beam = beam.chosen(kept)
+        fits = away[kept] + look.full(self._poses(beam), beam.places) / self.temperature
         used += len(beam)
         best = assorted(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used
@@ -141,8 +145,9 @@ class ExemplarTracker:
         taken = min(GROUPS_TAKEN if before is not None else FIRST_GROUPS, max(most // (4 * OF_A_GROUP), 1))
         count = max(most - taken * OF_A_GROUP, 1)
         states, middle, reach = self.exemplars.drawn(count, rng), 0.0, np.pi
-        if before is None and self.task.yaw is not None:
-            middle, reach = self.task.yaw, FACING
+        told = self.task.yaw if before is None and look.yaw is None else look.yaw
+        if told is not None:
+            middle, reach = told, FACING
         yaws = middle + rng.uniform(-reach, reach, count)
         beam = self._at(look, self._begun(states, yaws, before), False)
         best = np.argsort(look.small(self._poses(beam), beam.places), kind="stable")[:taken]
@@ -214,3 +219,10 @@ class ExemplarTracker:
         seconds = oldest.seconds + time.perf_counter() - began
         cpu_seconds = oldest.cpu_seconds + time.process_time() - begun
         return Finding(pose, place, look, evaluations, seconds, cpu_seconds, drawn), off
+
+
+def turned_away(yaws: Array, told: float | None) -> Array:
+    """Return what it costs that states have yaws (n,), radians, where a frame's is said to be about `told`."""
+    if told is None:
+        return np.zeros(len(yaws))
+    return np.asarray(AWAY * np.clip(np.abs(wrapped(yaws - told)) / FACING - 1.0, 0.0, 1.0))

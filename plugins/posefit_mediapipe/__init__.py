@@ -11,6 +11,7 @@ on-device real-time body pose tracking, 2020. Version 0.10.14 carries the weight
 ['confidence', 'threshold']
 """
 
+import math
 import os
 import sys
 import warnings
@@ -25,6 +26,9 @@ from posefit.fitting.check import between
 from posefit.hooks import RegisterSegmenter
 from posefit.silhouette.foreground import Footage, Image
 from posefit.silhouette.mask import Mask
+
+LEFT, RIGHT = (11, 23), (12, 24)  # shoulder and hip, in the model's numbers; x goes to the right, and z away
+SIDES = (1.0, 1.0, -1.0, -1.0)
 
 
 class MediaPipe:
@@ -42,6 +46,7 @@ class MediaPipe:
         between("confidence", confidence, 0.0, 1.0)
         between("threshold", threshold, 0.0, 1.0, ends=False)
         self._threshold = threshold
+        self.facing = math.nan  # in the latest picture: by his shoulders and hips, as the model sees them
         self._model = _model(confidence)
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
@@ -49,8 +54,18 @@ class MediaPipe:
         nobody = np.zeros(image.shape[:2], dtype=bool)
         with warnings.catch_warnings():  # of its own use of protobuf
             warnings.simplefilter("ignore")
-            soft = self._model.process(np.ascontiguousarray(image[..., ::-1])).segmentation_mask
+            found = self._model.process(np.ascontiguousarray(image[..., ::-1]))
+        soft, self.facing = found.segmentation_mask, _facing(found.pose_world_landmarks)
         return (nobody if soft is None else np.asarray(soft > self._threshold)), nobody.copy()
+
+
+def _facing(landmarks: Any) -> float:
+    """Return which way somebody faces, as `Segmenter.facing`, by the model's joints in metres; nan for nobody."""
+    if landmarks is None:
+        return math.nan
+    points = [landmarks.landmark[k] for k in (*LEFT, *RIGHT)]
+    across, away = (sum(getattr(one, axis) * sign for one, sign in zip(points, SIDES, strict=True)) for axis in "xz")
+    return math.atan2(away, across)
 
 
 def _model(confidence: float) -> Any:

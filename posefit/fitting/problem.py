@@ -150,6 +150,12 @@ def with_a_say(views: Sequence[T], silhouettes: Sequence[Silhouette]) -> Sequenc
     return [view for view, silhouette in zip(views, silhouettes, strict=True) if silhouette.known] or views
 
 
+def only_camera(cameras: Sequence[Camera], silhouettes: Sequence[Silhouette]) -> Camera | None:
+    """Return the camera that alone sees something of the person, and not how far he is; None where several do."""
+    seeing = with_a_say(cameras, silhouettes)
+    return seeing[0] if len(seeing) == 1 else None
+
+
 @final
 class CoarseFirst:
     """An optimiser whose populations are looked at in a small picture first; only the best of each go on.

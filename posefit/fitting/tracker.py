@@ -36,6 +36,7 @@ class Observation:
     silhouettes: Sequence[Silhouette] = field(repr=False)
     translation: Array | None = None  # (3,) metres
     usable: bool = True  # False: too little is seen to learn from it, and a tracker holds its pose
+    yaw: float | None = None  # radians: about which way the person faces; None where nobody says
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +51,7 @@ class Frame:
     seconds: float
     history: Array = field(repr=False)  # (populations,) best cost after each
     coordinates: Array | None = field(default=None, repr=False)  # (d,) where it was found in a search space
-    # (populations,) evaluations so far after each, where a tracker says
-    spent: NDArray[np.int64] | None = field(default=None, repr=False)
+    spent: NDArray[np.int64] | None = field(default=None, repr=False)  # (populations,) evaluations so far after each
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
     # of all threads of the process, where a tracker says: unlike `seconds` it does not grow on a busy machine
     cpu_seconds: float | None = None
@@ -79,6 +79,7 @@ class Task:
     first_pose: Array | None = None  # (63,) joint angles in the first frame, where somebody knows them
     before: Sequence[Frame] = field(default=(), repr=False)  # found earlier, where a track goes on that was interrupted
     threads: int = 1
+    fastest_turn: float | None = None  # radians a second that nobody's yaw turns faster than; None where nobody says
 
     @property
     def angles(self) -> Array:

@@ -9,11 +9,13 @@ from typing import Any
 import cv2
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.footage.extract import store
 from posefit.footage.given.settled import settled
 from posefit.footage.masks import FPS, FolderMasks, Masks, Range, Straight, Views
 from posefit.footage.scene import Placing, Scene, observed
 from posefit.footage.segmentation import Segmentation
+from posefit.footage.segmenting.facing import yaws_of
 from posefit.footage.stacks import StackMasks
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
@@ -35,6 +37,7 @@ class CameraView:
     fps: float
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
     warnings: Sequence[str] = ()
+    facings: Array | Sequence[float] = ()  # of each frame, as `Segmenter.facing`; nan where nobody knows
 
 
 def masks_of(path: Path, fps: float | None, frames: Range, label: int | None, holes: float | None) -> CameraView:
@@ -57,7 +60,7 @@ def video_of(video: Video, found: Segmentation, folder: Path, listener: Listener
     if found.verdict and found.verdict.refused:
         raise ValueError(found.verdict.text)
     pictures = partial(video.frames, found.start, found.stop, found.size)
-    return CameraView(masks, found.size, video.size, video.fps, pictures, found.warnings)
+    return CameraView(masks, found.size, video.size, video.fps, pictures, found.warnings, found.facings)
 
 
 def combined(
@@ -96,7 +99,9 @@ def combined(
         pictures = partial(_straightened, pictures, first)
     placing: Placing = "given" if cameras else "guessed"
     warnings = [warning for one in seen for warning in one.warnings]
-    return observed(Views(masks), body, placed, name, seen[0].fps, view_degrees, pictures, placing, warnings)
+    # several cameras tell front from back themselves
+    yaws = yaws_of(seen[0].facings if len(seen) == 1 else (), placed[0], seen[0].fps)
+    return observed(Views(masks, yaws), body, placed, name, seen[0].fps, view_degrees, pictures, placing, warnings)
 
 
 def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]) -> Iterator[Image]:

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting.tracker import Observation
 from posefit.footage.given.values import Palette, Reading, many_colours
 from posefit.silhouette.mask import Mask, Silhouette
@@ -176,6 +177,8 @@ class Views(Sequence[Observation]):
     """What several cameras saw at the same times. A camera that saw too little in a frame counts for nothing there."""
 
     masks: Sequence[Masks]
+    # radians (T,): about which way he faces; nan where nobody knows, and none where nobody says
+    yaws: Array = field(default_factory=lambda: np.empty(0), repr=False)
 
     def __len__(self) -> int:
         return min(map(len, self.masks))
@@ -183,10 +186,15 @@ class Views(Sequence[Observation]):
     def __getitem__(self, k):  # type: ignore[no-untyped-def]
         if not 0 <= k < len(self):
             raise IndexError(k)
-        return Observation([self._silhouette(v, k) for v in range(len(self.masks))], usable=self.is_usable(k))
+        silhouettes = [self._silhouette(v, k) for v in range(len(self.masks))]
+        return Observation(silhouettes, usable=self.is_usable(k), yaw=self.yaw(k))
 
     def __iter__(self) -> Iterator[Observation]:
         return (self[k] for k in range(len(self)))
+
+    def yaw(self, k: int) -> float | None:
+        """Return about which way the person faces in frame k, in radians; None where nobody knows."""
+        return float(self.yaws[k]) if k < len(self.yaws) and np.isfinite(self.yaws[k]) else None
 
     def is_usable(self, k: int) -> bool:
         """Return whether a camera saw enough in frame k."""

@@ -124,7 +124,7 @@ def observed(
             raise ValueError(f"{name}: {wrong}")
         anchor = meeting(cameras, [middle for middle, _ in boxes])[0]
     to_camera = -cameras[0].rotation[2]
-    yaw = None
+    yaw = views.yaw(views.first)
     if view_degrees is not None:
         yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
     return Scene(name, body, cameras, fps, len(views), yaw, anchor, None, views, placing, warnings, pictures)

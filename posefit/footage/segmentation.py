@@ -1,5 +1,6 @@
 """Goes through a video and tells the person in it from the background, frame by frame."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -10,9 +11,11 @@ from typing import Any, cast
 import cv2
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.fitting.guard import BrokenRuleError, blamed
 from posefit.footage.images import read_image
 from posefit.footage.masks import Range, span
+from posefit.footage.segmenting.facing import facings_on_the_spot
 from posefit.footage.segmenting.film import Box, VideoFootage
 from posefit.footage.segmenting.signs import Watch
 from posefit.footage.segmenting.verdict import Verdict, advice, verdict
@@ -112,6 +115,8 @@ class Segmentation:
         self._given = "background" in how.settings
         self._segmenter = self._learn() if self._given else None  # what is given is checked now
         self._shifts: list[float] = []
+        self._facings: list[float] = []  # of each frame, as the segmenter says; nan where it does not
+        self._middles: list[float] = []  # of the mask's pixels in each frame, from the left; nan where it is empty
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -125,6 +130,8 @@ class Segmentation:
             if k % PERIOD == 0:
                 self._shifts.append(still.shift(image))
             found = person(*self._segmented(segmenter, image), self._roi, self._ignored)
+            self._facings.append(float(getattr(segmenter, "facing", math.nan)))
+            self._middles.append(float((np.flatnonzero(found.mask) % self.size[0]).mean()) if found.area else math.nan)
             part = replace(found, mask=self._film.cut(found.mask), valid=self._film.cut(found.valid))
             self.rows.append(watch.look(self._film.cut(image), part, self.start + k))
             if not self._video.is_filmed(self.start + k):
@@ -148,6 +155,12 @@ class Segmentation:
         whole = np.zeros((2, *image.shape[:2]), dtype=bool)
         whole[:, y : y + tall, x : x + wide] = planes
         return whole[0], whole[1]
+
+    @property
+    def facings(self) -> Array:
+        """Which way the person faces in each frame, as `Segmenter.facing`; nan where nobody knows, or he goes along."""
+        sides = [row["longer_side"] for row in self.rows]
+        return facings_on_the_spot(self._facings, self._middles, sides, self._video.fps)
 
     @property
     def verdict(self) -> Verdict | None:

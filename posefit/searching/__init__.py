@@ -14,4 +14,6 @@
 | those of every frame that an optimiser follows | tracker.py |
 | several starts of a track, and the best of them | starts.py |
 | a track that looks all around again after a gap | again.py |
+| turns that nobody makes, and which way somebody faces all along | whirls.py |
+| a track that is followed again where there were some | anew.py |
 """

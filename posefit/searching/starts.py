@@ -18,15 +18,29 @@ BACKWARDS = 1.1  # what multiplies the cost of a start that faces the other way
 Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
 
 
-def usable(observations: Sequence[Observation], count: int, stride: int = 1) -> list[Observation]:
-    """Return the first `count` observations, of every `stride`th, that show enough of the person."""
+def usable(observations: Sequence[Observation], count: int, stride: int = 1, start: int = 0) -> list[Observation]:
+    """Return the first `count` observations from `start` on, of every `stride`th, that show enough of the person."""
     found: list[Observation] = []
-    for k in range(0, len(observations), stride):
+    for k in range(start, len(observations), stride):
         if len(found) == count:
             break
         if (observation := observations[k]).usable:
             found.append(observation)
     return found
+
+
+def best_seen(observations: Sequence[Observation]) -> int:
+    """Return the first frame in which no fewer cameras see the person than in any other; 0 for one camera."""
+    best, most = 0, 0
+    for k in range(len(observations)):
+        seen = observations[k].silhouettes
+        if len(seen) == 1:
+            return 0
+        if (seeing := sum(silhouette.known for silhouette in seen)) > most:
+            best, most = k, seeing
+        if most == len(seen):
+            break
+    return best
 
 
 def begun(

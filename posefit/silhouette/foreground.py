@@ -51,7 +51,8 @@ class Segmenter(Protocol):
     """Tells a person from the rest of a picture. Frames come in their order, each once.
 
     One that holds each frame against a still background may show that picture as `background` (height, width, 3), and
-    is then watched for a person who was learned into it.
+    is then watched for a person who was learned into it. One that knows people may say which way the person in the
+    latest picture faces as `facing`: radians, 0 towards the camera and growing to the picture's right, nan for nobody.
     """
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:

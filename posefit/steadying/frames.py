@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from posefit.fitting.problem import over_views
-from posefit.fitting.tracker import Frame
+from posefit.arrays import Array
+from posefit.fitting.problem import only_camera, over_views
+from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import areas
@@ -18,9 +19,15 @@ def steadied_frames(scene: Scene, found: Sequence[Frame], beta: float) -> list[F
     poses = np.array([frame.pose for frame in found])
     motion = Motion(scene.name, scene.body.skeleton, poses, np.array([frame.translation for frame in found]), scene.fps)
     usable = np.array([observation.usable for observation in scene.observations])
-    eye = scene.cameras[0].position if len(scene.cameras) == 1 else None
-    told = steadied(motion, SeenFrames(usable, eye))
+    eyes = np.array([_eye(scene, observation) for observation in scene.observations])
+    told = steadied(motion, SeenFrames(usable, eyes))
     return [_told(scene, k, frame, told, beta) for k, frame in enumerate(found)]
+
+
+def _eye(scene: Scene, observation: Observation) -> Array:
+    """Return where the only camera stands (3,) that sees anything; NaN where several do, or none."""
+    only = only_camera(scene.cameras, observation.silhouettes)
+    return np.full(3, np.nan) if only is None else only.position
 
 
 def _told(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:

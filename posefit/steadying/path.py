@@ -5,7 +5,7 @@ and feet that stand do not move. The legs give way a little, so that they do not
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ class SeenFrames:
     """How well each frame of a motion was seen."""
 
     usable: NDArray[np.bool_]  # (T,)
-    eye: Array | None  # (3,) metres: where the only camera stands; None where there are several
+    eyes: Array = field(repr=False)  # (T, 3) metres: where the only camera stands that sees it; NaN where several do
 
 
 def steadied(motion: Motion, seen: SeenFrames) -> Motion:
@@ -58,7 +58,7 @@ def steadied(motion: Motion, seen: SeenFrames) -> Motion:
     for start in range(0, len(motion), WINDOW):
         rows = whole[max(start - OVERLAP, 0) : start + WINDOW + OVERLAP]
         part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
-        found = _window(part, replace(seen, usable=seen.usable[rows]))
+        found = _window(part, SeenFrames(seen.usable[rows], seen.eyes[rows]))
         kept = (rows >= start) & (rows < start + WINDOW)
         poses[rows[kept]], places[rows[kept]] = found.poses[kept], found.translations[kept]
     return replace(motion, poses=poses, translations=places)
@@ -77,7 +77,7 @@ def _window(motion: Motion, seen: SeenFrames) -> Motion:
     if len(motion) < 3:
         return motion
     smooth = _solved(motion, seen, np.zeros((len(motion), 2), dtype=bool))
-    stands = stances(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, seen.eye)
+    stands = stances(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, seen.eyes)
     return _solved(motion, seen, stands)
 
 
@@ -111,12 +111,13 @@ def _precisions(motion: Motion, seen: SeenFrames) -> Array:
     """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance."""
     across = np.where(seen.usable, ACROSS, UNSEEN)
     precise = np.eye(3) / across[:, None, None] ** 2
-    if seen.eye is not None:
-        sights = motion.translations - seen.eye
-        far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
-        sights = sights / far[:, None]
-        along = np.maximum(DEPTH * far, across)
-        precise += (1.0 / along**2 - 1.0 / across**2)[:, None, None] * sights[:, :, None] * sights[:, None, :]
+    alone = np.isfinite(seen.eyes).all(axis=1)
+    sights = motion.translations[alone] - seen.eyes[alone]
+    far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
+    sights = sights / far[:, None]
+    along = np.maximum(DEPTH * far, across[alone])
+    less = 1.0 / along**2 - 1.0 / across[alone] ** 2
+    precise[alone] += less[:, None, None] * sights[:, :, None] * sights[:, None, :]
     return np.asarray(precise)
 
 

@@ -14,16 +14,16 @@ SHORTEST = 0.12  # seconds that a foot stands at least
 GAP = 0.07  # seconds that it may seem not to, in between
 
 
-def stances(joints: Array, fps: float, eye: Array | None) -> NDArray[np.bool_]:
+def stances(joints: Array, fps: float, eyes: Array) -> NDArray[np.bool_]:
     """Return whether the left and the right foot stand (T, 2), of joints (T, 27, 3) whose root moves smoothly.
 
-    A foot that stands is low, and slow beside the root: who walks leaves it behind. y is up. A single camera at `eye`
-    (3,) sees how slow it is across the line of sight alone.
+    A foot that stands is low, and slow beside the root: who walks leaves it behind. y is up. A single camera, at
+    `eyes` (T, 3), sees how slow it is across the line of sight alone; these are NaN where several see it.
     """
     count = len(joints)
     if count < 3:
         return np.zeros((count, 2), dtype=bool)
-    feet, sights = joints[:, BALLS], None if eye is None else (joints[:, 0] - eye)[:, [0, 2]]
+    feet, sights = joints[:, BALLS], (joints[:, 0] - eyes)[:, [0, 2]]
     speed, root = (_speeds(places, sights, fps) for places in (feet, joints[:, :1]))
     reach = max(round(0.5 * AROUND * fps), 1)
     heights = feet[..., 1].min(axis=1)
@@ -34,12 +34,14 @@ def stances(joints: Array, fps: float, eye: Array | None) -> NDArray[np.bool_]:
     return np.asarray(stands)
 
 
-def _speeds(places: Array, sights: Array | None, fps: float) -> Array:
-    """Return how fast places (T, n, 3) go along the ground (T, n), but for what is along the lines of sight (T, 2)."""
+def _speeds(places: Array, sights: Array, fps: float) -> Array:
+    """Return how fast places (T, n, 3) go along the ground (T, n), but for what is along the lines of sight (T, 2).
+
+    A line of NaN takes nothing away.
+    """
     ways = np.gradient(places[..., [0, 2]], 1.0 / fps, axis=0)
-    if sights is not None:
-        sights = sights / np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), 1e-9)
-        ways = ways - np.einsum("tni,ti->tn", ways, sights)[..., None] * sights[:, None]
+    sights = np.nan_to_num(sights / np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), 1e-9))
+    ways = ways - np.einsum("tni,ti->tn", ways, sights)[..., None] * sights[:, None]
     return np.asarray(np.linalg.norm(ways, axis=2))
 
 

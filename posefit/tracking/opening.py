@@ -14,7 +14,7 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.listening import Listener
 from posefit.motion.motion import Motion
-from posefit.searching.starts import RESTARTS, STRIDE, Follow, begun, usable
+from posefit.searching.starts import RESTARTS, STRIDE, Follow, begun, best_seen, usable
 from posefit.settings import PARTICLES
 from posefit.tracking.method import Method
 
@@ -115,8 +115,11 @@ def built(
     height: float | None,
     seed: int,
 ) -> Shape:
-    """Return the person's build, from the first usable frames: every third, where there are so many."""
-    chosen, stride = usable(observations, frames, STRIDE), STRIDE
+    """Return the person's build, from the first usable frames: every third, where there are so many.
+
+    Of several cameras as many as possible see the first of them: whoever comes in is seen by one alone for a while.
+    """
+    chosen, stride = usable(observations, frames, STRIDE, best_seen(observations)), STRIDE
     if len(chosen) < frames:
         chosen, stride = usable(observations, frames), 1
     task = replace(task, fps=task.fps / stride)

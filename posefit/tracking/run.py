@@ -17,6 +17,7 @@ from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
 from posefit.searching.again import GAP, LOOKED, LookingTracker
+from posefit.searching.anew import Anew, followed_anew
 from posefit.steadying.frames import steadied_frames
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
@@ -92,7 +93,8 @@ def follow(
         usable = [observation.usable for observation in scene.observations] if tracks > 1 else []
         each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
         found, told = _kept(scene, each, usable, training)
-        raw = found
+        anew = _without_whirls(scene, method, task, found, seed, listener)
+        raw = found = anew.frames
         if steady:
             found = steadied_frames(scene, found, method.beta)
         found = [_moded(frame, scene.body.skeleton) for frame in found]
@@ -142,6 +144,7 @@ def follow(
             "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
             "lost_frames": _numbers(rows, "lost", LOST),
             "looked_again": [k for k, frame in enumerate(found) if LOOKED in frame.details],
+            "followed_anew": anew.start,
             "backwards_share": round(float(back.mean()), 6),
             "trust": None if scene.truth is not None else trust_of(scene, raw, found, rows, measures.iou),
             "gait": gait_of(estimate, unseen(rows)).as_dict(),
@@ -230,6 +233,19 @@ def _tracker(scene: Scene, method: Method, task: Task) -> Tracker:
     if gap is None:
         gap = GAP if scene.truth is None and getattr(tracker, "lag", None) is None else 0
     return LookingTracker(task, following(method), gap) if gap else tracker
+
+
+def _without_whirls(
+    scene: Scene, method: Method, task: Task, found: list[Frame], seed: int, listener: Listener
+) -> Anew:
+    """Return a track of footage that was followed again where the body whirled, by a method that looks ahead."""
+    if scene.truth is not None or getattr(method.tracker(task), "lag", None) is None:
+        return Anew(found, None)
+    told = followed_anew(task, scene.observations, found, following(method), seed)
+    if told.start is not None:
+        said = f"it was followed again, onward and backwards from frame {told.start}"
+        listener.say(f"the body turned faster than anybody does: {said}")
+    return told
 
 
 def _kept(

@@ -15,6 +15,7 @@ from posefit_exemplars.beam import (
     SHARES,
     SPEEDS,
     TURN,
+    WHIRL,
     Beam,
     Steps,
     Transition,
@@ -220,3 +221,12 @@ def test_a_turn_costs_as_much_to_the_left_as_to_the_right(small: Exemplars) -> N
     np.testing.assert_allclose(
         transition_costs(Transition(small, before, round_, SECONDS, root, None), steps=STEPS)[0], costs, atol=1e-9
     )
+
+
+def test_a_step_that_turns_farther_than_anybody_does_costs_more_than_a_jump(small: Exemplars) -> None:
+    before = beam([3], [0.0], [0.0])
+    after = beam([30] * 4, [0.0, 0.2, 0.3, np.pi + 0.1], [0.0] * 4)
+    steps = replace(STEPS, fastest=0.25)
+    costs = transition_costs(Transition(small, before, after, SECONDS, None, None), steps=steps)[0]
+    farther = np.array([0.0, 0.0, 0.05, np.pi - 0.35])
+    np.testing.assert_allclose(costs, STEPS.jump + WHIRL * farther, rtol=1e-9)

@@ -205,10 +205,12 @@ def test_one_mask_twice_as_large_as_the_others_is_not_usable_but_a_person_who_st
 
 
 def test_a_verdict_is_given_on_what_all_frames_say() -> None:
-    def rows(beside: float = 0.0, areas: tuple[int, ...] = (100, 100), ghost: int = 0, usable: int = 1) -> Any:
+    def rows(
+        beside: float = 0.0, areas: tuple[int, ...] = (100, 100), ghost: int = 0, usable: int = 1, pieces: int = 1
+    ) -> Any:
         return [
             {"frame": k, "area": areas[k % 2], "longer_side": 10, "touches_border": 0, "beside": beside, "ghost": ghost}
-            | {"usable": usable}
+            | {"usable": usable, "pieces": pieces}
             for k in range(20)
         ]
 
@@ -227,6 +229,14 @@ def test_a_verdict_is_given_on_what_all_frames_say() -> None:
         assert not said.refused
         assert words in said.text
         assert "--background" not in said.text
+    assert verdict(rows(pieces=2), "median", learned=True) is None
+    parts = verdict(rows(0.16, (100, 150), pieces=2), "median", learned=True)
+    assert parts is not None
+    assert parts.refused
+    assert parts.text == (
+        "the masks change by 50% from frame to frame and are in pieces in 100% of the frames: parts of the person seem "
+        "to be missing; give --background with an empty picture, or --extraction mediapipe"
+    )
     ghosts = verdict(rows(ghost=1), "median", learned=True)
     assert ghosts is not None
     assert ghosts.refused

@@ -46,7 +46,7 @@ def joints_of(motion: Motion) -> np.ndarray:
 
 
 def all_seen(motion: Motion) -> SeenFrames:
-    return SeenFrames(np.ones(len(motion), dtype=bool), EYE)
+    return SeenFrames(np.ones(len(motion), dtype=bool), np.tile(EYE, (len(motion), 1)))
 
 
 def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
@@ -81,12 +81,12 @@ def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
 
 def test_stances_of_a_walk_are_those_of_feet_that_are_low_and_slow() -> None:
     motion = walk()
-    found = stances(joints_of(motion), motion.fps, EYE)
+    found = stances(joints_of(motion), motion.fps, np.tile(EYE, (len(motion), 1)))
     stands = standing(joints_of(motion), motion.fps)
     assert found[stands].mean() > 0.95
     assert found.any(axis=1).mean() > 0.9  # who walks has a foot on the ground,
     assert found.mean() < 0.75  # and the other one in the air for two fifths of the time
-    assert stances(joints_of(motion)[:2], motion.fps, EYE).shape == (2, 2)
+    assert stances(joints_of(motion)[:2], motion.fps, np.tile(EYE, (2, 1))).shape == (2, 2)
 
 
 def test_a_track_that_shakes_becomes_steady_and_its_feet_stand() -> None:
@@ -104,6 +104,20 @@ def test_a_track_that_shakes_becomes_steady_and_its_feet_stand() -> None:
     np.testing.assert_array_equal(told.poses[:, others], found.poses[:, others])
 
 
+def test_depth_is_believed_where_several_cameras_see_and_hardly_where_one_does() -> None:
+    # one camera, then several: whoever comes in is 10 cm too far at first, and then where he is
+    motion, alone = walk(), 15
+    places = motion.translations.copy()
+    places[:alone, 2] -= 0.1
+    eyes = np.full((len(motion), 3), np.nan)
+    several = steadied(replace(motion, translations=places), SeenFrames(np.ones(len(motion), dtype=bool), eyes.copy()))
+    eyes[:alone] = EYE
+    told = steadied(replace(motion, translations=places), SeenFrames(np.ones(len(motion), dtype=bool), eyes))
+    off, was = (np.abs(one.translations - motion.translations)[:, 2] for one in (told, several))
+    assert off[alone - 5 : alone].mean() < 0.7 * was[alone - 5 : alone].mean()
+    assert off[alone + 5 :].max() < 0.02
+
+
 def test_frames_that_show_too_little_are_bridged_and_strange_places_are_not_believed() -> None:
     motion = walk()
     usable = np.ones(len(motion), dtype=bool)
@@ -111,7 +125,7 @@ def test_frames_that_show_too_little_are_bridged_and_strange_places_are_not_beli
     places = motion.translations.copy()
     places[~usable] += [200.0, 30.0, -500.0]
     places[40, 2] -= 20.0
-    told = steadied(replace(motion, translations=places), SeenFrames(usable, EYE))
+    told = steadied(replace(motion, translations=places), SeenFrames(usable, np.tile(EYE, (len(motion), 1))))
     off = np.linalg.norm(told.translations - motion.translations, axis=1)
     assert off[20:25].max() < 0.05
     assert off[40] < 0.1

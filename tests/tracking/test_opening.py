@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,10 @@ import posefit
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import synthetic
 from posefit.motion import built_in
-from posefit.searching.starts import begun
+from posefit.searching.starts import begun, best_seen
 from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
+from posefit.silhouette.mask import Silhouette
 from posefit.tracking.opening import Opening, built, task_of
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
@@ -122,3 +124,25 @@ def test_a_build_sees_every_third_frame_where_there_are_so_many() -> None:
     built(task, scene.observations, follow, 10, None, 0)
     built(task, scene.observations, follow, 11, None, 0)  # of which there are not so many thirds
     assert set(looked) == {(10, scene.fps / 3), (11, scene.fps)}
+
+
+def test_a_build_begins_where_most_cameras_see_the_person() -> None:
+    scene = synthetic(built_in.motion("walk", frames=40), [0.0, 90.0], (120, 90), [], (None, None))
+    task = task_of(scene, Opening(), [built_in.motion("walk")], 80, 1)
+    nothing = Silhouette.of(np.zeros((90, 120), dtype=bool), np.zeros((90, 120), dtype=bool))
+    seen = [scene.observations[k] for k in range(40)]
+    seen[:10] = [replace(one, silhouettes=[one.silhouettes[0], nothing]) for one in seen[:10]]
+    looked: list[list[int]] = []
+
+    def follow(mine: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        told = list(observations)
+        looked.append([next(k for k, one in enumerate(seen) if one is each) for each in told])
+        pose, place = built_in.motion("walk").poses[0], scene.anchor
+        return (Frame(pose, place, 0.0, np.zeros((2, 3), np.int64), 0, 0.0, np.empty(0)) for _ in told)
+
+    built(task, seen, follow, 5, None, 0)
+    built(task, seen, follow, 11, None, 0)  # too many for those that come after
+    assert looked[0] == [10, 13, 16, 19, 22]
+    assert looked[-1] == list(range(11))
+    assert best_seen(seen) == 10
+    assert best_seen([replace(one, silhouettes=one.silhouettes[:1]) for one in seen]) == 0

@@ -79,7 +79,7 @@ def filmed_figures(source: str | Path, roi: Box, frames: Range, seed: int) -> di
         "iou_masks": result.summary["iou"],
         "iou_reference": float(np.mean(_overlaps(motion, radii, camera, seen)[usable])),
         "lowest_iou_masks": min(row["iou"] for row, ok in zip(result.frames, usable, strict=True) if ok),
-        **gait(steadied(motion, SeenFrames(usable, camera.position)), camera, seen),
+        **gait(steadied(motion, SeenFrames(usable, np.tile(camera.position, (len(usable), 1)))), camera, seen),
     }
 
 

@@ -13,6 +13,7 @@ UNEXPLAINED = 0.3  # more of what moves lies outside the masks, in half of the f
 TALLER, LARGER = 0.15, 0.25  # changes of the longer side and the area from frame to frame that one in ten exceeds
 GHOSTS = 0.1  # the share of frames with masks of an empty place that is worth a word,
 EMPTY = 0.5  # and that from which on nothing else is to be expected
+BROKEN = 0.3  # of the frames: masks that are in pieces more often, and unsteady, are parts of a person at best
 MOST = 0.5  # where fewer of the frames are usable and the masks are unsteady, there is nothing to follow
 
 
@@ -28,8 +29,8 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
     """Return what is wrong with masks, by the rows of `Watch`; None where nothing is.
 
     `learned` says that the segmenter was given no picture of the empty scene. What moves outside the masks while their
-    size jumps refuses them, and so does a size that jumps where few frames are usable; either alone may be another
-    person or clothes like the background, and is a warning.
+    size jumps refuses them, and so does a size that jumps where few frames are usable or most masks are in pieces;
+    either alone may be another person or clothes like the background, and is a warning.
     """
     whole = [row for row in rows if row["area"] and not row["touches_border"]]
     usable = sum(row["usable"] for row in whole)
@@ -54,8 +55,10 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
     if not usable:
         return Verdict(nobody, True)
     if unsteady:
-        said = f"the masks change by {larger:.0%} from frame to frame: parts of the person seem to be missing"
-        return Verdict(f"{said}{instead}", usable < MOST * len(whole))
+        broken = float(np.mean([row["pieces"] > 1 for row in whole]))
+        pieces = f" and are in pieces in {broken:.0%} of the frames" if broken > BROKEN else ""
+        said = f"the masks change by {larger:.0%} from frame to frame{pieces}: parts of the person seem to be missing"
+        return Verdict(f"{said}{instead}", usable < MOST * len(whole) or broken > BROKEN)
     if beside > UNEXPLAINED:
         said = f"{beside:.0%} of what moves near the person lies outside the masks, which may miss parts of the person"
         return Verdict(f"{said}{instead}", False)
