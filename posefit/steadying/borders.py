@@ -71,8 +71,8 @@ def _border(observation: Observation, view: int, factor: int, step: int) -> tupl
     around = silhouette.valid[part] & ~mask  # nobody is seen there
     if not around.any():
         return nothing
-    pixels = np.concatenate([_between(mask, around), _between(mask.T, around.T)[:, ::-1]]) + (left, top)
-    return pixels[::step], (left, top), distances_outside(mask, around)
+    pixels = np.concatenate([_between(mask, around), _between(mask.T, around.T)[:, ::-1]])
+    return pixels[::step] + np.array([left, top]), (left, top), distances_outside(mask, around)
 
 
 def distances_outside(mask: Mask, around: Mask) -> Distances:

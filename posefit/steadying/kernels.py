@@ -59,7 +59,7 @@ def _covered(x, y, bone, parents, centres, radii):
 
 
 @jit
-def _pull_points(points, parents, centres, radii, step, scale, curves, slopes, misses):
+def _pull_points(points, parents, centres, radii, step, scale, curves, slopes):
     """Add what brings the body's border to points (n, 2) of the mask's."""
     joints = centres.shape[0]
     for i in range(points.shape[0]):
@@ -73,13 +73,11 @@ def _pull_points(points, parents, centres, radii, step, scale, curves, slopes, m
             if off < least:
                 least, bone, share, nx, ny = off, b, at, ox, oy
         weight = step / (1.0 + (least / scale) ** 2)
-        misses[0] += step * abs(least)
-        misses[1] += step
         _add(curves, slopes, parents[bone], bone, joints, share, -nx, -ny, -1.0, least, weight)
 
 
 @jit
-def _pull_bones(field, corner, size, parents, centres, radii, spacing, scale, curves, slopes, misses):
+def _pull_bones(field, corner, size, parents, centres, radii, spacing, scale, curves, slopes):
     """Add what brings points of the body's border to the mask's, by a field of how far pixels are outside of it."""
     joints = centres.shape[0]
     for b in range(parents.size):
@@ -121,8 +119,6 @@ def _pull_bones(field, corner, size, parents, centres, radii, spacing, scale, cu
             across = (two - one) * (1.0 - v) + (four - three) * v
             down = (three - one) * (1.0 - u) + (four - two) * u
             weight = step / (1.0 + (off / scale) ** 2)
-            misses[0] += step * abs(off)
-            misses[1] += step
             _add(curves, slopes, p, b, joints, share, across, down, across * nx + down * ny, off, weight)
 
 
@@ -133,14 +129,13 @@ def pull_to_borders(parents, centres, radii, fields, corners, sizes, points, sta
     `centres` (T, J, 2) and `radii` (T, B, 2) are the drawn body; `fields` (T, h, w), `corners` and `sizes` (T, 2),
     `points` (n, 2) and `starts` (T + 1,) are a `Borders`, whose points stand for `step` pixels of the border each. A
     distance counts by the pixels that it stands for, and the less the farther it is off, beyond `scales` (T,). `out`
-    is curves (T, 2 J + 2 B, 2 J + 2 B), slopes (T, 2 J + 2 B) and, to add up a mean, sums of distances and of what
-    they count (T, 2).
+    is curves (T, 2 J + 2 B, 2 J + 2 B) and slopes (T, 2 J + 2 B).
     """
-    curves, slopes, misses = out
+    curves, slopes = out
     for k in range(centres.shape[0]):
         if starts[k] == starts[k + 1]:
             continue
         drawn = parents, centres[k], radii[k]
-        added = scales[k], curves[k], slopes[k], misses[k]
+        added = scales[k], curves[k], slopes[k]
         _pull_points(points[starts[k] : starts[k + 1]], *drawn, step, *added)
         _pull_bones(fields[k], corners[k], sizes[k], *drawn, 2.0 * step, *added)

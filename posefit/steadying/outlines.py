@@ -18,7 +18,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
-from posefit.motion.steadiness import BALLS, runs
+from posefit.motion.steadiness import BALLS
 from posefit.steadying import kernels
 from posefit.steadying.borders import Borders
 from posefit.steadying.path import (
@@ -43,9 +43,6 @@ GIVING = np.radians(6.0)  # that an angle may be off what was found
 SHAKING = np.radians(300.0)  # a second squared, of that difference
 AWAY = 0.03  # metres that the root may be off what was found, across the line of sight
 FARTHEST, WIDEST = np.radians(20.0), 0.2  # that a step may turn an angle, and change the logarithm of a factor
-BRIDGED = 5  # steps after which frames that fit badly begin anew, between those around them that fit well
-BAD, WORST = 2.0, 0.025  # times the median distance, and metres, from which on a frame fits badly
-GAP = 0.5  # seconds: longer runs of such frames stay as they are
 WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
@@ -69,12 +66,11 @@ class _Part:
 
 @dataclass(frozen=True, eq=False)
 class _Pulled:
-    """What the masks' borders ask for: of poses and way (T, n), and of the build (17); and how far they are off."""
+    """What the masks' borders ask for: of poses and way (T, n), and of the build (17)."""
 
     poses: tuple[Array, Array]
     mixed: Array  # (T, n, 17)
     build: tuple[Array, Array]
-    misses: Array  # (T,) metres
 
 
 def outlined(scene: Scene, motion: Motion, seen: SeenFrames, shape: Shape | None) -> tuple[Motion, Shape | None]:
@@ -114,13 +110,8 @@ def _fitted(
     factors, height = (np.zeros(len(SPREAD)), None) if shape is None else (np.log(shape.factors), shape.height)
     found = Motion(motion.name, body.skeleton, poses, places, motion.fps)
     part = _Part(found, body, factors, height, seen.usable[rows], seen.eye, poses, places)
-    for k, scale in enumerate(SCALES):
-        pulled = _pulled(part, borders, scale, build=shape is not None)
-        if k == BRIDGED:
-            part, again = _begun_anew(part, pulled.misses)
-            if again:
-                pulled = _pulled(part, borders, scale, build=shape is not None)
-        part = _stepped(part, pulled, build=shape is not None)
+    for scale in SCALES:
+        part = _stepped(part, _pulled(part, borders, scale, build=shape is not None), build=shape is not None)
     return part
 
 
@@ -130,18 +121,16 @@ def _pulled(part: _Part, borders: Sequence[Borders], scale: float, *, build: boo
     numbers = 3 + len(angles)
     curves, slopes = np.zeros((count, numbers, numbers)), np.zeros((count, numbers))
     mixed, curve, slope = np.zeros((count, numbers, factors)), np.zeros((factors, factors)), np.zeros(factors)
-    off, weights = np.zeros(count), np.zeros(count)
     joints = len(STARTS) + 1
     for view in borders:
         drawn = drawn_numbers(part.body, view.camera, part.poses, part.places)
         centres, radii = drawn[:, : 2 * joints].reshape(count, -1, 2), drawn[:, 2 * joints :].reshape(count, -1, 2)
-        out = np.zeros((count, NUMBERS, NUMBERS)), np.zeros((count, NUMBERS)), np.zeros((count, 2))
+        out = np.zeros((count, NUMBERS, NUMBERS)), np.zeros((count, NUMBERS))
         scales = np.maximum(scale * view.metres, LEAST_SCALE)
         shown = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
         kernels.pull_to_borders(STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), *shown, scales, out)
         worth = 1.0 / (view.metres**3 * TOGETHER * (OFF**2 + (ROUGH / view.metres) ** 2))
         found, asked = out[0] * worth[:, None, None], out[1] * worth[:, None]
-        off, weights = off + out[2][:, 0] / view.metres, weights + out[2][:, 1]
         ways = drawn_slopes(part.body, view.camera, part.poses, part.places, angles)
         across = ways.transpose(0, 2, 1)
         curves += across @ (found @ ways)
@@ -151,8 +140,7 @@ def _pulled(part: _Part, borders: Sequence[Borders], scale: float, *, build: boo
             mixed += across @ (found @ grown)
             curve += np.einsum("tqi,tqj->ij", grown, found @ grown)
             slope += np.einsum("tqi,tq->i", grown, asked)
-    misses = np.where(weights > 0.0, off / np.maximum(weights, 1.0), np.nan)
-    return _Pulled((curves, slopes), mixed, (curve, slope), misses)
+    return _Pulled((curves, slopes), mixed, (curve, slope))
 
 
 def _stepped(part: _Part, pulled: _Pulled, *, build: bool) -> _Part:
@@ -198,15 +186,3 @@ def _squares(part: _Part, pulled: _Pulled) -> Squares:
         ways[..., columns] = slopes
         squares.add_steps(both, feet, ways, fps / (30.0 * STANDING))
     return squares
-
-
-def _begun_anew(part: _Part, misses: Array) -> tuple[_Part, bool]:
-    """Return a window whose badly fitted frames are halfway between those around, and whether there are any."""
-    bad = np.nan_to_num(misses) > max(BAD * float(np.nanmedian(misses)), WORST)
-    poses, found, again = part.poses.copy(), part.motion.poses.copy(), False
-    for start, stop in runs(bad):
-        if 0 < start and stop < len(bad) and (stop - start) / part.motion.fps <= GAP:
-            shares = (np.arange(1, stop - start + 1) / (stop - start + 1))[:, None]
-            poses[start:stop] = part.poses[start - 1] + shares * wrapped(part.poses[stop] - part.poses[start - 1])
-            found[start:stop], again = poses[start:stop], True
-    return replace(part, poses=poses, motion=replace(part.motion, poses=found)), again

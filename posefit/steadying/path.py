@@ -123,7 +123,9 @@ def root_precisions(motion: Motion, seen: SeenFrames, deviation: float) -> Array
     return np.asarray(precise)
 
 
-def moving_feet(skeleton: Skeleton, poses: Array, places: Array, ball: int, angles: Sequence[int]) -> tuple[Array, Array]:
+def moving_feet(
+    skeleton: Skeleton, poses: Array, places: Array, ball: int, angles: Sequence[int]
+) -> tuple[Array, Array]:
     """Return where a foot is (T, 3), and how that changes with the root and the angles (T, 3, 3 + angles)."""
     feet = skeleton.joints(poses, places)[:, ball]
     turned = np.repeat(poses[None], len(angles), axis=0)

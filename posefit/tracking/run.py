@@ -94,7 +94,8 @@ def follow(
         found, told = _kept(scene, each, usable, training)
         raw = found
         if steady:
-            found = steadied_frames(scene, found, method.beta)
+            found, shape = steadied_frames(scene, found, method.beta, shape)
+            scene = scene if shape is None else replace(scene, body=shape.body)
         found = [_moded(frame, scene.body.skeleton) for frame in found]
         modes = _whole(scene.body.skeleton, found)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
