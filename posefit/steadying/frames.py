@@ -35,7 +35,9 @@ def steadied_frames(
     scene = scene if shape is None else replace(scene, body=shape.body)
     frames = [_told(scene, k, frame, told, beta) for k, frame in enumerate(found)]
     if shape is not None:
-        shape = replace(shape, cost=float(np.mean([frame.cost for frame, ok in zip(frames, usable, strict=True) if ok])))
+        shape = replace(
+            shape, cost=float(np.mean([frame.cost for frame, ok in zip(frames, usable, strict=True) if ok]))
+        )
     return frames, shape
 
 

@@ -37,10 +37,10 @@ from posefit.steadying.stance import stances
 OFF = 0.01  # metres that a point of the border may be off: standard deviation, as all that follow
 ROUGH = 0.5  # pixels, besides
 TOGETHER = 0.09  # metres of the border that are off together, so that they are one measurement
-SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033, 0.033, 0.033)  # metres, step by step: what is
+SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)  # metres, step by step: what is
 LEAST_SCALE = 3.0  # pixels           farther off counts less, and at last is another person's, or a bag's
-GIVING = np.radians(6.0)  # that an angle may be off what was found
-SHAKING = np.radians(300.0)  # a second squared, of that difference
+GIVING = np.radians(8.0)  # that an angle may be off what was found
+SHAKING = np.radians(450.0)  # a second squared, of that difference
 AWAY = 0.03  # metres that the root may be off what was found, across the line of sight
 FARTHEST, WIDEST = np.radians(20.0), 0.2  # that a step may turn an angle, and change the logarithm of a factor
 WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,12 @@ from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
 from posefit.searching.again import GAP, LOOKED, LookingTracker
-from posefit.steadying.frames import steadied_frames
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, following, opened, task_of
 from posefit.tracking.outputs import Nowhere, Output
+from posefit.tracking.passes import Pass, followed_again, usual_passes
 from posefit.tracking.tracks import (
     SEARCHED,
     Known,
@@ -63,19 +64,22 @@ def follow(
     source: Mapping[str, Any] | None = None,
     tracks: int = 1,
     steady: bool | None = None,
+    passes: int | None = None,
 ) -> Track:
     """Return a scene's motion followed by a method that learns from `training`, with what it is worth.
 
     With several `tracks`, each from another beginning and at the full budget, the one is kept whose whole cost is
     least; evaluations and times are those of all. `output` gets every frame as it comes and everything at the end;
     `source` is what the summary says of where the scene is from. What was found is `steady` in the end, by
-    default where nobody knows the truth. Raises ValueError where something does not fit.
+    default where nobody knows the truth, and what is steady is followed in several `passes`, by default twice by a
+    tracker that looks ahead: see `posefit.tracking.passes`. Raises ValueError where something does not fit.
     """
     choice, opening = choice or Choice(), opening or Opening()
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
-    if tracks < 1:
-        raise ValueError(f"tracks must be at least 1, got {tracks}")
+    for name, count in (("tracks", tracks), ("passes", 1 if passes is None else passes)):
+        if count < 1:
+            raise ValueError(f"{name} must be at least 1, got {count}")
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         for warning in scene.warnings:
             listener.say(f"warning: {warning}")
@@ -83,6 +87,8 @@ def follow(
         steady = scene.truth is None if steady is None else steady
         if steady and task.translation == "known":
             raise ValueError("steady must be given where the translation is searched or aligned, got known")
+        if passes is not None and passes > 1 and not steady:
+            raise ValueError(f"passes must be 1 where a track is not steady, got {passes}")
         method = prepare(choice, task)
         task, shape = opened(scene, method, task, opening, seed, listener)
         scene = replace(scene, body=task.body)
@@ -92,10 +98,12 @@ def follow(
         usable = [observation.usable for observation in scene.observations] if tracks > 1 else []
         each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
         found, told = _kept(scene, each, usable, training)
-        raw = found
+        raw, kept_pass = found, 1
         if steady:
-            found, shape = steadied_frames(scene, found, method.beta, shape)
-            scene = scene if shape is None else replace(scene, body=shape.body)
+            begun = Pass.of(scene, found, shape, method.beta)
+            passes = usual_passes(scene, method.tracker(task)) if passes is None else passes
+            last = followed_again(begun, task, partial(_tracker, method), passes, seed, method.beta, listener)
+            scene, found, shape, kept_pass = last.scene, last.told, last.shape, last.number
         found = [_moded(frame, scene.body.skeleton) for frame in found]
         modes = _whole(scene.body.skeleton, found)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
@@ -131,6 +139,8 @@ def follow(
             "translation": task.translation,
             "first_pose": opening.first_pose,
             "steady": steady,
+            "passes": passes or 1,
+            "kept_pass": kept_pass,
             "views": len(scene.cameras),
             "camera": scene.placing,
             "size": [scene.cameras[0].width, scene.cameras[0].height],
@@ -218,13 +228,13 @@ def _found(
         found.append((begun, frames))
         if len(frames) < scene.count:
             rest = (scene.observations[k] for k in range(len(frames), scene.count))
-            for frame in listener.progress(_tracker(scene, method, mine).track(rest, rng), scene.count - len(frames)):
+            for frame in listener.progress(_tracker(method, scene, mine).track(rest, rng), scene.count - len(frames)):
                 output.record(frame, dict(rng.bit_generator.state))
                 frames.append(frame)
     return found
 
 
-def _tracker(scene: Scene, method: Method, task: Task) -> Tracker:
+def _tracker(method: Method, scene: Scene, task: Task) -> Tracker:
     """Return the method's tracker, which in footage looks all around again after gaps; not one that looks ahead."""
     tracker, gap = method.tracker(task), method.look_again
     if gap is None:

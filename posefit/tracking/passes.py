@@ -1,0 +1,74 @@
+"""A track that is followed once more where it went: its root's way is known now, and so is the build.
+
+At first a body of another build is aligned to each mask alone, so that it comes nearer and goes away without a cause,
+and a tracker cannot tell from that which way somebody goes. The second time it can.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from posefit.fitting.shape import Shape
+from posefit.fitting.tracker import Frame, Task, Tracker
+from posefit.footage.scene import Scene
+from posefit.listening import Listener
+from posefit.steadying.frames import steadied_frames
+from posefit.tracking.tracks import spent_by_all
+
+PASSES = 2  # of footage, for a tracker that looks ahead
+SHORTEST = 3  # frames that are followed again
+DEARER = 1.125  # times what the pass before it costs: a pass that costs more is not kept
+SALT = 2026  # part of the seeds of all passes but the first
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """What came of following all frames."""
+
+    scene: Scene = field(repr=False)  # with the build that fits it
+    found: list[Frame] = field(repr=False)  # what the tracker found
+    told: list[Frame] = field(repr=False)  # what is steady
+    shape: Shape | None  # of the build, where that was fitted
+    number: int = 1
+
+    @classmethod
+    def of(cls, scene: Scene, found: list[Frame], shape: Shape | None, beta: float, number: int = 1) -> "Pass":
+        """Return what comes of frames that were found in a scene, steadied."""
+        told, shape = steadied_frames(scene, found, beta, shape)
+        return cls(scene if shape is None else replace(scene, body=shape.body), found, told, shape, number)
+
+    @cached_property
+    def cost(self) -> float:
+        """The mean cost of the frames that show enough of the person."""
+        costs = [one.cost for one, seen in zip(self.told, self.scene.observations, strict=True) if seen.usable]
+        return float(np.mean(costs)) if costs else 0.0
+
+
+def usual_passes(scene: Scene, tracker: Tracker) -> int:
+    """Return how often a scene is followed where nobody says: footage twice by a tracker that looks ahead."""
+    ahead = getattr(tracker, "lag", None) is not None
+    return PASSES if scene.truth is None and ahead and scene.count >= SHORTEST else 1
+
+
+def followed_again(
+    first: Pass, task: Task, make: Callable[[Scene, Task], Tracker], passes: int, seed: int, beta: float, say: Listener
+) -> Pass:
+    """Return the last of so many passes that does not cost much more than the one before it, `first` being the first.
+
+    `make` makes a tracker of a task. Each pass has the full budget, and frames have the evaluations and times of all.
+    """
+    kept = first
+    for number in range(1, passes):
+        scene, way = kept.scene, [frame.translation for frame in kept.told]
+        known = replace(task, body=scene.body, translation="known", anchor=way[0], before=())
+        seen = (replace(one, translation=place) for one, place in zip(scene.observations, way, strict=True))
+        say.say(f"following once more where it went, pass {number + 1} of {passes}")
+        rng = np.random.default_rng([seed, SALT, number])
+        found = list(say.progress(make(scene, known).track(seen, rng), scene.count))
+        other = Pass.of(scene, found, kept.shape, beta, number + 1)
+        better = int(other.cost <= DEARER * kept.cost)
+        told = spent_by_all([kept.told, other.told], better)
+        kept = replace((kept, other)[better], told=told)
+    return kept
