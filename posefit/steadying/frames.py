@@ -32,6 +32,7 @@ def steadied_frames(
     eye = scene.cameras[0].position if len(scene.cameras) == 1 else None
     seen = SeenFrames(usable, eye)
     told, shape = outlined(scene, steadied(motion, seen), seen, shape)
+    told = steadied(told, seen)  # borders pull at feet that stand
     scene = scene if shape is None else replace(scene, body=shape.body)
     frames = [_told(scene, k, frame, told, beta) for k, frame in enumerate(found)]
     if shape is not None:
