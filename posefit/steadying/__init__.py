@@ -4,5 +4,5 @@
   solves for all frames at once.
 - `outlines` fits poses, way and build to where the borders of the masks are: `borders` says where that is, `shown` what
   the border of a drawn body hangs on, and `kernels` brings both together.
-- `frames` does both to what a tracker found.
+- `frames` does both to what a tracker found, and `passes` follows once more where that went.
 """

@@ -18,12 +18,12 @@ from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
 from posefit.searching.again import GAP, LOOKED, LookingTracker
+from posefit.steadying.passes import Pass, followed_again, usual_passes
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
 from posefit.tracking.opening import Opening, following, opened, task_of
 from posefit.tracking.outputs import Nowhere, Output
-from posefit.tracking.passes import Pass, followed_again, usual_passes
 from posefit.tracking.tracks import (
     SEARCHED,
     Known,
@@ -72,7 +72,7 @@ def follow(
     least; evaluations and times are those of all. `output` gets every frame as it comes and everything at the end;
     `source` is what the summary says of where the scene is from. What was found is `steady` in the end, by
     default where nobody knows the truth, and what is steady is followed in several `passes`, by default twice by a
-    tracker that looks ahead: see `posefit.tracking.passes`. Raises ValueError where something does not fit.
+    tracker that looks ahead: see `posefit.steadying.passes`. Raises ValueError where something does not fit.
     """
     choice, opening = choice or Choice(), opening or Opening()
     if seed < 0:
@@ -102,8 +102,10 @@ def follow(
         if steady:
             begun = Pass.of(scene, found, shape, method.beta)
             passes = usual_passes(scene, method.tracker(task)) if passes is None else passes
-            last = followed_again(begun, task, partial(_tracker, method), passes, seed, method.beta, listener)
-            scene, found, shape, kept_pass = last.scene, last.told, last.shape, last.number
+            make = partial(_tracker, method)
+            passed, kept = followed_again(begun, task, make, passes, seed, method.beta, listener)
+            scene, shape, kept_pass = passed[kept].scene, passed[kept].shape, kept + 1
+            found = spent_by_all([one.told for one in passed], kept)
         found = [_moded(frame, scene.body.skeleton) for frame in found]
         modes = _whole(scene.body.skeleton, found)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)

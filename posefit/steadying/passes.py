@@ -15,7 +15,6 @@ from posefit.fitting.tracker import Frame, Task, Tracker
 from posefit.footage.scene import Scene
 from posefit.listening import Listener
 from posefit.steadying.frames import steadied_frames
-from posefit.tracking.tracks import spent_by_all
 
 PASSES = 2  # of footage, for a tracker that looks ahead
 SHORTEST = 3  # frames that are followed again
@@ -31,13 +30,12 @@ class Pass:
     found: list[Frame] = field(repr=False)  # what the tracker found
     told: list[Frame] = field(repr=False)  # what is steady
     shape: Shape | None  # of the build, where that was fitted
-    number: int = 1
 
     @classmethod
-    def of(cls, scene: Scene, found: list[Frame], shape: Shape | None, beta: float, number: int = 1) -> "Pass":
+    def of(cls, scene: Scene, found: list[Frame], shape: Shape | None, beta: float) -> "Pass":
         """Return what comes of frames that were found in a scene, steadied."""
         told, shape = steadied_frames(scene, found, beta, shape)
-        return cls(scene if shape is None else replace(scene, body=shape.body), found, told, shape, number)
+        return cls(scene if shape is None else replace(scene, body=shape.body), found, told, shape)
 
     @cached_property
     def cost(self) -> float:
@@ -54,21 +52,21 @@ def usual_passes(scene: Scene, tracker: Tracker) -> int:
 
 def followed_again(
     first: Pass, task: Task, make: Callable[[Scene, Task], Tracker], passes: int, seed: int, beta: float, say: Listener
-) -> Pass:
-    """Return the last of so many passes that does not cost much more than the one before it, `first` being the first.
+) -> tuple[list[Pass], int]:
+    """Return so many passes, `first` being the first, and which is kept: the last that costs not much more than before.
 
-    `make` makes a tracker of a task. Each pass has the full budget, and frames have the evaluations and times of all.
+    `make` makes a tracker of a task. Each pass has the full budget, and follows the one that was kept before it.
     """
-    kept = first
+    passed, kept = [first], 0
     for number in range(1, passes):
-        scene, way = kept.scene, [frame.translation for frame in kept.told]
+        before = passed[kept]
+        scene, way = before.scene, [frame.translation for frame in before.told]
         known = replace(task, body=scene.body, translation="known", anchor=way[0], before=())
         seen = (replace(one, translation=place) for one, place in zip(scene.observations, way, strict=True))
         say.say(f"following once more where it went, pass {number + 1} of {passes}")
         rng = np.random.default_rng([seed, SALT, number])
         found = list(say.progress(make(scene, known).track(seen, rng), scene.count))
-        other = Pass.of(scene, found, kept.shape, beta, number + 1)
-        better = int(other.cost <= DEARER * kept.cost)
-        told = spent_by_all([kept.told, other.told], better)
-        kept = replace((kept, other)[better], told=told)
-    return kept
+        passed.append(Pass.of(scene, found, before.shape, beta))
+        if passed[-1].cost <= DEARER * before.cost:
+            kept = number
+    return passed, kept

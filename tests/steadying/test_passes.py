@@ -14,9 +14,9 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, synthetic
 from posefit.motion import built_in
 from posefit.silhouette.cost import SCALE
+from posefit.steadying.passes import DEARER
 from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
-from posefit.tracking.passes import DEARER
 from posefit.tracking.run import Track, follow
 
 WALK = built_in.motion("walk", frames=60).frames(5, 11)
