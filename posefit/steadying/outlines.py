@@ -43,6 +43,7 @@ GIVING = np.radians(8.0)  # that an angle may be off what was found
 SHAKING = np.radians(450.0)  # a second squared, of that difference
 AWAY = 0.03  # metres that the root may be off what was found, across the line of sight
 FARTHEST, WIDEST = np.radians(20.0), 0.2  # that a step may turn an angle, and change the logarithm of a factor
+ALIKE = 3.0  # frames whose borders are off alike, so that they tell as much of the build as one
 WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
@@ -151,8 +152,9 @@ def _stepped(part: _Part, pulled: _Pulled, *, build: bool) -> _Part:
     else:
         found = steps.steps_for(np.concatenate([steps.slopes[..., None], pulled.mixed], axis=2))
         way, answers = found[..., 0], found[..., 1:]
-        curve = pulled.build[0] + np.diag(1.0 / SPREAD**2) - np.einsum("tni,tnj->ij", pulled.mixed, answers)
-        slope = pulled.build[1] + part.factors / SPREAD**2 - np.einsum("tni,tn->i", pulled.mixed, way)
+        known = max(np.count_nonzero(part.usable) / ALIKE, 1.0) / SPREAD**2
+        curve = pulled.build[0] + np.diag(known) - np.einsum("tni,tnj->ij", pulled.mixed, answers)
+        slope = pulled.build[1] + known * part.factors - np.einsum("tni,tn->i", pulled.mixed, way)
         turns = np.clip(np.linalg.solve(curve, slope), -WIDEST, WIDEST)
         way = way - answers @ turns
     poses = part.poses.copy()
