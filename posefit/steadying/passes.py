@@ -16,8 +16,6 @@ from posefit.footage.scene import Scene
 from posefit.listening import Listener
 from posefit.steadying.frames import steadied_frames
 
-PASSES = 2  # of footage, for a tracker that looks ahead
-SHORTEST = 3  # frames that are followed again
 DEARER = 1.125  # times what the pass before it costs: a pass that costs more is not kept
 SALT = 2026  # part of the seeds of all passes but the first
 
@@ -42,12 +40,6 @@ class Pass:
         """The mean cost of the frames that show enough of the person."""
         costs = [one.cost for one, seen in zip(self.told, self.scene.observations, strict=True) if seen.usable]
         return float(np.mean(costs)) if costs else 0.0
-
-
-def usual_passes(scene: Scene, tracker: Tracker) -> int:
-    """Return how often a scene is followed where nobody says: footage twice by a tracker that looks ahead."""
-    ahead = getattr(tracker, "lag", None) is not None
-    return PASSES if scene.truth is None and ahead and scene.count >= SHORTEST else 1
 
 
 def followed_again(

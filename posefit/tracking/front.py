@@ -73,7 +73,7 @@ def track(
     up: Up | None = None,
     tracks: int = 1,
     steady: bool | None = None,
-    passes: int | None = None,
+    passes: int = 1,
     seed: int = 0,
     threads: int = 1,
     ask_seconds: float | None = None,
@@ -104,8 +104,8 @@ def track(
     is fitted to `body_frames` (12; none where an .asf is given), as tall as `height` says. With several `tracks`
     the person is followed so many times from different beginnings, each at the full budget, and the track is kept
     whose whole cost is least. A track is `steady` where nobody knows the truth: its root goes smoothly, and feet
-    that stand stay where they are; False leaves what was found in each frame. It is followed in so many `passes`, 2
-    for a tracker that looks ahead: each after the first knows the root's way and the build that were fitted before.
+    that stand stay where they are; False leaves what was found in each frame. It is followed in so many `passes`:
+    each after the first knows the root's way and the build that were fitted before.
     `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
     calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video. `label`
     is the value that the person has in masks of several things, and `holes` the largest that is filled, a share of

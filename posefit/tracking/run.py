@@ -18,7 +18,7 @@ from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
 from posefit.searching.again import GAP, LOOKED, LookingTracker
-from posefit.steadying.passes import Pass, followed_again, usual_passes
+from posefit.steadying.passes import Pass, followed_again
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
@@ -64,20 +64,20 @@ def follow(
     source: Mapping[str, Any] | None = None,
     tracks: int = 1,
     steady: bool | None = None,
-    passes: int | None = None,
+    passes: int = 1,
 ) -> Track:
     """Return a scene's motion followed by a method that learns from `training`, with what it is worth.
 
     With several `tracks`, each from another beginning and at the full budget, the one is kept whose whole cost is
     least; evaluations and times are those of all. `output` gets every frame as it comes and everything at the end;
     `source` is what the summary says of where the scene is from. What was found is `steady` in the end, by
-    default where nobody knows the truth, and what is steady is followed in several `passes`, by default twice by a
-    tracker that looks ahead: see `posefit.steadying.passes`. Raises ValueError where something does not fit.
+    default where nobody knows the truth, and what is steady may be followed in several `passes`: see
+    `posefit.steadying.passes`. Raises ValueError where something does not fit.
     """
     choice, opening = choice or Choice(), opening or Opening()
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
-    for name, count in (("tracks", tracks), ("passes", 1 if passes is None else passes)):
+    for name, count in (("tracks", tracks), ("passes", passes)):
         if count < 1:
             raise ValueError(f"{name} must be at least 1, got {count}")
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
@@ -87,7 +87,7 @@ def follow(
         steady = scene.truth is None if steady is None else steady
         if steady and task.translation == "known":
             raise ValueError("steady must be given where the translation is searched or aligned, got known")
-        if passes is not None and passes > 1 and not steady:
+        if passes > 1 and not steady:
             raise ValueError(f"passes must be 1 where a track is not steady, got {passes}")
         method = prepare(choice, task)
         task, shape = opened(scene, method, task, opening, seed, listener)
@@ -101,7 +101,6 @@ def follow(
         raw, kept_pass = found, 1
         if steady:
             begun = Pass.of(scene, found, shape, method.beta)
-            passes = usual_passes(scene, method.tracker(task)) if passes is None else passes
             make = partial(_tracker, method)
             passed, kept = followed_again(begun, task, make, passes, seed, method.beta, listener)
             scene, shape, kept_pass = passed[kept].scene, passed[kept].shape, kept + 1
@@ -141,7 +140,7 @@ def follow(
             "translation": task.translation,
             "first_pose": opening.first_pose,
             "steady": steady,
-            "passes": passes or 1,
+            "passes": passes,
             "kept_pass": kept_pass,
             "views": len(scene.cameras),
             "camera": scene.placing,

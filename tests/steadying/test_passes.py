@@ -59,7 +59,7 @@ def posefit_areas(task: Task, camera: Any, silhouette: Any, pose: np.ndarray, pl
     return float(mismatch(counts)[0]), counts
 
 
-def followed(passes: int | None = None, **off: float) -> Track:
+def followed(passes: int = 2, **off: float) -> Track:
     Walker.off, Walker.told = off, []
     return follow(
         footage(),
@@ -70,7 +70,7 @@ def followed(passes: int | None = None, **off: float) -> Track:
     )
 
 
-def test_footage_is_followed_twice_by_who_looks_ahead_and_the_second_time_its_way_is_known() -> None:
+def test_the_second_time_the_way_is_known() -> None:
     found = followed()
     tasks = [task for task, seen in Walker.told if len(seen) == len(WALK)]
     assert [task.translation for task in tasks] == ["aligned", "known"]
@@ -99,7 +99,7 @@ def test_of_passes_the_better_one_is_kept() -> None:
     assert found.measures.cost < alone.measures.cost
 
 
-def test_a_known_motion_is_followed_once_and_what_searches_each_frame_follows_once() -> None:
+def test_a_track_is_followed_once_where_nobody_asks_for_more() -> None:
     found = posefit.track("walk", frames=(0, 3), translation="aligned", evaluations=300, steady=True)
     assert (found.summary["passes"], found.summary["kept_pass"]) == (1, 1)
 
