@@ -27,6 +27,8 @@ ASKED = {
     "view_degrees": ("degrees", "where the cameras were told to stand; null where nobody said"),
     "translation": ("", "how the root's place is found: known, searched or aligned"),
     "first_pose": ("", "how the first pose is found: searched, or given"),
+    "kept_pass": ("", "which of these passes is told, the first being 1"),
+    "passes": ("", "how often all frames were followed: [so](../howto/steady.md)"),
     "steady": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/steady.md)"),
     "views": ("", "number of cameras"),
     "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),

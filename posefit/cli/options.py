@@ -122,6 +122,7 @@ TRACK = (
         default=None,
         help="The root goes smoothly, and feet that stand do not slide; by default so for footage.",
     ),
+    click.option("--passes", type=int, default=1, show_default=True, help="How often a steady track is followed."),
     click.option("--seed", type=int, default=0, show_default=True),
     click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),
     click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),

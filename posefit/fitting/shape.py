@@ -76,6 +76,7 @@ class Shape:
     factors: Array = field(repr=False)  # (17,) in the order of `NAMES`
     spread: Array = field(repr=False)  # (17,) standard deviation of the factors over resampled frames
     cost: float  # mean over the frames
+    height: float | None = None  # metres that it was made to stand; None where frames told it
 
 
 def fit_shape(
@@ -105,7 +106,7 @@ def fit_shape(
         fitted.search(factors, rng.integers(len(observations), size=len(observations)), rng) for _ in range(resamples)
     ]
     cost = fitted.cost(factors, np.arange(len(observations)))
-    return Shape(shaped(base, factors, height), factors, np.std(drawn, axis=0), cost)
+    return Shape(shaped(base, factors, height), factors, np.std(drawn, axis=0), cost, height)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What a tracker found, steadied, and what it then costs."""
+"""What a tracker found, steadied and fitted to the borders of the masks, and what it then costs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,21 +7,38 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.problem import only_camera, over_views
+from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
+from posefit.posterior.modes import Posterior
 from posefit.silhouette.cost import areas
+from posefit.steadying.outlines import outlined
 from posefit.steadying.path import SeenFrames, steadied
 
 
-def steadied_frames(scene: Scene, found: Sequence[Frame], beta: float) -> list[Frame]:
-    """Return what was found in the frames of a scene, steadied; costs and areas are those of what is told then."""
+def steadied_frames(
+    scene: Scene, found: Sequence[Frame], beta: float, shape: Shape | None = None
+) -> tuple[list[Frame], Shape | None]:
+    """Return what was found in the frames of a scene, steadied, and the build fitted with it.
+
+    The build stays the scene's where it was not fitted before (`shape` is None). Costs and areas are those of what is
+    told then, and what else a frame may be goes with it as far as the pose and the root went.
+    """
     poses = np.array([frame.pose for frame in found])
     motion = Motion(scene.name, scene.body.skeleton, poses, np.array([frame.translation for frame in found]), scene.fps)
     usable = np.array([observation.usable for observation in scene.observations])
-    eyes = np.array([_eye(scene, observation) for observation in scene.observations])
-    told = steadied(motion, SeenFrames(usable, eyes))
-    return [_told(scene, k, frame, told, beta) for k, frame in enumerate(found)]
+    seen = SeenFrames(usable, np.array([_eye(scene, observation) for observation in scene.observations]))
+    told, shape = outlined(scene, steadied(motion, seen), seen, shape)
+    told = steadied(told, seen)  # borders pull at feet that stand
+    scene = scene if shape is None else replace(scene, body=shape.body)
+    frames = [_told(scene, k, frame, told, beta) for k, frame in enumerate(found)]
+    if shape is not None:
+        shape = replace(
+            shape, cost=float(np.mean([frame.cost for frame, ok in zip(frames, usable, strict=True) if ok]))
+        )
+    return frames, shape
 
 
 def _eye(scene: Scene, observation: Observation) -> Array:
@@ -37,4 +54,12 @@ def _told(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Fr
         for camera, silhouette in zip(scene.cameras, silhouettes, strict=True)
     ]
     cost = float(over_views(counts, silhouettes, beta)[0])
-    return replace(frame, pose=pose, translation=place, cost=cost, areas=np.concatenate(counts), coordinates=None)
+    posterior = frame.posterior
+    if posterior is not None:
+        posterior = _moved(posterior, wrapped(pose - frame.pose), place - frame.translation)
+    told = replace(frame, pose=pose, translation=place, cost=cost, areas=np.concatenate(counts))
+    return replace(told, coordinates=None, posterior=posterior)
+
+
+def _moved(posterior: Posterior, turn: Array, way: Array) -> Posterior:
+    return replace(posterior, poses=posterior.poses + turn, translations=posterior.translations + way)

@@ -86,7 +86,7 @@ def _solved(motion: Motion, seen: SeenFrames, stands: NDArray[np.bool_]) -> Moti
     skeleton, fps, count = motion.skeleton, motion.fps, len(motion)
     angles = [angle for angle in LEGS if skeleton.free[angle]]
     root, legs = slice(0, 3), slice(3, 3 + len(angles))
-    precision = _precisions(motion, seen)
+    precision = root_precisions(motion, seen, ACROSS)
     change = np.zeros((count, 3 + len(angles)))  # of the root, and of the angles
     poses, places = motion.poses.copy(), motion.translations.copy()
     for _ in range(ROUNDS):
@@ -99,7 +99,7 @@ def _solved(motion: Motion, seen: SeenFrames, stands: NDArray[np.bool_]) -> Moti
         squares.add_bends(legs, change[:, legs], fps**2 / SHAKING)
         for side, ball in enumerate(BALLS):
             both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
-            feet, slopes = _feet(skeleton, poses, places, ball, angles)
+            feet, slopes = moving_feet(skeleton, poses, places, ball, angles)
             squares.add_steps(both, feet, slopes, fps / (30.0 * STANDING))
         change = change - squares.least()
         poses[:, angles] = motion.poses[:, angles] + change[:, 3:]
@@ -107,9 +107,12 @@ def _solved(motion: Motion, seen: SeenFrames, stands: NDArray[np.bool_]) -> Moti
     return Motion(motion.name, skeleton, poses, places, fps)
 
 
-def _precisions(motion: Motion, seen: SeenFrames) -> Array:
-    """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance."""
-    across = np.where(seen.usable, ACROSS, UNSEEN)
+def root_precisions(motion: Motion, seen: SeenFrames, deviation: float) -> Array:
+    """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance.
+
+    `deviation` is how many metres it may be off across the line of sight, and where no camera is alone in depth.
+    """
+    across = np.where(seen.usable, deviation, UNSEEN)
     precise = np.eye(3) / across[:, None, None] ** 2
     alone = np.isfinite(seen.eyes).all(axis=1)
     sights = motion.translations[alone] - seen.eyes[alone]
@@ -121,7 +124,9 @@ def _precisions(motion: Motion, seen: SeenFrames) -> Array:
     return np.asarray(precise)
 
 
-def _feet(skeleton: Skeleton, poses: Array, places: Array, ball: int, angles: Sequence[int]) -> tuple[Array, Array]:
+def moving_feet(
+    skeleton: Skeleton, poses: Array, places: Array, ball: int, angles: Sequence[int]
+) -> tuple[Array, Array]:
     """Return where a foot is (T, 3), and how that changes with the root and the angles (T, 3, 3 + angles)."""
     feet = skeleton.joints(poses, places)[:, ball]
     turned = np.repeat(poses[None], len(angles), axis=0)

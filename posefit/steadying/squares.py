@@ -57,6 +57,10 @@ class Squares:
 
     def least(self) -> Array:
         """Return the step (T, n) that is to be taken away from the numbers, so that the sum is least."""
+        return self.steps_for(self.slopes[..., None])[..., 0]
+
+    def steps_for(self, slopes: Array) -> Array:
+        """Return the steps (T, n, m) that would be the least ones, were the slopes each of m others (T, n, m)."""
         _, count, numbers, _ = self.curves.shape
         band = (REACH + 1) * numbers
         lines = np.zeros((band, count * numbers))  # scipy's upper form: lines[band - 1 + row - column, column]
@@ -67,5 +71,5 @@ class Squares:
                     if off >= 0:
                         values = self.curves[apart, : count - apart, row, column]
                         lines[band - 1 - off, apart * numbers + column :: numbers] = values
-        found = solveh_banded(lines, self.slopes.reshape(-1), check_finite=False)
-        return np.asarray(found).reshape(count, numbers)
+        found = solveh_banded(lines, slopes.reshape(count * numbers, -1), check_finite=False)
+        return np.asarray(found).reshape(slopes.shape)

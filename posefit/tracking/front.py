@@ -73,6 +73,7 @@ def track(
     up: Up | None = None,
     tracks: int = 1,
     steady: bool | None = None,
+    passes: int = 1,
     seed: int = 0,
     threads: int = 1,
     ask_seconds: float | None = None,
@@ -96,17 +97,19 @@ def track(
     `translation` is "known" where the truth is, else "aligned". A `first_pose` that is "given" starts the first frame
     around the true one. `ask_seconds` is how long a plugin may take to propose a population.
 
-    Where the truth is known the method is `sapso` with `pca`, which learns from the other styles of a built-in motion,
-    else from the built-in walks. Where it is not, it is the tracker `exemplars`, which learns from the library; or, if
-    an optimiser or a prior is given, `sapso` with `loose`, which learns from the built-in walks. There the first frame
-    is searched `restarts` times (8; 0 for a tracker that looks ahead), and the person's build is fitted to
-    `body_frames` (12; none where an .asf is given), as tall as `height` says. With several `tracks` the person is
-    followed so many times from different beginnings, each at the full budget, and the track is kept whose whole cost is
-    least. A track is `steady` where nobody knows the truth: its root goes smoothly, and feet that stand stay where they
-    are; False leaves what was found in each frame. `view_degrees` gives where the camera stands, several of them
-    several cameras; `camera` is a camera or a calibration, one a view, in whose world `up` points up; `extraction` is
-    how masks are taken from video. `label` is the value that the person has in masks of several things, and `holes` the
-    largest that is filled, a share of him.
+    Where the truth is known the method is `sapso` with `pca`, which learns from the other styles of a built-in
+    motion, else from the built-in walks. Where it is not, it is the tracker `exemplars`, which learns from the
+    library; or, if an optimiser or a prior is given, `sapso` with `loose`, which learns from the built-in walks.
+    There the first frame is searched `restarts` times (8; 0 for a tracker that looks ahead), and the person's build
+    is fitted to `body_frames` (12; none where an .asf is given), as tall as `height` says. With several `tracks`
+    the person is followed so many times from different beginnings, each at the full budget, and the track is kept
+    whose whole cost is least. A track is `steady` where nobody knows the truth: its root goes smoothly, and feet
+    that stand stay where they are; False leaves what was found in each frame. It is followed in so many `passes`:
+    each after the first knows the root's way and the build that were fitted before.
+    `view_degrees` gives where the camera stands, several of them several cameras; `camera` is a camera or a
+    calibration, one a view, in whose world `up` points up; `extraction` is how masks are taken from video. `label`
+    is the value that the person has in masks of several things, and `holes` the largest that is filled, a share of
+    him.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
     not at all. What was found when a track ended too early is kept, and `resume` goes on from there. `rerun` is where a
@@ -120,6 +123,7 @@ def track(
         restarts=restarts,
         body_frames=body_frames,
         tracks=tracks,
+        passes=passes,
         seed=seed,
         threads=threads,
         ask_seconds=ask_seconds,
@@ -197,6 +201,7 @@ def track(
             },
             tracks=tracks,
             steady=steady,
+            passes=passes,
         )
         if rerun is not None:
             from posefit.tracking.recording import record

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
 from posefit.searching.again import GAP, LOOKED, LookingTracker
 from posefit.searching.anew import Anew, followed_anew
-from posefit.steadying.frames import steadied_frames
+from posefit.steadying.passes import Pass, followed_again
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Choice, Method, prepare
@@ -64,19 +65,22 @@ def follow(
     source: Mapping[str, Any] | None = None,
     tracks: int = 1,
     steady: bool | None = None,
+    passes: int = 1,
 ) -> Track:
     """Return a scene's motion followed by a method that learns from `training`, with what it is worth.
 
     With several `tracks`, each from another beginning and at the full budget, the one is kept whose whole cost is
     least; evaluations and times are those of all. `output` gets every frame as it comes and everything at the end;
     `source` is what the summary says of where the scene is from. What was found is `steady` in the end, by
-    default where nobody knows the truth. Raises ValueError where something does not fit.
+    default where nobody knows the truth, and what is steady may be followed in several `passes`: see
+    `posefit.steadying.passes`. Raises ValueError where something does not fit.
     """
     choice, opening = choice or Choice(), opening or Opening()
     if seed < 0:
         raise ValueError(f"seed must be 0 or more, got {seed}")
-    if tracks < 1:
-        raise ValueError(f"tracks must be at least 1, got {tracks}")
+    for name, count in (("tracks", tracks), ("passes", passes)):
+        if count < 1:
+            raise ValueError(f"{name} must be at least 1, got {count}")
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         for warning in scene.warnings:
             listener.say(f"warning: {warning}")
@@ -84,6 +88,8 @@ def follow(
         steady = scene.truth is None if steady is None else steady
         if steady and task.translation == "known":
             raise ValueError("steady must be given where the translation is searched or aligned, got known")
+        if passes > 1 and not steady:
+            raise ValueError(f"passes must be 1 where a track is not steady, got {passes}")
         method = prepare(choice, task)
         task, shape = opened(scene, method, task, opening, seed, listener)
         scene = replace(scene, body=task.body)
@@ -94,9 +100,13 @@ def follow(
         each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
         found, told = _kept(scene, each, usable, training)
         anew = _without_whirls(scene, method, task, found, seed, listener)
-        raw = found = anew.frames
+        raw, found, kept_pass = anew.frames, anew.frames, 1
         if steady:
-            found = steadied_frames(scene, found, method.beta)
+            begun = Pass.of(scene, found, shape, method.beta)
+            make = partial(_tracker, method)
+            passed, kept = followed_again(begun, task, make, passes, seed, method.beta, listener)
+            scene, shape, kept_pass = passed[kept].scene, passed[kept].shape, kept + 1
+            found = spent_by_all([one.told for one in passed], kept)
         found = [_moded(frame, scene.body.skeleton) for frame in found]
         modes = _whole(scene.body.skeleton, found)
         evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
@@ -133,6 +143,8 @@ def follow(
             "translation": task.translation,
             "first_pose": opening.first_pose,
             "steady": steady,
+            "passes": passes,
+            "kept_pass": kept_pass,
             "views": len(scene.cameras),
             "camera": scene.placing,
             "size": [scene.cameras[0].width, scene.cameras[0].height],
@@ -221,13 +233,13 @@ def _found(
         found.append((begun, frames))
         if len(frames) < scene.count:
             rest = (scene.observations[k] for k in range(len(frames), scene.count))
-            for frame in listener.progress(_tracker(scene, method, mine).track(rest, rng), scene.count - len(frames)):
+            for frame in listener.progress(_tracker(method, scene, mine).track(rest, rng), scene.count - len(frames)):
                 output.record(frame, dict(rng.bit_generator.state))
                 frames.append(frame)
     return found
 
 
-def _tracker(scene: Scene, method: Method, task: Task) -> Tracker:
+def _tracker(method: Method, scene: Scene, task: Task) -> Tracker:
     """Return the method's tracker, which in footage looks all around again after gaps; not one that looks ahead."""
     tracker, gap = method.tracker(task), method.look_again
     if gap is None:

@@ -1,0 +1,190 @@
+"""Poses, way and build whose borders are those of the masks, by least squares over all frames at once.
+
+What a tracker finds is a pose among those that it knows, and a search of each frame shakes. Here every angle gives way
+a little, and smoothly, to where the borders of the masks are, and the build, the same in all frames, gives way with
+them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.fitting.shape import SPREAD, Shape, shaped
+from posefit.fitting.tracker import Observation
+from posefit.footage.scene import Scene
+from posefit.geometry.body import Body
+from posefit.geometry.rotation import wrapped
+from posefit.motion.motion import Motion
+from posefit.motion.steadiness import BALLS
+from posefit.steadying import kernels
+from posefit.steadying.borders import Borders
+from posefit.steadying.path import (
+    ACCELERATION,
+    LEGS,
+    STANDING,
+    STRANGE,
+    SeenFrames,
+    moving_feet,
+    root_precisions,
+)
+from posefit.steadying.shown import NUMBERS, STARTS, build_slopes, drawn_numbers, drawn_slopes
+from posefit.steadying.squares import Squares
+from posefit.steadying.stance import stances
+
+OFF = 0.01  # metres that a point of the border may be off: standard deviation, as all that follow
+ROUGH = 0.5  # pixels, besides
+TOGETHER = 0.09  # metres of the border that are off together, so that they are one measurement
+SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)  # metres, step by step: what is
+LEAST_SCALE = 3.0  # pixels           farther off counts less, and at last is another person's, or a bag's
+GIVING = np.radians(8.0)  # that an angle may be off what was found
+SHAKING = np.radians(450.0)  # a second squared, of that difference
+AWAY = 0.03  # metres that the root may be off what was found, across the line of sight
+FARTHEST, WIDEST = np.radians(20.0), 0.2  # that a step may turn an angle, and change the logarithm of a factor
+ALIKE = 3.0  # frames whose borders are off alike, so that they tell as much of the build as one
+WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A window of a track, as far as it is fitted."""
+
+    motion: Motion  # as it was found; its skeleton is that of the body
+    body: Body
+    factors: Array  # (17,) logarithms of what the body was fitted by before
+    height: float | None
+    usable: NDArray[np.bool_]
+    eyes: Array  # (T, 3): see `SeenFrames`
+    poses: Array
+    places: Array
+
+    @property
+    def angles(self) -> list[int]:
+        return np.flatnonzero(self.motion.skeleton.free).tolist()
+
+
+@dataclass(frozen=True, eq=False)
+class _Pulled:
+    """What the masks' borders ask for: of poses and way (T, n), and of the build (17)."""
+
+    poses: tuple[Array, Array]
+    mixed: Array  # (T, n, 17)
+    build: tuple[Array, Array]
+
+
+def outlined(scene: Scene, motion: Motion, seen: SeenFrames, shape: Shape | None) -> tuple[Motion, Shape | None]:
+    """Return a steady motion fitted to the borders of a scene's masks, and the build fitted with it.
+
+    The build stays as it is where it was not fitted before (`shape` is None): it is then known. That of a long track
+    is found in the window of which most is seen. A motion of fewer than 3 frames is returned as it is.
+    """
+    if len(motion) < 3 or not seen.usable.any():
+        return motion, shape
+    starts = range(0, len(motion), WINDOW)
+    windows = [np.arange(max(s - OVERLAP, 0), min(s + WINDOW + OVERLAP, len(motion))) for s in starts]
+    fitted: dict[int, _Part] = {}
+    if shape is not None:
+        best = int(np.argmax([seen.usable[rows].sum() for rows in windows]))
+        found = _fitted(scene, motion, seen, windows[best], scene.body, shape)
+        shape = replace(shape, body=found.body, factors=np.exp(found.factors))
+        fitted[best] = found
+    body = scene.body if shape is None else shape.body
+    poses, places = motion.poses.copy(), motion.translations.copy()
+    for k, (start, rows) in enumerate(zip(starts, windows, strict=True)):
+        if len(rows) < 3:
+            continue
+        part = fitted.get(k) or _fitted(scene, motion, seen, rows, body, None)
+        kept = (rows >= start) & (rows < start + WINDOW)
+        poses[rows[kept]], places[rows[kept]] = part.poses[kept], part.places[kept]
+    return replace(motion, skeleton=body.skeleton, poses=poses, translations=places), shape
+
+
+def _fitted(
+    scene: Scene, motion: Motion, seen: SeenFrames, rows: NDArray[np.int64], body: Body, shape: Shape | None
+) -> _Part:
+    """Return some frames of a motion, fitted; the build with them where there is a shape that it begins with."""
+    poses, places = motion.poses[rows], motion.translations[rows]
+    observations: Sequence[Observation] = [scene.observations[k] for k in rows.tolist()]
+    borders = [Borders.of(camera, view, observations, places) for view, camera in enumerate(scene.cameras)]
+    factors, height = (np.zeros(len(SPREAD)), None) if shape is None else (np.log(shape.factors), shape.height)
+    found = Motion(motion.name, body.skeleton, poses, places, motion.fps)
+    part = _Part(found, body, factors, height, seen.usable[rows], seen.eyes[rows], poses, places)
+    for scale in SCALES:
+        part = _stepped(part, _pulled(part, borders, scale, build=shape is not None), build=shape is not None)
+    return part
+
+
+def _pulled(part: _Part, borders: Sequence[Borders], scale: float, *, build: bool) -> _Pulled:
+    """Return what the borders of all views ask for."""
+    count, angles, factors = len(part.poses), part.angles, len(part.factors) if build else 0
+    numbers = 3 + len(angles)
+    curves, slopes = np.zeros((count, numbers, numbers)), np.zeros((count, numbers))
+    mixed, curve, slope = np.zeros((count, numbers, factors)), np.zeros((factors, factors)), np.zeros(factors)
+    joints = len(STARTS) + 1
+    for view in borders:
+        drawn = drawn_numbers(part.body, view.camera, part.poses, part.places)
+        centres, radii = drawn[:, : 2 * joints].reshape(count, -1, 2), drawn[:, 2 * joints :].reshape(count, -1, 2)
+        out = np.zeros((count, NUMBERS, NUMBERS)), np.zeros((count, NUMBERS))
+        scales = np.maximum(scale * view.metres, LEAST_SCALE)
+        shown = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
+        kernels.pull_to_borders(STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), *shown, scales, out)
+        worth = 1.0 / (view.metres**3 * TOGETHER * (OFF**2 + (ROUGH / view.metres) ** 2))
+        found, asked = out[0] * worth[:, None, None], out[1] * worth[:, None]
+        ways = drawn_slopes(part.body, view.camera, part.poses, part.places, angles)
+        across = ways.transpose(0, 2, 1)
+        curves += across @ (found @ ways)
+        slopes += (across @ asked[..., None])[..., 0]
+        if build:
+            grown = build_slopes(part.body, view.camera, part.poses, part.places, part.height)
+            mixed += across @ (found @ grown)
+            curve += np.einsum("tqi,tqj->ij", grown, found @ grown)
+            slope += np.einsum("tqi,tq->i", grown, asked)
+    return _Pulled((curves, slopes), mixed, (curve, slope))
+
+
+def _stepped(part: _Part, pulled: _Pulled, *, build: bool) -> _Part:
+    """Return a window one step of Gauss and Newton farther."""
+    steps, turns = _squares(part, pulled), np.zeros(len(part.factors))
+    if not build:
+        way = steps.least()
+    else:
+        found = steps.steps_for(np.concatenate([steps.slopes[..., None], pulled.mixed], axis=2))
+        way, answers = found[..., 0], found[..., 1:]
+        known = max(np.count_nonzero(part.usable) / ALIKE, 1.0) / SPREAD**2
+        curve = pulled.build[0] + np.diag(known) - np.einsum("tni,tnj->ij", pulled.mixed, answers)
+        slope = pulled.build[1] + known * part.factors - np.einsum("tni,tn->i", pulled.mixed, way)
+        turns = np.clip(np.linalg.solve(curve, slope), -WIDEST, WIDEST)
+        way = way - answers @ turns
+    poses = part.poses.copy()
+    poses[:, part.angles] -= np.clip(way[:, 3:], -FARTHEST, FARTHEST)
+    body = shaped(part.body, np.exp(-turns), part.height) if build else part.body
+    return replace(part, poses=poses, places=part.places - way[:, :3], body=body, factors=part.factors - turns)
+
+
+def _squares(part: _Part, pulled: _Pulled) -> Squares:
+    """Return what borders, smoothness and standing feet ask of poses and way together."""
+    fps, angles = part.motion.fps, part.angles
+    root, turned = slice(0, 3), slice(3, 3 + len(angles))
+    squares = Squares.of(len(part.poses), 3 + len(angles))
+    squares.add(slice(None), *pulled.poses)
+    moved, change = part.places - part.motion.translations, wrapped(part.poses - part.motion.poses)[:, angles]
+    precision = root_precisions(part.motion, SeenFrames(part.usable, part.eyes), AWAY)
+    off = np.einsum("ti,tij,tj->t", moved, precision, moved)
+    precision /= (1.0 + off / STRANGE**2)[:, None, None]
+    squares.add(root, precision, np.einsum("tij,tj->ti", precision, moved))
+    squares.add_bends(root, part.places, fps**2 / ACCELERATION)
+    squares.add(turned, np.eye(len(angles)) / GIVING**2, change / GIVING**2)
+    squares.add_bends(turned, change, fps**2 / SHAKING)
+    skeleton = part.body.skeleton
+    stands = stances(skeleton.joints(part.poses, part.places), fps, part.eyes)
+    legs = [angle for angle in LEGS if angle in angles]
+    columns = [0, 1, 2, *(3 + angles.index(angle) for angle in legs)]
+    for side, ball in enumerate(BALLS):
+        both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
+        feet, slopes = moving_feet(skeleton, part.poses, part.places, ball, legs)
+        ways = np.zeros((*feet.shape, 3 + len(angles)))
+        ways[..., columns] = slopes
+        squares.add_steps(both, feet, ways, fps / (30.0 * STANDING))
+    return squares
