@@ -57,8 +57,8 @@ def filmed_lines(told: dict[str, Any]) -> Iterator[str]:
 def filmed_figures(source: str | Path, roi: Box, frames: Range, seed: int) -> dict[str, Any]:
     """Return what the track of a seed is worth: its overlap as a search of each frame finds it, its gait as steadied.
 
-    What is steady overlaps less, by about 0.02; and what is found in each frame goes to and fro in depth, so that it
-    tells little of which way somebody goes in a moment.
+    What is steady is fitted to the masks once more; and what is found in each frame goes to and fro in depth, so that
+    it tells little of which way somebody goes in a moment.
     """
     video = Video.of(source)
     with tempfile.TemporaryDirectory() as folder:
