@@ -55,6 +55,10 @@ register(
     entry_point="posefit_envs.configure:ConfigureEnv",
     vector_entry_point="posefit_envs.vector.configure:ConfigureVectorEnv",
 )
+register(
+    id="posefit/Configure-v1",
+    entry_point="posefit_envs.configuring.single:OptimiserEnv",
+)
 register(id="posefit/Modes-v0", entry_point="posefit_envs.modes:ModesEnv")
 
 
