@@ -59,6 +59,10 @@ register(
     id="posefit/Configure-v1",
     entry_point="posefit_envs.configuring.single:OptimiserEnv",
 )
+register(
+    id="posefit/Fit-v1",
+    entry_point="posefit_envs.proposing.single:ProposalEnv",
+)
 register(id="posefit/Modes-v0", entry_point="posefit_envs.modes:ModesEnv")
 
 
