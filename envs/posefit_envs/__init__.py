@@ -58,10 +58,12 @@ register(
 register(
     id="posefit/Configure-v1",
     entry_point="posefit_envs.configuring.single:OptimiserEnv",
+    vector_entry_point="posefit_envs.vector.configuring:OptimiserVectorEnv",
 )
 register(
     id="posefit/Fit-v1",
     entry_point="posefit_envs.proposing.single:ProposalEnv",
+    vector_entry_point="posefit_envs.vector.proposing:ProposalVectorEnv",
 )
 register(id="posefit/Modes-v0", entry_point="posefit_envs.modes:ModesEnv")
 

@@ -60,6 +60,11 @@ def progress_features(herd: Herd) -> Array:
     )
 
 
+def shown(features: Array, herd: Herd) -> State:
+    """Return the observation (25,) of an instance's features and a search."""
+    return np.clip(np.concatenate([features, progress_features(herd)]), 0.0, 1.0).astype(np.float32)
+
+
 def _priced(cost: float) -> float:
     return float(np.log1p(cost) / np.log1p(DEAREST))
 

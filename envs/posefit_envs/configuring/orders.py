@@ -10,7 +10,7 @@ from posefit_envs.configure import INERTIA, LOG_TEMPERATURE
 
 OPTIMISERS = ("swarm", "differential", "normal")
 LAYERS = ("root", "first", "second")  # the root, and either half of the prior's latents
-SPREAD = 0.1  # the largest diffusion, in half-ranges
+SPREAD = 0.3  # the largest diffusion, in half-ranges
 SHARPNESS = 5.0
 LOG_POPULATION = (0.0, -2.0)  # powers of two, of all particles
 NUMBERS = len(OPTIMISERS) + 4 + len(LAYERS)

@@ -8,7 +8,7 @@ from gymnasium import error
 
 from posefit.fitting.check import whole
 from posefit_envs.configure import ITERATIONS, PARTICLES
-from posefit_envs.configuring.features import State, instance_features, progress_features, space_of_features
+from posefit_envs.configuring.features import State, instance_features, shown, space_of_features
 from posefit_envs.configuring.herd import LEAST, Herd
 from posefit_envs.configuring.orders import NUMBERS, order_of, space_of_orders
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
@@ -55,7 +55,7 @@ class OptimiserEnv(gym.Env[State, Any]):
         self._features = instance_features(herd)
         if self.render_mode == "human":
             self.render()
-        return self._state(herd), self._info(herd)
+        return shown(self._features, herd), self._info(herd)
 
     def step(self, action: Any) -> tuple[State, float, bool, bool, dict[str, Any]]:
         """Search on with one order."""
@@ -69,10 +69,7 @@ class OptimiserEnv(gym.Env[State, Any]):
             herd.tell(self._stage.costs(herd.ask()[None], self._stage.everyone)[0])
         if self.render_mode == "human":
             self.render()
-        return self._state(herd), gained(before, herd.best), herd.left == 0, False, self._info(herd)
-
-    def _state(self, herd: Herd) -> State:
-        return np.clip(np.concatenate([self._features, progress_features(herd)]), 0.0, 1.0).astype(np.float32)
+        return shown(self._features, herd), gained(before, herd.best), herd.left == 0, False, self._info(herd)
 
     def _info(self, herd: Herd) -> dict[str, Any]:
         info = {"best_cost": herd.best, "evaluations": herd.used, "instance": herd.episode.instance.number}
