@@ -34,10 +34,11 @@ from gymnasium.envs.registration import register
 if TYPE_CHECKING:
     from posefit_envs.checker import check_vector_env as check_vector_env
     from posefit_envs.driving import drive as drive
+    from posefit_envs.driving import drive_each as drive_each
     from posefit_envs.driving import track_reference as track_reference
     from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
 
-_HOME = {"check_vector_env": "checker", "drive": "driving", "track_reference": "driving", "to_sb3_vec_env": "sb3"}
+_HOME = {"check_vector_env": "checker", "drive": "driving", "drive_each": "driving", "track_reference": "driving", "to_sb3_vec_env": "sb3"}
 __all__ = list(_HOME)
 
 register(
