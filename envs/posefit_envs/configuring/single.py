@@ -20,7 +20,68 @@ EVERY = 5  # iterations a step
 
 
 class OptimiserEnv(gym.Env[State, Any]):
-    """DOC"""
+    """
+    ## Description
+    A population searches for the pose in one silhouette. Each step is `every` iterations of it, and the action says
+    which optimisers move it, how far, how much of it at a time, what is scattered and what begins anew: dynamic
+    algorithm configuration with a choice of algorithms. `posefit_envs.policies.sapso_action` is SAPSO, bit for bit.
+
+    ## Action Space
+    `Box(-1, 1, (10,), float32)`
+
+    | Num | Meaning | -1 stands for | 1 stands for |
+    |---|---|---|---|
+    | 0, 1, 2 | shares of the particles that move as a swarm, by differential evolution, and as a draw from the normal distribution of the better half: e^(5 a) over the sum of the three | | |
+    | 3 | how much of the population moves at a time, the best first, by powers of two | all, from -0.5 down | a quarter, from 0.5 up |
+    | 4 | stride: inertia of the swarm, weight of differences, and width of the normal distribution in 0.6ths | 0 | 1.2 |
+    | 5 | temperature at which worse moves are accepted, by powers of ten | 0.001 | 32 |
+    | 6 | how much of the population begins anew, anywhere, the worst first | none, from 0 down | all |
+    | 7, 8, 9 | standard deviation of a random kick to every particle in the root, and in the first and the second half of the latents, in half-ranges of the box | 0, from 0 down | 0.3 |
+
+    A step always has `every * particles` evaluations: so a smaller part moves more often. Stride and temperature fall
+    with each iteration of a step as SAPSO's do. The best pose of all is kept, whatever begins anew. Actions outside
+    are clipped, with one warning.
+
+    ## Observation Space
+    `Box(0, 1, (25,), float32)`
+
+    | Num | Meaning |
+    |---|---|
+    | 0 to 4 | of the silhouette, mean over views: share of the picture, height, width, share of the box around it, share of its pixels at an edge |
+    | 5 | dimensions / 66 |
+    | 6, 7 | median and standard deviation of the first population's costs / 100 |
+    | 8 | correlation of those costs with the distance to the cheapest, -1 to 1 |
+    | 9, 10, 11 | best cost so far, best that the population knows, and lowest of the last step: ln(1 + cost) / ln 101 |
+    | 12, 13 | mean and standard deviation of the last step's costs, in the same way |
+    | 14, 15, 16 | spread of the particles' bests in the root, and in either half of the latents, 0.001 to 1 half-ranges by its logarithm |
+    | 17 | mean speed of the particles / the largest allowed |
+    | 18 | share of moves accepted in the last step |
+    | 19, 20 | budget left; steps since the best cost fell / 10 |
+    | 21 to 24 | shares and part of the population of the last action |
+
+    ## Rewards
+    ln((1 + best cost before) / (1 + best cost after)), so that the sum over an episode is by what factor it came down.
+
+    ## Starting State
+    A first population of `particles`, drawn uniformly and evaluated; the instance as in `Fit-v0`.
+
+    ## Episode End
+    Terminates after `iterations` iterations, `iterations / every` steps. It is never truncated.
+
+    ## Information
+    `best_cost`, `evaluations`, `instance`, and unless `errors=False` `error_degrees`, of the best pose against the
+    truth; a reset too.
+
+    ## Arguments
+    As in `Fit-v0`, with `particles=40`, 4 or more, `iterations=60` and `every=5`, of which `iterations` must be a
+    multiple, instead of `target_cost` and `max_evaluations`.
+
+    ## Version History
+    - v1: shares of three optimisers, part of the population, restarts and diffusion by layer; instance features in the
+      observation; the reward is a fall of the logarithm; a step is several iterations. Rewards and actions of v0 mean
+      something else; the swarm, and SAPSO as a policy, are the same.
+    - v0: `posefit/Configure-v0`, which stays as it is.
+    """
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
 

@@ -17,7 +17,56 @@ from posefit_envs.stage import Stage
 
 
 class ProposalEnv(gym.Env[Any, Any]):
-    """DOC"""
+    """
+    ## Description
+    A person was seen as a silhouette. Each step proposes a pose; its body is projected, and what does not overlap with
+    the silhouette is its cost. The episode is a search for the pose, and the observation says enough to search with:
+    the best proposals so far and the last ones, with their costs.
+
+    ## Action Space
+    `Box(-1, 1, (d + 1,), float32)`, with `prior="pca"` and a known translation d = 9.
+
+    | Num | Meaning |
+    |---|---|
+    | 0 to d - 1 | where to: a proposal, as in `Fit-v0` |
+    | d | how much of the way there from the best proposal so far, by powers of ten: -1 is a hundredth, 0 a tenth; 1 is all of it, and proposes the first numbers bit for bit |
+
+    So every proposal lies in the box. Actions outside are clipped, with one warning. float64 is not rounded.
+
+    ## Observation Space
+    `Box(-1, 1, (8 d + 10,), float32)`; with `image=True` a `Dict` of it as `search` and the picture of `Fit-v0` as
+    `image`.
+
+    | Num | Meaning |
+    |---|---|
+    | 0 to 4 d - 1 | the four best proposals so far, the best first |
+    | 4 d to 8 d - 1 | the last four, the last first |
+    | 8 d to 8 d + 7 | what these eight cost: 2 ln(1 + cost) / ln 101 - 1 |
+    | 8 d + 8 | budget left: from 1 to -1 |
+    | 8 d + 9 | proposals since the best cost fell: from -1 to 1 for 50 or more |
+
+    ## Rewards
+    ln((1 + best cost before) / (1 + best cost after)): 0 where the proposal is no better than the best so far. The sum
+    over an episode is by what factor the cost of the middle of the box came down.
+
+    ## Starting State
+    An instance, as in `Fit-v0`. The middle of the box is proposed first, as the first of `max_evaluations`.
+
+    ## Episode End
+    Terminates after `max_evaluations` proposals. There is no target. It is never truncated.
+
+    ## Information
+    `cost`, `best_cost`, `evaluations`, `areas` (views, 3) R, B, Y in pixels, `instance`, and unless `errors=False`
+    `error_degrees` of the proposal against the truth; a reset too, of the middle of the box.
+
+    ## Arguments
+    As in `Fit-v0`, with `image=False`, and without `target_cost`.
+
+    ## Version History
+    - v1: the observation is the search and no picture; the action has a part of the way; the reward is a fall of the
+      logarithm of the best cost, and was minus the cost; the middle of the box is proposed first; no target ends it.
+    - v0: `posefit/Fit-v0`, which stays as it is.
+    """
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
 

@@ -90,6 +90,8 @@ def agent_row(turn: Turn) -> dict[str, Any]:
         row["costs"] = _searched(turn.agent.split()[0], evaluations, numbers, turn.seed)
     else:
         row["costs"] = _costs(turn, _policy(turn, row["curve"]), numbers)
+        if row["curve"]:
+            row["curve"].append([turn.steps, row["costs"][:CURVE_INSTANCES]])
     return row | {"minutes": round((time.perf_counter() - began) / 60.0, 2)}
 
 
@@ -112,7 +114,7 @@ def _policy(turn: Turn, curve: list[Any]) -> Policy:
 
     def look(steps: int, policy: Policy) -> None:
         due = turn.steps * len(curve) // CURVE
-        if steps >= due and len(curve) <= CURVE:
+        if steps >= due and len(curve) < CURVE:
             curve.append([steps, _costs(turn, policy, numbers)])
 
     if turn.agent in ("bandit", "cma over constants"):
