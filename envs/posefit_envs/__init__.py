@@ -43,7 +43,13 @@ if TYPE_CHECKING:
     from posefit_envs.driving import track_reference as track_reference
     from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
 
-_HOME = {"check_vector_env": "checker", "drive": "driving", "drive_each": "driving", "track_reference": "driving", "to_sb3_vec_env": "sb3"}
+_HOME = {
+    "check_vector_env": "checker",
+    "drive": "driving",
+    "drive_each": "driving",
+    "track_reference": "driving",
+    "to_sb3_vec_env": "sb3",
+}
 __all__ = list(_HOME)
 
 register(

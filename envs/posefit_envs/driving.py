@@ -44,7 +44,9 @@ def drive(
     numbers = desk.begin(seed, instance)
     if len(set(numbers)) > 1:
         raise error.Error(f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each")
-    searching = _built(desk.space(0), optimiser, seed, evaluations, settings) if isinstance(optimiser, str) else optimiser
+    searching = (
+        _built(desk.space(0), optimiser, seed, evaluations, settings) if isinstance(optimiser, str) else optimiser
+    )
     try:
         return minimise(desk.costs, searching, evaluations, told=True)
     except BudgetError as mistake:

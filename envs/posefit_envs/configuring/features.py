@@ -55,9 +55,7 @@ def progress_features(herd: Herd) -> Array:
     paid = [_priced(one) for one in (herd.best, float(flock.best_cost.min()), costs.min(), costs.mean(), costs.std())]
     order = herd.order
     waits = [herd.left / herd.steps, min(herd.stale / 10.0, 1.0)]
-    return np.array(
-        [*paid, *layers, speed, float(herd.accepted.mean()), *waits, *order.shares, order.population]
-    )
+    return np.array([*paid, *layers, speed, float(herd.accepted.mean()), *waits, *order.shares, order.population])
 
 
 def shown(features: Array, herd: Herd) -> State:

@@ -25,7 +25,9 @@ class Herd:
     A step is `follow`, and then `ask` and `tell` as long as something is `open`.
     """
 
-    def __init__(self, world: World, number: int, generator: np.random.Generator, particles: int, steps: int, every: int) -> None:
+    def __init__(
+        self, world: World, number: int, generator: np.random.Generator, particles: int, steps: int, every: int
+    ) -> None:
         self.episode = Episode(world, number, particles * (steps * every + 1))
         self.rng = np.random.default_rng(int(generator.integers(2**63)))
         self.space = self.episode.space

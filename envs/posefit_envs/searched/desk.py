@@ -9,7 +9,11 @@ from gymnasium.vector import VectorEnv
 
 from posefit import SearchSpace
 from posefit.arrays import Array
+from posefit_envs.fit import FitEnv
 from posefit_envs.policies import PROPOSED
+from posefit_envs.proposing.single import ProposalEnv
+from posefit_envs.vector.fit import FitVectorEnv
+from posefit_envs.vector.proposing import ProposalVectorEnv
 
 
 class Desk:
@@ -20,12 +24,12 @@ class Desk:
 
     def __init__(self, env: VectorEnv[Any, Any, Any] | Env[Any, Any], dtype: Any) -> None:
         self._env, self._dtype = env, dtype
-        # what is typed as an environment or a vector of them is stepped in either way
+        self._bare: Any = env.unwrapped
         self._several = isinstance(env, VectorEnv)
         self.count = env.num_envs if isinstance(env, VectorEnv) else 1
-        self._bare: Any = env.unwrapped
-        if not hasattr(type(self._bare), "search_spaces" if self._several else "search_space"):
+        if not isinstance(self._bare, FitEnv | FitVectorEnv | ProposalEnv | ProposalVectorEnv):
             raise error.Error(f"env must be posefit/Fit-v0 or Fit-v1, got {type(self._bare).__name__}")
+        self._whole = isinstance(self._bare, ProposalEnv | ProposalVectorEnv)  # Fit-v1 is told to go all the way
         self._numbers: list[int] = []
 
     def begin(self, seed: int, instance: int | Sequence[int] | None) -> list[int]:
@@ -33,11 +37,6 @@ class Desk:
         options = {} if instance is None else {"options": {"instance": instance}}
         _, info = self._env.reset(seed=seed, **options)
         self._numbers = np.atleast_1d(info["instance"]).tolist()
-        size = self.space(0).dimensions
-        actions = self._bare.single_action_space if self._several else self._bare.action_space
-        if actions.shape not in ((size,), (size + 1,)):
-            raise error.Error(f"env must be posefit/Fit-v0 or Fit-v1, got {type(self._bare).__name__}")
-        self._whole = actions.shape == (size + 1,)  # Fit-v1, which is told to go all the way
         return self._numbers
 
     def space(self, i: int) -> SearchSpace:

@@ -48,9 +48,7 @@ class Turn(NamedTuple):
     instances: int
 
 
-def agent_turns(
-    tasks: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int
-) -> list[Turn]:
+def agent_turns(tasks: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int) -> list[Turn]:
     """Return the rows that are asked for, of each agent that a task has."""
     turns = []
     for name in tasks:
