@@ -39,24 +39,24 @@ def sapso_action_v0(step: int, *, iterations: int = ITERATIONS) -> Array:
 def constant_policy(action: Any) -> Policy:
     """Return the policy that always takes this action."""
     always = np.array(action, dtype=np.float64)
-    return lambda observation, step: always
+    return lambda _, __: always
 
 
 def sapso_policy(*, iterations: int = ITERATIONS, every: int = EVERY) -> Policy:
     """Return SAPSO's own schedule as a policy of Configure-v1."""
-    return lambda observation, step: sapso_action(step, iterations=iterations, every=every)
+    return lambda _, step: sapso_action(step, iterations=iterations, every=every)
 
 
 def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
     """Return the policy that draws actions uniformly from an environment's box."""
     shape = env.action_space.shape
-    return lambda observation, step: rng.uniform(-1.0, 1.0, shape)
+    return lambda _, __: rng.uniform(-1.0, 1.0, shape)
 
 
 def random_search_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
     """Return random search as a policy of Fit-v1: proposals drawn uniformly from the box, whatever is seen."""
     d = (env.action_space.shape or (0,))[0] - 1
-    return lambda observation, step: np.append(rng.uniform(-1.0, 1.0, d), PROPOSED)
+    return lambda _, __: np.append(rng.uniform(-1.0, 1.0, d), PROPOSED)
 
 
 def gaussian_policy(env: gym.Env[Any, Any], rng: np.random.Generator, spread: float = 0.1) -> Policy:
@@ -68,7 +68,7 @@ def gaussian_policy(env: gym.Env[Any, Any], rng: np.random.Generator, spread: fl
     positive("spread", spread)
     d = (env.action_space.shape or (0,))[0] - 1
 
-    def propose(observation: Any, step: int) -> Array:
+    def propose(observation: Any, _: int) -> Array:
         shown = observation["search"] if isinstance(observation, dict) else observation
         return np.append(np.clip(shown[:d] + spread * rng.standard_normal(d), -1.0, 1.0), PROPOSED)
 

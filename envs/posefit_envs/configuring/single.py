@@ -12,7 +12,7 @@ from posefit_envs.configuring.features import State, instance_features, shown, s
 from posefit_envs.configuring.herd import LEAST, Herd
 from posefit_envs.configuring.orders import NUMBERS, order_of, space_of_orders
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
-from posefit_envs.instance import Arguments, ArgumentError, approved, select
+from posefit_envs.instance import ArgumentError, Arguments, approved, select
 from posefit_envs.search import Doorkeeper
 from posefit_envs.stage import Stage
 
@@ -31,12 +31,18 @@ class OptimiserEnv(gym.Env[State, Any]):
 
     | Num | Meaning | -1 stands for | 1 stands for |
     |---|---|---|---|
-    | 0, 1, 2 | shares of the particles that move as a swarm, by differential evolution, and as a draw from the normal distribution of the better half: e^(5 a) over the sum of the three | | |
-    | 3 | how much of the population moves at a time, the best first, by powers of two | all, from -0.5 down | a quarter, from 0.5 up |
-    | 4 | stride: inertia of the swarm, weight of differences, and width of the normal distribution in 0.6ths | 0 | 1.2 |
+    | 0 | share of the particles that move as a swarm | none, nearly | all, nearly |
+    | 1 | share that moves by differential evolution | none, nearly | all, nearly |
+    | 2 | share that is drawn from the normal distribution of the better half | none, nearly | all, nearly |
+    | 3 | how much of the population moves at a time, the best first, by powers of two | all | a quarter |
+    | 4 | stride: inertia of the swarm, weight of differences, width of the draws in 0.6ths | 0 | 1.2 |
     | 5 | temperature at which worse moves are accepted, by powers of ten | 0.001 | 32 |
-    | 6 | how much of the population begins anew, anywhere, the worst first | none, from 0 down | all |
-    | 7, 8, 9 | standard deviation of a random kick to every particle in the root, and in the first and the second half of the latents, in half-ranges of the box | 0, from 0 down | 0.3 |
+    | 6 | how much of the population begins anew, anywhere, the worst first | none | all |
+    | 7 | standard deviation of a random kick in the root, in half-ranges of the box | 0 | 0.3 |
+    | 8, 9 | the same in the first and in the second half of the latents | 0 | 0.3 |
+
+    The shares are e^(5 a) of the first three numbers over their sum. Number 3 has come to its ends at -0.5 and 0.5.
+    Numbers 6 to 9 stand for nothing from 0 down.
 
     A step always has `every * particles` evaluations: so a smaller part moves more often. Stride and temperature fall
     with each iteration of a step as SAPSO's do. The best pose of all is kept, whatever begins anew. Actions outside
@@ -47,13 +53,14 @@ class OptimiserEnv(gym.Env[State, Any]):
 
     | Num | Meaning |
     |---|---|
-    | 0 to 4 | of the silhouette, mean over views: share of the picture, height, width, share of the box around it, share of its pixels at an edge |
+    | 0, 1, 2 | of the silhouette, mean over views: share of the picture, height, width |
+    | 3, 4 | its share of the box around it, share of its pixels at an edge |
     | 5 | dimensions / 66 |
     | 6, 7 | median and standard deviation of the first population's costs / 100 |
     | 8 | correlation of those costs with the distance to the cheapest, -1 to 1 |
-    | 9, 10, 11 | best cost so far, best that the population knows, and lowest of the last step: ln(1 + cost) / ln 101 |
-    | 12, 13 | mean and standard deviation of the last step's costs, in the same way |
-    | 14, 15, 16 | spread of the particles' bests in the root, and in either half of the latents, 0.001 to 1 half-ranges by its logarithm |
+    | 9, 10 | best cost so far, and best that the population knows: ln(1 + cost) / ln 101 |
+    | 11, 12, 13 | lowest, mean and standard deviation of the last step's costs, in the same way |
+    | 14, 15, 16 | spread of the bests in the root and either half of the latents, 0.001 to 1, by its logarithm |
     | 17 | mean speed of the particles / the largest allowed |
     | 18 | share of moves accepted in the last step |
     | 19, 20 | budget left; steps since the best cost fell / 10 |

@@ -10,7 +10,7 @@ from posefit import SearchSpace
 from posefit.fitting.check import whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import MAX_EVALUATIONS, Episode, action_shape, spaces_of
-from posefit_envs.instance import Arguments, ArgumentError, World, approved, select
+from posefit_envs.instance import ArgumentError, Arguments, World, approved, select
 from posefit_envs.proposing.memory import Memory, seen_with, space_of_memory
 from posefit_envs.search import Doorkeeper
 from posefit_envs.stage import Stage
@@ -29,8 +29,9 @@ class ProposalEnv(gym.Env[Any, Any]):
     | Num | Meaning |
     |---|---|
     | 0 to d - 1 | where to: a proposal, as in `Fit-v0` |
-    | d | how much of the way there from the best proposal so far, by powers of ten: -1 is a hundredth, 0 a tenth; 1 is all of it, and proposes the first numbers bit for bit |
+    | d | how much of the way there from the best proposal so far, by powers of ten from 0.01 to 1 |
 
+    Where the last number is 1 the first numbers are proposed, bit for bit; at 0 a tenth of the way is gone.
     So every proposal lies in the box. Actions outside are clipped, with one warning. float64 is not rounded.
 
     ## Observation Space

@@ -40,7 +40,7 @@ def setting_policy(task: str, setting: Array, rng: np.random.Generator, dimensio
     if task == "configure":
         return constant_policy(setting)
 
-    def propose(observation: Any, step: int) -> Array:
+    def propose(_: Any, step: int) -> Array:
         power = setting[0] + (setting[1] - setting[0]) * step / length
         return np.append(rng.uniform(-1.0, 1.0, dimensions - 1), power)
 

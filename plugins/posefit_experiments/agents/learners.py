@@ -32,7 +32,7 @@ def trained(
     learner = {"ppo": PPO, "sac": SAC}[agent]
     model = learner("MlpPolicy", env, seed=seed, device="cpu", gamma=DISCOUNT)
 
-    def act(observation: Any, step: int) -> Array:
+    def act(observation: Any, _: int) -> Array:
         chosen: Array = model.predict(observation, deterministic=deterministic)[0]
         return chosen
 
