@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 import posefit_envs  # noqa: F401, registers it
 from posefit_envs.policies import constant_policy, gaussian_policy, played, random_search_policy, uniform_policy
-from posefit_envs.proposing.memory import Memory
+from posefit_envs.proposing.memory import ProposalMemory
 
 NAME = "posefit/Fit-v1"
 
@@ -34,7 +34,7 @@ def test_its_first_numbers_are_proposed_where_the_last_is_one_bit_for_bit() -> N
 
 
 def test_the_last_number_says_how_much_of_the_way_by_powers_of_ten() -> None:
-    memory = Memory(2, 50.0, 10)
+    memory = ProposalMemory(2, 50.0, 10)
     memory.take(np.array([0.5, 0.0]), 20.0)
     for power, reach in ((-1.0, 0.01), (0.0, 0.1), (0.5, 10.0**-0.5)):
         # from the best, (0.5, 0), to (0, 1)
@@ -42,7 +42,7 @@ def test_the_last_number_says_how_much_of_the_way_by_powers_of_ten() -> None:
 
 
 def test_it_shows_the_best_proposals_and_the_last_ones_with_their_costs() -> None:
-    memory = Memory(1, 50.0, 11)
+    memory = ProposalMemory(1, 50.0, 11)
     rewards = [memory.take(np.array([place]), cost) for place, cost in ((0.1, 60.0), (0.2, 30.0), (0.3, 40.0))]
     # by hand: ln(51 / 31) when 30 comes, else nothing
     assert rewards == pytest.approx([0.0, np.log(51.0 / 31.0), 0.0])

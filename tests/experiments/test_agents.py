@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from posefit_experiments.agents import experiment
 from posefit_experiments.agents.constants import arms, bandit, evolved, setting_policy
-from posefit_experiments.agents.design import TASKS, Turn, agent_turns
+from posefit_experiments.agents.design import TASKS, Training, agent_turns
 from posefit_experiments.agents.tables import agent_tables, agents_lines, normalised, score_interval
 from posefit_experiments.commands.measurements import agents_command
 
@@ -82,9 +82,9 @@ def test_rows_are_kept_and_go_on(tmp_path: Any, monkeypatch: pytest.MonkeyPatch)
     path = tmp_path / "rows.jsonl"
     asked: dict[str, Any] = {"environments": ("fit",), "names": ("gaussian",), "seeds": 2, "steps": 100}
     asked |= {"instances": 2, "quick": False, "rows": str(path), "workers": 1}
-    measured: list[Turn] = []
+    measured: list[Training] = []
 
-    def row(turn: Turn) -> dict[str, Any]:
+    def row(turn: Training) -> dict[str, Any]:
         measured.append(turn)
         return turn._asdict() | {"curve": [], "costs": [turn.seed + 10.0 * len(turn.agent)] * 2, "minutes": 0.0}
 
@@ -108,7 +108,7 @@ def test_every_reference_and_learner_gives_a_row() -> None:
     for task in TASKS.values():
         name = next(key for key, one in TASKS.items() if one is task)
         for agent in (*task.references, *(one for one in task.learners if one != "ppo")):
-            row = experiment.agent_row(Turn(name, agent, 0, 24 if agent in task.learners else 0, 1))
+            row = experiment.agent_row(Training(name, agent, 0, 24 if agent in task.learners else 0, 1))
             assert len(row["costs"]) == 1
             assert 0.0 <= row["costs"][0] < 40.0
             json.dumps(row)
@@ -116,9 +116,10 @@ def test_every_reference_and_learner_gives_a_row() -> None:
 
 def test_the_lines_say_scores_and_curves() -> None:
     rows = [
-        Turn("fit", "random search", 0, 0, 2)._asdict() | {"costs": [10.0, 20.0], "curve": [], "minutes": 0.1},
-        Turn("fit", "ppo", 0, 50, 2)._asdict() | {"costs": [5.0, 10.0], "curve": [[50, [5.0, 10.0]]], "minutes": 1.0},
-        Turn("fit", "best known", 0, 0, 2)._asdict() | {"costs": [0.0, 0.0], "curve": [], "minutes": 0.1},
+        Training("fit", "random search", 0, 0, 2)._asdict() | {"costs": [10.0, 20.0], "curve": [], "minutes": 0.1},
+        Training("fit", "ppo", 0, 50, 2)._asdict()
+        | {"costs": [5.0, 10.0], "curve": [[50, [5.0, 10.0]]], "minutes": 1.0},
+        Training("fit", "best known", 0, 0, 2)._asdict() | {"costs": [0.0, 0.0], "curve": [], "minutes": 0.1},
     ]
     lines = list(agents_lines({"instances": 2} | agent_tables(rows)))
     assert "| ppo | 50 | 1 | 0.500 | 0.500 to 0.500 | 7.50 | 7.50 | 1.0 |" in lines

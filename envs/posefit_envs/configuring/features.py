@@ -58,7 +58,7 @@ def progress_features(herd: Herd) -> Array:
     return np.array([*paid, *layers, speed, float(herd.accepted.mean()), *waits, *order.shares, order.population])
 
 
-def shown(features: Array, herd: Herd) -> State:
+def observed_state(features: Array, herd: Herd) -> State:
     """Return the observation (25,) of an instance's features and a search."""
     return np.clip(np.concatenate([features, progress_features(herd)]), 0.0, 1.0).astype(np.float32)
 

@@ -8,7 +8,7 @@ from gymnasium import error
 
 from posefit.fitting.check import whole
 from posefit_envs.configure import ITERATIONS, PARTICLES
-from posefit_envs.configuring.features import State, instance_features, shown, space_of_features
+from posefit_envs.configuring.features import State, instance_features, observed_state, space_of_features
 from posefit_envs.configuring.herd import LEAST, Herd
 from posefit_envs.configuring.orders import NUMBERS, order_of, space_of_orders
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
@@ -123,7 +123,7 @@ class OptimiserEnv(gym.Env[State, Any]):
         self._features = instance_features(herd)
         if self.render_mode == "human":
             self.render()
-        return shown(self._features, herd), self._info(herd)
+        return observed_state(self._features, herd), self._info(herd)
 
     def step(self, action: Any) -> tuple[State, float, bool, bool, dict[str, Any]]:
         """Search on with one order."""
@@ -137,7 +137,7 @@ class OptimiserEnv(gym.Env[State, Any]):
             herd.tell(self._stage.costs(herd.ask()[None], self._stage.everyone)[0])
         if self.render_mode == "human":
             self.render()
-        return shown(self._features, herd), gained(before, herd.best), herd.left == 0, False, self._info(herd)
+        return observed_state(self._features, herd), gained(before, herd.best), herd.left == 0, False, self._info(herd)
 
     def _info(self, herd: Herd) -> dict[str, Any]:
         info = {"best_cost": herd.best, "evaluations": herd.used, "instance": herd.episode.instance.number}

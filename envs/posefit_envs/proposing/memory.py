@@ -16,7 +16,7 @@ DEAR = 100.0  # the cost that shows as 1
 PATIENCE = 50.0  # proposals without a gain that show as 1
 
 
-class Memory:
+class ProposalMemory:
     """The proposals of one search and their costs; it begins with the middle of the box, which was evaluated."""
 
     def __init__(self, dimensions: int, cost: float, evaluations: int) -> None:

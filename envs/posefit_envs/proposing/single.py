@@ -11,7 +11,7 @@ from posefit.fitting.check import whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import MAX_EVALUATIONS, Episode, action_shape, spaces_of
 from posefit_envs.instance import ArgumentError, Arguments, World, approved, select
-from posefit_envs.proposing.memory import Memory, seen_with, space_of_memory
+from posefit_envs.proposing.memory import ProposalMemory, seen_with, space_of_memory
 from posefit_envs.search import Doorkeeper
 from posefit_envs.stage import Stage
 
@@ -105,7 +105,7 @@ class ProposalEnv(gym.Env[Any, Any]):
         self._stage.put(0, episode.scenery, episode.space)
         outcome = self._stage.look(np.zeros((1, self._dimensions)), self._stage.everyone)
         info = episode.take(outcome, self._selection.errors)
-        self._memory = Memory(self._dimensions, episode.cost, self._most)
+        self._memory = ProposalMemory(self._dimensions, episode.cost, self._most)
         if self.render_mode == "human":
             self.render()
         return seen_with(self._memory.state(), outcome.pictures[0], self._image), info

@@ -71,7 +71,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         The option "reset_mask" says which environments begin; the others go on.
         """
         seeds, mask = seeds_of(seed, self.num_envs), mask_of(options, self.num_envs, self._begun)
-        numbers = numbers_of(options, self.num_envs)
+        numbers = chosen_instances(options, self.num_envs)
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._generators[i] = seeding.np_random(seeds[i])[0]
@@ -140,7 +140,7 @@ def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> list[int | 
     return list(seed)
 
 
-def numbers_of(options: Mapping[str, Any] | None, count: int) -> list[int | None]:
+def chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int | None]:
     """Return the instance that a reset's options choose for each environment: one number is all's, None is no choice.
 
     Raises ArgumentError where there are too few or too many, or where there is none of such a number.

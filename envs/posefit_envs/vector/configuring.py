@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.fitting.metrics import pose_error_degrees
 from posefit.geometry.skeleton import ANGLES
 from posefit_envs.configure import ITERATIONS, PARTICLES
-from posefit_envs.configuring.features import State, instance_features, shown, space_of_features
+from posefit_envs.configuring.features import State, instance_features, observed_state, space_of_features
 from posefit_envs.configuring.herd import Herd
 from posefit_envs.configuring.orders import order_of, space_of_orders
 from posefit_envs.configuring.single import EVERY, check_herd, gained
@@ -86,7 +86,7 @@ class OptimiserVectorEnv(SearchVectorEnv):
                 herds[i].tell(costs[i, : len(mine)])
 
     def _states(self) -> State:
-        return np.stack([shown(one, herd) for one, herd in zip(self._features, self._current(), strict=True)])
+        return np.stack([observed_state(one, herd) for one, herd in zip(self._features, self._current(), strict=True)])
 
     def _infos(self) -> Infos:
         herds = self._current()

@@ -12,7 +12,7 @@ from posefit.geometry.skeleton import ANGLES
 from posefit_envs.drawing import portray
 from posefit_envs.fit import MAX_EVALUATIONS, Episode
 from posefit_envs.instance import Arguments, select
-from posefit_envs.proposing.memory import Memory, seen_with
+from posefit_envs.proposing.memory import ProposalMemory, seen_with
 from posefit_envs.proposing.single import check_proposing, spaces_of_proposing
 from posefit_envs.stage import Evaluated
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
@@ -43,7 +43,7 @@ class ProposalVectorEnv(SearchVectorEnv):
         super().__init__(num_envs, selection, spaces, threads, render_mode, max_episode_steps)
         self._most, self._image, self._dimensions = int(max_evaluations), image, self._shape[1] - 1
         self._episodes: list[Episode | None] = [None] * num_envs
-        self._memories = [Memory(self._dimensions, np.inf, self._most) for _ in range(num_envs)]
+        self._memories = [ProposalMemory(self._dimensions, np.inf, self._most) for _ in range(num_envs)]
         self._truths = np.empty((num_envs, ANGLES))
         self._last: Evaluated | None = None
 
@@ -76,7 +76,7 @@ class ProposalVectorEnv(SearchVectorEnv):
         """Evaluate proposals (n, d) of some environments; in those that have begun they are the first ones."""
         seen = self._last = self._stage.look(proposals, np.flatnonzero(rows))
         for i in np.flatnonzero(begun).tolist():
-            self._memories[i] = Memory(self._dimensions, float(seen.costs[i]), self._most)
+            self._memories[i] = ProposalMemory(self._dimensions, float(seen.costs[i]), self._most)
         return seen
 
     def _states(self, pictures: Any) -> Any:

@@ -14,7 +14,7 @@ UNTRAINED = 0  # steps of training of a reference
 
 
 @dataclass(frozen=True)
-class Task:
+class Contested:
     """An environment, the budget of its episodes in evaluations, and who plays it."""
 
     name: str
@@ -23,13 +23,13 @@ class Task:
     learners: tuple[str, ...]
 
 
-CONFIGURE = Task(
+CONFIGURE = Contested(
     "posefit/Configure-v1",
     2440,
     ("random search", "random actions", "middle", "sapso"),
     ("bandit", "cma over constants", "ppo", "sac"),
 )
-FIT = Task(
+FIT = Contested(
     "posefit/Fit-v1",
     200,
     ("random search", "random actions", "gaussian", "sapso", "cma"),
@@ -38,7 +38,7 @@ FIT = Task(
 TASKS = {"configure": CONFIGURE, "fit": FIT}
 
 
-class Turn(NamedTuple):
+class Training(NamedTuple):
     """One row: an agent in an environment, with a seed of its training and evaluation, and its steps of training."""
 
     task: str
@@ -48,7 +48,9 @@ class Turn(NamedTuple):
     instances: int
 
 
-def agent_turns(tasks: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int) -> list[Turn]:
+def agent_turns(
+    tasks: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int
+) -> list[Training]:
     """Return the rows that are asked for, of each agent that a task has."""
     turns = []
     for name in tasks:
@@ -57,7 +59,7 @@ def agent_turns(tasks: tuple[str, ...], agents: tuple[str, ...], seeds: int, ste
             for agent in (*task.references, *task.learners):
                 if not agents or agent in agents or agent == "random search":
                     trained = steps if agent in task.learners else UNTRAINED
-                    turns.append(Turn(name, agent, seed, trained, instances))
+                    turns.append(Training(name, agent, seed, trained, instances))
     return turns
 
 

@@ -35,7 +35,7 @@ from posefit_experiments.agents.design import (
     QUICK_STEPS,
     STRONGEST,
     TASKS,
-    Turn,
+    Training,
     agent_turns,
     check_design,
 )
@@ -70,7 +70,7 @@ def agents(
         seeds, steps, instances = min(seeds, 2), QUICK_STEPS, QUICK_INSTANCES
     turns = agent_turns(asked, names, seeds, steps, instances)
     check_learners({turn.agent for turn in turns})
-    turns += [Turn(name, BEST, 0, 0, instances) for name in asked]
+    turns += [Training(name, BEST, 0, 0, instances) for name in asked]
     done = _earlier(rows)
     jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
     done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
@@ -78,7 +78,7 @@ def agents(
     return {"seeds": seeds, "steps": steps, "instances": instances, "rows": found} | agent_tables(found)
 
 
-def agent_row(turn: Turn) -> dict[str, Any]:
+def agent_row(turn: Training) -> dict[str, Any]:
     """Return a row: the best costs that an agent reached on held-out instances, and what it learned on the way."""
     began = time.perf_counter()
     numbers = range(HELD_OUT, HELD_OUT + turn.instances)
@@ -95,11 +95,11 @@ def agent_row(turn: Turn) -> dict[str, Any]:
     return row | {"minutes": round((time.perf_counter() - began) / 60.0, 2)}
 
 
-def _is_policy(turn: Turn) -> bool:
+def _is_policy(turn: Training) -> bool:
     return (turn.task, turn.agent) in {("fit", "random search"), ("configure", "sapso")}
 
 
-def _policy(turn: Turn, curve: list[Any]) -> Policy:
+def _policy(turn: Training, curve: list[Any]) -> Policy:
     env, rng = _made(turn.task), np.random.default_rng([turn.seed, 1])
     plain = {
         "random search": lambda: random_search_policy(env, rng),
@@ -133,7 +133,7 @@ def _made(task: str) -> gym.Env[Any, Any]:
     return gym.make(TASKS[task].name, errors=False, **more)
 
 
-def _costs(turn: Turn, policy: Policy, numbers: range) -> list[float]:
+def _costs(turn: Training, policy: Policy, numbers: range) -> list[float]:
     env = _made(turn.task)
     return [played(env, policy, number, 1000 * turn.seed + number)["best_cost"] for number in numbers]
 
@@ -151,7 +151,7 @@ def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> li
     return found
 
 
-def _earlier(path: str | None) -> dict[Turn, dict[str, Any]]:
+def _earlier(path: str | None) -> dict[Training, dict[str, Any]]:
     """Return the rows of a file, which is made where there is none.
 
     Raises ValueError where it cannot be written to, or a line is no row.
@@ -166,19 +166,19 @@ def _earlier(path: str | None) -> dict[Turn, dict[str, Any]]:
     for number, line in enumerate(read_text(path, LARGEST_ROWS).splitlines(), 1):
         try:
             row = parsed_json(line)
-            turn = Turn(*(row[name] for name in Turn._fields))
+            turn = Training(*(row[name] for name in Training._fields))
             if len(row["costs"]) != turn.instances:
                 raise ValueError("costs")
             found[turn] = row
         except (ValueError, TypeError, KeyError):
-            wanted = ", ".join((*Turn._fields, "costs"))
+            wanted = ", ".join((*Training._fields, "costs"))
             raise ValueError(f"{path}: line {number} must be a row with {wanted}, got another text") from None
     return found
 
 
 def _kept(
-    path: str | None, progress: Progress | None, ended: Iterator[tuple[Turn, dict[str, Any]]], count: int
-) -> Iterator[tuple[Turn, dict[str, Any]]]:
+    path: str | None, progress: Progress | None, ended: Iterator[tuple[Training, dict[str, Any]]], count: int
+) -> Iterator[tuple[Training, dict[str, Any]]]:
     """Yield rows as they come, each written to a file at once where one is named."""
     for turn, row in progress(ended, count) if progress else ended:
         if path is not None:
