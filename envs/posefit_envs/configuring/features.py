@@ -60,7 +60,8 @@ def progress_features(herd: Herd) -> Array:
 
 def observed_state(features: Array, herd: Herd) -> State:
     """Return the observation (25,) of an instance's features and a search."""
-    return np.clip(np.concatenate([features, progress_features(herd)]), 0.0, 1.0).astype(np.float32)
+    state: State = np.clip(np.concatenate([features, progress_features(herd)]), 0.0, 1.0).astype(np.float32)
+    return state
 
 
 def _priced(cost: float) -> float:

@@ -34,7 +34,8 @@ class ProposalMemory:
         if power >= 1.0:
             return np.array(target)
         reach = 10.0 ** (LOG_REACH[0] + 0.5 * (power + 1.0) * (LOG_REACH[1] - LOG_REACH[0]))
-        return self.best[0] + reach * (target - self.best[0])
+        proposed: Array = self.best[0] + reach * (target - self.best[0])
+        return proposed
 
     def take(self, proposal: Array, cost: float) -> float:
         """Remember what a proposal (d,) cost, and return the reward: ln((1 + before) / (1 + after)) of the best."""
@@ -54,7 +55,8 @@ class ProposalMemory:
         costs = 2.0 * np.log1p(np.concatenate([self.best_costs, self.last_costs])) / np.log1p(DEAR) - 1.0
         ends = [2.0 * (1.0 - self.used / self.most) - 1.0, 2.0 * min(self.stale / PATIENCE, 1.0) - 1.0]
         shown = np.concatenate([self.best.ravel(), self.last.ravel(), costs, ends])
-        return np.clip(shown, -1.0, 1.0).astype(np.float32)
+        state: State = np.clip(shown, -1.0, 1.0).astype(np.float32)
+        return state
 
 
 def space_of_memory(dimensions: int) -> spaces.Box:

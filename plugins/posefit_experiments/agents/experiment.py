@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -101,7 +101,7 @@ def _is_policy(turn: Training) -> bool:
 
 def _policy(turn: Training, curve: list[Any]) -> Policy:
     env, rng = _made(turn.task), np.random.default_rng([turn.seed, 1])
-    plain = {
+    plain: dict[str, Callable[[], Policy]] = {
         "random search": lambda: random_search_policy(env, rng),
         "random actions": lambda: uniform_policy(env, rng),
         "middle": lambda: constant_policy(np.zeros(env.action_space.shape or ())),
@@ -129,7 +129,7 @@ def _length(task: str) -> int:
 
 
 def _made(task: str) -> gym.Env[Any, Any]:
-    more = {"max_evaluations": TASKS[task].evaluations} if task == "fit" else {}
+    more: dict[str, Any] = {"max_evaluations": TASKS[task].evaluations} if task == "fit" else {}
     return gym.make(TASKS[task].name, errors=False, **more)
 
 
