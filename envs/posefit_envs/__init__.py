@@ -1,28 +1,33 @@
-"""Gymnasium environments of posefit: `gym.make("posefit_envs:posefit/Fit-v0")`.
+"""Gymnasium environments of posefit: `gym.make("posefit_envs:posefit/Fit-v1")`.
 
     import gymnasium as gym
 
-    env = gym.make("posefit_envs:posefit/Fit-v0", motion="run", instance=17)
+    env = gym.make("posefit_envs:posefit/Fit-v1", motion="run", instance=17)
     observation, info = env.reset(seed=0)
-    observation, cost, ended, cut, info = env.step(env.action_space.sample())      # the reward is minus the cost
+    observation, gain, ended, cut, info = env.step(env.action_space.sample())
 
-`Fit-v0` is a search for the pose in one silhouette; `Track-v0` follows a sequence; `Configure-v0` steers a running
-swarm; `Modes-v0` asks for all poses of one silhouette. Their docstrings are their manual. Importing this package
-registers them; the environments themselves are imported when they are made. `drive` runs an optimiser against a vector
-environment, `track_reference` says what a tracker would commit in Track-v0, `to_sb3_vec_env` hands a vector environment
-to Stable-Baselines3, and `check_vector_env` compares any vector environment with single ones.
+`Fit-v1` is a search for the pose in one silhouette, `Fit-v0` one whose observation is the picture; `Track-v0` follows a
+sequence; `Configure-v1` chooses and steers the optimisers of a search, `Configure-v0` a swarm; `Modes-v0` asks for all
+poses of one silhouette. Their docstrings are their manual. Importing this package registers them; the environments
+themselves are imported when they are made. `drive` runs an optimiser against an environment or a vector of them,
+`drive_each` one in every environment of a vector, `track_reference` says what a tracker would commit in Track-v0,
+`to_sb3_vec_env` hands a vector environment to Stable-Baselines3, and `check_vector_env` compares any vector environment
+with single ones. `posefit_envs.policies` has references to beat.
 
 | looking for | file |
 |---|---|
 | Fit-v0, Track-v0 | fit.py, track.py |
+| Fit-v1 | proposing/ |
 | Modes-v0: niching | modes.py |
 | Configure-v0: dynamic algorithm configuration | configure.py |
-| the first three many at once; seeds and masks of vector environments | vector/ |
+| Configure-v1: with a choice of optimisers | configuring/ |
+| all but Modes-v0 many at once; seeds and masks of vector environments | vector/ |
+| references as policies | policies.py |
 | the arguments; what an instance's number stands for (as in sweeps: `posefit.footage.instance`) | instance.py |
 | what is seen in a frame; actions that are not allowed | search.py |
 | proposals become poses, costs and pictures, in many scenes at once; compiled | stage.py, kernels.py |
 | what is rendered | drawing.py |
-| optimisers that search an environment, trackers as references; Stable-Baselines3 | driving.py, sb3.py |
+| optimisers that search an environment, trackers as references; Stable-Baselines3 | driving.py, searched/, sb3.py |
 | a checker for vector environments | checker.py |
 """
 
@@ -34,16 +39,28 @@ from gymnasium.envs.registration import register
 if TYPE_CHECKING:
     from posefit_envs.checker import check_vector_env as check_vector_env
     from posefit_envs.driving import drive as drive
+    from posefit_envs.driving import drive_each as drive_each
     from posefit_envs.driving import track_reference as track_reference
     from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
 
-_HOME = {"check_vector_env": "checker", "drive": "driving", "track_reference": "driving", "to_sb3_vec_env": "sb3"}
+_HOME = {
+    "check_vector_env": "checker",
+    "drive": "driving",
+    "drive_each": "driving",
+    "track_reference": "driving",
+    "to_sb3_vec_env": "sb3",
+}
 __all__ = list(_HOME)
 
 register(
     id="posefit/Fit-v0",
     entry_point="posefit_envs.fit:FitEnv",
     vector_entry_point="posefit_envs.vector.fit:FitVectorEnv",
+)
+register(
+    id="posefit/Fit-v1",
+    entry_point="posefit_envs.proposing.single:ProposalEnv",
+    vector_entry_point="posefit_envs.vector.proposing:ProposalVectorEnv",
 )
 register(
     id="posefit/Track-v0",
@@ -54,6 +71,11 @@ register(
     id="posefit/Configure-v0",
     entry_point="posefit_envs.configure:ConfigureEnv",
     vector_entry_point="posefit_envs.vector.configure:ConfigureVectorEnv",
+)
+register(
+    id="posefit/Configure-v1",
+    entry_point="posefit_envs.configuring.single:OptimiserEnv",
+    vector_entry_point="posefit_envs.vector.configuring:OptimiserVectorEnv",
 )
 register(id="posefit/Modes-v0", entry_point="posefit_envs.modes:ModesEnv")
 

@@ -29,7 +29,7 @@ def check_vector_env(
     assert observations in vector.observation_space, "reset must return observations of the observation space"
     for i, single in enumerate(singles):
         observation, info = single.reset(seed=seed + i)
-        _same(f"environment {i}, reset: observation", observations[i], observation)
+        _same(f"environment {i}, reset: observation", _part(observations, i), observation)
         _same_info(f"environment {i}, reset", infos, info, i)
     ended = np.zeros(n, dtype=bool)
     vector.action_space.seed(seed)
@@ -50,7 +50,7 @@ def check_vector_env(
                 _same(f"{where}: final observation", infos["final_obs"][i], observation)
                 _same_info(f"{where}: final info", infos["final_info"], info, i)
                 observation, info = single.reset()
-            _same(f"{where}: observation", observations[i], observation)
+            _same(f"{where}: observation", _part(observations, i), observation)
             _same(f"{where}: reward", rewards[i], reward)
             _same(f"{where}: terminated", terminated[i], ends)
             _same(f"{where}: truncated", truncated[i], cut)
@@ -70,7 +70,17 @@ def _same_later(where: str, now: Any, then: Any) -> None:
             _same(f"{where}: the info {key} before it", now[1][key], value)
 
 
+def _part(observations: Any, i: int) -> Any:
+    """Return what environment i observes; of a Dict, by name."""
+    return {name: one[i] for name, one in observations.items()} if isinstance(observations, dict) else observations[i]
+
+
 def _same(where: str, ours: Any, theirs: Any) -> None:
+    if isinstance(theirs, dict):
+        assert ours.keys() == theirs.keys(), f"{where} must have {sorted(theirs)}, got {sorted(ours)}"
+        for name, one in theirs.items():
+            _same(f"{where} {name}", ours[name], one)
+        return
     assert np.array_equal(np.asarray(ours), np.asarray(theirs)), f"{where} must be {theirs}, got {ours}"
 
 

@@ -8,17 +8,20 @@ import numpy as np
 from gymnasium import Env, error
 from gymnasium.vector import VectorEnv
 
-from posefit import Minimum, Optimiser, minimise
+from posefit import Minimum, Optimiser, SearchSpace, minimise
 from posefit.fitting.optimiser import BudgetError
 from posefit.footage.training import training_clips, training_motions
+from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check, planned
 from posefit.tracking.method import Choice, prepare
+from posefit_envs.searched.desk import Desk
+from posefit_envs.searched.stepwise import Stepwise
 from posefit_envs.track import TrackEnv, committed
 
 
 def drive(
-    env: VectorEnv[Any, Any, Any],
+    env: VectorEnv[Any, Any, Any] | Env[Any, Any],
     optimiser: str | Optimiser = "sapso",
     *,
     seed: int = 0,
@@ -27,21 +30,55 @@ def drive(
     dtype: Any = np.float64,
     **settings: Any,
 ) -> Minimum:
-    """Return what an optimiser finds by stepping `posefit/Fit-v0` in its vector form, with whole populations.
+    """Return what an optimiser finds by stepping `posefit/Fit-v0` or `Fit-v1`: one environment, or a vector of them.
 
-    A population is proposed in as many steps as it has multiples of `num_envs` rows. Actions go in as float64, so the
-    result is the library's, bit for bit. With `dtype` numpy.float32, what the action space asks of others, a proposal
-    is rounded to 7 digits; a pixel at a silhouette's edge may then count otherwise, and from the first such pixel on
-    the search goes another way. Raises gymnasium.error.Error where the population is no multiple of `num_envs`, or an
-    episode ends before the search does.
+    A population of any size is proposed in as many steps as it takes; what is left over in the last of them is filled
+    up with its last proposal, which counts for nothing. An episode that ends, at its target or with its budget, begins
+    anew with the same instance: `evaluations` alone end the search. Actions go in as float64, so the result is the
+    library's, bit for bit. With `dtype` numpy.float32, what the action space asks of others, a proposal is rounded to 7
+    digits; a pixel at a silhouette's edge may then count otherwise, and from the first such pixel on the search goes
+    another way. Raises gymnasium.error.Error for another environment, and where the budget does not hold one
+    population or the environments have not all the same instance; `drive_each` is for those.
     """
-    options = {} if instance is None else {"options": {"instance": instance}}
-    env.reset(seed=seed, **options)
-    searching = _built(env, optimiser, seed, evaluations, settings) if isinstance(optimiser, str) else optimiser
+    desk = Desk(env, dtype)
+    numbers = desk.begin(seed, instance)
+    if len(set(numbers)) > 1:
+        raise error.Error(f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each")
+    searching = (
+        _built(desk.space(0), optimiser, seed, evaluations, settings) if isinstance(optimiser, str) else optimiser
+    )
     try:
-        return minimise(lambda proposals: _costs(env, proposals.astype(dtype)), searching, evaluations, told=True)
+        return minimise(desk.costs, searching, evaluations, told=True)
     except BudgetError as mistake:
         raise error.Error(str(mistake)) from None
+
+
+def drive_each(
+    env: VectorEnv[Any, Any, Any],
+    optimiser: str = "sapso",
+    *,
+    seed: int = 0,
+    instances: Sequence[int] | None = None,
+    evaluations: int = 2440,
+    dtype: Any = np.float64,
+    **settings: Any,
+) -> list[Minimum]:
+    """Return what an optimiser finds in each environment of a vector of `posefit/Fit-v0` or `Fit-v1`, by itself.
+
+    The searches run side by side, a proposal of each in a step, with a population of any size and the seeds `seed`,
+    `seed` + 1 and so on. `instances` names an instance for each environment; without, each draws its own. Raises
+    gymnasium.error.Error as `drive` does.
+    """
+    desk = Desk(env, dtype)
+    count = len(desk.begin(seed, instances))
+    searches = [
+        Stepwise(_built(desk.space(i), optimiser, seed + i, evaluations, settings), evaluations) for i in range(count)
+    ]
+    while any(search.waiting for search in searches):
+        rows = np.stack([search.following() for search in searches])
+        for search, cost in zip(searches, desk.step(rows).tolist(), strict=True):
+            search.told(cost)
+    return [search.found() for search in searches]
 
 
 def track_reference(
@@ -68,24 +105,9 @@ def track_reference(
     ]
 
 
-def _built(
-    env: VectorEnv[Any, Any, Any], name: str, seed: int, evaluations: int, settings: dict[str, Any]
-) -> Optimiser:
+def _built(space: SearchSpace, name: str, seed: int, evaluations: int, settings: dict[str, Any]) -> Optimiser:
     offer = registry().offer("optimiser", name)
     filled = planned(offer.factory, settings, evaluations)
     check(offer.name, offer.factory, filled)
-    space = env.unwrapped.search_spaces[0]  # type: ignore[attr-defined]
     made: Optimiser = offer.factory(space, np.random.default_rng(seed), **filled)
     return made
-
-
-def _costs(env: VectorEnv[Any, Any, Any], proposals: Any) -> Any:
-    if len(proposals) % env.num_envs:
-        raise error.Error(f"a population must be a multiple of num_envs {env.num_envs}, got {len(proposals)}")
-    costs = np.empty(len(proposals))
-    for row in range(0, len(proposals), env.num_envs):
-        _, _, _, _, infos = env.step(proposals[row : row + env.num_envs])
-        if not np.all(infos.get("_cost", False)):
-            raise error.Error("an episode must not end before the search: raise max_evaluations, lower target_cost")
-        costs[row : row + env.num_envs] = infos["cost"]
-    return costs

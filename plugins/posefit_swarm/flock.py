@@ -1,5 +1,6 @@
 """A swarm in flight: positions, velocities and personal bests, moved so that every constraint is met."""
 
+from copy import copy
 from typing import Any, Literal
 
 import numpy as np
@@ -11,6 +12,8 @@ from posefit_swarm.kernels import fly, mend, settle, settle_and_fly
 
 FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
 SPARE = 2048  # ours: how many numbers are drawn at once for redraws, beside those that one particle may need
+
+_EACH = ("moved", "velocity", "position", "cost", "best", "best_cost")  # what every particle has
 
 Pull = tuple[float, float, Array]  # omega, the acceleration c1 = c2, and the swarm's best (d,)
 
@@ -84,6 +87,21 @@ class Flock:
         )
         self._finish(reached, rand, (omega, acceleration, self.best[leader]))
         return accepted
+
+    def some(self, rows: NDArray[np.int64]) -> "Flock":
+        """Return some particles (k,) as a flock of their own, which draws from the same generator."""
+        part = copy(self)
+        for name in _EACH:
+            setattr(part, name, getattr(self, name)[rows])
+        part._everyone = np.arange(len(rows))
+        part._flown, part._stuck = np.empty_like(part.moved), np.zeros(len(rows), dtype=bool)
+        return part
+
+    def join(self, rows: NDArray[np.int64], part: "Flock") -> None:
+        """Take back what `some` gave for these rows, as it is now."""
+        for name in _EACH:
+            getattr(self, name)[rows] = getattr(part, name)
+        self._spare, self._used = part._spare, part._used
 
     def _swarm(self) -> tuple[Any, ...]:
         """Return what the swarm knows, as the compiled loops want it."""

@@ -3,5 +3,6 @@
 | looking for | file |
 |---|---|
 | Fit-v0, Track-v0, Configure-v0 | fit.py, track.py, configure.py |
+| Fit-v1, Configure-v1 | proposing.py, configuring.py |
 | what they share: seeds, instances, masks of a reset and of infos | batch.py |
 """

@@ -12,8 +12,9 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from posefit.fitting.check import whole
+from posefit.reading import quoted
 from posefit_envs.drawing import MODES, check_mode
-from posefit_envs.instance import Selection, approved
+from posefit_envs.instance import ArgumentError, Selection, approved, instance_number
 from posefit_envs.search import Doorkeeper
 from posefit_envs.stage import Stage
 
@@ -65,19 +66,23 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, Infos]:
-        """Begin with an instance each; `options={"instance": 17}` chooses one for all, "reset_mask" some to begin."""
+        """Begin with an instance each; `options={"instance": 17}` chooses one for all, [17, 18, ...] one for each.
+
+        The option "reset_mask" says which environments begin; the others go on.
+        """
         seeds, mask = seeds_of(seed, self.num_envs), mask_of(options, self.num_envs, self._begun)
+        numbers = chosen_instances(options, self.num_envs)
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._generators[i] = seeding.np_random(seeds[i])[0]
-            self._renew(i, options)
+            self._renew(i, numbers[i])
         self._begun = True
         observations, infos = self._opened(mask)
         return observations, masked(mask, infos)
 
-    def _renew(self, i: int, options: Mapping[str, Any] | None) -> None:
-        """Begin one environment's next episode."""
-        number = self._selection.number(options, lambda: self._generator(i))
+    def _renew(self, i: int, chosen: int | None) -> None:
+        """Begin one environment's next episode, with an instance that is chosen or None."""
+        number = self._selection.number({"instance": chosen}, lambda: self._generator(i))
         self._begin(i, number)
         self._numbers[i], self._steps[i], self._ended[i] = number, 0, False
 
@@ -133,6 +138,21 @@ def seeds_of(seed: int | Sequence[int | None] | None, count: int) -> list[int | 
     if len(seed) != count:
         raise error.Error(f"seed must be one number or {count}, got {len(seed)}")
     return list(seed)
+
+
+def chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int | None]:
+    """Return the instance that a reset's options choose for each environment: one number is all's, None is no choice.
+
+    Raises ArgumentError where there are too few or too many, or where there is none of such a number.
+    """
+    chosen = options.get("instance") if options else None
+    if chosen is None:
+        return [None] * count
+    if isinstance(chosen, int | np.integer) or not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
+        return [instance_number(chosen)] * count
+    if np.ndim(chosen) != 1 or len(chosen) != count:
+        raise ArgumentError(f"instance must be one number or {count}, one for each environment, got {quoted(chosen)}")
+    return [instance_number(one) for one in chosen]
 
 
 def mask_of(options: Mapping[str, Any] | None, count: int, begun: bool) -> Flags:

@@ -2,7 +2,7 @@
 
     papers.py        sapso, vsmm
     measurements.py  accuracy, methods, views, degradation, builds, footage,
-                     composites, people, posterior, lost, modes
+                     composites, people, posterior, lost, modes, agents
     benchmark.py     posefit bench
     options.py       options that several of them have
 
@@ -32,6 +32,7 @@ REPRODUCED = (
     measurements.posterior_command,
     measurements.lost_command,
     measurements.modes_command,
+    measurements.agents_command,
 )
 
 

@@ -195,6 +195,23 @@ def modes_command(as_json: bool, **asked: Any) -> None:
     _print(niches(**asked, progress=bar), niches_lines, as_json)
 
 
+@click.command("agents")
+@click.option("--environment", "environments", multiple=True, help="configure or fit; by default both.")
+@click.option("--agent", "names", multiple=True, help="One alone, such as ppo, beside random search. Again for more.")
+@seeds(5, "Trainings of each agent.")
+@click.option("--steps", type=int, default=20_000, show_default=True, help="Of a training.")
+@click.option("--instances", type=int, default=40, show_default=True, help="Held out, for the scores.")
+@click.option("--quick", is_flag=True, help="Two trainings of 300 steps, four instances: a look, not a measurement.")
+@click.option("--rows", metavar="FILE", help="A file for a row a line as they come; the same command goes on there.")
+@workers(None)
+@JSON
+def agents_command(as_json: bool, **asked: Any) -> None:
+    """Baseline agents of the environments on held-out instances: chance, constants, schedules, bandit, PPO and SAC."""
+    from posefit_experiments.agents import experiment, tables
+
+    _print(experiment.agents(**asked, progress=bar), tables.agents_lines, as_json)
+
+
 def _print(told: dict[str, Any], lines: Callable[[dict[str, Any]], Iterable[str]], as_json: bool) -> None:
     for line in [json_line(told)] if as_json else lines(told):
         click.echo(line)

@@ -1,0 +1,92 @@
+"""Agents that learn a constant setting: a bandit over a few of them, and CMA-ES over all.
+
+A setting of Configure-v1 is an action, which every step takes. One of Fit-v1 is two last numbers of an action, for the
+beginning and the end of the budget, the others drawn uniformly: how far proposals go from the best so far.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.evolution.constants import usual_population
+from posefit.evolution.strategy import Strategy
+from posefit_envs.configuring.orders import Order, action_of
+from posefit_envs.policies import Policy, constant_policy, played
+
+WIDE = 0.5  # the first step size of CMA-ES, of a box from -1 to 1
+EPISODES = 4  # that a setting of CMA-ES is tried in, the same instances for a whole generation
+CURIOSITY = 0.5  # of the bandit: how many deviations of rewards an arm that was never tried is worth
+
+Look = Callable[[int, Policy], None]
+
+
+def arms(task: str) -> list[Array]:
+    """Return the settings that the bandit may choose from."""
+    if task == "fit":
+        return [np.full(2, power) for power in np.linspace(-1.0, 1.0, 9)]
+    kinds = [tuple(float(k == kind) for k in range(3)) for kind in range(3)]
+    return [
+        action_of(Order((one, two, three), population, stride, 0.01))
+        for one, two, three in kinds
+        for population in (1.0, 0.5)
+        for stride in (0.3, 0.6, 0.9)
+    ]
+
+
+def setting_policy(task: str, setting: Array, rng: np.random.Generator, dimensions: int, length: int) -> Policy:
+    """Return what a setting does in episodes of so many steps."""
+    if task == "configure":
+        return constant_policy(setting)
+
+    def propose(_: Any, step: int) -> Array:
+        power = setting[0] + (setting[1] - setting[0]) * step / length
+        return np.append(rng.uniform(-1.0, 1.0, dimensions - 1), power)
+
+    return propose
+
+
+def bandit(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
+    """Return the best arm by UCB1 over whole episodes of a training environment, `steps` of its steps.
+
+    `length` is how many an episode has; `look` is called with the steps so far and the policy of then.
+    """
+    rng, choices = np.random.default_rng(seed), arms(task)
+    d = env.action_space.shape[0]
+    policies = [setting_policy(task, arm, rng, d, length) for arm in choices]
+    sums, squares, counts = np.zeros(len(choices)), np.zeros(len(choices)), np.zeros(len(choices))
+    for episode in range(max(1, steps // length)):
+        tried = np.maximum(counts, 1.0)
+        deviation = np.sqrt(max(squares.sum() / max(episode, 1) - (sums.sum() / max(episode, 1)) ** 2, 0.0))
+        bonus = CURIOSITY * deviation * np.sqrt(2.0 * np.log(episode + 1.0) / tried)
+        arm = int(np.where(counts > 0, sums / tried + bonus, np.inf).argmax())
+        gain = played(env, policies[arm], int(rng.integers(10_000)), int(rng.integers(2**31)))["gain"]
+        sums[arm], squares[arm], counts[arm] = sums[arm] + gain, squares[arm] + gain**2, counts[arm] + 1
+        look((episode + 1) * length, policies[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
+    return policies[int(np.where(counts > 0, sums / np.maximum(counts, 1.0), -np.inf).argmax())]
+
+
+def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
+    """Return the setting at the mean of CMA-ES after `steps` steps of a training environment."""
+    rng = np.random.default_rng(seed)
+    d = env.action_space.shape[0]
+    size = 2 if task == "fit" else d
+    population = usual_population(size)
+    strategy, used = Strategy(np.zeros(size), np.full(size, WIDE), population), 0
+    while used + population * EPISODES * length <= steps:
+        settings = np.clip(strategy.sample(rng, population), -1.0, 1.0)
+        numbers, seeds = rng.integers(10_000, size=EPISODES), rng.integers(2**31, size=EPISODES)
+        costs = [
+            -np.mean(
+                [
+                    played(env, setting_policy(task, setting, rng, d, length), int(number), int(one))["gain"]
+                    for number, one in zip(numbers, seeds, strict=True)
+                ]
+            )
+            for setting in settings
+        ]
+        strategy.learn(settings, np.array(costs))
+        used += population * EPISODES * length
+        look(used, setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), rng, d, length))
+    return setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), rng, d, length)

@@ -1,0 +1,187 @@
+"""Baseline agents are trained and evaluated: `posefit reproduce agents`, a row an agent and seed, kept as they come."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+import posefit_envs  # noqa: F401, registers the environments
+from posefit import minimise
+from posefit.reading import parsed_json, read_text
+from posefit.registry import registry
+from posefit.settings import planned
+from posefit_envs.instance import instance, select
+from posefit_envs.policies import (
+    Policy,
+    constant_policy,
+    gaussian_policy,
+    played,
+    random_search_policy,
+    sapso_policy,
+    uniform_policy,
+)
+from posefit_experiments.agents.constants import bandit, evolved
+from posefit_experiments.agents.design import (
+    BEST_KNOWN_TIMES,
+    CURVE,
+    CURVE_INSTANCES,
+    HELD_OUT,
+    QUICK_INSTANCES,
+    QUICK_STEPS,
+    STRONGEST,
+    TASKS,
+    Training,
+    agent_turns,
+    check_design,
+)
+from posefit_experiments.agents.learners import check_learners, trained
+from posefit_experiments.agents.tables import agent_tables
+from posefit_experiments.grid import Progress, each
+
+LARGEST_ROWS = 50_000_000  # bytes of a file of rows
+BEST = "best known"
+SAMPLED = ("fit",)  # tasks in which a learner's actions are drawn, as its noise is what searches
+
+
+def agents(
+    environments: tuple[str, ...],
+    names: tuple[str, ...],
+    seeds: int,
+    steps: int,
+    instances: int,
+    quick: bool,
+    rows: str | None,
+    workers: int | None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Return the table of agents: normalised scores on held-out instances, with intervals, and learning curves.
+
+    `rows` is a file for a row a line as they come; what it holds already is not measured again. Raises ValueError where
+    something asked for is not there.
+    """
+    asked = environments or tuple(TASKS)
+    check_design(asked, names, {"seeds": seeds, "steps": steps, "instances": instances})
+    if quick:
+        seeds, steps, instances = min(seeds, 2), QUICK_STEPS, QUICK_INSTANCES
+    turns = agent_turns(asked, names, seeds, steps, instances)
+    check_learners({turn.agent for turn in turns})
+    turns += [Training(name, BEST, 0, 0, instances) for name in asked]
+    done = _earlier(rows)
+    jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
+    done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
+    found = [done[turn] for turn in turns]
+    return {"seeds": seeds, "steps": steps, "instances": instances, "rows": found} | agent_tables(found)
+
+
+def agent_row(turn: Training) -> dict[str, Any]:
+    """Return a row: the best costs that an agent reached on held-out instances, and what it learned on the way."""
+    began = time.perf_counter()
+    numbers = range(HELD_OUT, HELD_OUT + turn.instances)
+    row: dict[str, Any] = turn._asdict() | {"curve": []}
+    evaluations = TASKS[turn.task].evaluations
+    if turn.agent == BEST:
+        row["costs"] = _searched(STRONGEST, BEST_KNOWN_TIMES * 2440, numbers, turn.seed)
+    elif turn.agent in ("random search", "sapso", "cma") and not _is_policy(turn):
+        row["costs"] = _searched(turn.agent.split()[0], evaluations, numbers, turn.seed)
+    else:
+        row["costs"] = _costs(turn, _policy(turn, row["curve"]), numbers)
+        if row["curve"]:
+            row["curve"].append([turn.steps, row["costs"][:CURVE_INSTANCES]])
+    return row | {"minutes": round((time.perf_counter() - began) / 60.0, 2)}
+
+
+def _is_policy(turn: Training) -> bool:
+    return (turn.task, turn.agent) in {("fit", "random search"), ("configure", "sapso")}
+
+
+def _policy(turn: Training, curve: list[Any]) -> Policy:
+    env, rng = _made(turn.task), np.random.default_rng([turn.seed, 1])
+    plain: dict[str, Callable[[], Policy]] = {
+        "random search": lambda: random_search_policy(env, rng),
+        "random actions": lambda: uniform_policy(env, rng),
+        "middle": lambda: constant_policy(np.zeros(env.action_space.shape or ())),
+        "sapso": sapso_policy,
+        "gaussian": lambda: gaussian_policy(env, rng),
+    }
+    if turn.agent in plain:
+        return plain[turn.agent]()
+    numbers = range(HELD_OUT, HELD_OUT + min(turn.instances, CURVE_INSTANCES))
+
+    def look(steps: int, policy: Policy) -> None:
+        due = turn.steps * len(curve) // CURVE
+        if steps >= due and len(curve) < CURVE:
+            curve.append([steps, _costs(turn, policy, numbers)])
+
+    if turn.agent in ("bandit", "cma over constants"):
+        learn = bandit if turn.agent == "bandit" else evolved
+        return learn(turn.task, env, _length(turn.task), turn.steps, turn.seed, look)
+    return trained(turn.agent, env, turn.steps, turn.seed, turn.task not in SAMPLED, look)
+
+
+def _length(task: str) -> int:
+    """Return how many steps an episode has."""
+    return 12 if task == "configure" else TASKS[task].evaluations - 1
+
+
+def _made(task: str) -> gym.Env[Any, Any]:
+    more: dict[str, Any] = {"max_evaluations": TASKS[task].evaluations} if task == "fit" else {}
+    return gym.make(TASKS[task].name, errors=False, **more)
+
+
+def _costs(turn: Training, policy: Policy, numbers: range) -> list[float]:
+    env = _made(turn.task)
+    return [played(env, policy, number, 1000 * turn.seed + number)["best_cost"] for number in numbers]
+
+
+def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> list[float]:
+    """Return the costs that an optimiser of the library reaches on the same instances, by itself."""
+    world, factory = select().world, registry().optimiser(optimiser)
+    found = []
+    for number in numbers:
+        made = instance(world, number, 1, evaluations)
+        space = made.space(world.learned)
+        searching = factory(space, np.random.default_rng([seed, number]), **planned(factory, {}, evaluations))
+        problem = made.scenery(0).problem(space)
+        found.append(minimise(problem.evaluate, searching, evaluations, told=True).cost)
+    return found
+
+
+def _earlier(path: str | None) -> dict[Training, dict[str, Any]]:
+    """Return the rows of a file, which is made where there is none.
+
+    Raises ValueError where it cannot be written to, or a line is no row.
+    """
+    if path is None:
+        return {}
+    try:
+        Path(path).touch()
+    except OSError as error:
+        raise ValueError(f"{path}: expected a file for rows, got {error.strerror}") from None
+    found = {}
+    for number, line in enumerate(read_text(path, LARGEST_ROWS).splitlines(), 1):
+        try:
+            row = parsed_json(line)
+            turn = Training(*(row[name] for name in Training._fields))
+            if len(row["costs"]) != turn.instances:
+                raise ValueError("costs")
+            found[turn] = row
+        except (ValueError, TypeError, KeyError):
+            wanted = ", ".join((*Training._fields, "costs"))
+            raise ValueError(f"{path}: line {number} must be a row with {wanted}, got another text") from None
+    return found
+
+
+def _kept(
+    path: str | None, progress: Progress | None, ended: Iterator[tuple[Training, dict[str, Any]]], count: int
+) -> Iterator[tuple[Training, dict[str, Any]]]:
+    """Yield rows as they come, each written to a file at once where one is named."""
+    for turn, row in progress(ended, count) if progress else ended:
+        if path is not None:
+            with Path(path).open("a", encoding="utf-8") as file:
+                file.write(f"{json.dumps(row)}\n")
+        yield turn, row

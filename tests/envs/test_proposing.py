@@ -1,0 +1,99 @@
+"""Fit-v1: its observation says what was proposed and what it cost, and references play it."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium import error
+from gymnasium.utils.env_checker import check_env
+
+import posefit_envs  # noqa: F401, registers it
+from posefit_envs.policies import constant_policy, gaussian_policy, played, random_search_policy, uniform_policy
+from posefit_envs.proposing.memory import ProposalMemory
+
+NAME = "posefit/Fit-v1"
+
+
+@pytest.mark.filterwarnings("ignore:.*pkg_resources.*:UserWarning", "ignore:.*pkg_resources.*:DeprecationWarning")
+@pytest.mark.parametrize("arguments", [{}, {"image": True, "view_degrees": [0.0, 90.0], "max_evaluations": 5}])
+def test_the_checkers_of_gymnasium_and_stable_baselines3_pass_without_a_warning(arguments: dict[str, Any]) -> None:
+    check_env(gym.make(NAME, **arguments).unwrapped)
+    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs posefit[rl]")
+    checker.check_env(gym.make(NAME, **arguments).unwrapped)
+
+
+def test_its_first_numbers_are_proposed_where_the_last_is_one_bit_for_bit() -> None:
+    new, old = gym.make(NAME, instance=3).unwrapped, gym.make("posefit/Fit-v0", instance=3).unwrapped
+    new.reset(seed=0)
+    old.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        proposal = rng.uniform(-1.0, 1.0, 9)
+        assert new.step(np.append(proposal, 1.0))[4]["cost"] == old.step(proposal)[4]["cost"]
+
+
+def test_the_last_number_says_how_much_of_the_way_by_powers_of_ten() -> None:
+    memory = ProposalMemory(2, 50.0, 10)
+    memory.take(np.array([0.5, 0.0]), 20.0)
+    for power, reach in ((-1.0, 0.01), (0.0, 0.1), (0.5, 10.0**-0.5)):
+        # from the best, (0.5, 0), to (0, 1)
+        np.testing.assert_allclose(memory.proposal(np.array([0.0, 1.0, power])), [0.5 - 0.5 * reach, reach])
+
+
+def test_it_shows_the_best_proposals_and_the_last_ones_with_their_costs() -> None:
+    memory = ProposalMemory(1, 50.0, 11)
+    rewards = [memory.take(np.array([place]), cost) for place, cost in ((0.1, 60.0), (0.2, 30.0), (0.3, 40.0))]
+    # by hand: ln(51 / 31) when 30 comes, else nothing
+    assert rewards == pytest.approx([0.0, np.log(51.0 / 31.0), 0.0])
+    state = memory.state()
+    np.testing.assert_allclose(state[:4], [0.2, 0.3, 0.0, 0.0], atol=1e-7)  # 30, 40, and the middle's 50
+    np.testing.assert_allclose(state[4:8], [0.3, 0.2, 0.1, 0.0], atol=1e-7)
+    costs = 2.0 * np.log([31.0, 41.0, 51.0, 51.0, 41.0, 31.0, 61.0, 51.0]) / np.log(101.0) - 1.0
+    np.testing.assert_allclose(state[8:16], costs, rtol=1e-6)
+    # 4 of 11 are used, and one since the last gain of 50 that show
+    np.testing.assert_allclose(state[16:], [2.0 * 7.0 / 11.0 - 1.0, 2.0 / 50.0 - 1.0], rtol=1e-6)
+
+
+def test_the_budget_counts_the_middle_and_no_target_ends_it() -> None:
+    env = gym.make(NAME, instance=3, max_evaluations=4).unwrapped
+    _, info = env.reset(seed=0)
+    assert info["evaluations"] == 1
+    first, total, ends = info["best_cost"], 0.0, []
+    for _ in range(3):
+        _, reward, ended, cut, info = env.step(env.action_space.sample())
+        total += float(reward)
+        ends.append((ended, cut))
+    assert ends == [(False, False), (False, False), (True, False)]
+    assert total == pytest.approx(np.log((1.0 + first) / (1.0 + info["best_cost"])))
+    with pytest.raises(error.ResetNeeded, match="the episode has ended"):
+        env.step(env.action_space.sample())
+
+
+def test_the_picture_comes_beside_the_search_if_asked_for() -> None:
+    env = gym.make(NAME, instance=3, image=True)
+    observation, _ = env.reset(seed=0)
+    assert sorted(observation) == ["image", "search"]
+    assert observation["image"].shape == (48, 64, 2)
+    assert observation["image"][..., 1].any()  # the middle of the box, which was proposed
+    with pytest.raises(error.Error, match="image must be true or false, got 'yes'"):
+        gym.make(NAME, image="yes")
+    with pytest.raises(error.Error, match="max_evaluations must be at least 2, got 1"):
+        gym.make(NAME, max_evaluations=1)
+
+
+def test_a_step_from_the_best_so_far_finds_more_than_random_search() -> None:
+    env = gym.make(NAME, max_evaluations=100).unwrapped
+    costs = {}
+    for name, make in (("gaussian", gaussian_policy), ("random", random_search_policy), ("uniform", uniform_policy)):
+        policy = make(env, np.random.default_rng(0))
+        costs[name] = np.mean([played(env, policy, 10_000 + k, k)["best_cost"] for k in range(6)])
+    assert costs["gaussian"] < costs["random"]
+    assert costs["uniform"] < costs["random"]
+    with pytest.raises(ValueError, match="spread must be"):
+        gaussian_policy(env, np.random.default_rng(0), spread=0.0)
+
+
+def test_a_constant_that_stays_earns_nothing_more() -> None:
+    env = gym.make(NAME, max_evaluations=10).unwrapped
+    assert played(env, constant_policy(np.zeros(10)), 17, 0)["gain"] == 0.0

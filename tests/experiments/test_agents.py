@@ -1,0 +1,151 @@
+"""The table of agents: scores by hand, rows that are kept, and every agent once."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from posefit_experiments.agents import experiment
+from posefit_experiments.agents.constants import arms, bandit, evolved, setting_policy
+from posefit_experiments.agents.design import TASKS, Training, agent_turns
+from posefit_experiments.agents.tables import agent_tables, agents_lines, normalised, score_interval
+from posefit_experiments.commands.measurements import agents_command
+
+
+def test_a_score_is_0_at_random_search_and_1_at_what_is_best_known() -> None:
+    chance, best = np.array([10.0, 20.0, 5.0]), np.array([0.0, 10.0, 5.0])
+    # by hand: (10 - 5) / 10 and (20 - 25) / 10; the third instance has no room between the two
+    np.testing.assert_allclose(normalised(np.array([[5.0, 25.0, 5.0]]), chance, best), [[0.5, -0.5]])
+    np.testing.assert_allclose(normalised(np.stack([chance, best]), chance, best), [[0.0, 0.0], [1.0, 1.0]])
+    with pytest.raises(ValueError, match="best known must lie below random search, got none of 1 instances"):
+        normalised(np.ones((1, 1)), np.ones(1), np.ones(1))
+
+
+def test_an_interval_holds_the_mean_and_shrinks_where_everything_agrees() -> None:
+    scores = np.random.default_rng(0).normal(0.5, 0.1, (5, 40))
+    low, high = score_interval(scores)
+    assert low < scores.mean() < high
+    # seeds and instances are drawn anew, so it is at least as wide as of 200 independent scores: 2 * 1.96 * 0.1 / 14.1
+    assert high - low > 0.027
+    assert score_interval(np.full((5, 40), 0.5)) == (0.5, 0.5)
+
+
+def test_random_search_is_always_there_to_be_compared_with() -> None:
+    turns = agent_turns(("fit",), ("ppo",), 2, 300, 4)
+    assert [(turn.agent, turn.seed, turn.steps) for turn in turns] == [
+        ("random search", 0, 0),
+        ("ppo", 0, 300),
+        ("random search", 1, 0),
+        ("ppo", 1, 300),
+    ]
+
+
+class Slope:
+    """An environment of one step, whose reward is -|a - 0.5|, where an episode is a reset and a step."""
+
+    action_space = type("Box", (), {"shape": (3,)})
+
+    def reset(self, *, seed: Any, options: Any) -> Any:
+        return np.zeros(1), {}
+
+    def step(self, action: Any) -> Any:
+        return np.zeros(1), -float(np.abs(action - 0.5).sum()), True, False, {}
+
+
+def test_cma_over_constants_walks_up_a_slope() -> None:
+    looks: list[int] = []
+    policy = evolved("configure", Slope(), 1, 1600, 0, lambda steps, policy: looks.append(steps))
+    np.testing.assert_allclose(policy(None, 0), 0.5, atol=0.02)
+    assert looks == sorted(looks)
+    assert looks[-1] <= 1600
+
+
+def test_the_bandit_finds_the_arm_that_pays_most() -> None:
+    class Ten(Slope):
+        action_space = type("Box", (), {"shape": (10,)})
+
+        def step(self, action: Any) -> Any:
+            return np.zeros(1), -float(np.abs(action - arms("configure")[7]).sum()), True, False, {}
+
+    policy = bandit("configure", Ten(), 1, 100, 0, lambda steps, policy: None)
+    np.testing.assert_array_equal(policy(None, 0), arms("configure")[7])
+
+
+def test_a_setting_of_fit_goes_from_its_first_number_to_its_second() -> None:
+    policy = setting_policy("fit", np.array([1.0, -1.0]), np.random.default_rng(0), 10, 100)
+    assert [policy(None, step)[-1] for step in (0, 50, 100)] == [1.0, 0.0, -1.0]
+
+
+def test_rows_are_kept_and_go_on(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "rows.jsonl"
+    asked: dict[str, Any] = {"environments": ("fit",), "names": ("gaussian",), "seeds": 2, "steps": 100}
+    asked |= {"instances": 2, "quick": False, "rows": str(path), "workers": 1}
+    measured: list[Training] = []
+
+    def row(turn: Training) -> dict[str, Any]:
+        measured.append(turn)
+        return turn._asdict() | {"curve": [], "costs": [turn.seed + 10.0 * len(turn.agent)] * 2, "minutes": 0.0}
+
+    def here(jobs: Any, workers: Any, progress: Any) -> Any:
+        return dict(progress(((key, job()) for key, job in jobs.items()), len(jobs)))
+
+    monkeypatch.setattr(experiment, "agent_row", row)
+    monkeypatch.setattr(experiment, "each", here)
+    first = experiment.agents(**asked)
+    assert len(measured) == len(path.read_text().splitlines()) == 5  # two agents, two seeds, and what is best known
+    path.write_text("".join(f"{line}\n" for line in path.read_text().splitlines()[:3]))
+    again = experiment.agents(**asked)
+    assert len(measured) == 7
+    assert again == first
+    assert first["tables"]["fit"][0]["agent"] == "random search"
+
+
+@pytest.mark.slow
+def test_every_reference_and_learner_gives_a_row() -> None:
+    pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
+    for task in TASKS.values():
+        name = next(key for key, one in TASKS.items() if one is task)
+        for agent in (*task.references, *(one for one in task.learners if one != "ppo")):
+            row = experiment.agent_row(Training(name, agent, 0, 24 if agent in task.learners else 0, 1))
+            assert len(row["costs"]) == 1
+            assert 0.0 <= row["costs"][0] < 40.0
+            json.dumps(row)
+
+
+def test_the_lines_say_scores_and_curves() -> None:
+    rows = [
+        Training("fit", "random search", 0, 0, 2)._asdict() | {"costs": [10.0, 20.0], "curve": [], "minutes": 0.1},
+        Training("fit", "ppo", 0, 50, 2)._asdict()
+        | {"costs": [5.0, 10.0], "curve": [[50, [5.0, 10.0]]], "minutes": 1.0},
+        Training("fit", "best known", 0, 0, 2)._asdict() | {"costs": [0.0, 0.0], "curve": [], "minutes": 0.1},
+    ]
+    lines = list(agents_lines({"instances": 2} | agent_tables(rows)))
+    assert "| ppo | 50 | 1 | 0.500 | 0.500 to 0.500 | 7.50 | 7.50 | 1.0 |" in lines
+    assert "ppo learns: 50: 0.50 (0.50 to 0.50)" in lines
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--environment", "walk"], "environment must be one of configure, fit, got 'walk'"),
+        (["--agent", "dqn"], "agent must be one of random search, .*, got 'dqn'"),
+        (["--seeds", "0"], "seeds must be at least 1, got 0"),
+        (["--steps", "0"], "steps must be at least 1, got 0"),
+        (["--instances", "10001"], "instances must be at most 10000, got 10001"),
+    ],
+)
+def test_what_makes_no_sense_is_named_before_anything_is_measured(arguments: list[str], message: str) -> None:
+    ran = CliRunner().invoke(agents_command, arguments)
+    with pytest.raises(ValueError, match=message):
+        raise ran.exception or AssertionError(ran.output)
+
+
+def test_a_file_that_holds_no_rows_is_refused(tmp_path: Any) -> None:
+    path = tmp_path / "rows.jsonl"
+    path.write_text('{"task": "fit"}\n')
+    with pytest.raises(ValueError, match="line 1 must be a row with task, agent, seed, steps, instances, costs"):
+        experiment.agents((), (), 1, 1, 1, False, str(path), 1)
+    with pytest.raises(ValueError, match="expected a file for rows, got"):
+        experiment.agents((), (), 1, 1, 1, False, str(tmp_path / "none" / "rows.jsonl"), 1)
