@@ -65,13 +65,18 @@ def test_a_box_has_never_known_the_person_that_is_sought() -> None:
 
 
 def test_the_file_of_boxes_is_what_the_library_says_today() -> None:
-    """The number of people is what matters: rounding may differ by one step where another LAPACK decomposes."""
+    """Where another LAPACK decomposes, rounding may differ, and a component may point the other way.
+
+    The sign is that of its largest number; those of a left and a right limb are equally large but for rounding.
+    """
     from posefit.suites.boxes import STEP
     from posefit.suites.make_boxes import _poses, learned_from
 
     anew, stored = learned_from(_poses(tuple(one for one in TRAINING_PEOPLE if one != "17"))), learned_without("17")
     assert np.abs(STEP * anew["mean"] - stored.mean).max() <= STEP
-    assert np.abs(STEP * anew["components"] - stored.components).max() <= 10 * STEP
+    components = STEP * anew["components"]
+    components *= np.sign((components * stored.components).sum(axis=1))[:, None]
+    assert np.abs(components - stored.components).max() <= 10 * STEP
     assert np.array_equal(anew["order"], stored.order)
 
 
