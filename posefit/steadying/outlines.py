@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.shape import SPREAD, Shape, shaped
+from posefit.fitting.problem import over_views
+from posefit.fitting.shape import REACH, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS
+from posefit.silhouette.cost import areas
 from posefit.steadying import kernels
 from posefit.steadying.borders import Borders
 from posefit.steadying.path import (
@@ -88,8 +90,9 @@ def outlined(scene: Scene, motion: Motion, seen: SeenFrames, shape: Shape | None
     if shape is not None:
         best = int(np.argmax([seen.usable[rows].sum() for rows in windows]))
         found = _fitted(scene, motion, seen, windows[best], scene.body, shape)
-        shape = replace(shape, body=found.body, factors=np.exp(found.factors))
-        fitted[best] = found
+        if found.body is not scene.body:  # else no build was found that fits better, and only poses are fitted
+            shape = replace(shape, body=found.body, factors=np.exp(found.factors))
+            fitted[best] = found
     body = scene.body if shape is None else shape.body
     poses, places = motion.poses.copy(), motion.translations.copy()
     for k, (start, rows) in enumerate(zip(starts, windows, strict=True)):
@@ -111,9 +114,22 @@ def _fitted(
     factors, height = (np.zeros(len(SPREAD)), None) if shape is None else (np.log(shape.factors), shape.height)
     found = Motion(motion.name, body.skeleton, poses, places, motion.fps)
     part = _Part(found, body, factors, height, seen.usable[rows], seen.eyes[rows], poses, places)
+    best, least = part, _mean_cost(scene, part, observations)
     for scale in SCALES:
         part = _stepped(part, _pulled(part, borders, scale, build=shape is not None), build=shape is not None)
-    return part
+        if (cost := _mean_cost(scene, part, observations)) < least:
+            best, least = part, cost
+    return best
+
+
+def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation]) -> float:
+    """Return the mean cost of the frames that show enough of the person; infinite where there is none."""
+    costs = []
+    for row in np.flatnonzero(part.usable).tolist():
+        seen, pose, place = observations[row].silhouettes, part.poses[row : row + 1], part.places[row : row + 1]
+        counts = [areas(part.body, *view, pose, place) for view in zip(scene.cameras, seen, strict=True)]
+        costs.append(float(over_views(counts, seen, 0.5)[0]))
+    return float(np.mean(costs)) if costs else np.inf
 
 
 def _pulled(part: _Part, borders: Sequence[Borders], scale: float, *, build: bool) -> _Pulled:
@@ -156,6 +172,7 @@ def _stepped(part: _Part, pulled: _Pulled, *, build: bool) -> _Part:
         curve = pulled.build[0] + np.diag(known) - np.einsum("tni,tnj->ij", pulled.mixed, answers)
         slope = pulled.build[1] + known * part.factors - np.einsum("tni,tn->i", pulled.mixed, way)
         turns = np.clip(np.linalg.solve(curve, slope), -WIDEST, WIDEST)
+        turns = part.factors - np.clip(part.factors - turns, -REACH * SPREAD, REACH * SPREAD)
         way = way - answers @ turns
     poses = part.poses.copy()
     poses[:, part.angles] -= np.clip(way[:, 3:], -FARTHEST, FARTHEST)
