@@ -194,6 +194,26 @@ def test_limbs_that_are_thicker_than_the_bodys_become_as_thick() -> None:
     np.testing.assert_allclose(shape.body.radii, shaped(scene.body, shape.factors).radii)
 
 
+def test_a_fit_that_costs_more_than_what_it_began_with_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    def astray(part: outlines._Part, pulled: object, *, build: bool) -> outlines._Part:
+        return replace(part, places=part.places + 1.0, body=shaped(part.body, np.full(len(NAMES), 0.9)))
+
+    scene, motion = footage(6)
+    shape = average_shape(scene)
+    monkeypatch.setattr(outlines, "_stepped", astray)
+    told, found = outlined(scene, motion, seen_by(scene), shape)
+    assert found is shape
+    np.testing.assert_array_equal(told.poses, motion.poses)
+    np.testing.assert_array_equal(told.translations, motion.translations)
+
+
+def test_a_build_stays_within_what_the_opening_searches() -> None:
+    scene, motion = footage(6, girth=4.0)  # three spreads of 0.3 make a girth at most 2.46 times as thick
+    _, shape = outlined(scene, motion, seen_by(scene), average_shape(scene))
+    assert shape is not None
+    assert 1.5 < shape.factors.max() <= np.exp(0.9) + 1e-9
+
+
 def test_a_build_as_tall_as_was_said_stays_so_tall() -> None:
     scene, truth = footage(girth=1.25)
     shape = replace(average_shape(scene), height=scene.body.stature)
