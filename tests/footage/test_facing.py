@@ -48,9 +48,12 @@ def test_whoever_goes_along_is_not_told_how_he_faces() -> None:
     still, going = [50.0] * 5, [50.0 + 20.0 * k for k in range(5)]
     sides = [100.0] * 5
     np.testing.assert_array_equal(facings_on_the_spot([0.5] * 5, still, sides, FPS), [0.5] * 5)
-    # two frames to either side count: 40 pixels at an end, 80 in the middle, of which 35 are too far
+    # two seconds to either side count, so all five frames: 80 pixels, where 35 are too far
     assert np.isnan(facings_on_the_spot([0.5] * 5, going, sides, FPS)).all()
-    np.testing.assert_array_equal(facings_on_the_spot([0.5] * 5, going, [200.0] * 5, FPS)[[0, 4]], [0.5, 0.5])
+    np.testing.assert_array_equal(facings_on_the_spot([0.5] * 5, going, [250.0] * 5, FPS), [0.5] * 5)  # 87.5 are not
+    # who sets out with frame 21 is 40 pixels away in frame 22, which is two seconds after frame 14
+    later = facings_on_the_spot([0.5] * 25, [50.0] * 20 + going, [100.0] * 25, FPS)
+    assert np.flatnonzero(np.isnan(later)).tolist() == list(range(14, 25))
     np.testing.assert_array_equal(facings_on_the_spot([0.5] * 2, [np.nan] * 2, [0.0] * 2, FPS), [0.5] * 2)
 
 

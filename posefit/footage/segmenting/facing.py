@@ -9,8 +9,8 @@ from posefit.geometry.camera import Camera
 
 AROUND = 0.5  # seconds before and after a frame in which most of what is said counts
 AGREED = 0.6  # how long the mean of unit vectors is at least: what is said may not contradict itself
-
-GOING = 0.35  # of his longer side: whoever goes as far across the picture in that time is no longer on the spot
+GOING = 0.35  # of his longer side: whoever goes as far across the picture in twice `STAYING` is not on the spot
+STAYING = 2.0  # seconds before and after a frame
 
 
 def facings_on_the_spot(
@@ -21,7 +21,7 @@ def facings_on_the_spot(
     `middles` and `sides` are those of his mask, in pixels. Who goes along tells the front from the back himself, by the
     clips that go on so; a network is no surer of him.
     """
-    told, reach = np.array(facings, dtype=np.float64), max(round(AROUND * fps), 1)
+    told, reach = np.array(facings, dtype=np.float64), max(round(STAYING * fps), 1)
     for k in range(len(told)):
         rows = slice(max(k - reach, 0), k + reach + 1)
         seen = np.isfinite(middles[rows])
