@@ -313,7 +313,7 @@ MUTANTS = (
     ),
     Mutant(
         "evaluations of tracks that are not kept are not counted",
-        "posefit/tracking/tracks.py",
+        "posefit/searching/spent.py",
         (("sum(one.evaluations for one in together)", "frame.evaluations"),),
         "tests/tracking/test_tracks.py::test_the_evaluations_of_all_tracks_are_counted[method0]",
     ),

@@ -16,4 +16,5 @@
 | a track that looks all around again after a gap | again.py |
 | turns that nobody makes, and which way somebody faces all along | whirls.py |
 | a track that is followed again where there were some | anew.py |
+| what tracks cost, and what several took together | spent.py |
 """

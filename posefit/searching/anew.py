@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
+from posefit.searching.spent import mean_cost, spent_by_all
 from posefit.searching.starts import Follow
 from posefit.searching.whirls import FASTEST, agreeing, surest, whirling
 
@@ -46,11 +47,8 @@ def followed_anew(
     until = (observations[k] for k in range(start, -1, -1))
     behind = list(follow(back, until, np.random.default_rng([seed, SALT, 1])))
     told = [*_joined(task.body.skeleton, behind, ahead[0])[:0:-1], *ahead]
-    cost, was = (_mean_cost(each, usable) for each in (told, frames))
-    better = _whirls(task, told, usable) < before and cost <= DEARER * was
-    kept = told if better else frames
-    spent = [_spent(frame, one, other) for frame, one, other in zip(kept, told, frames, strict=True)]
-    return Anew(spent, start if better else None)
+    better = _whirls(task, told, usable) < before and mean_cost(told, usable) <= DEARER * mean_cost(frames, usable)
+    return Anew(spent_by_all([frames, told], int(better)), start if better else None)
 
 
 def in_reverse(motion: Motion) -> Motion:
@@ -61,10 +59,6 @@ def in_reverse(motion: Motion) -> Motion:
 def _whirls(task: Task, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> int:
     """Return in how many frames a track whirls."""
     return int(whirling(np.array([frame.pose[0] for frame in frames]), usable, task.fps).sum())
-
-
-def _mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
-    return float(np.mean([frame.cost for frame, seen in zip(frames, usable, strict=True) if seen]))
 
 
 def _joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Frame]:
@@ -91,11 +85,3 @@ def _joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[F
         )
         for frame in behind
     ]
-
-
-def _spent(frame: Frame, one: Frame, other: Frame) -> Frame:
-    """Return a frame with what two tracks took."""
-    known = None if one.cpu_seconds is None or other.cpu_seconds is None else one.cpu_seconds + other.cpu_seconds
-    return replace(
-        frame, evaluations=one.evaluations + other.evaluations, seconds=one.seconds + other.seconds, cpu_seconds=known
-    )

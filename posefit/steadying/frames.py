@@ -13,6 +13,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.posterior.modes import Posterior
+from posefit.searching.spent import mean_cost
 from posefit.silhouette.cost import areas
 from posefit.steadying.outlines import outlined
 from posefit.steadying.path import SeenFrames, steadied
@@ -30,14 +31,12 @@ def steadied_frames(
     motion = Motion(scene.name, scene.body.skeleton, poses, np.array([frame.translation for frame in found]), scene.fps)
     usable = np.array([observation.usable for observation in scene.observations])
     seen = SeenFrames(usable, np.array([_eye(scene, observation) for observation in scene.observations]))
-    told, shape = outlined(scene, steadied(motion, seen), seen, shape)
+    told, shape = outlined(scene, steadied(motion, seen), seen, shape, beta)
     told = steadied(told, seen)  # borders pull at feet that stand
     scene = scene if shape is None else replace(scene, body=shape.body)
     frames = [_told(scene, k, frame, told, beta) for k, frame in enumerate(found)]
     if shape is not None:
-        shape = replace(
-            shape, cost=float(np.mean([frame.cost for frame, ok in zip(frames, usable, strict=True) if ok]))
-        )
+        shape = replace(shape, cost=mean_cost(frames, usable))
     return frames, shape
 
 

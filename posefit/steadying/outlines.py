@@ -20,7 +20,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS
-from posefit.silhouette.cost import areas
+from posefit.silhouette.cost import BETA, areas
 from posefit.steadying import kernels
 from posefit.steadying.borders import Borders
 from posefit.steadying.path import (
@@ -76,11 +76,14 @@ class _Pulled:
     build: tuple[Array, Array]
 
 
-def outlined(scene: Scene, motion: Motion, seen: SeenFrames, shape: Shape | None) -> tuple[Motion, Shape | None]:
+def outlined(
+    scene: Scene, motion: Motion, seen: SeenFrames, shape: Shape | None, beta: float = BETA
+) -> tuple[Motion, Shape | None]:
     """Return a steady motion fitted to the borders of a scene's masks, and the build fitted with it.
 
     The build stays as it is where it was not fitted before (`shape` is None): it is then known. That of a long track
-    is found in the window of which most is seen. A motion of fewer than 3 frames is returned as it is.
+    is found in the window of which most is seen. What costs more than what it began with is not kept. A motion of fewer
+    than 3 frames is returned as it is.
     """
     if len(motion) < 3 or not seen.usable.any():
         return motion, shape
@@ -89,7 +92,7 @@ def outlined(scene: Scene, motion: Motion, seen: SeenFrames, shape: Shape | None
     fitted: dict[int, _Part] = {}
     if shape is not None:
         best = int(np.argmax([seen.usable[rows].sum() for rows in windows]))
-        found = _fitted(scene, motion, seen, windows[best], scene.body, shape)
+        found = _fitted(scene, motion, seen, windows[best], scene.body, shape, beta)
         if found.body is not scene.body:  # else no build was found that fits better, and only poses are fitted
             shape = replace(shape, body=found.body, factors=np.exp(found.factors))
             fitted[best] = found
@@ -98,37 +101,43 @@ def outlined(scene: Scene, motion: Motion, seen: SeenFrames, shape: Shape | None
     for k, (start, rows) in enumerate(zip(starts, windows, strict=True)):
         if len(rows) < 3:
             continue
-        part = fitted.get(k) or _fitted(scene, motion, seen, rows, body, None)
+        part = fitted.get(k) or _fitted(scene, motion, seen, rows, body, None, beta)
         kept = (rows >= start) & (rows < start + WINDOW)
         poses[rows[kept]], places[rows[kept]] = part.poses[kept], part.places[kept]
     return replace(motion, skeleton=body.skeleton, poses=poses, translations=places), shape
 
 
 def _fitted(
-    scene: Scene, motion: Motion, seen: SeenFrames, rows: NDArray[np.int64], body: Body, shape: Shape | None
+    scene: Scene,
+    motion: Motion,
+    seen: SeenFrames,
+    rows: NDArray[np.int64],
+    body: Body,
+    shape: Shape | None,
+    beta: float,
 ) -> _Part:
-    """Return some frames of a motion, fitted; the build with them where there is a shape that it begins with."""
+    """Return some frames of a motion as the best step fits them; the build too where there is a shape to begin with."""
     poses, places = motion.poses[rows], motion.translations[rows]
     observations: Sequence[Observation] = [scene.observations[k] for k in rows.tolist()]
     borders = [Borders.of(camera, view, observations, places) for view, camera in enumerate(scene.cameras)]
     factors, height = (np.zeros(len(SPREAD)), None) if shape is None else (np.log(shape.factors), shape.height)
     found = Motion(motion.name, body.skeleton, poses, places, motion.fps)
     part = _Part(found, body, factors, height, seen.usable[rows], seen.eyes[rows], poses, places)
-    best, least = part, _mean_cost(scene, part, observations)
+    best, least = part, _mean_cost(scene, part, observations, beta)
     for scale in SCALES:
         part = _stepped(part, _pulled(part, borders, scale, build=shape is not None), build=shape is not None)
-        if (cost := _mean_cost(scene, part, observations)) < least:
+        if (cost := _mean_cost(scene, part, observations, beta)) < least:
             best, least = part, cost
     return best
 
 
-def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation]) -> float:
+def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], beta: float) -> float:
     """Return the mean cost of the frames that show enough of the person; infinite where there is none."""
     costs = []
     for row in np.flatnonzero(part.usable).tolist():
         seen, pose, place = observations[row].silhouettes, part.poses[row : row + 1], part.places[row : row + 1]
         counts = [areas(part.body, *view, pose, place) for view in zip(scene.cameras, seen, strict=True)]
-        costs.append(float(over_views(counts, seen, 0.5)[0]))
+        costs.append(float(over_views(counts, seen, beta)[0]))
     return float(np.mean(costs)) if costs else np.inf
 
 

@@ -14,6 +14,7 @@ from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Task, Tracker
 from posefit.footage.scene import Scene
 from posefit.listening import Listener
+from posefit.searching.spent import mean_cost
 from posefit.steadying.frames import steadied_frames
 
 DEARER = 1.125  # times what the pass before it costs: a pass that costs more is not kept
@@ -37,9 +38,8 @@ class Pass:
 
     @cached_property
     def cost(self) -> float:
-        """The mean cost of the frames that show enough of the person."""
-        costs = [one.cost for one, seen in zip(self.told, self.scene.observations, strict=True) if seen.usable]
-        return float(np.mean(costs)) if costs else 0.0
+        """What the steady frames cost: see `mean_cost`."""
+        return mean_cost(self.told, np.array([observation.usable for observation in self.scene.observations]))
 
 
 def followed_again(

@@ -19,6 +19,7 @@ from posefit.motion.motion import Motion
 from posefit.posterior.modes import TrackMode, modes_of, track_modes
 from posefit.searching.again import GAP, LOOKED, LookingTracker
 from posefit.searching.anew import Anew, followed_anew
+from posefit.searching.spent import spent_by_all
 from posefit.steadying.passes import Pass, followed_again
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
@@ -31,7 +32,6 @@ from posefit.tracking.tracks import (
     beginning,
     first_seen,
     generator,
-    spent_by_all,
     usual_speed,
     whole_cost,
 )

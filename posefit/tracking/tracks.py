@@ -16,6 +16,7 @@ from posefit.geometry.alike import exchanged_limbs, facing, mirrored_poses, refl
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
+from posefit.searching.spent import mean_cost
 
 SALT = 2005  # part of every seed but the first track's
 SEARCHED, ANEW = "searched", "searched anew"
@@ -108,34 +109,12 @@ def whole_cost(frames: Sequence[Frame], usable: Sequence[bool], skeleton: Skelet
     for five usual speeds at most: a body that jumped has jumped, however far.
     """
     seen = np.asarray(usable, dtype=bool)
-    costs = np.array([frame.cost for frame in frames])
     velocities = _velocities(skeleton.joints(np.array([frame.pose for frame in frames])), fps)
     step = _step(fps)
     changes = _squared(velocities[step:] - velocities[:-step])
     followed = seen[: -2 * step] & seen[step:-step] & seen[2 * step :]  # of each change, the three frames it is of
     pull = 0.5 * np.minimum(changes[followed], (ELSEWHERE * usual) ** 2) / (TURNING * usual) ** 2
-    cost = costs[seen].mean() if seen.any() else costs.mean()
-    return Whole(float(cost), float(pull.mean()) if len(pull) else 0.0)
-
-
-def spent_by_all(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Frame]:
-    """Return the frames of the track that is kept, with the evaluations and the time of all tracks.
-
-    The course of a search is told as if all tracks went on abreast: its evaluations are stretched to those of all.
-    """
-    return [_spent(together, together[kept]) for together in zip(*tracks, strict=True)]
-
-
-def _spent(together: Sequence[Frame], frame: Frame) -> Frame:
-    total, taken = sum(one.evaluations for one in together), [one.cpu_seconds for one in together]
-    known = [one for one in taken if one is not None]
-    return replace(
-        frame,
-        evaluations=total,
-        seconds=sum(one.seconds for one in together),
-        cpu_seconds=sum(known) if len(known) == len(taken) else None,
-        spent=None if frame.spent is None else frame.spent * total // max(frame.evaluations, 1),
-    )
+    return Whole(mean_cost(frames, seen), float(pull.mean()) if len(pull) else 0.0)
 
 
 def _step(fps: float) -> int:

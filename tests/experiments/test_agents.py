@@ -146,6 +146,6 @@ def test_a_file_that_holds_no_rows_is_refused(tmp_path: Any) -> None:
     path = tmp_path / "rows.jsonl"
     path.write_text('{"task": "fit"}\n')
     with pytest.raises(ValueError, match="line 1 must be a row with task, agent, seed, steps, instances, costs"):
-        experiment.agents((), (), 1, 1, 1, False, str(path), 1)
+        experiment.agents((), ("random actions",), 1, 1, 1, False, str(path), 1)
     with pytest.raises(ValueError, match="expected a file for rows, got"):
-        experiment.agents((), (), 1, 1, 1, False, str(tmp_path / "none" / "rows.jsonl"), 1)
+        experiment.agents((), ("random actions",), 1, 1, 1, False, str(tmp_path / "none" / "rows.jsonl"), 1)

@@ -18,6 +18,7 @@ from posefit.footage.scene import synthetic
 from posefit.geometry.alike import mirrored_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.searching.spent import spent_by_all
 from posefit.silhouette.drawn import PoseCount
 from posefit.tracking.tracks import (
     ALIKE,
@@ -28,7 +29,6 @@ from posefit.tracking.tracks import (
     beginning,
     first_seen,
     generator,
-    spent_by_all,
     usual_speed,
     whole_cost,
 )
