@@ -52,9 +52,10 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
     "ahead": _as_it_is,  # metres a second by which the root goes where it faces
     "speed": _as_it_is,  # metres a second by which it goes anywhere
     "across": _as_it_is,  # how far he faces across the only camera's line of sight, from 0 to 1; 0 where there are more
-    "views": _as_it_is,
+    "views": _as_it_is,  # how many cameras see something of him, `MOST` at most
 }
 UNTOLD = {"reflected": 1.0, "mirrored": 1.0}  # what a frame is taken to have where none has told it yet; 0 of all else
+MOST = 2  # cameras: what more of them tell, nobody has learned
 OF_TWINS = 1.0  # per cent that are added to costs of which one is divided by another
 GOING = 0.5  # seconds over which a root goes somewhere
 FASTEST = 2.0  # metres a second: who seems to go faster goes no less surely
@@ -67,11 +68,12 @@ def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> 
     Its `details` tell whether it is `usable` and what its `twins` cost, see `Look.twins`.
     """
     assert frame.posterior is not None
+    seeing = [camera for camera, counts in zip(cameras, frame.areas, strict=True) if counts.any()] or cameras
     told = {
         "farthest": farthest(skeleton, frame.posterior, frame.pose),
         "second": second_side(skeleton, frame.posterior, frame.pose),
-        "across": across(cameras, float(frame.pose[0]), frame.translation),
-        "views": float(len(cameras)),
+        "across": across(seeing, float(frame.pose[0]), frame.translation),
+        "views": float(min(len(seeing), MOST)),
     }
     if frame.details["usable"]:
         mirrored, *reflected = (frame.details["twins"] + OF_TWINS) / (frame.cost + OF_TWINS)
@@ -79,14 +81,14 @@ def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> 
     return told
 
 
-def going(places: Sequence[Array], yaw: float, fps: float) -> dict[str, float]:
+def going(places: Sequence[Array], yaw: float, fps: float, *, backwards: bool = False) -> dict[str, float]:
     """Return how fast the root goes `ahead`, where it faces, and anywhere, from places (3,) of the latest frames.
 
-    Metres a second, `FASTEST` at most. Nothing where there is one place alone.
+    Metres a second, `FASTEST` at most. Nothing where there is one place alone. With `backwards` they come in reverse.
     """
     if len(places) < 2:
         return {}
-    way = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1)
+    way = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
     ahead = float(way @ [math.sin(yaw), math.cos(yaw)])
     return {"ahead": min(max(ahead, -FASTEST), FASTEST), "speed": min(float(np.linalg.norm(way)), FASTEST)}
 
@@ -184,7 +186,7 @@ def doubted(frames: Iterable[Frame], task: Task, judge: Judge) -> Iterator[Frame
             continue
         places.append(frame.translation)
         told = evidence_of(task.body.skeleton, frame, task.cameras)
-        told |= going(places, float(frame.pose[0]), task.fps)
+        told |= going(places, float(frame.pose[0]), task.fps, backwards=task.backwards)
         features = memory.features(told)
         exchanged = judge.sides.probability(features)
         yield replace(

@@ -79,6 +79,7 @@ class Task:
     first_pose: Array | None = None  # (63,) joint angles in the first frame, where somebody knows them
     before: Sequence[Frame] = field(default=(), repr=False)  # found earlier, where a track goes on that was interrupted
     threads: int = 1
+    backwards: bool = False  # whether observations and training come in reverse, the last one first
     fastest_turn: float | None = None  # radians a second that nobody's yaw turns faster than; None where nobody says
 
     @property
@@ -95,7 +96,6 @@ class Tracker(Protocol):
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, as it comes."""
-        ...
 
 
 # Builds a tracker, as `factory(task, **settings)`: a Task and keyword-only settings.

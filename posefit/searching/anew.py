@@ -41,7 +41,7 @@ def followed_anew(
         return Anew(list(frames), None)
     pose, place = frames[start].pose, frames[start].translation
     sure = replace(task, yaw=float(pose[0]), anchor=place, first_pose=pose[3:], before=(), fastest_turn=FASTEST)
-    back = replace(sure, training=[in_reverse(motion) for motion in task.training])
+    back = replace(sure, training=[in_reverse(motion) for motion in task.training], backwards=True)
     onward = (observations[k] for k in range(start, len(frames)))
     ahead = list(follow(sure, onward, np.random.default_rng([seed, SALT, 0])))
     until = (observations[k] for k in range(start, -1, -1))

@@ -45,7 +45,7 @@ GIVING = np.radians(8.0)  # that an angle may be off what was found
 SHAKING = np.radians(450.0)  # a second squared, of that difference
 AWAY = 0.03  # metres that the root may be off what was found, across the line of sight
 FARTHEST, WIDEST = np.radians(20.0), 0.2  # that a step may turn an angle, and change the logarithm of a factor
-ALIKE = 3.0  # frames whose borders are off alike, so that they tell as much of the build as one
+ALIKE = 3.0  # frames for each of which the build is held once more: borders are off alike in many, and add up
 WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
@@ -53,7 +53,7 @@ WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that 
 class _Part:
     """A window of a track, as far as it is fitted."""
 
-    motion: Motion  # as it was found; its skeleton is that of the body
+    motion: Motion  # as it was found
     body: Body
     factors: Array  # (17,) logarithms of what the body was fitted by before
     height: float | None

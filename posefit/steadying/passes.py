@@ -26,7 +26,6 @@ class Pass:
     """What came of following all frames."""
 
     scene: Scene = field(repr=False)  # with the build that fits it
-    found: list[Frame] = field(repr=False)  # what the tracker found
     told: list[Frame] = field(repr=False)  # what is steady
     shape: Shape | None  # of the build, where that was fitted
 
@@ -34,7 +33,7 @@ class Pass:
     def of(cls, scene: Scene, found: list[Frame], shape: Shape | None, beta: float) -> "Pass":
         """Return what comes of frames that were found in a scene, steadied."""
         told, shape = steadied_frames(scene, found, beta, shape)
-        return cls(scene if shape is None else replace(scene, body=shape.body), found, told, shape)
+        return cls(scene if shape is None else replace(scene, body=shape.body), told, shape)
 
     @cached_property
     def cost(self) -> float:

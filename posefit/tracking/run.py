@@ -20,6 +20,7 @@ from posefit.posterior.modes import TrackMode, modes_of, track_modes
 from posefit.searching.again import GAP, LOOKED, LookingTracker
 from posefit.searching.anew import Anew, followed_anew
 from posefit.searching.spent import spent_by_all
+from posefit.searching.whirls import FASTEST
 from posefit.steadying.passes import Pass, followed_again
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
@@ -101,6 +102,7 @@ def follow(
         found, told = _kept(scene, each, usable, training)
         anew = _without_whirls(scene, method, task, found, seed, listener)
         raw, found, kept_pass = anew.frames, anew.frames, 1
+        task = replace(task, fastest_turn=None if anew.start is None else FASTEST)
         if steady:
             begun = Pass.of(scene, found, shape, method.beta)
             make = partial(_tracker, method)

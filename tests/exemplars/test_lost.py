@@ -67,6 +67,16 @@ def test_evidence_of_twins_is_how_many_times_as_much_the_cheapest_reflected_and_
     assert (told["second"], told["views"]) == pytest.approx((0.25, 1.0))
 
 
+def test_cameras_that_see_nothing_of_him_do_not_count_and_more_than_two_count_as_two(walker: Walk) -> None:
+    camera, frame = walker.task.cameras[0], frame_of(walker)
+    counted = []
+    for seeing in (1, 2, 4):
+        areas = np.array([[1, 1, 1]] * seeing + [[0, 0, 0]] * (4 - seeing))
+        told = evidence_of(walker.motion.skeleton, replace(frame, areas=areas), [camera] * 4)
+        counted.append((told["views"], told["across"] > 0.0))
+    assert counted == [(1.0, True), (2.0, False), (2.0, False)]
+
+
 def test_who_is_seen_from_his_side_faces_across_the_only_camera() -> None:
     aside, oblique, ahead = (Camera.around(np.zeros(3), np.radians(view), 4.0, (64, 48)) for view in (90.0, 30.0, 0.0))
     told = [across([camera], 0.0, np.zeros(3)) for camera in (aside, oblique, ahead)]
@@ -79,6 +89,7 @@ def test_who_goes_where_he_faces_goes_ahead() -> None:
     # 3 and 4 centimetres in two thirtieths of a second
     assert going(places, 0.0, 30.0) == pytest.approx({"ahead": 0.6, "speed": 0.75})
     assert going(places, np.pi, 30.0)["ahead"] == pytest.approx(-0.6)
+    assert going(places[::-1], 0.0, 30.0, backwards=True) == pytest.approx({"ahead": 0.6, "speed": 0.75})
     assert going(places, np.pi / 2.0, 30.0)["ahead"] == pytest.approx(0.45)
     assert going(places, 0.0, 300.0) == {"ahead": FASTEST, "speed": FASTEST}
     assert going(places[:1], 0.0, 30.0) == {}

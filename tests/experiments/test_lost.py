@@ -157,9 +157,11 @@ def test_what_cannot_be_told_apart_is_told(mpjpe: float, count: int) -> None:
         fit(same)
 
 
-def test_one_person_alone_judges_nobody() -> None:
-    with pytest.raises(ValueError, match="rows must be of two people or more, got those of 02"):
+def test_one_person_alone_judges_nobody_and_two_people_neither() -> None:
+    with pytest.raises(ValueError, match="rows must be of three people or more, got those of 02$"):
         judge(rows()[:2])
+    with pytest.raises(ValueError, match="rows must be of three people or more, got those of 02, 05$"):
+        judge([row(subject, [0.1] * 20, [60.0] * 20) for subject in ("02", "05")])
 
 
 def test_tables_say_how_often_it_is_right() -> None:

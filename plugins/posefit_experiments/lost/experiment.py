@@ -55,10 +55,9 @@ def lost(
             if store:
                 raise ValueError(f"rows must have evidence to be fitted, got some of {rows or method} without")
             return told | lost_tables(found, judge_costs(found))
-        model = fit(found)
+        said, model = judge(found), fit(found)
         if kept is not None:
             kept.write_text(json.dumps(model, indent=1) + "\n", encoding="utf-8")
-    said = judge(found)
     tables = lost_tables(found, [one.lost for one in said]) | {"sides": sides_table(found, said)}
     return told | {"model": model} | tables
 
@@ -101,9 +100,13 @@ def _tracked(cell: Cell, track: Turn) -> dict[str, Any]:
 
 
 def _read(path: str) -> list[dict[str, Any]]:
-    """Return the rows of an earlier run. Raises ValueError where a line is none."""
+    """Return the rows of an earlier run. Raises ValueError where there is no such file, or a line is none."""
     found = []
-    for number, line in enumerate(read_text(path, LARGEST).splitlines(), 1):
+    try:
+        lines = read_text(path, LARGEST).splitlines()
+    except FileNotFoundError:
+        raise ValueError(f"{path}: expected a file of rows that --out wrote, got none") from None
+    for number, line in enumerate(lines, 1):
         try:
             row = parsed_json(line)
         except ValueError:

@@ -55,7 +55,12 @@ def fit(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def judge(rows: Sequence[Row]) -> list[Said]:
-    """Return what is said of each row by models that were fitted to other people."""
+    """Return what is said of each row by models that were fitted to other people.
+
+    Raises ValueError where there are fewer than three: of the others, too, each is left out once.
+    """
+    if len(people := dict.fromkeys(row["subject"] for row in rows)) < 3:
+        raise ValueError(f"rows must be of three people or more, got those of {', '.join(people)}")
     known = [features(row) for row in rows]
     found: list[Said] = [Said(np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))] * len(rows)
     for his, others in _left_out(rows):
@@ -75,8 +80,6 @@ def judge_costs(rows: Sequence[Row]) -> list[Array]:
 def _left_out(rows: Sequence[Row]) -> list[tuple[list[int], list[int]]]:
     """Return the rows of each person, and those of the others."""
     people = list(dict.fromkeys(row["subject"] for row in rows))
-    if len(people) < 2:
-        raise ValueError(f"rows must be of two people or more, got those of {', '.join(people)}")
     each = [[k for k, row in enumerate(rows) if row["subject"] == person] for person in people]
     return [(his, [k for k in range(len(rows)) if k not in his]) for his in each]
 
