@@ -55,6 +55,7 @@ def bandit(task: str, env: Any, length: int, steps: int, seed: int, look: Look) 
     rng, choices = np.random.default_rng(seed), arms(task)
     d = env.action_space.shape[0]
     policies = [setting_policy(task, arm, rng, d, length) for arm in choices]
+    shown = [setting_policy(task, arm, _apart(seed), d, length) for arm in choices]
     sums, squares, counts = np.zeros(len(choices)), np.zeros(len(choices)), np.zeros(len(choices))
     for episode in range(max(1, steps // length)):
         tried = np.maximum(counts, 1.0)
@@ -63,13 +64,18 @@ def bandit(task: str, env: Any, length: int, steps: int, seed: int, look: Look) 
         arm = int(np.where(counts > 0, sums / tried + bonus, np.inf).argmax())
         gain = played(env, policies[arm], int(rng.integers(10_000)), int(rng.integers(2**31)))["gain"]
         sums[arm], squares[arm], counts[arm] = sums[arm] + gain, squares[arm] + gain**2, counts[arm] + 1
-        look((episode + 1) * length, policies[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
-    return policies[int(np.where(counts > 0, sums / np.maximum(counts, 1.0), -np.inf).argmax())]
+        look((episode + 1) * length, shown[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
+    return shown[int(np.where(counts > 0, sums / np.maximum(counts, 1.0), -np.inf).argmax())]
+
+
+def _apart(seed: int) -> np.random.Generator:
+    """Return a generator for looks at what was learned, so that looking changes nothing of the training."""
+    return np.random.default_rng([seed, 2])
 
 
 def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
     """Return the setting at the mean of CMA-ES after `steps` steps of a training environment."""
-    rng = np.random.default_rng(seed)
+    rng, other = np.random.default_rng(seed), _apart(seed)
     d = env.action_space.shape[0]
     size = 2 if task == "fit" else d
     population = usual_population(size)
@@ -88,5 +94,5 @@ def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look)
         ]
         strategy.learn(settings, np.array(costs))
         used += population * EPISODES * length
-        look(used, setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), rng, d, length))
-    return setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), rng, d, length)
+        look(used, setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length))
+    return setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length)

@@ -38,7 +38,8 @@ def trained(
 
     class Looking(BaseCallback):  # type: ignore[misc]
         def _on_step(self) -> bool:
-            look(self.num_timesteps, act)
+            with torch.random.fork_rng(devices=()):  # looking changes nothing of the training
+                look(self.num_timesteps, act)
             return True
 
     model.learn(steps, callback=Looking())
