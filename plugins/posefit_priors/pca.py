@@ -15,6 +15,7 @@ from posefit_priors.kernels import distance, near, recover
 
 COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
+DECIMALS = 7  # of what is learned, in radians and shares
 QUANTILE = 0.99  # Reading S5: chi is this quantile of the training distances
 _SHAPES = {
     "mean": (63,),
@@ -64,11 +65,11 @@ class PCA:
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
         least = int(self._components) + 1 if self._components >= 1 else 2
         angles = angles_of(angles, max(self._clusters, least))
-        self.mean = angles.mean(axis=0)  # SAPSO 2.1.1
+        self.mean = alike(angles.mean(axis=0))  # SAPSO 2.1.1
         self.components, self.explained = principal(angles - self.mean, self._components)
-        latents = self.transform(angles)
+        latents = alike(self.transform(angles))
         self.low, self.high = latents.min(axis=0), latents.max(axis=0)  # SAPSO 2.2 constraint 1
-        self.centres = clustered(latents, self._clusters, self._seed)[0]
+        self.centres = alike(clustered(latents, self._clusters, self._seed)[0])
         self.reach = reach_of(self.centres, latents, self._quantile)
         return self
 
@@ -120,6 +121,8 @@ def check_components(components: float) -> None:
 def principal(centred: Array, components: float) -> tuple[Array, Array]:
     """Return the principal directions (m, 63) of centred joint angles (T, 63), and each one's share of variance (m,).
 
+    Of either sign that a direction may have, its largest number is above 0.
+
     Raises ValueError where the frames are too few for so many.
     """
     most = min(len(centred) - 1, centred.shape[1])
@@ -128,7 +131,28 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
     _, spread, directions = np.linalg.svd(centred, full_matrices=False)  # SAPSO 2.1.2
     share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
     kept = int(components) if components >= 1 else int(np.searchsorted(share.cumsum(), components)) + 1
-    return directions[:kept].copy(), share[:kept].copy()
+    directions = directions[:kept]
+    longest = np.take_along_axis(directions, np.abs(directions).argmax(axis=1)[:, None], axis=1)
+    return _orthonormal(alike(np.where(longest < 0.0, -directions, directions))), alike(share[:kept])
+
+
+def alike(numbers: Array) -> Array:
+    """Return numbers with seven decimals.
+
+    Libraries of linear algebra differ in the last digits from processor to processor, and a search that follows a track
+    makes degrees of them. Rounded, the same frames give the same space everywhere.
+    """
+    return np.asarray(np.round(numbers, DECIMALS) + 0.0)  # no -0.0
+
+
+def _orthonormal(directions: Array) -> Array:
+    """Return directions (m, 63) that are so but for rounding, to the last digits, without a library's sums."""
+    kept: list[Array] = []
+    for direction in directions:
+        for other in kept:
+            direction = direction - (direction * other).sum() * other
+        kept.append(direction / np.sqrt((direction * direction).sum()))
+    return np.array(kept)
 
 
 def reach_of(centres: Array, latents: Array, quantile: float) -> Array:

@@ -50,7 +50,7 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
     if values["motion"] in train:
         raise ValueError(f"train must not contain the motion itself, got {values['motion']}")
     files = {path: digest for one in (values["motion"], *train) for path, digest in _files(one)}
-    foreign = sorted({f"{offer.distribution} {offer.version}" for offer in offers if offer.distribution != PROJECT})
+    foreign = sorted({offer.origin for offer in offers if offer.distribution != PROJECT})
     version = ", ".join([__version__, *foreign])
     cell = Cell(**{**values, "settings": dict(settings), "train": train, "files": files, "version": version})
     if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:

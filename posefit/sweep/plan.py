@@ -158,14 +158,17 @@ class _Shared:
 
 
 def _lists(tables: Any) -> list[Entries] | None:
-    """Return the entries of each list of a product; None where there is no product."""
+    """Return the entries of each list of a product; None where there is no product.
+
+    Methods come last, which a product changes soonest: a sweep that is under way compares them on what is done.
+    """
     if tables is None:
         return None
     named = _mapping("product", tables)
     for name in named:
         if name not in LISTS:
             raise ValueError(f"product must hold {', '.join(LISTS)}, got {quoted(name)}")
-    entries = [_entries(name, values) for name, values in named.items()]
+    entries = [_entries(name, named[name]) for name in sorted(named, key=lambda name: name == "methods")]
     if (count := prod(len(one) for one in entries)) > MOST:
         raise ValueError(f"product must hold at most {MOST:,} cells, got {count:,}")
     return entries

@@ -171,7 +171,7 @@ def test_a_budget_below_one_population_is_refused() -> None:
 def test_sapso_beats_random_search_at_the_same_cost(problem: PoseProblem) -> None:
     found = {
         factory: np.median(
-            [minimise(problem.evaluate, factory(problem.space, np.random.default_rng(s)), 2440).cost for s in range(5)]
+            [minimise(problem.evaluate, factory(problem.space, np.random.default_rng(s)), 2440).cost for s in range(20)]
         )
         for factory in (SAPSO, Random)
     }

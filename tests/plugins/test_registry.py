@@ -1,9 +1,11 @@
 """Plugins come in by one door, and a broken one costs a warning."""
 
+import importlib
 import io
 import sys
 import threading
 import time
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +16,7 @@ import pytest
 
 from posefit import entries, hookimpl
 from posefit.motion import built_in
-from posefit.registry import registry, registry_of
+from posefit.registry import Offer, registry, registry_of, source_digest
 from posefit_priors.pca import PCA
 
 
@@ -252,3 +254,27 @@ def test_settings_are_checked() -> None:
             PCA(**settings)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="angles must hold at least 7 frames, got 3"):
         PCA().fit(np.zeros((3, 63)))
+
+
+def test_what_results_hang_on_changes_with_the_source_of_a_plugin(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    package = tmp_path / "growing"
+    package.mkdir()
+    (package / "__init__.py").write_text("from growing.part import Search\n")
+    said = []
+    for text in ("class Search:\n    step = 1\n", "class Search:\n    step = 2\n", "class Search:\n    step = 1\n"):
+        (package / "part.py").write_text(text)
+        for name in ("growing.part", "growing"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        source_digest.cache_clear()
+        search = importlib.import_module("growing").Search
+        said.append(Offer("optimiser", "growing", partial(search), "posefit-growing", "1.0").origin)
+    assert said[0] == said[2] != said[1]
+    assert said[0].startswith("posefit-growing 1.0 ")
+
+
+def test_a_plugin_without_a_file_has_its_version_alone() -> None:
+    assert Offer("optimiser", "plain", dict, "posefit-plain", "1.0").origin == "posefit-plain 1.0"

@@ -114,7 +114,7 @@ def test_2_1_2_the_directions_are_those_of_the_covariance(walk: Array) -> None:
     values, vectors = np.linalg.eigh(np.cov(walk.T))
     ours = np.abs(prior.components @ vectors[:, ::-1][:, :6])
     np.testing.assert_allclose(ours, np.eye(6), atol=1e-6)
-    np.testing.assert_allclose(prior.explained, (values[::-1] / values.sum())[:6], rtol=1e-9)
+    np.testing.assert_allclose(prior.explained, (values[::-1] / values.sum())[:6], atol=1e-7)  # seven decimals
 
 
 def test_2_1_a_share_of_the_variance_chooses_the_components(walk: Array) -> None:
@@ -142,8 +142,8 @@ def test_2_1_3_projection_undoes_recovery(walk: Array) -> None:
 def test_2_2_constraint_1_is_the_range_of_the_training_latents(walk: Array) -> None:
     prior = PCA().fit(walk)
     latents = (walk - walk.mean(axis=0)) @ prior.components.T
-    np.testing.assert_allclose(prior.low, latents.min(axis=0), atol=1e-12)
-    np.testing.assert_allclose(prior.high, latents.max(axis=0), atol=1e-12)
+    np.testing.assert_allclose(prior.low, latents.min(axis=0), atol=1e-6)  # a sum of 63 numbers of seven decimals
+    np.testing.assert_allclose(prior.high, latents.max(axis=0), atol=1e-6)
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
     edge = np.concatenate([np.zeros(3), prior.high])
     np.testing.assert_allclose(space.proposals(edge)[3:], 1.0)

@@ -14,7 +14,7 @@ from posefit.entries import Plugin
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
-from posefit.registry import Offer, Registry
+from posefit.registry import Offer, Registry, source_digest
 from posefit.sweep import check
 from posefit.sweep.cell import LATER, Cell, anytime_trace, cell_scene, digest_of, run_cell
 from posefit.sweep.check import cell_of
@@ -53,6 +53,13 @@ def test_a_product_holds_every_combination_and_cells_come_beside_it() -> None:
     assert {cell.view_degrees for cell in plan} == {(45.0,), (0.0, 90.0)}
     assert {cell.seed for cell in plan} == {0, 1, 2}
     assert plan.cells[-1].train == built_in.other_styles("jump")
+
+
+def test_methods_change_soonest_so_that_a_sweep_under_way_compares_them() -> None:
+    plan = planned(product={"methods": ["random@pca", "pso@pca"], "motions": ["walk", "run"], "seeds": 2})
+    assert [(cell.method, cell.motion, cell.seed) for cell in plan] == [
+        (method, motion, seed) for motion in ("walk", "run") for seed in (0, 1) for method in ("random@pca", "pso@pca")
+    ]
 
 
 def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
@@ -271,7 +278,7 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
         monkeypatch.setattr(module, "registry", lambda: found)
     spec = {"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]}
     (cell,) = Plan.of({"cells": [spec]})
-    assert cell.version == f"{posefit.__version__}, posefit-hold 2.5"
+    assert cell.version == f"{posefit.__version__}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
     row = run_cell(cell).row
     assert row["prior_floor_degrees"] is None
     assert row["trace"]["evaluations"][-1] <= 2440
@@ -310,8 +317,8 @@ def test_a_product_gives_the_cells_and_keys_that_its_specs_give_one_by_one() -> 
     defaults = {"frames": 5, "tracks": 2, "translation": "searched", "settings": {"sapso.cooling": 0.9}}
     plan = Plan.of({"defaults": defaults, "product": lists})
     expected = []
-    for seed, chosen, damage, motion, view, instance in product(
-        lists["seeds"], lists["methods"], lists["corruptions"], lists["motions"], lists["views"], range(2)
+    for seed, damage, motion, view, instance, chosen in product(
+        lists["seeds"], lists["corruptions"], lists["motions"], lists["views"], range(2), lists["methods"]
     ):
         spec: dict[str, Any] = {"frames": 5, "tracks": 2, "translation": "searched", "seed": seed, "instance": instance}
         spec |= {"corruption": damage, **(view if isinstance(view, dict) else {"view_degrees": view})}

@@ -52,14 +52,14 @@ def search_cells(tables: Mapping[str, Any]) -> list[SearchCell]:
     instances = _numbers("instances", tables.get("instances", 15), HELD_OUT.start)
     budgets = [whole("budgets", one, 1) for one in _listed("budgets", tables.get("budgets", [EVALUATIONS]))]
     seeds = [whole("seeds", one, 0) for one in _numbers("seeds", tables.get("seeds", 1), 0)]
-    lists = (dimensions, functions, instances, methods, budgets, seeds)
+    lists = (dimensions, functions, instances, seeds, budgets, methods)
     count = 1
     for one in lists:
         count *= len(one)
     if count > MOST:
         raise ValueError(f"a plan must hold at most {MOST:,} cells, got {count:,}")
     cells = []
-    for dimension, function, instance, (method, chosen, version), budget, seed in product(*lists):
+    for dimension, function, instance, seed, budget, (method, chosen, version) in product(*lists):
         if dimension in function.dimensions:
             number, instance, dimension = checked_address(suite, function.number, instance, dimension)
             evaluations = budget * dimension
@@ -85,7 +85,7 @@ def _method(value: Any) -> tuple[str, dict[str, Any], str]:
         raise ValueError(f"an entry of methods must be a name, or a table of a name and settings, got {quoted(value)}")
     offer = registry().offer("optimiser", method)
     settings.check(method, offer.factory, chosen)
-    foreign = [] if offer.distribution == PROJECT else [f"{offer.distribution} {offer.version}"]
+    foreign = [] if offer.distribution == PROJECT else [offer.origin]
     return method, dict(chosen), ", ".join([__version__, *foreign])
 
 
