@@ -141,7 +141,7 @@ def suite_audit(
 
     from posefit.files import new_file
     from posefit.fitting.check import whole
-    from posefit.suites.audit import METHODS, STRONGEST, audit_lines, audited, known_json
+    from posefit.suites.audit import METHODS, audit_lines, audited, known_json
     from posefit.suites.front import Suite
 
     with results_alone():
@@ -149,11 +149,12 @@ def suite_audit(
         if write is not None:
             _check_new(write)
         problems = Suite(functions=functions or None, dimensions=dimensions or (9,), instances=_numbers(instances))
-        asked = audited(problems, methods or METHODS, times=times)
+        searching = methods or METHODS
+        asked = audited(problems, searching, times=times)
         rows = list(progress(asked, len(problems), "problem"))
         if write is not None:
             with new_file(write) as building:
-                building.write_text(json.dumps(known_json(rows, times, STRONGEST), indent=1) + "\n", encoding="utf-8")
+                building.write_text(json.dumps(known_json(rows, searching, times), indent=1) + "\n", encoding="utf-8")
     for line in audit_lines(rows):
         click.echo(line)
     context.exit(1 if any(row.faults for row in rows) else 0)
@@ -170,15 +171,25 @@ def _numbers(instances: tuple[int | None, int | None]) -> range:
 
 
 def write_runs(runs: "list[SuiteRun]", out: str) -> None:
-    """Write runs to a new folder, as IOHprofiler has them."""
+    """Write runs to a new folder, as IOHprofiler has them.
+
+    Among the settings of a run is what became of infeasible proposals and, where a dimension has several budgets, the
+    budget. Both have names of several words, which no optimiser's setting can have.
+    """
     from posefit.report.export import LoggedRun, write_iohprofiler
     from posefit.suites.functions import suite_function
+    from posefit.suites.tally import budgets_differ
 
+    def told(run: "SuiteRun") -> dict[str, Any]:
+        budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
+        return {**run.settings, "infeasible proposals": run.infeasible, **budget}
+
+    several = budgets_differ(runs)
     write_iohprofiler(
         (
             LoggedRun(
                 run.method,
-                run.settings,
+                told(run),
                 f"f{run.function} {suite_function(run.function).name}",
                 run.dimension,
                 run.instance,

@@ -37,6 +37,7 @@ def test_a_cost_that_is_not_true_is_found() -> None:
 
 def test_the_file_names_problems_of_the_suite_and_costs_below_their_truths() -> None:
     best = known_file()["best"]
+    assert len(best) >= 100
     for name, cost in list(best.items())[::9]:
         function, instance, dimension = map(int, re.fullmatch(r"posefit-2026.1_f(\d+)_i(\d+)_d(\d+)", name).groups())  # type: ignore[union-attr]
         problem = posefit.suite("posefit-2026.1", function, instance, dimension)
@@ -54,10 +55,25 @@ def test_the_command_writes_what_it_found_and_keeps_what_is_there(tmp_path: Path
     found = json.loads((tmp_path / "known.json").read_text("utf-8"))
     truths = {f"posefit-2026.1_f005_i{n:05d}_d09": posefit.suite("posefit-2026.1", 5, n, 9).truth_cost for n in (3, 4)}
     assert found["problems"] == 2
+    assert found["made_by"] == "cma with 5 times the usual budget, and cma with the usual one"
+    assert found["best"]
     assert all(cost < truths[name] for name, cost in found["best"].items())
     again = CliRunner().invoke(main, [*words, "--write", str(tmp_path / "known.json")])
     assert again.exit_code == 2
     assert "expected a new name to write to, got one that exists" in again.stderr
+
+
+def test_what_was_written_says_who_searched_where_nobody_searched_longer(tmp_path: Path) -> None:
+    words = ["suite", "audit", "--function", "1", "--instances", "3:4", "--times", "0", "--method", "random"]
+    done = CliRunner().invoke(main, [*words, "--method", "pso", "--write", str(tmp_path / "known.json")])
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "known.json").read_text("utf-8"))
+    assert found == {"made_by": "random, pso with the usual budget", "problems": 1, "best": {}}
+
+
+def test_the_suites_file_says_what_the_command_of_the_handbook_writes() -> None:
+    usual = "random, sapso, pso, cma, annealed, scipy with the usual one"
+    assert known_file()["made_by"] == f"cma with 100 times the usual budget, and {usual}"
 
 
 def test_a_proposal_of_the_audit_may_be_counted_from_its_numbers_alone() -> None:
