@@ -34,18 +34,22 @@ def run(*words: object) -> Result:
     return CliRunner().invoke(main, [str(word) for word in words])
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a ledger of the plan's cells, as a sweep writes it."""
+def swept(folder: Path, *plans: str) -> Path:
+    """Return a folder, once the cells of plans have run into its ledger."""
     from posefit.sweep.driver import Claim, Driver
 
-    folder = tmp_path_factory.mktemp("suite") / "results"
     with Driver(folder) as driver:
-        for cell in search_cells(tomllib.loads(PLAN)):
+        for cell in [cell for plan in plans for cell in search_cells(tomllib.loads(plan))]:
             claim = driver.claim(cell)
             assert isinstance(claim, Claim)
             driver.finish(claim, run_search(cell))
     return folder
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a ledger of the plan's cells, as a sweep writes it."""
+    return swept(tmp_path_factory.mktemp("suite") / "results", PLAN)
 
 
 def test_the_functions_are_listed() -> None:
@@ -85,6 +89,41 @@ def test_scores_are_what_the_traces_say() -> None:
     expected = (sum(hit) + 100 * (3 - len(hit))) / len(hit) if hit else None
     assert score.running_times[16.0] == (None if expected is None else pytest.approx(expected))
     assert list(score.shares) == [1, 3, 10]
+
+
+def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken_together(tmp_path: Path) -> None:
+    plan = """
+suite = "posefit-2026.1"
+methods = ["random"]
+functions = [1]
+instances = [3, 4]
+"""
+    ledger = swept(tmp_path / "out", f"{plan}\nbudgets = [5, 10]", f'{plan}\nbudgets = [10]\ninfeasible = "penalise"')
+    done = run("suite", "table", ledger, "--iohprofiler", tmp_path / "ioh", "--json")
+    assert done.exit_code == 0, done.stderr
+    scores = {(one["budget"], one["infeasible"]): one for one in json.loads(done.stdout)}
+    assert set(scores) == {(45, "repair"), (90, "repair"), (90, "penalise")}
+    for (budget, infeasible), score in scores.items():
+        mine = [
+            run_on(posefit.suite(function=1, instance=n, infeasible=infeasible), "random", evaluations=budget)
+            for n in (3, 4)
+        ]
+        assert (score["method"], score["runs"]) == ("random", 2)
+        assert score["above"] == np.median([one.cost - one.best_known for one in mine])
+    table = run("suite", "table", ledger).stdout
+    assert set(re.findall(r"random, \S+ x d, \w+", table)) == {
+        "random, 5 x d, repair", "random, 10 x d, repair", "random, 10 x d, penalise"
+    }  # fmt: skip
+    told = [json.loads(path.read_text("utf-8"))["algorithm"] for path in (tmp_path / "ioh").rglob("*.json")]
+    assert {json.dumps(json.loads(one["info"]), sort_keys=True) for one in told} == {
+        json.dumps({"evaluations for each dimension": each, "infeasible proposals": way}, sort_keys=True)
+        for each, way in ((5.0, "repair"), (10.0, "repair"), (10.0, "penalise"))
+    }
+    assert len({one["name"] for one in told}) == 3
+
+
+def test_one_budget_and_one_way_are_not_in_the_name(results: Path) -> None:
+    assert "x d," not in run("suite", "table", results).stdout
 
 
 def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not() -> None:
