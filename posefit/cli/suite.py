@@ -63,6 +63,7 @@ def suite_run(
 ) -> None:
     """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
     from posefit import settings
+    from posefit.files import check_new, check_place
     from posefit.fitting.check import whole
     from posefit.registry import registry
     from posefit.suites.front import Suite
@@ -74,7 +75,8 @@ def suite_run(
             whole("budget", budget, 1)
         whole("seed", seed, 0)
         if out is not None:
-            _check_new(out)
+            check_new(out)
+            check_place(out)
         problems = Suite(
             name,
             functions=functions or None,
@@ -99,12 +101,14 @@ def suite_run(
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     """Print what a sweep of a plan of single searches to DIR found, by dimension, function and method."""
+    from posefit.files import check_new, check_place
     from posefit.suites.tally import score_lines, suite_scores
     from posefit.sweep.ledger import Ledger
     from posefit.sweep.single.rows import search_runs
 
     if iohprofiler is not None:
-        _check_new(iohprofiler)
+        check_new(iohprofiler)
+        check_place(iohprofiler)
     kept = Ledger(ledger, say)
     runs = list(search_runs(kept))
     scores = suite_scores(runs)
@@ -139,7 +143,7 @@ def suite_audit(
     """Search problems with each method, and check what is reported; exit status 1 where something is not true."""
     import json
 
-    from posefit.files import new_file
+    from posefit.files import check_new, check_place, new_file
     from posefit.fitting.check import whole
     from posefit.suites.audit import METHODS, audit_lines, audited, known_json
     from posefit.suites.front import Suite
@@ -147,7 +151,8 @@ def suite_audit(
     with results_alone():
         whole("times", times, 0)
         if write is not None:
-            _check_new(write)
+            check_new(write)
+            check_place(write)
         problems = Suite(functions=functions or None, dimensions=dimensions or (9,), instances=_numbers(instances))
         searching = methods or METHODS
         asked = audited(problems, searching, times=times)
@@ -201,13 +206,3 @@ def write_runs(runs: "list[SuiteRun]", out: str) -> None:
         ),
         out,
     )
-
-
-def _check_new(out: str) -> None:
-    """Return nothing. Raises ValueError where a folder is there already, before anything runs for it."""
-    from pathlib import Path
-
-    if Path(out).exists():
-        raise ValueError(f"{out}: expected a new name to write to, got one that exists")
-    if not Path(out).resolve().parent.is_dir():
-        raise ValueError(f"{out}: expected a place to write to, got one in {Path(out).resolve().parent}, which is none")

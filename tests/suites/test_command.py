@@ -218,6 +218,22 @@ def test_a_mistake_is_one_line_and_status_2(
 
 
 @pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "random", "--function", 1, "--instances", "3:4", "--out"],
+        ["audit", "--function", 1, "--instances", "3:4", "--times", 0, "--write"],
+        ["table", "ledger", "--iohprofiler"],
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_link_that_leads_nowhere_is_refused_before_anything_runs(words: list[Any], tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "nothing")
+    done = run("suite", *words, tmp_path / "link")
+    assert done.exit_code == 2
+    assert done.stderr == f"posefit: {tmp_path / 'link'}: expected a new name to write to, got one that exists\n"
+
+
+@pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"motions": ["walk"]}, "a plan of a suite must hold suite, methods, .*, got 'motions'"),
