@@ -90,10 +90,8 @@ def _method(value: Any) -> tuple[str, dict[str, Any], str]:
 
 
 def _check_population(method: str, chosen: Mapping[str, Any], evaluations: int) -> None:
-    offer = registry().offer("optimiser", method)
-    known = {setting.name: setting.default for setting in offer.settings}
-    size = chosen.get("particles", known.get("particles", 1))
-    if isinstance(size, int) and size > evaluations:
+    size = settings.population(registry().optimiser(method), chosen, evaluations)
+    if size > evaluations:
         raise ValueError(f"evaluations must hold one population of {size}, got {evaluations} of {method}")
 
 
