@@ -15,6 +15,7 @@ import posefit
 from posefit.cli import main
 from posefit.suites.running import run_on
 from posefit.suites.tally import suite_scores
+from posefit.sweep.engines.engine import Keyed, Outcome, Run
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.single.plan import search_cells
 from posefit.sweep.single.rows import search_runs
@@ -171,11 +172,54 @@ def test_the_ledger_is_a_table_and_no_report_of_tracks(results: Path, tmp_path: 
     assert list(tmp_path.iterdir()) == []
 
 
+class Inside:
+    """An engine that runs a cell where it is, at once."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._ended: list[Outcome] = []
+
+    def window(self) -> int:
+        return 1
+
+    def submit(self, cell: Keyed) -> None:
+        try:
+            self._ended.append(Outcome(cell, self._run(cell)))
+        except ValueError as error:
+            self._ended.append(Outcome(cell, None, str(error)))
+
+    def wait(self, seconds: float) -> list[Outcome]:
+        ended, self._ended = self._ended, []
+        return ended
+
+    def close(self) -> None: ...
+
+
+def test_a_preview_says_about_how_long_searches_take_and_which_kind_would_fail(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.sweep.engines.processes.Processes", lambda _workers, _limits, run: Inside(run))
+    plan, out = tmp_path / "plan.toml", tmp_path / "out"
+    failing = '{ method = "cma", settings = { spread = -1.0 } }'  # found out where it is built
+    plan.write_text(PLAN.replace('"random",', f'"random", {failing},').replace("[1, 7]", "[1]"), "utf-8")
+    swept(out, PLAN.replace("[1, 7]", "[1]").replace("[9, 24]", "[9]"))
+    done = run("sweep", plan, "--dry-run", "--workers", 1, "--out", out)
+    assert done.exit_code == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert sum(line.endswith("  done") for line in lines) == 4
+    assert len([line for line in lines if line.startswith("warning: cma on f1 in 9D, instance 10000, seed 0: ")]) == 1
+    assert re.fullmatch(r"12 cells, 8 of them to run: about \d+ seconds? on 1 workers", lines[-1])
+    found = json.loads(run("sweep", plan, "--dry-run", "--workers", 1, "--out", out, "--json").stdout)
+    assert [cell["method"] for cell in found["cells"] if cell["done"]] == 2 * ["random", "pso"]
+    assert found["seconds"] > 0.0
+    assert len(found["untried"]) == 2
+
+
 @pytest.mark.slow
 def test_a_sweep_runs_a_plan_of_searches_and_goes_on(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN.replace("[1, 7]", "[1]").replace("[9, 24]", "[9]"), "utf-8")
     shown = run("sweep", tmp_path / "plan.toml", "--dry-run")
-    assert shown.stdout.splitlines()[-1] == "4 cells, 4 of them to run"
+    assert re.fullmatch(r"4 cells, 4 of them to run: about \d+ seconds? on \d+ workers", shown.stdout.splitlines()[-1])
     words = ("sweep", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", 1)
     done = run(*words)
     assert done.exit_code == 0, done.stderr
