@@ -297,6 +297,12 @@ def test_a_suite_without_problems_is_refused() -> None:
         posefit.Suite(dimensions=[10])
 
 
+@pytest.mark.parametrize("name", ["functions", "dimensions", "instances"])
+def test_a_suite_of_one_number_instead_of_a_list_is_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=f"{name} must be a list of numbers, got 9"):
+        posefit.Suite(**{name: 9})  # type: ignore[arg-type]
+
+
 def test_a_box_is_read_and_not_learned() -> None:
     with pytest.raises(TypeError, match="the box of a suite must stay as it is"):
         box_without("02", 9, False).fit(np.zeros((3, 63)))
