@@ -51,11 +51,11 @@ def posefit_register_claims(register: Callable[[ClaimedOrder], None]) -> Any:
 
 def claimed_orders() -> tuple[ClaimedOrder, ...]:
     """Return what all installed plugins say that publications claim."""
-    return tuple(order for plugin in installed() for order in plugin.offers)
+    return tuple(order for plugin in claiming() for order in plugin.offers)
 
 
 @lru_cache(maxsize=1)
-def installed() -> tuple[Plugin[ClaimedOrder], ...]:
+def claiming() -> tuple[Plugin[ClaimedOrder], ...]:
     """Return what became of all installed plugins with claims."""
     return claims_of(entry_points(group=CLAIMS_GROUP))
 
@@ -64,10 +64,10 @@ def claims_of(
     points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ
 ) -> tuple[Plugin[ClaimedOrder], ...]:
     """Return what became of the plugins behind entry points; see `posefit.entries.load`."""
-    return entries.load(points, sys.modules[__name__], _claimed, named, variables)
+    return entries.load(points, sys.modules[__name__], _claimed, order_name, variables)
 
 
-def named(order: ClaimedOrder) -> str:
+def order_name(order: ClaimedOrder) -> str:
     """Return how lists and errors name an order."""
     return f"claim {order.source!r} of {', '.join(order.methods)}"
 

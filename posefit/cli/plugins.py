@@ -39,7 +39,7 @@ def doctor(context: click.Context, verbose: bool) -> None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the same is said below
-        lines, well = diagnosis(registry(), commands.installed(_own(context)), claims.installed(), verbose)
+        lines, well = diagnosis(registry(), commands.installed(_own(context)), claims.claiming(), verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 

@@ -359,7 +359,7 @@ def test_the_doctor_lists_claims_and_says_in_one_line_why_one_is_left_out(monkey
     said = "offers claim 'the SAPSO paper' of particle@full, sapso@full, sapso@pca"
     assert re.search(rf"^loaded    swarm \(posefit .*\): {said}$", run("plugins", "doctor").stdout, re.MULTILINE)
     bad = point("bad", ImportError("no module named 'lost',\n  nor 'found'"))
-    monkeypatch.setattr(claims, "installed", lambda: claims.claims_of([bad], {}))
+    monkeypatch.setattr(claims, "claiming", lambda: claims.claims_of([bad], {}))
     result = run("plugins", "doctor")
     assert result.exit_code == 1
     assert "broken    bad (posefit-bad 1.0): ImportError: no module named 'lost', nor 'found'\n" in result.stdout
