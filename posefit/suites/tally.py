@@ -65,7 +65,13 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
         for (dimension, function, method, *_), mine in groups.items()
         if function != ALL or dimension in several
     ]
-    return sorted(found, key=lambda one: (one.dimension, one.function, -one.reached, one.above, one.method))
+    return sorted(found, key=_place)
+
+
+def _place(score: SuiteScore) -> tuple[object, ...]:
+    """Return what scores are sorted by."""
+    least = -score.reached, score.above
+    return score.dimension, score.function, *least, score.method, score.budget, score.infeasible
 
 
 def method_name(run: SuiteRun) -> str:
