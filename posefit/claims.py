@@ -49,20 +49,26 @@ def posefit_register_claims(register: Callable[[ClaimedOrder], None]) -> Any:
     """Call `register(order)` for each order of methods that a publication claims."""
 
 
-@lru_cache(maxsize=1)
 def claimed_orders() -> tuple[ClaimedOrder, ...]:
     """Return what all installed plugins say that publications claim."""
-    return tuple(order for plugin in claims_of(entry_points(group=CLAIMS_GROUP)) for order in plugin.offers)
+    return tuple(order for plugin in claiming() for order in plugin.offers)
+
+
+@lru_cache(maxsize=1)
+def claiming() -> tuple[Plugin[ClaimedOrder], ...]:
+    """Return what became of all installed plugins with claims."""
+    return claims_of(entry_points(group=CLAIMS_GROUP))
 
 
 def claims_of(
     points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ
 ) -> tuple[Plugin[ClaimedOrder], ...]:
     """Return what became of the plugins behind entry points; see `posefit.entries.load`."""
-    return entries.load(points, sys.modules[__name__], _claimed, _order_named, variables)
+    return entries.load(points, sys.modules[__name__], _claimed, order_name, variables)
 
 
-def _order_named(order: ClaimedOrder) -> str:
+def order_name(order: ClaimedOrder) -> str:
+    """Return how lists and errors name an order."""
     return f"claim {order.source!r} of {', '.join(order.methods)}"
 
 

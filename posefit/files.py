@@ -3,6 +3,7 @@
 - `new_folder`, `new_file`: what must not be there yet.
 - `replaced_file`: what may replace an earlier file of its kind, which its first bytes tell.
 - `Unfinished`: a folder that is worked on for so long that it may have to be gone on with later.
+- `check_new`, `check_place`: what is refused before anything is computed for a new name.
 - `appear`: a small file that many may want to be the first to make, such as a claim.
 
 What is being written stands beside its place, under a random name that begins with a dot. It is created exclusively, so
@@ -31,6 +32,19 @@ _NO_LINKS = (errno.EPERM, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.E
 _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # what it says where a folder's new name is no longer free
 
 
+def check_new(path: str | Path) -> None:
+    """Return nothing. Raises ValueError where `path` exists, be it a link that leads nowhere."""
+    if os.path.lexists(path):
+        raise _exists(path)
+
+
+def check_place(path: str | Path) -> None:
+    """Return nothing. Raises ValueError where `path` is in no folder, or in one that cannot be written to."""
+    parent = Path(path).resolve().parent
+    if not parent.is_dir() or not os.access(parent, os.W_OK):
+        raise ValueError(f"{path}: expected a place to write to, got one in {parent}, which is none")
+
+
 @contextmanager
 def new_folder(path: str | Path) -> Iterator[Path]:
     """Give an empty folder to write to, which takes the name `path` where nothing fails; else nothing is left.
@@ -39,7 +53,7 @@ def new_folder(path: str | Path) -> Iterator[Path]:
     """
     target = Path(path)
     with _told(target):
-        _check_new(target)
+        check_new(target)
         building = _beside(target)
         building.mkdir()
         with _undone(lambda: shutil.rmtree(building)):
@@ -60,7 +74,7 @@ def new_file(path: str | Path) -> Iterator[Path]:
     """
     target = Path(path)
     with _told(target):
-        _check_new(target)
+        check_new(target)
         building = _created(target)
         with _undone(building.unlink):
             yield building
@@ -248,12 +262,7 @@ def _undone(remove: Callable[[], None]) -> Iterator[None]:
         raise
 
 
-def _check_new(target: Path) -> None:
-    if os.path.lexists(target):
-        raise _exists(target)
-
-
-def _exists(target: Path) -> ValueError:
+def _exists(target: str | Path) -> ValueError:
     return ValueError(f"{target}: expected a new name to write to, got one that exists")
 
 

@@ -81,8 +81,11 @@ def parsed_toml(text: str) -> dict[str, Any]:
         raise ValueError("expected values that are not nested so deeply, got too many brackets") from None
 
 
-def parsed_json(text: str) -> Any:
-    """Return the value of a JSON text. Raises ValueError where it is none, or nested so deeply that it is hostile."""
+def parsed_json(text: str | bytes) -> Any:
+    """Return the value of a JSON text, or of its bytes.
+
+    Raises ValueError where it is none, or nested so deeply that it is hostile.
+    """
     try:
         return json.loads(text)
     except RecursionError:

@@ -67,6 +67,13 @@ def planned(
     return filled
 
 
+def population(factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int) -> int:
+    """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
+    known = {setting.name: setting.default for setting in settings_of(factory)}
+    size = planned(factory, given, evaluations).get("particles", known.get("particles", 1))
+    return size if isinstance(size, int) else 1
+
+
 def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) -> dict[str, Any]:
     """Return settings that were given as text, as the values their types ask for.
 

@@ -8,7 +8,7 @@ from threading import Barrier, Thread
 import pytest
 
 from posefit.files import MARK as UNFINISHED
-from posefit.files import Unfinished, appear, new_file, new_folder, replaceable, replaced_file
+from posefit.files import Unfinished, appear, check_new, check_place, new_file, new_folder, replaceable, replaced_file
 
 MARK = b"<!-- ours -->"
 
@@ -123,6 +123,21 @@ def test_a_link_at_the_name_itself_is_something_that_exists(tmp_path, opened):
         with pytest.raises(ValueError, match="expected a new name"), opened(tmp_path / name):
             pass
     assert not (tmp_path / "nothing").exists()
+
+
+def test_a_name_and_its_place_are_checked_before_anything_is_computed(tmp_path):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "dangling").symlink_to(tmp_path / "nothing")
+    for name in ("file", "dangling"):
+        check_place(tmp_path / name)
+        with pytest.raises(ValueError, match=f"{name}: expected a new name to write to, got one that exists"):
+            check_new(tmp_path / name)
+    for name in ("none/out", "file/out"):
+        check_new(tmp_path / name)
+        with pytest.raises(ValueError, match=f"{name}: expected a place to write to, got one in .*, which is none"):
+            check_place(tmp_path / name)
+    check_new(tmp_path / "out")
+    check_place(tmp_path / "out")
 
 
 @pytest.mark.parametrize("opened", [new_folder, new_file])

@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from posefit.claims import ClaimedOrder, order_name
 from posefit.entries import BLOCK, LOAD, STRICT, Plugin
 from posefit.registry import KINDS, Offer, Registry
 
@@ -48,11 +49,15 @@ def listing(found: Registry) -> Iterator[str]:
 
 
 def diagnosis(
-    found: Registry, added: Sequence[Plugin[click.Command]] = (), verbose: bool = False
+    found: Registry,
+    added: Sequence[Plugin[click.Command]] = (),
+    claiming: Sequence[Plugin[ClaimedOrder]] = (),
+    verbose: bool = False,
 ) -> tuple[list[str], bool]:
-    """Return what `posefit plugins doctor` says, and whether all is well; `added` are the plugins with commands.
+    """Return what `posefit plugins doctor` says, and whether all is well.
 
-    Where it is to be `verbose`, the traceback of what could not be loaded follows its line.
+    `added` are the plugins with commands, and `claiming` those with claims of publications. Where it is to be
+    `verbose`, the traceback of what could not be loaded follows its line.
     """
     lines = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ]
     for plugin in found.plugins:
@@ -66,13 +71,17 @@ def diagnosis(
     for more in added:
         names = ", ".join(f"command {command.name}" for command in more.offers) or "nothing"
         lines += _state(more, f"offers {names}", verbose)
-    states = [*(plugin.state for plugin in found.plugins), *(plugin.state for plugin in added)]
-    well = "broken" not in states
+    for one in claiming:
+        names = "; ".join(map(order_name, one.offers)) or "nothing"
+        lines += _state(one, f"offers {names}", verbose)
+    groups: tuple[Sequence[Plugin[Any]], ...] = (found.plugins, added, claiming)
+    well = all(plugin.state != "broken" for group in groups for plugin in group)
     more_told = "" if verbose else "; -v shows where they fail"
     lines.append("all plugins work" if well else f"broken plugins are left out; the others work{more_told}")
     return lines, well
 
 
 def _state(plugin: Plugin[Any], offers: str, verbose: bool) -> list[str]:
-    said = f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {plugin.cause or offers}"
+    cause = " ".join(plugin.cause.split())  # on one line, whatever the error says
+    said = f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause or offers}"
     return [said, *(f"          {line}" for line in plugin.traceback.splitlines() if verbose)]

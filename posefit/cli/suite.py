@@ -63,6 +63,7 @@ def suite_run(
 ) -> None:
     """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
     from posefit import settings
+    from posefit.files import check_new, check_place
     from posefit.fitting.check import whole
     from posefit.registry import registry
     from posefit.suites.front import Suite
@@ -74,7 +75,8 @@ def suite_run(
             whole("budget", budget, 1)
         whole("seed", seed, 0)
         if out is not None:
-            _check_new(out)
+            check_new(out)
+            check_place(out)
         problems = Suite(
             name,
             functions=functions or None,
@@ -99,12 +101,14 @@ def suite_run(
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     """Print what a sweep of a plan of single searches to DIR found, by dimension, function and method."""
+    from posefit.files import check_new, check_place
     from posefit.suites.tally import score_lines, suite_scores
     from posefit.sweep.ledger import Ledger
     from posefit.sweep.single.rows import search_runs
 
     if iohprofiler is not None:
-        _check_new(iohprofiler)
+        check_new(iohprofiler)
+        check_place(iohprofiler)
     kept = Ledger(ledger, say)
     runs = list(search_runs(kept))
     scores = suite_scores(runs)
@@ -139,21 +143,23 @@ def suite_audit(
     """Search problems with each method, and check what is reported; exit status 1 where something is not true."""
     import json
 
-    from posefit.files import new_file
+    from posefit.files import check_new, check_place, new_file
     from posefit.fitting.check import whole
-    from posefit.suites.audit import METHODS, STRONGEST, audit_lines, audited, known_json
+    from posefit.suites.audit import METHODS, audit_lines, audited, known_json
     from posefit.suites.front import Suite
 
     with results_alone():
         whole("times", times, 0)
         if write is not None:
-            _check_new(write)
+            check_new(write)
+            check_place(write)
         problems = Suite(functions=functions or None, dimensions=dimensions or (9,), instances=_numbers(instances))
-        asked = audited(problems, methods or METHODS, times=times)
+        searching = methods or METHODS
+        asked = audited(problems, searching, times=times)
         rows = list(progress(asked, len(problems), "problem"))
         if write is not None:
             with new_file(write) as building:
-                building.write_text(json.dumps(known_json(rows, times, STRONGEST), indent=1) + "\n", encoding="utf-8")
+                building.write_text(json.dumps(known_json(rows, searching, times), indent=1) + "\n", encoding="utf-8")
     for line in audit_lines(rows):
         click.echo(line)
     context.exit(1 if any(row.faults for row in rows) else 0)
@@ -170,15 +176,25 @@ def _numbers(instances: tuple[int | None, int | None]) -> range:
 
 
 def write_runs(runs: "list[SuiteRun]", out: str) -> None:
-    """Write runs to a new folder, as IOHprofiler has them."""
+    """Write runs to a new folder, as IOHprofiler has them.
+
+    Among the settings of a run is what became of infeasible proposals and, where a dimension has several budgets, the
+    budget. Both have names of several words, which no optimiser's setting can have.
+    """
     from posefit.report.export import LoggedRun, write_iohprofiler
     from posefit.suites.functions import suite_function
+    from posefit.suites.tally import budgets_differ
 
+    def told(run: "SuiteRun") -> dict[str, Any]:
+        budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
+        return {**run.settings, "infeasible proposals": run.infeasible, **budget}
+
+    several = budgets_differ(runs)
     write_iohprofiler(
         (
             LoggedRun(
                 run.method,
-                run.settings,
+                told(run),
                 f"f{run.function} {suite_function(run.function).name}",
                 run.dimension,
                 run.instance,
@@ -190,13 +206,3 @@ def write_runs(runs: "list[SuiteRun]", out: str) -> None:
         ),
         out,
     )
-
-
-def _check_new(out: str) -> None:
-    """Return nothing. Raises ValueError where a folder is there already, before anything runs for it."""
-    from pathlib import Path
-
-    if Path(out).exists():
-        raise ValueError(f"{out}: expected a new name to write to, got one that exists")
-    if not Path(out).resolve().parent.is_dir():
-        raise ValueError(f"{out}: expected a place to write to, got one in {Path(out).resolve().parent}, which is none")

@@ -54,8 +54,16 @@ class RecordedClip:
         return float(self.times[-1]) / FPS
 
     def motion(self) -> Motion:
-        """Return the whole clip at 30 frames a second: angles and translations between the poses are interpolated."""
-        frames = np.arange(self.times[-1] + 1)
+        """Return the whole clip at 30 frames a second."""
+        poses, translations = self.at(np.arange(self.times[-1] + 1))
+        return Motion(self.name, self.skeleton, poses, translations, FPS)
+
+    def at(self, frames: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Return the poses (n, 66) and translations (n, 3) at frames since the first, at 30 frames a second.
+
+        Angles and translations between the poses are interpolated; after the last, it is held.
+        """
+        frames = np.minimum(frames, self.times[-1])
         before = np.minimum(np.searchsorted(self.times, frames, "right") - 1, max(len(self) - 2, 0))
         after = np.minimum(before + 1, len(self) - 1)
         gap = np.maximum(self.times[after] - self.times[before], 1)
@@ -63,7 +71,7 @@ class RecordedClip:
         poses, translations = (
             (1.0 - share) * series[before] + share * series[after] for series in (self.poses, self.translations)
         )
-        return Motion(self.name, self.skeleton, poses, translations, FPS)
+        return poses, translations
 
 
 @lru_cache(maxsize=1)

@@ -1,11 +1,10 @@
 """What `posefit report` does: a page, and where they are asked for figures, tables and files for other tools."""
 
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from posefit.files import replaceable, replaced_file
+from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.geometry.skeleton import ANGLES
 from posefit.page.document import plain
 from posefit.report.content import data_of
@@ -115,11 +114,10 @@ def _check(ledger: Path, out: str, others: list[str | None]) -> None:
         if Path(place).resolve() == ledger.resolve() or places.count(place) > 1:
             raise ValueError(f"{place}: expected a place of its own for each of what is written, got it twice")
     for other in others:
-        if other is not None and Path(other).exists():
-            raise ValueError(f"{other}: expected a new name to write to, got one that exists")
+        if other is not None:
+            check_new(other)
     for place in places:
-        if not (parent := Path(place).resolve().parent).is_dir() or not os.access(parent, os.W_OK):
-            raise ValueError(f"{place}: expected a place to write to, got one in {parent}, which is none")
+        check_place(place)
 
 
 def _write_iohprofiler(ledger: Ledger, path: str) -> None:

@@ -27,7 +27,6 @@ class Audited:
 
     problem: str
     truth_cost: float
-    best_known: float  # by the suite's file, before
     found: dict[str, float]  # the best cost by method; `STRONGEST x TIMES` is the long search
     faults: tuple[str, ...] = field(default=())  # what was not as it should be, in words
 
@@ -37,19 +36,17 @@ class Audited:
         return min(self.truth_cost, *self.found.values())
 
 
-def audited(
-    problems: Suite, methods: Sequence[str] = METHODS, *, strongest: str = STRONGEST, times: int = TIMES
-) -> Iterator[Audited]:
+def audited(problems: Suite, methods: Sequence[str] = METHODS, *, times: int = TIMES) -> Iterator[Audited]:
     """Yield what becomes of each problem; with `times` of 0 nobody searches longer than usual."""
     for problem in problems:
         found, faults = {}, []
         plans = [(method, method, 1) for method in methods]
-        for label, method, factor in [*plans, (f"{strongest} x {times}", strongest, times)][: len(plans) + bool(times)]:
+        for label, method, factor in [*plans, (f"{STRONGEST} x {times}", STRONGEST, times)][: len(plans) + bool(times)]:
             fresh = suite(problem.suite, problem.id_function, problem.instance, problem.dimension)
             run_on(fresh, method, evaluations=factor * usual_budget(problem.dimension))
             found[label] = fresh.best_observed_fvalue1
             faults += [f"{label}: {fault}" for fault in reported_faults(fresh)]
-        yield Audited(problem.id, problem.truth_cost, problem.best_known, found, tuple(faults))
+        yield Audited(problem.id, problem.truth_cost, found, tuple(faults))
 
 
 def reported_faults(problem: Problem) -> list[str]:
@@ -98,10 +95,14 @@ def audit_lines(rows: Sequence[Audited]) -> list[str]:
     return [*lines, *faults, f"{len(rows)} problems, {len(rows) * len(labels)} searches, {len(faults)} faults"]
 
 
-def known_json(rows: Sequence[Audited], times: int, strongest: str) -> dict[str, Any]:
-    """Return what the file of known costs holds."""
+def known_json(rows: Sequence[Audited], methods: Sequence[str], times: int) -> dict[str, Any]:
+    """Return what the file of known costs holds: who searched with which budgets, how many problems, the best costs.
+
+    `methods` and `times` are those of `audited`, which found the rows.
+    """
+    usual = f"{', '.join(methods)} with the usual"
     return {
-        "made_by": f"{strongest} with {times} times the usual budget, and {', '.join(METHODS)} with the usual one",
+        "made_by": f"{STRONGEST} with {times} times the usual budget, and {usual} one" if times else f"{usual} budget",
         "problems": len(rows),
         "best": known_costs(rows),
     }

@@ -1,10 +1,11 @@
 """`posefit.suite` and `posefit.Suite`: one problem by its numbers, and many to go through."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import final
 
 from posefit.fitting.check import one_of
+from posefit.reading import quoted
 from posefit.suites.functions import (
     DIMENSIONS,
     FUNCTIONS,
@@ -60,6 +61,9 @@ class Suite:
         seconds: float | None = None,
     ) -> None:
         one_of("suite", name, SUITES)
+        for what, numbers in (("functions", functions), ("dimensions", dimensions), ("instances", instances)):
+            if numbers is not None and not isinstance(numbers, Iterable):
+                raise ValueError(f"{what} must be a list of numbers, got {quoted(numbers)}")
         chosen = FUNCTIONS if functions is None else [suite_function(number) for number in functions]
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)

@@ -1,8 +1,12 @@
 """The functions of a suite, and which numbers and dimensions there are. None of this changes under one name."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from posefit.fitting.check import one_of, whole
+from posefit.reading import quoted
 
 SUITE = "posefit-2026.1"
 SUITES = (SUITE,)
@@ -37,10 +41,9 @@ FUNCTIONS = (
 
 def suite_function(number: object) -> SuiteFunction:
     """Return the function of a number. Raises ValueError where there is none."""
-    found = {one.number: one for one in FUNCTIONS}
-    if isinstance(number, bool) or number not in found:
-        raise ValueError(f"function must be a whole number from 1 to {len(FUNCTIONS)}, got {number!r}")
-    return found[int(number)]  # type: ignore[call-overload,no-any-return]
+    if not _among(number, range(1, len(FUNCTIONS) + 1)):
+        raise ValueError(f"function must be a whole number from 1 to {len(FUNCTIONS)}, got {quoted(number)}")
+    return next(one for one in FUNCTIONS if one.number == number)
 
 
 def checked_address(name: object, function: object, instance: object, dimension: object) -> tuple[int, int, int]:
@@ -50,7 +53,12 @@ def checked_address(name: object, function: object, instance: object, dimension:
     number = whole("instance", instance, 0)
     if number not in INSTANCES:
         raise ValueError(f"instance must be at most {INSTANCES[-1]}, got {number}")
-    if isinstance(dimension, bool) or dimension not in chosen.dimensions:
+    if not _among(dimension, chosen.dimensions):
         known = ", ".join(map(str, chosen.dimensions))
-        raise ValueError(f"dimension of function {chosen.number} must be one of {known}, got {dimension!r}")
+        raise ValueError(f"dimension of function {chosen.number} must be one of {known}, got {quoted(dimension)}")
     return chosen.number, number, int(dimension)  # type: ignore[call-overload]
+
+
+def _among(value: object, numbers: Sequence[int]) -> bool:
+    """Return whether a value is one of some whole numbers, and neither a truth value nor a float."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value in numbers

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.box import Start
@@ -22,7 +21,6 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import recorded
-from posefit.motion.recorded import RecordedClip
 from posefit.silhouette.corruption import corrupted
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
@@ -95,7 +93,7 @@ class _Draft:
         while True:
             clip = clips[int(self.rng.integers(len(clips)))]
             first = int(self.rng.integers(max(int(clip.times[-1]) + 1 - STEP * (count - 1), 1)))
-            poses = wrapped(_poses_at(clip, first + STEP * np.arange(count, dtype=np.int64)))
+            poses = wrapped(clip.at(first + STEP * np.arange(count, dtype=np.int64))[0])
             last = poses[-1]
             if is_upright(last) and np.abs(np.diff(poses, axis=0)).max(initial=0.0) < 1.0:
                 return np.asarray(poses)
@@ -118,15 +116,6 @@ class _Draft:
     def made(self, problem: PoseProblem, truth: Array, decoy: Array | None = None) -> SuiteInstance:
         cost = float(problem.evaluate(truth[None])[0])
         return SuiteInstance(self.function, self.number, self.subject, problem, self.box, truth, cost, decoy)
-
-
-def _poses_at(clip: RecordedClip, frames: NDArray[np.int64]) -> Array:
-    """Return the poses (n, 66) of some frames of a clip; its ends are held."""
-    frames = np.minimum(frames, clip.times[-1])
-    before = np.minimum(np.searchsorted(clip.times, frames, "right") - 1, max(len(clip) - 2, 0))
-    after = np.minimum(before + 1, len(clip) - 1)
-    share = ((frames - clip.times[before]) / np.maximum(clip.times[after] - clip.times[before], 1))[:, None]
-    return np.asarray((1.0 - share) * clip.poses[before] + share * clip.poses[after])
 
 
 @lru_cache(maxsize=16)

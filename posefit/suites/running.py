@@ -27,6 +27,7 @@ class SuiteRun:
     instance: int
     seed: int
     budget: int  # evaluations that there could have been
+    infeasible: str  # what became of proposals that were not feasible: see `Problem`
     best_known: float
     targets: Array = field(repr=False)  # (t,) costs, falling
     evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
@@ -50,7 +51,6 @@ def run_on(
     *,
     evaluations: int | None = None,
     seed: int = 0,
-    ask_seconds: float | None = None,
 ) -> SuiteRun:
     """Return what an optimiser, by its name, finds on a problem within a budget; the same for the same seed.
 
@@ -62,9 +62,9 @@ def run_on(
     rng = np.random.default_rng([SALT, seed, problem.id_function, problem.instance, problem.dimension])
     factory = registry().optimiser(method)
     settings.check(method, factory, chosen)
-    with blamed(f"optimiser {method}", "construction", ask_seconds, (BudgetError, ImportError)):
+    with blamed(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):
         optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
-    guarded = Guarded(optimiser, space, f"optimiser {method}", ask_seconds, evaluations)
+    guarded = Guarded(optimiser, space, f"optimiser {method}", None, evaluations)
     minimise(problem.evaluate, guarded, evaluations, told=True)
     if not len(problem.trace[0]):
         raise ValueError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")
@@ -76,6 +76,7 @@ def run_on(
         problem.instance,
         seed,
         evaluations,
+        problem.infeasible,
         problem.best_known,
         problem.targets,
         *problem.trace,

@@ -1,4 +1,6 @@
-"""What runs on a suite come to, by method, function and dimension: shares of targets, running times, costs.
+"""What runs on a suite come to, by method, function, dimension, budget and what became of infeasible proposals.
+
+That is shares of targets, running times and costs. Only runs that are alike in all of these are taken together.
 
 Targets are an instance's own, from 32 to 0.25 above its best known cost. Hansen et al., COCO: a platform for comparing
 continuous optimizers in a black-box setting, 2021.
@@ -23,12 +25,14 @@ POINTS = (1, 3, 10, 30, 100, 300, 1000)  # evaluations for each dimension at whi
 
 @dataclass(frozen=True)
 class SuiteScore:
-    """What runs of one method on one function in one dimension come to."""
+    """What runs of one method with one budget on one function in one dimension come to."""
 
     method: str
     function: int
     name: str
     dimension: int
+    budget: int  # evaluations that a run could have had
+    infeasible: str  # what became of proposals that were not feasible: see `posefit.suites.problem.Problem`
     runs: int
     above: float  # median of the best costs above the best known
     reached: float  # share of runs and targets, at the end
@@ -41,24 +45,33 @@ class SuiteScore:
 
 
 def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
-    """Return the scores of runs, by dimension, function and method, the best method first.
+    """Return the scores of runs, by dimension, function and method, the best first.
 
     In a dimension with several functions those of all together come first, as function 0. Methods with other settings
-    are other methods. Raises ValueError where there is no run.
+    are other methods; runs with another budget, or with another way with what is not feasible, have a score of their
+    own. Raises ValueError where there is no run.
     """
-    groups: dict[tuple[int, int, str], list[SuiteRun]] = {}
+    groups: dict[tuple[int, int, str, int, str], list[SuiteRun]] = {}
     for run in runs:
         for function in (run.function, ALL):
-            groups.setdefault((run.dimension, function, method_name(run)), []).append(run)
+            alike = run.dimension, function, method_name(run), run.budget, run.infeasible
+            groups.setdefault(alike, []).append(run)
     if not groups:
         raise ValueError("runs must be at least one, got none")
-    several = {dimension for dimension, _, _ in groups if len({f for d, f, _ in groups if d == dimension}) > 2}
+    there = {(dimension, function) for dimension, function, *_ in groups}
+    several = {dimension for dimension, _ in there if sum(other == dimension for other, _ in there) > 2}
     found = [
-        _score(method, function, dimension, mine)
-        for (dimension, function, method), mine in groups.items()
+        _score(method, function, mine)
+        for (dimension, function, method, *_), mine in groups.items()
         if function != ALL or dimension in several
     ]
-    return sorted(found, key=lambda one: (one.dimension, one.function, -one.reached, one.above, one.method))
+    return sorted(found, key=_place)
+
+
+def _place(score: SuiteScore) -> tuple[object, ...]:
+    """Return what scores are sorted by."""
+    least = -score.reached, score.above
+    return score.dimension, score.function, *least, score.method, score.budget, score.infeasible
 
 
 def method_name(run: SuiteRun) -> str:
@@ -67,17 +80,26 @@ def method_name(run: SuiteRun) -> str:
     return f"{run.method} ({told})" if told else run.method
 
 
-def _score(method: str, function: int, dimension: int, runs: Sequence[SuiteRun]) -> SuiteScore:
+def budgets_differ(found: Sequence[SuiteRun] | Sequence[SuiteScore]) -> bool:
+    """Return whether in some dimension runs, or those behind scores, have several budgets."""
+    return len({(one.dimension, one.budget) for one in found}) > len({one.dimension for one in found})
+
+
+def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
+    """Return the score of runs that are alike in all but their instances, seeds and functions."""
+    dimension, budget = runs[0].dimension, runs[0].budget
     reached = np.array([hits((run.evaluations, run.costs), run.targets) for run in runs])
     spent = np.array([run.evaluations[-1] for run in runs])
     times = expected_running_time(reached, spent)
-    points = [point for point in POINTS if point * dimension <= min(run.budget for run in runs)]
+    points = [point for point in POINTS if point * dimension <= budget]
     shares = attained(reached, [*(point * dimension for point in points), float(spent.max())])
     return SuiteScore(
         method,
         function,
         "all functions" if function == ALL else suite_function(function).name,
         dimension,
+        budget,
+        runs[0].infeasible,
         len(runs),
         float(np.median([run.cost - run.best_known for run in runs])),
         float(shares[-1]),
@@ -93,24 +115,33 @@ def _finite(value: Array | float) -> float | None:
 def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
     """Return the lines of two tables of scores, for a terminal: where runs end, and how soon they reach targets."""
     heads = [f"ERT +{above:g}" for above in SHOWN]
-    wide = max(24, *(len(one.method) for one in scores)) if scores else 24
+    labels = _labels(scores)
+    wide = max(24, *map(len, labels)) if scores else 24
     lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
-    for one in scores:
+    for one, label in zip(scores, labels, strict=True):
         times = ["-" if one.running_times[above] is None else f"{one.running_times[above]:.0f}" for above in SHOWN]
         figures = f"{one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}"
-        lines.append(f"{_start(one, wide)} {figures}{_cells(times)}")
+        lines.append(f"{_start(one, label, wide)} {figures}{_cells(times)}")
     points = sorted({point for one in scores for point in one.shares})
     lines += ["", f"share of targets reached after d x{'':{wide - 1}}" + _cells([str(point) for point in points])]
-    for one in scores:
+    for one, label in zip(scores, labels, strict=True):
         shares = [f"{one.shares[point]:.1%}" if point in one.shares else "" for point in points]
-        lines.append(f"{_start(one, wide)}{_cells(shares)}".rstrip())
+        lines.append(f"{_start(one, label, wide)}{_cells(shares)}".rstrip())
     return lines
 
 
-def _start(score: SuiteScore, wide: int) -> str:
+def _labels(scores: Sequence[SuiteScore]) -> list[str]:
+    """Return how tables name the method of each score: with what else tells some of them apart."""
+    budgets, ways = budgets_differ(scores), len({one.infeasible for one in scores}) > 1
+    return [
+        one.method + f", {one.budget / one.dimension:g} x d" * budgets + f", {one.infeasible}" * ways for one in scores
+    ]
+
+
+def _start(score: SuiteScore, label: str, wide: int) -> str:
     """Return the columns that both tables begin with."""
-    label = score.name if score.function == ALL else f"{score.function} {score.name}"
-    return f"{score.dimension:>3} {label:22} {score.method:{wide}}"
+    function = score.name if score.function == ALL else f"{score.function} {score.name}"
+    return f"{score.dimension:>3} {function:22} {label:{wide}}"
 
 
 def _cells(texts: Sequence[str]) -> str:

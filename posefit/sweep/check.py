@@ -18,7 +18,7 @@ from posefit.motion import built_in, recorded
 from posefit.motion.motion import RATES
 from posefit.reading import SHOWN, cut, quoted
 from posefit.registry import Kind, Offer, registry
-from posefit.settings import planned
+from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import ALL_AROUND, DROPPED, Cell, digest_of, parts, settings_text
 from posefit.tracking.method import parse_settings
@@ -117,9 +117,7 @@ def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
     mine = {
         name.removeprefix(family): value for name, value in _settings(method, texts).items() if name.startswith(family)
     }
-    known = {setting.name: setting.default for setting in offer.settings}
-    size = planned(offer.factory, mine, evaluations).get("particles", known.get("particles", 1))
-    return size if isinstance(size, int) else 1
+    return population(offer.factory, mine, evaluations)
 
 
 @lru_cache(maxsize=1024)

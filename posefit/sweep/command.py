@@ -4,7 +4,7 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from posefit.sweep.engines.engine import Engine, Run
 from posefit.sweep.engines.limits import Limits
 from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.plan import Plan
-from posefit.sweep.single.plan import read_plan, search_json, search_line
+from posefit.sweep.single.plan import read_plan, search_line
 from posefit.sweep.single.search import SearchCell, run_search
 
 DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
@@ -38,7 +38,7 @@ class Where:
 def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = False, say: Say) -> tuple[Tally, int, str]:
     """Return how the sweep of a plan to a folder ended, the exit status that says so, and what shows what it found."""
     cells = read_plan(plan)
-    start = engine(where, run_cell if isinstance(cells, Plan) else run_search)
+    start = engine(where, _what_runs(cells))
     with closing(start()) as running:  # without an engine there is no folder either
         tally = swept(cells, out, running, say, retry_quarantined)
     status = STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
@@ -71,18 +71,18 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
 
     Or those of one JSON object that says the same. A million cells are never in memory together.
     """
-    from posefit.sweep.estimate import SECONDS, Amounts, Estimate, estimate_of
+    from posefit.sweep.estimate import SECONDS, TRACKS, Amounts, Estimate, estimate_of
+    from posefit.sweep.single.estimate import SEARCHES
 
     cells = read_plan(plan)
-    if not isinstance(cells, Plan):
-        yield from _searches(cells, out, as_json)
-        return
-    start = engine(replace(where, limits=replace(where.limits, seconds=min(where.limits.seconds, SECONDS))))
+    limits = replace(where.limits, seconds=min(where.limits.seconds, SECONDS))
+    start = engine(replace(where, limits=limits), _what_runs(cells))
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
-    left, count = Amounts(), 0
+    left, count = Amounts(TRACKS if isinstance(cells, Plan) else SEARCHES), 0
     if as_json:
         yield '{"cells": ['
-    for k, cell in enumerate(cells):
+    every: Iterable[Cell | SearchCell] = cells
+    for k, cell in enumerate(every):
         done = ledger is not None and cell.key in ledger
         if not done:
             left.add(cell)
@@ -90,7 +90,7 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
             shown = json.dumps({"key": cell.key, "done": done, **cell.spec})
             yield shown if k == len(cells) - 1 else f"{shown},"
         else:
-            yield preview_line(cell, done)
+            yield preview_line(cell, done) if isinstance(cell, Cell) else search_line(cell, done)
     found = Estimate(0.0, {})
     if len(left):
         with closing(start()) as running:
@@ -105,15 +105,9 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
     yield f"{len(cells)} cells, {len(left)} of them to run{takes}"
 
 
-def _searches(cells: list[SearchCell], out: str | None, as_json: bool) -> Iterator[str]:
-    """Yield the lines that show the cells of a plan of single searches; how long they take is not tried."""
-    ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
-    done = {cell.key for cell in cells if ledger is not None and cell.key in ledger}
-    if as_json:
-        yield json.dumps({"cells": list(search_json(cells, done))})
-        return
-    yield from (search_line(cell, cell.key in done) for cell in cells)
-    yield f"{len(cells)} cells, {len(cells) - len(done)} of them to run"
+def _what_runs(cells: Plan | list[SearchCell]) -> Run:
+    """Return the function that runs one of these cells."""
+    return run_cell if isinstance(cells, Plan) else run_search
 
 
 def engine(where: Where, run: Run = run_cell) -> Callable[[], Engine]:

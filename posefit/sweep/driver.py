@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from posefit.files import appear, replaced_file
+from posefit.reading import parsed_json
 from posefit.sweep.cell import CellResult
 from posefit.sweep.engines.engine import Keyed
 from posefit.sweep.fold import LEFT, fold_logs
@@ -102,7 +103,7 @@ class Driver:
                     self._clear(cell.key, attempt)
                     return state
                 return Claim(cell, attempt)
-            held = _held(path)
+            held = held_by(path)
             if held is None:  # it was finished or released just now
                 self.ledger.refresh()
                 return self.state(cell.key) or State.ELSEWHERE
@@ -220,10 +221,13 @@ class Driver:
         return name not in self._dead
 
 
-def _held(path: Path) -> dict[str, Any] | None:
-    """Return what a claim says; None where there is none. A damaged one holds nothing."""
+def held_by(path: Path) -> dict[str, Any] | None:
+    """Return what a claim says: its `driver`, `process` and `host`, or why it `failed`; None where there is none.
+
+    A damaged one has failed, and holds nothing.
+    """
     try:
-        held: dict[str, Any] = json.loads(path.read_bytes())
+        held: dict[str, Any] = parsed_json(path.read_bytes())
         if all(isinstance(held[name], str) for name in ("driver", "host")) and held["process"]:
             return held
     except FileNotFoundError:

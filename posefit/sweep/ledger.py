@@ -114,7 +114,7 @@ class Ledger:
         for path in (self.path / PLANS).glob("*.cells"):
             try:
                 head, _, short = path.read_bytes().partition(b"\n")
-                plan = BegunPlan(**json.loads(head), keys=short)
+                plan = BegunPlan(**parsed_json(head), keys=short)
             except (OSError, ValueError, TypeError):
                 continue
             if plan.cells == len(plan.keys) // SHORT:
@@ -218,7 +218,7 @@ class Ledger:
     def _sentence(self, path: Path) -> dict[str, Any] | None:
         """Return what a file of the quarantine says. A damaged one is put aside, and its cell is tried again."""
         try:
-            found: dict[str, Any] = json.loads(path.read_bytes())
+            found: dict[str, Any] = parsed_json(path.read_bytes())
             if found["key"] == path.stem and isinstance(found["spec"], dict) and isinstance(found["reasons"], list):
                 return found
         except (ValueError, KeyError, TypeError):

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from posefit.motion import built_in
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
 from tests.files import arrays
+from tests.plugins.test_commands import point
 
 FEW = ["--particles", "10", "--iterations", "4"]
 QUICK = [*FEW, "--size", "120x90"]
@@ -349,6 +351,18 @@ def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.Monkey
     assert "line 7, in bad" not in result.stdout
     verbose = run("plugins", "doctor", "-v").stdout
     assert "no module named 'lost'\n          Traceback ...\n            line 7, in bad\n" in verbose
+
+
+def test_the_doctor_lists_claims_and_says_in_one_line_why_one_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    from posefit import claims
+
+    said = "offers claim 'the SAPSO paper' of particle@full, sapso@full, sapso@pca"
+    assert re.search(rf"^loaded    swarm \(posefit .*\): {said}$", run("plugins", "doctor").stdout, re.MULTILINE)
+    bad = point("bad", ImportError("no module named 'lost',\n  nor 'found'"))
+    monkeypatch.setattr(claims, "claiming", lambda: claims.claims_of([bad], {}))
+    result = run("plugins", "doctor")
+    assert result.exit_code == 1
+    assert "broken    bad (posefit-bad 1.0): ImportError: no module named 'lost', nor 'found'\n" in result.stdout
 
 
 def test_check_reports_every_rule_and_how_many_ran() -> None:

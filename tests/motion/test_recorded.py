@@ -50,6 +50,19 @@ def test_the_file_is_small_says_where_it_comes_from_and_opens_without_pickle() -
         assert "NSF EIA-0196217" in str(stored["origin"])
 
 
+def test_between_two_stored_poses_lies_their_mean_and_after_the_last_nothing_moves() -> None:
+    clip = next(one for one in recorded.clips() if (np.diff(one.times) == 2).any())
+    poses, translations = clip.at(clip.times)
+    assert np.array_equal(poses, clip.poses)
+    assert np.array_equal(translations, clip.translations)
+    k = int(np.flatnonzero(np.diff(clip.times) == 2)[0])
+    poses, translations = clip.at(np.array([clip.times[k] + 1, clip.times[-1] + 50]))
+    assert poses[0] == pytest.approx(clip.poses[k : k + 2].mean(axis=0), abs=1e-12)
+    assert translations[0] == pytest.approx(clip.translations[k : k + 2].mean(axis=0), abs=1e-12)
+    assert np.array_equal(poses[1], clip.poses[-1])
+    assert np.array_equal(translations[1], clip.translations[-1])
+
+
 def test_a_body_at_rest_leaves_few_frames_and_one_that_moves_all() -> None:
     average = average_skeleton()
     rest = np.zeros((50, 66))

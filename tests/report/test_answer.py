@@ -125,6 +125,28 @@ def test_a_selector_closes_the_gap_where_the_plan_tells_who_wins(tmp_path: Path)
     assert parts["damage: holes 0.3"] == (tough, pytest.approx(1.5))
 
 
+def test_of_many_instances_a_selector_is_trained_of_some_in_no_order_of_the_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # from each side one instance is damaged and one is not: every other one would be of one kind, its selector nonsense
+    monkeypatch.setattr("posefit.report.answer.selection.MOST", 32)
+    made = [
+        result(
+            replace(FIRST, method=name, view_degrees=(5.0 * i,), corruption={"holes": 0.3} if bad else {}), both[bad]
+        )
+        for name, both in {"clean": (1.0, 4.0), "tough": (3.0, 2.5)}.items()
+        for i in range(32)
+        for bad in (0, 1)
+    ]
+    contested = contest_of(runs_of(Ledger(ledger(tmp_path / "results", made))))
+    assert contested is not None
+    found = selection_of(contested)
+    assert found is not None
+    assert (found["instances"], found["trained"]) == (64, 32)
+    assert found["oracle"] == pytest.approx(1.75)
+    assert found["selector"] == pytest.approx(1.75, abs=0.4)
+
+
 def test_a_selector_that_learns_nothing_takes_the_single_best() -> None:
     rng = np.random.default_rng(0)
     errors = rng.uniform(1.0, 2.0, (40, 3)) - np.array([0.5, 0.0, 0.0])

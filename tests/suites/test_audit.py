@@ -46,6 +46,14 @@ def test_the_file_names_problems_of_the_suite_and_costs_below_their_truths() -> 
     assert best_known_of("posefit-2026.1_f001_i00000_d09") is None
 
 
+def test_what_is_best_known_never_rises_and_no_problem_goes() -> None:
+    best = known_file()["best"]
+    assert len(best) >= 151  # in the suite's first version
+    first = {"f004_i10000_d09": 7.427, "f005_i10000_d09": 0.9715, "f005_i10001_d40": 0.9295, "f008_i10000_d40": 0.2070}
+    for name, cost in first.items():
+        assert best[f"posefit-2026.1_{name}"] <= cost
+
+
 def test_the_command_writes_what_it_found_and_keeps_what_is_there(tmp_path: Path) -> None:
     words = ["suite", "audit", "--function", "5", "--instances", "3:5", "--method", "cma", "--times", "5"]
     done = CliRunner().invoke(main, [*words, "--write", str(tmp_path / "known.json")])
@@ -54,10 +62,25 @@ def test_the_command_writes_what_it_found_and_keeps_what_is_there(tmp_path: Path
     found = json.loads((tmp_path / "known.json").read_text("utf-8"))
     truths = {f"posefit-2026.1_f005_i{n:05d}_d09": posefit.suite("posefit-2026.1", 5, n, 9).truth_cost for n in (3, 4)}
     assert found["problems"] == 2
+    assert found["made_by"] == "cma with 5 times the usual budget, and cma with the usual one"
+    assert found["best"]
     assert all(cost < truths[name] for name, cost in found["best"].items())
     again = CliRunner().invoke(main, [*words, "--write", str(tmp_path / "known.json")])
     assert again.exit_code == 2
     assert "expected a new name to write to, got one that exists" in again.stderr
+
+
+def test_what_was_written_says_who_searched_where_nobody_searched_longer(tmp_path: Path) -> None:
+    words = ["suite", "audit", "--function", "1", "--instances", "3:4", "--times", "0", "--method", "random"]
+    done = CliRunner().invoke(main, [*words, "--method", "pso", "--write", str(tmp_path / "known.json")])
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "known.json").read_text("utf-8"))
+    assert found == {"made_by": "random, pso with the usual budget", "problems": 1, "best": {}}
+
+
+def test_the_suites_file_says_what_the_command_of_the_handbook_writes() -> None:
+    usual = "random, sapso, pso, cma, annealed, scipy with the usual one"
+    assert known_file()["made_by"] == f"cma with 100 times the usual budget, and {usual}"
 
 
 def test_a_proposal_of_the_audit_may_be_counted_from_its_numbers_alone() -> None:

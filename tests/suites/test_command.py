@@ -15,6 +15,7 @@ import posefit
 from posefit.cli import main
 from posefit.suites.running import run_on
 from posefit.suites.tally import suite_scores
+from posefit.sweep.engines.engine import Keyed, Outcome, Run
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.single.plan import search_cells
 from posefit.sweep.single.rows import search_runs
@@ -34,18 +35,22 @@ def run(*words: object) -> Result:
     return CliRunner().invoke(main, [str(word) for word in words])
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a ledger of the plan's cells, as a sweep writes it."""
+def swept(folder: Path, *plans: str) -> Path:
+    """Return a folder, once the cells of plans have run into its ledger."""
     from posefit.sweep.driver import Claim, Driver
 
-    folder = tmp_path_factory.mktemp("suite") / "results"
     with Driver(folder) as driver:
-        for cell in search_cells(tomllib.loads(PLAN)):
+        for cell in [cell for plan in plans for cell in search_cells(tomllib.loads(plan))]:
             claim = driver.claim(cell)
             assert isinstance(claim, Claim)
             driver.finish(claim, run_search(cell))
     return folder
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a ledger of the plan's cells, as a sweep writes it."""
+    return swept(tmp_path_factory.mktemp("suite") / "results", PLAN)
 
 
 def test_the_functions_are_listed() -> None:
@@ -85,6 +90,41 @@ def test_scores_are_what_the_traces_say() -> None:
     expected = (sum(hit) + 100 * (3 - len(hit))) / len(hit) if hit else None
     assert score.running_times[16.0] == (None if expected is None else pytest.approx(expected))
     assert list(score.shares) == [1, 3, 10]
+
+
+def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken_together(tmp_path: Path) -> None:
+    plan = """
+suite = "posefit-2026.1"
+methods = ["random"]
+functions = [1]
+instances = [3, 4]
+"""
+    ledger = swept(tmp_path / "out", f"{plan}\nbudgets = [5, 10]", f'{plan}\nbudgets = [10]\ninfeasible = "penalise"')
+    done = run("suite", "table", ledger, "--iohprofiler", tmp_path / "ioh", "--json")
+    assert done.exit_code == 0, done.stderr
+    scores = {(one["budget"], one["infeasible"]): one for one in json.loads(done.stdout)}
+    assert set(scores) == {(45, "repair"), (90, "repair"), (90, "penalise")}
+    for (budget, infeasible), score in scores.items():
+        mine = [
+            run_on(posefit.suite(function=1, instance=n, infeasible=infeasible), "random", evaluations=budget)
+            for n in (3, 4)
+        ]
+        assert (score["method"], score["runs"]) == ("random", 2)
+        assert score["above"] == np.median([one.cost - one.best_known for one in mine])
+    table = run("suite", "table", ledger).stdout
+    assert set(re.findall(r"random, \S+ x d, \w+", table)) == {
+        "random, 5 x d, repair", "random, 10 x d, repair", "random, 10 x d, penalise"
+    }  # fmt: skip
+    told = [json.loads(path.read_text("utf-8"))["algorithm"] for path in (tmp_path / "ioh").rglob("*.json")]
+    assert {json.dumps(json.loads(one["info"]), sort_keys=True) for one in told} == {
+        json.dumps({"evaluations for each dimension": each, "infeasible proposals": way}, sort_keys=True)
+        for each, way in ((5.0, "repair"), (10.0, "repair"), (10.0, "penalise"))
+    }
+    assert len({one["name"] for one in told}) == 3
+
+
+def test_one_budget_and_one_way_are_not_in_the_name(results: Path) -> None:
+    assert "x d," not in run("suite", "table", results).stdout
 
 
 def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not() -> None:
@@ -132,11 +172,54 @@ def test_the_ledger_is_a_table_and_no_report_of_tracks(results: Path, tmp_path: 
     assert list(tmp_path.iterdir()) == []
 
 
+class Inside:
+    """An engine that runs a cell where it is, at once."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._ended: list[Outcome] = []
+
+    def window(self) -> int:
+        return 1
+
+    def submit(self, cell: Keyed) -> None:
+        try:
+            self._ended.append(Outcome(cell, self._run(cell)))
+        except ValueError as error:
+            self._ended.append(Outcome(cell, None, str(error)))
+
+    def wait(self, seconds: float) -> list[Outcome]:
+        ended, self._ended = self._ended, []
+        return ended
+
+    def close(self) -> None: ...
+
+
+def test_a_preview_says_about_how_long_searches_take_and_which_kind_would_fail(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.sweep.engines.processes.Processes", lambda _workers, _limits, run: Inside(run))
+    plan, out = tmp_path / "plan.toml", tmp_path / "out"
+    failing = '{ method = "cma", settings = { spread = -1.0 } }'  # found out where it is built
+    plan.write_text(PLAN.replace('"random",', f'"random", {failing},').replace("[1, 7]", "[1]"), "utf-8")
+    swept(out, PLAN.replace("[1, 7]", "[1]").replace("[9, 24]", "[9]"))
+    done = run("sweep", plan, "--dry-run", "--workers", 1, "--out", out)
+    assert done.exit_code == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert sum(line.endswith("  done") for line in lines) == 4
+    assert len([line for line in lines if line.startswith("warning: cma on f1 in 9D, instance 10000, seed 0: ")]) == 1
+    assert re.fullmatch(r"12 cells, 8 of them to run: about \d+ seconds? on 1 workers", lines[-1])
+    found = json.loads(run("sweep", plan, "--dry-run", "--workers", 1, "--out", out, "--json").stdout)
+    assert [cell["method"] for cell in found["cells"] if cell["done"]] == 2 * ["random", "pso"]
+    assert found["seconds"] > 0.0
+    assert len(found["untried"]) == 2
+
+
 @pytest.mark.slow
 def test_a_sweep_runs_a_plan_of_searches_and_goes_on(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(PLAN.replace("[1, 7]", "[1]").replace("[9, 24]", "[9]"), "utf-8")
     shown = run("sweep", tmp_path / "plan.toml", "--dry-run")
-    assert shown.stdout.splitlines()[-1] == "4 cells, 4 of them to run"
+    assert re.fullmatch(r"4 cells, 4 of them to run: about \d+ seconds? on \d+ workers", shown.stdout.splitlines()[-1])
     words = ("sweep", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", 1)
     done = run(*words)
     assert done.exit_code == 0, done.stderr
@@ -176,6 +259,22 @@ def test_a_mistake_is_one_line_and_status_2(
     assert last.startswith("posefit: ")
     assert re.search(message, last), last
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "random", "--function", 1, "--instances", "3:4", "--out"],
+        ["audit", "--function", 1, "--instances", "3:4", "--times", 0, "--write"],
+        ["table", "ledger", "--iohprofiler"],
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_link_that_leads_nowhere_is_refused_before_anything_runs(words: list[Any], tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "nothing")
+    done = run("suite", *words, tmp_path / "link")
+    assert done.exit_code == 2
+    assert done.stderr == f"posefit: {tmp_path / 'link'}: expected a new name to write to, got one that exists\n"
 
 
 @pytest.mark.parametrize(

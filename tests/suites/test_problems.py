@@ -1,16 +1,17 @@
 """A number stands for the same problem for ever, and a problem counts, repairs and ends as it says."""
 
 import json
-import time
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 import posefit
 from posefit.geometry.skeleton import JOINTS
+from posefit.silhouette.drawn import PoseCount
 from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, box_without, learned_without
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
-from posefit.suites.instances import suite_instance
+from posefit.suites.instances import ATTEMPTS, suite_instance
 from posefit.suites.problem import BudgetSpentError, Problem
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
 
@@ -164,34 +165,62 @@ def test_a_budget_holds_so_many_evaluations_and_no_more() -> None:
         posed(np.zeros(9))
 
 
-def test_a_budget_of_seconds_begins_with_the_first_evaluation() -> None:
-    posed = problem(seconds=0.2)
-    time.sleep(0.25)
+@dataclass
+class Clock:
+    """Stands for the module `time`, and goes when it is told to."""
+
+    now: float
+
+    def perf_counter(self) -> float:
+        return self.now
+
+
+def test_a_budget_of_seconds_begins_with_the_first_evaluation(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock(now=50.0)
+    monkeypatch.setattr("posefit.suites.problem.time", clock)
+    posed = problem(seconds=2.0)
+    clock.now += 3.0
+    assert posed.elapsed == 0.0
     posed(np.zeros(9))
-    time.sleep(0.25)
-    with pytest.raises(BudgetSpentError, match="its 0.2 seconds are over"):
+    clock.now += 2.0
+    posed(np.zeros(9))
+    assert posed.elapsed == 2.0
+    clock.now += 0.5
+    with pytest.raises(BudgetSpentError, match="its 2 seconds are over"):
         posed(np.zeros(9))
-    assert posed.evaluations == 1
+    assert posed.evaluations == 2
 
 
 def test_targets_fall_to_a_quarter_above_the_best_known() -> None:
-    posed = problem(5, 10_000, 9)
-    assert posed.best_known <= posed.truth_cost
-    assert posed.targets - posed.best_known == pytest.approx([2.0 ** (5 - k / 4) for k in range(29)])
-    assert not posed.final_target_hit
-    posed(posed.made.truth)
-    assert posed.final_target_hit or posed.truth_cost > posed.best_known + 0.25
+    for function in (1, 5):
+        posed = problem(function, 10_000, 9)
+        assert posed.targets - posed.best_known == pytest.approx([2.0 ** (5 - k / 4) for k in range(29)])
 
 
-def test_an_instance_is_made_in_less_than_20_milliseconds() -> None:
+def test_the_last_target_is_hit_by_the_truth_of_an_exact_function_and_missed_where_another_body_fits_better() -> None:
+    exact, mismatched = problem(1, 10_000, 9), problem(5, 10_000, 9)
+    assert mismatched.truth_cost > mismatched.best_known + 0.25
+    for posed, hit in ((exact, True), (mismatched, False)):
+        assert not posed.final_target_hit
+        posed(posed.made.truth)
+        assert posed.final_target_hit == hit
+
+
+def test_an_instance_takes_a_few_drawn_poses_and_learns_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In each view one pose is seen, and one compared with it; once more where it is then spoilt or sought otherwise.
+
+    The ambiguous one draws the pose and its mirror image in each attempt.
+    """
+    posefit.suite(SUITE, 1, 0, 9)  # reads the boxes and the clips
+    monkeypatch.setattr(np, "load", lambda *_: pytest.fail("an instance must read nothing, got a file that it reads"))
+    monkeypatch.setattr(np.linalg, "svd", lambda *_: pytest.fail("an instance must learn nothing, got a decomposition"))
+    most = {1: 2, 2: 2, 3: 4, 4: 3, 5: 3, 6: 2 * ATTEMPTS + 1, 7: 2, 8: 3}
     for one in FUNCTIONS:
-        suite_instance(one.number, 0, one.dimensions[0])  # compiles, and reads the boxes
-        times = []
         for number in range(30, 39):
-            began = time.perf_counter()
-            suite_instance(one.number, number, one.dimensions[0])
-            times.append(time.perf_counter() - began)
-        assert np.median(times) < 0.02, one.name
+            count = PoseCount()
+            with count.counting():
+                suite_instance.__wrapped__(one.number, number, one.dimensions[0])
+            assert 2 <= count.poses <= most[one.number], one.name
 
 
 def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
@@ -215,11 +244,15 @@ def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
         ((SUITE, 9, 0, 9), "function must be a whole number from 1 to 8, got 9"),
         ((SUITE, True, 0, 9), "function must be a whole number from 1 to 8, got True"),
         ((SUITE, "1", 0, 9), "function must be a whole number from 1 to 8, got '1'"),
+        ((SUITE, [1], 0, 9), r"function must be a whole number from 1 to 8, got \[1\]"),
+        ((SUITE, 1.0, 0, 9), "function must be a whole number from 1 to 8, got 1.0"),
+        ((SUITE, np.array([1, 2]), 0, 9), r"function must be a whole number from 1 to 8, got array\(\[1, 2\]\)"),
         ((SUITE, 1, -1, 9), "instance must be 0 or more, got -1"),
         ((SUITE, 1, 20_000, 9), "instance must be at most 19999, got 20000"),
         ((SUITE, 1, 1.5, 9), "instance must be a whole number of at least 0, got 1.5"),
         ((SUITE, 7, 0, 9), "dimension of function 7 must be one of 24, 40, 66, got 9"),
         ((SUITE, 1, 0, 10), "dimension of function 1 must be one of 9, 16, 24, 40, got 10"),
+        ((SUITE, 1, 0, np.array([9, 16])), r"dimension of function 1 must be one of .*, got array\(\[ 9, 16\]\)"),
     ],
 )
 def test_a_problem_that_there_is_not_is_named(address: tuple[object, ...], message: str) -> None:
@@ -262,6 +295,12 @@ def test_a_suite_without_problems_is_refused() -> None:
         posefit.Suite(functions=[1], dimensions=[66])
     with pytest.raises(ValueError, match="dimension must be one of 9, 16, 24, 40, 66, got 10"):
         posefit.Suite(dimensions=[10])
+
+
+@pytest.mark.parametrize("name", ["functions", "dimensions", "instances"])
+def test_a_suite_of_one_number_instead_of_a_list_is_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=f"{name} must be a list of numbers, got 9"):
+        posefit.Suite(**{name: 9})  # type: ignore[arg-type]
 
 
 def test_a_box_is_read_and_not_learned() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from posefit.report.live.progress import progress_so_far
 from posefit.sweep import fold, locks
 from posefit.sweep.drive import drive_cells
 from posefit.sweep.driver import Claim, Driver
@@ -20,6 +21,7 @@ from posefit.sweep.locks import on_one_machine
 from tests.sweep.fake import cells, result
 from tests.sweep.test_ledger import Here, filled
 
+DEEP = b"[" * 200_000  # nested more deeply than anybody reads
 ROOT = Path(__file__).parents[2]
 KILLS = 24
 # A driver that is gone right before its nth call that changes a disk, half of the bytes of a write being there.
@@ -140,15 +142,36 @@ def test_a_log_that_somebody_removes_ends_the_sweep_in_one_line(tmp_path: Path) 
             drive_cells(cells(2), driver, Here(), print, lambda _: None)
 
 
-def test_a_damaged_file_of_the_quarantine_is_put_aside_and_its_cell_is_tried_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("content", [b'{"key"', DEEP, b"\xff"])
+def test_a_damaged_file_of_the_quarantine_is_put_aside_and_its_cell_is_tried_again(
+    content: bytes, tmp_path: Path
+) -> None:
     folder = filled(tmp_path / "ledger", 1)
     bad = folder / "quarantine" / f"{cells(2)[1].key}.json"
-    bad.write_bytes(b'{"key"')
+    bad.write_bytes(content)
     said: list[str] = []
     assert Ledger(folder, said.append).quarantined() == []
     assert len(said) == 1
-    assert (folder / "aside" / bad.name).read_bytes() == b'{"key"'
+    assert (folder / "aside" / bad.name).read_bytes() == content
     filled(folder, 2)
+
+
+@pytest.mark.parametrize("content", [b'{"driver"', DEEP, b"\xff", b"{}"])
+def test_a_damaged_claim_holds_nothing(content: bytes, tmp_path: Path) -> None:
+    folder, cell = tmp_path / "ledger", cells(1)[0]
+    with Driver(folder) as driver:
+        (folder / "claims" / f"{cell.key}.1").write_bytes(content)
+        found = driver.claim(cell)
+    assert isinstance(found, Claim)
+    assert found.attempt == 2
+    assert progress_so_far(Ledger(folder)).running == 0
+
+
+def test_a_damaged_note_of_a_plan_is_passed_over(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger", 1)
+    (folder / "plans").mkdir(exist_ok=True)
+    (folder / "plans" / "bad.cells").write_bytes(DEEP)
+    assert Ledger(folder).plans() == []
 
 
 @pytest.mark.parametrize("step", [-86_400.0, 86_400.0])

@@ -1,11 +1,12 @@
 """How far a sweep is, read from its ledger while any number of drivers write to it."""
 
-import json
 import os
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from time import time
 
+from posefit.sweep.driver import held_by
 from posefit.sweep.ledger import CLAIMS, ROWS, SHORT, Ledger
 from posefit.sweep.locks import is_locked
 from posefit.sweep.log import SUFFIX
@@ -46,11 +47,12 @@ def _running(ledger: Ledger) -> int:
     for entry in os.scandir(ledger.path / CLAIMS):
         if entry.name.startswith("."):
             continue
-        with suppress(OSError, ValueError, KeyError, TypeError):  # given up just now, or damaged
-            with open(entry.path, "rb") as file:
-                held = json.loads(file.read())
-            name = str(held["driver"])
+        with suppress(OSError):  # a disk that does not say
+            held = held_by(Path(entry))
+            if held is None or "failed" in held:
+                continue
+            name = held["driver"]
             if name not in lives:
                 lives[name] = is_locked(ledger.path / ROWS / f"{name}{SUFFIX}")
-            count += lives[name] and "failed" not in held
+            count += lives[name]
     return count

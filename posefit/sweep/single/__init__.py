@@ -12,5 +12,6 @@
 |---|---|
 | what a cell is, and what it measures | search.py |
 | a plan becomes cells, all checked before anything runs | plan.py |
+| how long searches take, from two that are shorter | estimate.py |
 | the rows of a ledger as runs with their targets | rows.py |
 """

@@ -1,6 +1,6 @@
 """A plan of single searches becomes cells, all checked before anything runs."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -90,10 +90,8 @@ def _method(value: Any) -> tuple[str, dict[str, Any], str]:
 
 
 def _check_population(method: str, chosen: Mapping[str, Any], evaluations: int) -> None:
-    offer = registry().offer("optimiser", method)
-    known = {setting.name: setting.default for setting in offer.settings}
-    size = chosen.get("particles", known.get("particles", 1))
-    if isinstance(size, int) and size > evaluations:
+    size = settings.population(registry().optimiser(method), chosen, evaluations)
+    if size > evaluations:
         raise ValueError(f"evaluations must hold one population of {size}, got {evaluations} of {method}")
 
 
@@ -116,8 +114,3 @@ def search_line(cell: SearchCell, done: bool) -> str:
     """Return the line that shows a cell of a preview."""
     told = "".join(f", {name}={value}" for name, value in sorted(cell.settings.items()))
     return f"{cell.key[:8]}  {cell}, {cell.evaluations} evaluations{told}{'  done' if done else ''}"
-
-
-def search_json(cells: list[SearchCell], done: set[str]) -> Iterator[dict[str, Any]]:
-    """Yield each cell as JSON holds it."""
-    return ({"key": cell.key, "done": cell.key in done, **cell.spec} for cell in cells)

@@ -35,6 +35,7 @@ def _run(row: Mapping[str, Any]) -> SuiteRun:
         spec["instance"],
         spec["seed"],
         spec["evaluations"],
+        spec["infeasible"],
         row["best_known"],
         row["best_known"] + TARGETS,
         np.array(trace["evaluations"], dtype=np.float64),
