@@ -41,7 +41,7 @@ def suite(context: click.Context, as_json: bool) -> None:
 @click.option(
     "--instances", callback=frame_range, default="10000:10005", show_default=True, metavar="A:B", help="A to B - 1."
 )
-@click.option("--budget", type=int, help="Evaluations of a run; by default 100 for each dimension.")
+@click.option("--budget", type=int, default=100, show_default=True, help="Evaluations for each dimension, as in plans.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
 @click.option("--infeasible", default="repair", show_default=True, help="repair, reject or penalise.")
@@ -53,7 +53,7 @@ def suite_run(
     functions: tuple[int, ...],
     dimensions: tuple[int, ...],
     instances: tuple[int | None, int | None],
-    budget: int | None,
+    budget: int,
     seed: int,
     texts: tuple[str, ...],
     infeasible: Any,
@@ -71,8 +71,7 @@ def suite_run(
     from posefit.suites.tally import score_lines, suite_scores
 
     with results_alone():
-        if budget is not None:
-            whole("budget", budget, 1)
+        whole("budget", budget, 1)
         whole("seed", seed, 0)
         if out is not None:
             check_new(out)
@@ -84,8 +83,14 @@ def suite_run(
             instances=_numbers(instances),
             infeasible=infeasible,
         )
+        for one in problems.passed_over:
+            listed = ", ".join(map(str, one.dimensions))
+            say(f"function {one.number} is left out: it has dimensions {listed}")
         chosen = settings.parse_texts(optimiser, registry().optimiser(optimiser), texts)
-        asked = (run_on(problem, optimiser, chosen, evaluations=budget, seed=seed) for problem in problems)
+        asked = (
+            run_on(problem, optimiser, chosen, evaluations=budget * problem.dimension, seed=seed)
+            for problem in problems
+        )
         runs = list(progress(asked, len(problems), "run"))
         scores = suite_scores(runs)
         if out is not None:

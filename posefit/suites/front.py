@@ -45,8 +45,8 @@ class Suite:
     """Problems to go through: `for problem in Suite(): ...`, as with COCO's. Each is made when its turn comes.
 
     By default that is each function in each of its dimensions, on fifteen held-out instances; a dimension that a
-    function has not is passed over. They come by dimension, function and instance. Raises ValueError where a number is
-    not known, or where nothing is left.
+    function has not is passed over, and a function that has none of them is `passed_over`. They come by dimension,
+    function and instance. Raises ValueError where a number is not known, or where nothing is left.
     """
 
     def __init__(
@@ -67,6 +67,7 @@ class Suite:
         chosen = FUNCTIONS if functions is None else [suite_function(number) for number in functions]
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
+        self.passed_over = tuple(one for one in chosen if not set(dimensions) & set(one.dimensions))
         self.name, self._infeasible, self._budget, self._seconds = name, infeasible, budget, seconds
         self._addresses = [
             checked_address(name, one.number, instance, dimension)

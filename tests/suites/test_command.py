@@ -61,7 +61,7 @@ def test_the_functions_are_listed() -> None:
 
 
 def test_a_run_prints_what_it_reaches_and_writes_what_iohinspector_opens(tmp_path: Path) -> None:
-    words = ("run", "random", "--function", 2, "--instances", "10000:10003", "--budget", 50, "--out", tmp_path / "ioh")
+    words = ("run", "random", "--function", 2, "--instances", "10000:10003", "--budget", 5, "--out", tmp_path / "ioh")
     done = run("suite", *words, "--json")
     assert done.exit_code == 0, done.stderr
     (score,) = json.loads(done.stdout)
@@ -72,10 +72,17 @@ def test_a_run_prints_what_it_reaches_and_writes_what_iohinspector_opens(tmp_pat
     assert set(manager.overview["function_name"]) == {"f2 next frame"}
     data = manager.load(monotonic=False)
     problems = posefit.Suite(functions=[2], dimensions=[9], instances=range(10_000, 10_003))
-    runs = [run_on(problem, "random", evaluations=50) for problem in problems]
+    runs = [run_on(problem, "random", evaluations=45) for problem in problems]
     expected = sorted((int(used), cost) for one in runs for used, cost in zip(one.evaluations, one.costs, strict=True))
     assert sorted(zip(data["evaluations"], data["raw_y"], strict=True)) == expected
     assert [one.evaluations[0] for one in runs] == [1.0, 1.0, 1.0]
+
+
+def test_a_function_without_the_dimension_that_was_asked_for_is_named() -> None:
+    done = run("suite", "run", "random", "--function", 1, "--function", 7, "--instances", "10000:10001", "--budget", 5)
+    assert done.exit_code == 0, done.stderr
+    assert "function 7 is left out: it has dimensions 24, 40, 66" in done.stderr
+    assert "1 single image" in done.stdout
 
 
 def test_scores_are_what_the_traces_say() -> None:
@@ -238,7 +245,7 @@ def test_a_sweep_runs_a_plan_of_searches_and_goes_on(tmp_path: Path) -> None:
         (["run", "sapso", "--instances", "19999:20001"], "got 19999:20001"),
         (["run", "sapso", "--instances", "7"], "expected A:B such as"),
         (["run", "sapso", "--budget", 0], "budget must be at least 1, got 0"),
-        (["run", "sapso", "--budget", 39], "evaluations must hold one population of 40, got 39"),
+        (["run", "sapso", "--budget", 4], "evaluations must hold one population of 40, got 36"),
         (["run", "sapso", "--seed", -1], "seed must be 0 or more, got -1"),
         (["run", "sapso", "--set", "foo=1"], "a setting of sapso must be one of .*, got 'foo'"),
         (["run", "sapso", "--infeasible", "ignore"], "infeasible must be one of repair, reject, penalise, got 'ignore'"),
