@@ -1,0 +1,20 @@
+// The share of targets reached over evaluations, of all functions together and of each.
+function curves() {
+  const figure = ({ title, shares }) => {
+    const box = make("div", { class: "chart" });
+    const drawing = (width) =>
+      chart(
+        width,
+        visible().map(([m, place]) => ({ m, values: shares[place] })),
+        1,
+        { label: `${title}: share of targets reached`, under: "evaluations for each dimension", stepped: true },
+      );
+    return { box, drawing, node: make("figure", {}, make("figcaption", {}, title), box) };
+  };
+  const [all, ...each] = D.curves.map(figure);
+  $("together").append(all.node);
+  $("each").append(...each.map((one) => one.node));
+  if (!each.length) ["each", "each-title"].forEach((id) => $(id).remove());
+  // where the box is in the page it has a width
+  for (const { box, drawing } of [all, ...each]) redraws.push(drawn(box, drawing));
+}
