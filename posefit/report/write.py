@@ -16,7 +16,7 @@ from posefit.report.search.write import board_lines, write_searches
 from posefit.sweep.ledger import Ledger
 
 NAMED = 20  # instances that are named where they are not compared
-ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired runs, Holm, 5 %"
+ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired {}, Holm, 5 %"
 
 Say = Callable[[str], None]
 
@@ -80,8 +80,9 @@ def _searches(ledger: Ledger, out: str, others: dict[str, str | None], csv: str 
 def leaderboard_lines(found: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: who leads, what is left out, the leaderboard, and where the page is."""
     board = found["leaderboard"] or []
-    lines = _board_lines(board) if "times" not in found else board_lines(board)
-    lines += [ALIKE] if any(row["letters"] for row in board) else []
+    searched = "times" in found
+    lines = board_lines(board) if searched else _board_lines(board)
+    lines += [ALIKE.format("instances" if searched else "runs")] if any(row["letters"] for row in board) else []
     answer = [found["answer"]] if found["answer"] else []
     return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
 

@@ -1,4 +1,4 @@
-// A chart of curves over evaluations with their intervals, and the legend whose buttons show and hide methods everywhere.
+// A chart of curves over evaluations with intervals, and the legend whose buttons show and hide methods everywhere.
 const CURVES = 4; // that are shown at first
 const LABELLED = 8; // curves that have their names at their ends
 const hidden = new Set();

@@ -36,7 +36,7 @@ def _where(match: Match) -> str:
     seeds = match.shared.rows.shape[2]
     on = "function" if len(functions) == 1 else "functions"
     return (
-        f"{on} {_series(functions)} in {_series(dimensions)} dimensions, {counted(len(instances), 'instance')} "
+        f"{on} {_series(functions)} in {_series(dimensions)} dimensions, {counted(len(instances), 'instance')} in all "
         f"with {'one seed' if seeds == 1 else f'{seeds} seeds each'}"
     )
 

@@ -1,12 +1,13 @@
 // The share of targets reached over evaluations, of all functions together and of each.
 function curves() {
+  const most = Math.min(1, 1.1 * Math.max(0.05, ...D.curves.flatMap(({ shares }) => shares.map((one) => one.at(-1)))));
   const figure = ({ title, shares }) => {
     const box = make("div", { class: "chart" });
     const drawing = (width) =>
       chart(
         width,
         visible().map(([m, place]) => ({ m, values: shares[place] })),
-        1,
+        most,
         { label: `${title}: share of targets reached`, under: "evaluations for each dimension", stepped: true },
       );
     return { box, drawing, node: make("figure", {}, make("figcaption", {}, title), box) };
