@@ -27,6 +27,23 @@ SCORE = {  # what the first figure shows of methods
     "better": "more",
 }
 
+COLUMNS = {  # what tables show of methods
+    "reached": {
+        "title": "targets %",
+        "about": "Share of all runs and targets that were reached",
+        "digits": SCORE["digits"],
+        "factor": 1.0,
+        "down": True,
+    },
+    "above": {
+        "title": "above",
+        "about": "Median of the best costs above the best known one",
+        "digits": 2,
+        "factor": 1.0,
+        "down": False,
+    },
+}
+
 
 def data_of_searches(searches: Searches) -> dict[str, Any]:
     """Return everything that the page shows of single searches."""
@@ -38,6 +55,7 @@ def data_of_searches(searches: Searches) -> dict[str, Any]:
         "colours": len(METHODS),
         "trivial": {"random": "random search"},
         "score": SCORE,
+        "columns": COLUMNS,
         **({} if match is None else _compared(match)),
         "warnings": [],
         "warned": {},

@@ -1,7 +1,7 @@
 // The share of targets reached over evaluations, of all functions together and of each.
 function curves() {
   const most = Math.min(1, 1.1 * Math.max(0.05, ...D.curves.flatMap(({ shares }) => shares.map((one) => one.at(-1)))));
-  const figure = ({ title, shares }) => {
+  const panel = ({ title, shares }) => {
     const box = make("div", { class: "chart" });
     const drawing = (width) =>
       chart(
@@ -12,7 +12,7 @@ function curves() {
       );
     return { box, drawing, node: make("figure", {}, make("figcaption", {}, title), box) };
   };
-  const [all, ...each] = D.curves.map(figure);
+  const [all, ...each] = D.curves.map(panel);
   $("together").append(all.node);
   $("each").append(...each.map((one) => one.node));
   if (!each.length) ["each", "each-title"].forEach((id) => $(id).remove());

@@ -7,18 +7,8 @@ const named = {
   value: (row) => METHODS[row.method],
   show: (row) => [swatch(row.method), METHODS[row.method]],
 };
-const targetsReached = {
-  title: "targets %",
-  down: true,
-  value: (row) => row.reached,
-  show: (row) => share(row.reached),
-};
-const aboveBest = {
-  title: "above",
-  about: "Median of the best costs above the best known one",
-  value: (row) => row.above,
-  show: (row) => number(row.above, 2),
-};
+const targetsReached = figure("reached", (row) => row.reached);
+const aboveBest = figure("above", (row) => row.above);
 const runsOf = { title: "runs", down: true, value: (row) => row.runs, show: (row) => whole(row.runs) };
 
 function leaderboard() {
@@ -26,7 +16,7 @@ function leaderboard() {
     $("leaders"),
     [
       named,
-      { ...targetsReached, about: "Share of all runs and targets that were reached" },
+      targetsReached,
       {
         title: "95 % interval",
         about: "What other instances would give. Sorts by its width",
