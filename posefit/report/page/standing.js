@@ -34,7 +34,7 @@ function standing(width) {
   const narrow = width < 480;
   const step = narrow ? 38 : 26;
   const longest = Math.min(27, Math.max(...rows.map((row) => row.name.length)));
-  const [left, right] = [narrow ? 10 : 7.4 * longest + 24, width - (narrow ? 12 : 66)];
+  const [left, right] = [narrow ? 14 : 7.4 * longest + 24, width - (narrow ? 12 : 66)];
   const bases = D.baselines.filter((row) => given(row[of])).sort((a, b) => a[of] - b[of]);
   const spans = rows.flatMap((row) => [row[of], row.low, row.high].filter((one) => given(one) && one > 0));
   const scale = scoreScale([...spans, ...bases.map((row) => row[of])], left, right);
