@@ -10,7 +10,7 @@ from posefit.report.answer.lead import alike
 from posefit.report.colours import METHODS
 from posefit.report.content import REASONS
 from posefit.report.search.answer import search_sentence
-from posefit.report.search.match import Match, baseline_rows, leaderboard, left_out, match_of, paired_tests
+from posefit.report.search.match import Match, instance_tests, left_out, match_of, random_rows, search_board
 from posefit.report.search.rows import Searches
 from posefit.statistics.profiles import attained
 from posefit.suites.functions import suite_function
@@ -95,9 +95,9 @@ def _name(function: int, dimension: int, instance: int, _: str) -> str:
 
 
 def _compared(match: Match) -> dict[str, Any]:
-    tests = paired_tests(match)
-    board = leaderboard(match, tests)
-    bases = baseline_rows(match, board)
+    tests = instance_tests(match)
+    board = search_board(match, tests)
+    bases = random_rows(match, board)
     evaluations = _grid(match)
     return {
         "answer": search_sentence(match, board, bases, tests),

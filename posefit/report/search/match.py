@@ -64,7 +64,7 @@ def _rows(searches: Searches) -> Rows:
     return Rows(searches.method, searches.problem, searches.seed, ALL - searches.reached)
 
 
-def leaderboard(match: Match, tests: dict[str, Any] | None) -> list[dict[str, Any]]:
+def search_board(match: Match, tests: dict[str, Any] | None) -> list[dict[str, Any]]:
     """Return a row a method, the highest share of targets first; those that take no part come last, with their own."""
     found: list[dict[str, Any]] = []
     shares = match.reached()
@@ -90,7 +90,7 @@ def leaderboard(match: Match, tests: dict[str, Any] | None) -> list[dict[str, An
     return [{**row, "letters": letters.get(row["method"], "")} for row in found]
 
 
-def baseline_rows(match: Match, board: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def random_rows(match: Match, board: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return what random search reached on the same runs, the best where it has several variants; none without it."""
     mine = [row["reached"] for row in board if row["taking_part"] and is_random(match.searches, row["method"])]
     return [{"baseline": RANDOM, "reached": max(mine)}] if mine else []
@@ -101,7 +101,7 @@ def is_random(searches: Searches, method: int) -> bool:
     return bool(searches.variants[method]["method"] == RANDOM)
 
 
-def paired_tests(match: Match) -> dict[str, Any] | None:
+def instance_tests(match: Match) -> dict[str, Any] | None:
     """Return Wilcoxon's signed ranks of each two methods over instances, in targets missed; None of too few.
 
     `pairs` lists first, second, median difference in per cent, p, and p after Holm; a difference below 0 is in favour

@@ -9,7 +9,7 @@ import pytest
 
 from posefit.report.search.answer import search_sentence
 from posefit.report.search.content import data_of_searches
-from posefit.report.search.match import Match, baseline_rows, leaderboard, left_out, match_of, paired_tests
+from posefit.report.search.match import Match, instance_tests, left_out, match_of, random_rows, search_board
 from posefit.report.search.rows import searches_of
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger
@@ -23,15 +23,15 @@ def match(path: Path) -> Match:
 
 
 def sentence(one: Match) -> str:
-    tests = paired_tests(one)
-    board = leaderboard(one, tests)
-    return search_sentence(one, board, baseline_rows(one, board), tests)
+    tests = instance_tests(one)
+    board = search_board(one, tests)
+    return search_sentence(one, board, random_rows(one, board), tests)
 
 
 def test_who_leads_on_what_and_how_surely_is_one_sentence(tmp_path: Path) -> None:
     # of 29 targets 10, 11 or 12 in turn, by function and instance: 11 on average, 37.9 %
     one = match(searched(tmp_path / "r", {"cma": 10, "random": 2}, problems([1, 5], [9, 24], 3)))
-    board = leaderboard(one, paired_tests(one))
+    board = search_board(one, instance_tests(one))
     assert [(row["name"], row["runs"], row["letters"]) for row in board] == [("cma", 12, "a"), ("random", 12, "b")]
     assert [row["reached"] for row in board] == pytest.approx([1100.0 / 29.0, 300.0 / 29.0])
     assert sentence(one) == (
@@ -44,7 +44,7 @@ def test_who_leads_on_what_and_how_surely_is_one_sentence(tmp_path: Path) -> Non
 
 def test_the_interval_is_that_of_instances_and_two_dimensions_of_one_are_no_two_of_them(tmp_path: Path) -> None:
     flat, both = (searched(tmp_path / str(len(d)), {"cma": 10}, problems([1], d, 3)) for d in ([9], [9, 24]))
-    rows = [leaderboard(match(path), None)[0] for path in (flat, both)]
+    rows = [search_board(match(path), None)[0] for path in (flat, both)]
     # 10, 11 and 12 of 29: a standard deviation of 1, so t of 2 degrees of freedom, 4.302653, over the root of 3
     assert rows[0]["high"] - rows[0]["reached"] == pytest.approx(4.302653 / math.sqrt(3.0) * 100.0 / 29.0)
     assert rows[1]["high"] == pytest.approx(rows[0]["high"])
@@ -59,7 +59,7 @@ def test_random_search_that_leads_is_called_so_and_without_it_there_is_no_baseli
         "cma leads with 17.2 % of all targets reached on function 1 in 9 dimensions, 1 instance in all with one seed; "
         "no other method shares its runs."
     )
-    assert baseline_rows(alone, leaderboard(alone, None)) == []
+    assert random_rows(alone, search_board(alone, None)) == []
     once = match(searched(tmp_path / "c", {"cma": 3, "pso": 2}, problems([1], [9, 24], 1)))
     assert "; one shared instance is too few to tell it apart from any other method" in sentence(once)
 
