@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from email.message import Message
 from http.client import HTTPConnection
+from http.server import ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from posefit.report.live.progress import Progress, progress_so_far
 from posefit.report.live.server import LOOPBACK, Handler, Showing, address_of, serving
 from posefit.sweep.driver import Claim, Driver
 from posefit.sweep.ledger import PLANS, Ledger
-from tests.cli.test_command_line import fails
+from tests.cli.test_command_line import fails, run
 from tests.report.browser import browser, ledger, opened, result
 from tests.sweep.fake import cells
 
@@ -201,6 +202,23 @@ def test_ctrl_c_ends_it_with_status_0_after_one_line_with_the_address(begun: Pat
         assert process.wait(60) == 0
         assert process.stdout.read() == process.stderr.read() == ""
     assert sorted(begun.rglob("*")) == before
+
+
+@pytest.mark.parametrize("early", [True, False])
+def test_ctrl_c_ends_it_with_status_0_before_and_after_it_answers_too(
+    begun: Path, monkeypatch: pytest.MonkeyPatch, early: bool
+) -> None:
+    @contextmanager
+    def interrupted(*_: object) -> Iterator[ThreadingHTTPServer]:
+        if early:
+            raise KeyboardInterrupt
+        with serving(begun, 0, lambda _: None) as server:
+            server.serve_forever = lambda *_: None  # type: ignore[method-assign]
+            yield server
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("posefit.report.live.server.serving", interrupted)
+    assert run("report", begun, "--serve").exit_code == 0
 
 
 @contextmanager
