@@ -1,7 +1,9 @@
 """What several folders of tests share, and which tests a plain run leaves out."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,3 +27,12 @@ def cmu() -> Path:
     if not (folder / "manifest.tsv").is_file():
         pytest.skip(f"no CMU clips in {folder}: name their folder in the environment variable POSEFIT_CMU")
     return folder
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """Return a headless browser, or skip the test where there is none."""
+    from tests.report.browser import browser
+
+    with browser() as found:
+        yield found

@@ -73,7 +73,7 @@ def _next(lines: Iterator[str], as_json: bool) -> str:
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json: bool, **others: Any) -> None:
-    """Write what a sweep to DIR found as one page that any browser opens, offline.
+    """Write what a sweep to DIR found, of tracks or of single searches, as one page that any browser opens, offline.
 
     It may be written while the sweep goes on, of the cells that are done. With --serve a page shows how far it is, what
     failed and the report so far, and loads itself anew until Ctrl-C ends it.
@@ -98,7 +98,6 @@ def _serve(ledger: str, port: int) -> None:
     """Show the report of a ledger until somebody presses Ctrl-C."""
     from posefit.report.live.server import address_of, serving
 
-    with serving(ledger, port, say) as server:
+    with suppress(KeyboardInterrupt), serving(ledger, port, say) as server:
         click.echo(f"showing {ledger} at {address_of(server)} until Ctrl-C")
-        with suppress(KeyboardInterrupt):
-            server.serve_forever()
+        server.serve_forever()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 PART = "<!--part-->"  # in the markup: where style, data and scripts go
-SHARED = ("base", "body", "play")  # scripts of every page, in this order
+SHARED = ("base", "body", "play")  # scripts of pages with bodies, in this order; of others the first is enough
 _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
 
@@ -25,9 +25,10 @@ def assembled(mark: str, markup: str, style: str, data: Any, script: str) -> str
     return "".join([mark, before, look, middle, held, after, f"<script>\n{script}</script>", end])
 
 
-def as_one(package: str, names: Sequence[str]) -> str:
-    """Return the shared scripts and those of a package as one, so that no name of theirs reaches beyond it."""
-    parts = [part(__package__, f"{name}.js") for name in SHARED] + [part(package, f"{name}.js") for name in names]
+def as_one(shared: Sequence[str], *others: tuple[str, Sequence[str]]) -> str:
+    """Return scripts as one, so that no name of theirs reaches beyond it: those shared, then of each other package."""
+    rooms = [(__package__, shared), *others]
+    parts = [part(package, f"{name}.js") for package, names in rooms for name in names]
     return '"use strict";\n(() => {\n' + "\n".join(parts) + "})();\n"
 
 

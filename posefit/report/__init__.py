@@ -21,6 +21,7 @@ r"""What a ledger says: one page that any browser opens, figures and tables for 
 | cost over evaluations, targets reached, errors of joints, how sure methods are, as numbers | curves.py |
 | everything the page shows, as data; its moving pictures | content.py, gallery.py |
 | what the first screen says: who leads, what was claimed of it, who wins where | answer/ |
+| the report of a ledger of single searches | search/ |
 | the report of a sweep that goes on, shown to this machine alone | live/ |
 | the page: its markup, style and scripts, and how they become one file | page/ |
 | figures by matplotlib; colours; all of a paper's files in one folder | figures.py, colours.py, portfolio.py |

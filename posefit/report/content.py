@@ -11,7 +11,7 @@ from posefit.claims import claimed_orders
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
 from posefit.report.answer.claimed import claim_results
-from posefit.report.answer.lead import lead_sentence, three_tracks
+from posefit.report.answer.lead import alike, lead_sentence, three_tracks
 from posefit.report.answer.selection import selection_of
 from posefit.report.colours import METHODS
 from posefit.report.columns import COLUMNS
@@ -29,6 +29,14 @@ from posefit.report.runs import Runs, shown_of
 from posefit.sweep.ledger import Ledger
 from posefit.tracking.measures import BASELINES
 
+SCORE = {  # what the first figure shows of methods
+    "name": "error",
+    "said": "Errors in degrees",
+    "axis": "error in degrees",
+    "unit": "°",
+    "digits": 2,
+    "better": "less",
+}
 REASONS = 5  # of failures, the most frequent ones, that are named at the top
 
 
@@ -47,6 +55,7 @@ def data_of(ledger: Ledger, runs: Runs, say: Callable[[str], None]) -> dict[str,
         "colours": len(METHODS),
         "columns": {name: COLUMNS[name].about() for name in shown_of(runs)},
         "trivial": BASELINES,
+        "score": SCORE,
         **compared,
         "rows": _rows(runs),
         **_warned(runs),
@@ -105,6 +114,7 @@ def _compared(contest: Contest) -> dict[str, Any]:
     tests = paired_tests(contest) if enough else None
     return {
         "answer": lead_sentence(contest, board, bases, tests),
+        "alike": alike(tests, board[0]["method"]),
         "tracks": three_tracks(contest, board[0]["method"]),
         "leaderboard": board,
         "baselines": bases,

@@ -13,14 +13,13 @@ from posefit.report.runs import Runs
 from posefit.statistics.improvement import improvement_interval, probability_of_improvement
 from posefit.statistics.intervals import LEAST_RESAMPLES, RESAMPLES, TRIMMED, Intervals, iqm_intervals
 from posefit.statistics.letters import compact_letters
-from posefit.statistics.pairing import paired, shared
 from posefit.statistics.ranks import LEVEL, friedman, wilcoxon
+from posefit.statistics.sharing import Rows, gaps, most_shared
 from posefit.tracking.measures import BASELINES
 
 SEED = 2013  # of every bootstrap
 WORK = 1e8  # numbers that the resamples of one study may come to
 LEAST_SEEDS = 3  # below, a probability of improvement has no interval: two seeds say too little
-LEAST_SHARE = 0.5  # of the runs of all methods but one, that are shared with it; below, it does not take part
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,42 +53,8 @@ def contest_of(runs: Runs) -> Contest | None:
 
     A method with which less than half of the runs that the others share would be left does not take part.
     """
-    counts = np.bincount(runs.method[np.isfinite(runs.figures["error"])], minlength=len(runs.methods))
-    taking = sorted(np.flatnonzero(counts).tolist(), key=lambda m: (-counts[m], m))
-    every = _shared(runs, taking) if taking else None
-    if every is not None and every.rows[0].size >= LEAST_SHARE * counts.max():
-        return every
-    best: Contest | None = None
-    accepted: list[int] = []
-    for m in taking:
-        found = _shared(runs, [*accepted, m])
-        if found is not None and (best is None or found.rows[0].size >= LEAST_SHARE * best.rows[0].size):
-            best = found
-            accepted.append(m)
-    return best
-
-
-def _shared(runs: Runs, methods: Sequence[int]) -> Contest | None:
-    chosen = np.isin(runs.method, methods) & np.isfinite(runs.figures["error"])
-    index = {
-        (int(m), int(i), int(s)): int(k)
-        for k, m, i, s in zip(
-            np.flatnonzero(chosen), runs.method[chosen], runs.instance[chosen], runs.seed[chosen], strict=True
-        )
-    }
-    rows = sorted((str(m), i, s, float(runs.figures["error"][k])) for (m, i, s), k in index.items())
-    try:
-        kept, left_out = shared(rows)
-    except ValueError:  # they have nothing in common
-        return None
-    block = paired(kept)
-    order = np.argsort([int(name) for name in block.methods])
-    instances = [int(str(one)) for one in block.instances]
-    table = [
-        [[index[int(block.methods[m]), i, s] for s in seeds] for i, seeds in zip(instances, block.seeds, strict=True)]
-        for m in order
-    ]
-    return Contest(runs, tuple(int(block.methods[m]) for m in order), tuple(instances), np.array(table), left_out)
+    found = most_shared(_rows(runs))
+    return None if found is None else Contest(runs, found.methods, found.instances, found.rows, found.left_out)
 
 
 def dropped(contest: Contest) -> list[dict[str, Any]]:
@@ -97,14 +62,12 @@ def dropped(contest: Contest) -> list[dict[str, Any]]:
 
     A method that takes part has runs of it, but one of the others has not, or none with the same seed.
     """
-    runs = contest.runs
-    finished = np.isfinite(runs.figures["error"])
-    found = []
-    for instance in np.unique(runs.instance[finished & np.isin(runs.method, contest.methods)]).tolist():
-        if instance not in contest.instances:
-            there = set(runs.method[finished & (runs.instance == instance)].tolist())
-            found.append({"instance": instance, "missing": [m for m in contest.methods if m not in there]})
-    return found
+    found = gaps(_rows(contest.runs), contest.methods, contest.instances)
+    return [{"instance": instance, "missing": missing} for instance, missing in found]
+
+
+def _rows(runs: Runs) -> Rows:
+    return Rows(runs.method, runs.instance, runs.seed, runs.figures["error"])
 
 
 def resamples(numbers: int) -> int:

@@ -7,6 +7,7 @@ from posefit.sweep.cell import setting_text
 from posefit.sweep.check import FIELDS
 
 LAST = ("instance", "seed")  # what rows of one head differ by
+_BEGIN = "posefit sweep - --out rerun <<'END'\n"
 _ESCAPES = {'"': '\\"', "\\": "\\\\"}
 
 
@@ -21,7 +22,19 @@ def command_head(spec: Mapping[str, Any]) -> str:
     The shell reads the plan as it is, whatever names it holds: each of its lines begins with a field's name.
     """
     lines = [f"{name} = {_toml(_plain(name, spec[name]))}\n" for name in FIELDS if name in spec and name not in LAST]
-    return "posefit sweep - --out rerun <<'END'\n[[cells]]\n" + "".join(lines)
+    return _BEGIN + "[[cells]]\n" + "".join(lines)
+
+
+def search_command(spec: Mapping[str, Any]) -> str:
+    """Return what a shell runs to get the row of a single search again, in the ledger `rerun`."""
+    plan = {
+        "suite": spec["suite"],
+        "methods": [{"method": spec["method"], "settings": spec["settings"]}],
+        **{f"{name}s": [spec[name]] for name in ("function", "dimension", "instance", "seed")},
+        "budgets": [spec["evaluations"] // spec["dimension"]],
+        "infeasible": spec["infeasible"],
+    }
+    return _BEGIN + "".join(f"{name} = {_toml(value)}\n" for name, value in plan.items()) + "END"
 
 
 def _plain(name: str, value: Any) -> Any:
@@ -34,6 +47,8 @@ def _toml(value: Any) -> str:
         return "{ " + ", ".join(f"{_string(name)} = {_toml(one)}" for name, one in value.items()) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
     return _string(value) if isinstance(value, str) else str(value)
 
 

@@ -66,11 +66,18 @@ def runs_of(ledger: "Ledger") -> Runs:
 def runs_so_far(ledger: "Ledger") -> Runs:
     """Return the same of a ledger that may hold nothing yet."""
     found = _Table()
+    lost = ledger.quarantined()
     for row in ledger.rows():
-        if is_search(row["spec"]):
-            raise ValueError(f"{ledger.path}: expected a ledger of tracks, got one of searches: posefit suite table")
+        _check_track(ledger, row)
         found.add(row)
-    return found.runs(ledger.version, ledger.quarantined())
+    for row in lost:
+        _check_track(ledger, row)
+    return found.runs(ledger.version, lost)
+
+
+def _check_track(ledger: "Ledger", row: Mapping[str, Any]) -> None:
+    if is_search(row["spec"]):
+        raise ValueError(f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one")
 
 
 def shown_of(runs: Runs) -> list[str]:
@@ -135,14 +142,14 @@ class _Table:
         seeds = np.array([ranks[seed] for seed in self.seeds], dtype=int)
         order = np.lexsort((seeds, numbers[:, 0], numbers[:, 1]))
         variants, places = [variants[m] for m in best], [places[i] for i in sorted_places]
-        methods = _distinct([one["method"] for one in variants], [_variation(one) for one in variants])
+        methods = distinct([one["method"] for one in variants], [_variation(one) for one in variants])
         method, instance, begun = numbers[order].T
         lost = Counter(_variant(one["spec"]) for one in quarantined)
         return Runs(
             version=version,
             methods=methods,
             variants=tuple({**one, "settings": ", ".join(settings_text(one["settings"]))} for one in variants),
-            instances=_distinct([_place(one) for one in places], [_rest(one) for one in places]),
+            instances=distinct([_place(one) for one in places], [_rest(one) for one in places]),
             places=tuple(places),
             heads=tuple(list(self.heads)[k] for k in heads),
             method=method,
@@ -212,7 +219,7 @@ def _rest(place: Mapping[str, Any]) -> list[str]:
     return [f"{name} {_text(value)}" for name, value in place.items() if name not in _PLACE]
 
 
-def _distinct(names: Sequence[str], more: Sequence[Sequence[str]]) -> tuple[str, ...]:
+def distinct(names: Sequence[str], more: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """Return names, those that occur twice with what makes them differ."""
     alike: dict[str, list[Sequence[str]]] = {}
     for name, words in zip(names, more, strict=True):

@@ -10,10 +10,12 @@ from posefit.page.document import plain
 from posefit.report.content import data_of
 from posefit.report.page.webpage import MARK, document
 from posefit.report.runs import runs_of
+from posefit.report.search.rows import holds_searches, searches_of
+from posefit.report.search.write import board_lines, write_searches
 from posefit.sweep.ledger import Ledger
 
 NAMED = 20  # instances that are named where they are not compared
-ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired runs, Holm, 5 %"
+ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired {}, Holm, 5 %"
 
 Say = Callable[[str], None]
 
@@ -40,6 +42,8 @@ def write_report(
 
         check_figure("any.png")
     ledger = Ledger(path, say)
+    if holds_searches(ledger):
+        return _searches(ledger, out, {"figures": figures, "iohprofiler": iohprofiler}, csv)
     runs = runs_of(ledger)
     data = data_of(ledger, runs, say)
     with replaced_file(out, MARK.encode()) as building:
@@ -51,10 +55,7 @@ def write_report(
     if iohprofiler is not None:
         _write_iohprofiler(ledger, iohprofiler)
     if csv is not None:
-        from posefit.report.export import write_csv
-        from posefit.sweep.table import flat
-
-        write_csv(map(flat, ledger.all_rows()), csv)
+        _write_csv(ledger, csv)
     said = {name: data.get(name) for name in ("header", "answer", "leaderboard", "baselines", "claims", "selection")}
     gaps = [
         {"instance": runs.instances[one["instance"]], "missing": [runs.methods[m] for m in one["missing"]]}
@@ -63,20 +64,37 @@ def write_report(
     return {"out": out, **dict(plain(said)), "gaps": gaps}
 
 
+def _searches(ledger: Ledger, out: str, others: dict[str, str | None], csv: str | None) -> dict[str, Any]:
+    """Write the report of single searches, and return what it says."""
+    for name, place in others.items():
+        if place is not None:
+            table = f": posefit suite table {ledger.path} --iohprofiler" if name == "iohprofiler" else ""
+            raise ValueError(f"--{name} must be given with a sweep of tracks, got one of single searches{table}")
+    found = write_searches(searches_of(ledger), out)
+    if csv is not None:
+        _write_csv(ledger, csv)
+    return found
+
+
 def leaderboard_lines(found: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: who leads, what is left out, the leaderboard, and where the page is."""
+    board = found["leaderboard"] or []
+    searched = "times" in found
+    lines = board_lines(board) if searched else _board_lines(board)
+    lines += [ALIKE.format("instances" if searched else "runs")] if any(row["letters"] for row in board) else []
+    answer = [found["answer"]] if found["answer"] else []
+    return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
+
+
+def _board_lines(board: list[dict[str, Any]]) -> list[str]:
     lines = []
-    for row in found["leaderboard"] or []:
+    for row in board:
         ends = "" if row["low"] is None else f"{row['low']:.2f} to {row['high']:.2f}"
         skill = "-" if row["skill_mean_pose"] is None else f"{row['skill_mean_pose']:.2f}"
         error = "-" if row["error"] is None else f"{row['error']:.2f}"
         lines.append(f"{row['name'][:32]:32} {error:>9} {ends:>15} {skill:>7}  {row['letters']}".rstrip())
-    if lines:
-        lettered = any(row["letters"] for row in found["leaderboard"])
-        head = f"{'':32} {'error deg':>9} {'95 % interval':>15} {'skill':>7}"
-        lines = [f"{head}  alike" if lettered else head, *lines, *([ALIKE] if lettered else [])]
-    answer = [found["answer"]] if found["answer"] else []
-    return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
+    head = f"{'':32} {'error deg':>9} {'95 % interval':>15} {'skill':>7}"
+    return [f"{head}  alike" if any(row["letters"] for row in board) else head, *lines] if lines else []
 
 
 def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:
@@ -118,6 +136,13 @@ def _check(ledger: Path, out: str, others: list[str | None]) -> None:
             check_new(other)
     for place in places:
         check_place(place)
+
+
+def _write_csv(ledger: Ledger, path: str) -> None:
+    from posefit.report.export import write_csv
+    from posefit.sweep.table import flat
+
+    write_csv(map(flat, ledger.all_rows()), path)
 
 
 def _write_iohprofiler(ledger: Ledger, path: str) -> None:

@@ -17,7 +17,9 @@ together. Randomness comes from a numpy Generator alone.
 | looking for | field's term | file |
 |---|---|---|
 | runs side by side, and what is left of a sweep with gaps | paired, blocked design | pairing.py |
+| which methods share enough runs to be held against each other | | sharing.py |
 | the mean of the middle half, and how sure it is | interquartile mean, studentised bootstrap | intervals.py |
+| the mean of runs of which some have a draw in common | stratified cluster sample | means.py |
 | which method is better, judged by order alone | Friedman, Nemenyi, Wilcoxon, Holm | ranks.py |
 | which methods share a letter, as no test tells them apart | compact letter display | letters.py |
 | how probably a run of one beats a run of another | probability of improvement, Mann-Whitney's U | improvement.py |

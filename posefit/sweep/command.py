@@ -42,7 +42,7 @@ def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = Fal
     with closing(start()) as running:  # without an engine there is no folder either
         tally = swept(cells, out, running, say, retry_quarantined)
     status = STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
-    return tally, status, _showing(cells, out)
+    return tally, status, _showing(out)
 
 
 def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quarantined: bool = False) -> Tally:
@@ -134,10 +134,8 @@ def engine(where: Where, run: Run = run_cell) -> Callable[[], Engine]:
     return start
 
 
-def _showing(cells: Cells, out: str) -> str:
+def _showing(out: str) -> str:
     """Return the command that shows what a sweep found."""
-    if not isinstance(cells, Plan):
-        return f"posefit suite table {shlex.quote(out)}"
     return f"posefit report {shlex.quote(out)} --out {shlex.quote(f'{out.rstrip(os.sep)}.html')}"
 
 

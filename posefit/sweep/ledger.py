@@ -259,13 +259,16 @@ def create(path: Path) -> None:
 
 def _version(path: Path) -> str:
     """Return the version of posefit whose results a ledger holds."""
+    if os.path.isfile(path):
+        raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got a file")
     try:
         index = parsed_json(read_text(path / INDEX, LARGEST_INDEX))
         form, version = index["format"], index["version"]
-    except (FileNotFoundError, NotADirectoryError):
+    except FileNotFoundError:
         raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {cut(str(error))}") from None
+        said = str(error).removeprefix(f"{path / INDEX}: ")
+        raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {cut(said)}") from None
     if form != FORMAT or not isinstance(version, str):
         raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")
     return version

@@ -9,15 +9,23 @@ from pathlib import Path
 import pytest
 
 from posefit.page.document import SHARED
+from posefit.report.page.webpage import COMMON, script
 from posefit.report.page.webpage import SCRIPTS as OF_REPORT
-from posefit.report.page.webpage import script
+from posefit.report.search.page.webpage import SCRIPTS as OF_SEARCHES
+from posefit.report.search.page.webpage import search_script
 from posefit.tracking.page.webpage import SCRIPTS as OF_VIEWER
 from posefit.tracking.page.webpage import viewer_script
 
 LONGEST = 120
 ROOT = Path(__file__).parents[2]
-WHOLE = {"report": script, "viewer": viewer_script}
-NAMES = {"posefit.page": SHARED, "posefit.report.page": OF_REPORT, "posefit.tracking.page": OF_VIEWER}
+WHOLE = {"report": script, "searches": search_script, "viewer": viewer_script}
+NAMES = {
+    "posefit.page": SHARED,
+    "posefit.report.page": (*COMMON, *OF_REPORT),
+    "posefit.report.search.page": OF_SEARCHES,
+    "posefit.tracking.page": OF_VIEWER,
+}
+OF_ALL = {"report": SHARED, "searches": SHARED[:1], "viewer": SHARED}  # what of the shared scripts a page has
 PARTS = {name: [one for one in files(name).iterdir() if one.name.endswith((".js", ".css", ".html"))] for name in NAMES}
 
 
@@ -37,7 +45,7 @@ def test_every_script_is_part_of_its_page(package):
 
 @pytest.mark.parametrize("page", WHOLE)
 def test_what_pages_share_stands_in_each_of_them_once(page):
-    for name in SHARED:
+    for name in OF_ALL[page]:
         (part,) = (one for one in PARTS["posefit.page"] if one.name == f"{name}.js")
         assert WHOLE[page]().count(part.read_text("utf-8")) == 1
 

@@ -17,6 +17,8 @@ from posefit.sweep.driver import Driver
 from posefit.sweep.ledger import QUARANTINE, ROWS
 from posefit.sweep.log import Writer
 
+# what no page may take for markup
+EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028'\"&"
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
 

@@ -1,7 +1,6 @@
 """Everybody can read the report: contrast in light and dark, what axe-core finds, marks beside colours, no motion."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import pytest
 from posefit.page.document import part
 from posefit.report.colours import DARK, LIGHT
 from tests.cli.test_command_line import run
-from tests.report.browser import browser, ledger, opened, result, sure
+from tests.report.browser import ledger, opened, result, sure
 from tests.sweep.fake import cells
 
 FIRST = replace(cells(1)[0], frames=4)
@@ -45,12 +44,6 @@ def test_colours_stand_out_from_what_is_behind_them(scheme: int, colours: dict[s
     for name, colour in shown.items():
         if colour.startswith("#"):
             assert min(ratio(colour, base[behind]) for behind in ("back", "card")) >= LEAST, (name, colour)
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """A report while the sweep goes on: how far it is, what failed, and the report so far, on this machine alone."""
 
+import io
 import json
 import os
 import re
@@ -12,17 +13,19 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from email.message import Message
 from http.client import HTTPConnection
+from http.server import ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from posefit.report.live.progress import Progress, progress_so_far
-from posefit.report.live.server import LOOPBACK, address_of, serving
+from posefit.report.live.server import LOOPBACK, Handler, Showing, address_of, serving
 from posefit.sweep.driver import Claim, Driver
 from posefit.sweep.ledger import PLANS, Ledger
-from tests.cli.test_command_line import fails
+from tests.cli.test_command_line import fails, run
 from tests.report.browser import browser, ledger, opened, result
 from tests.sweep.fake import cells
 
@@ -99,7 +102,7 @@ def test_the_page_is_the_report_with_the_progress_and_reasons(begun: Path) -> No
     data = data_in(text)
     assert status == 200
     assert data["live"] == {"cells": 6, "done": 3, "quarantined": 1, "left": 2, "running": 0, "seconds": None,
-                            "rows": 3, "again": data["live"]["again"]}  # fmt: skip
+                            "again": data["live"]["again"]}  # fmt: skip
     assert data["live"]["again"] >= 5.0
     assert data["failures"][0]["reasons"] == ["ValueError: it had to"]
 
@@ -112,10 +115,72 @@ def test_before_the_first_cell_is_done_there_is_a_page_too(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("asked", "status"), [({"Host": "evil.example"}, 403), ({"path": "/../etc/passwd"}, 404), ({"path": "/?x"}, 200)]
+    ("asked", "status"),
+    [
+        ({"Host": "evil.example"}, 403),
+        ({"Host": "localhost.evil.example"}, 403),
+        ({"Host": "localhost:80@evil.example"}, 403),
+        ({"Host": ""}, 403),
+        ({"Host": "localhost"}, 200),
+        ({"Host": "LocalHost:1"}, 200),
+        ({"Host": "127.0.0.1"}, 200),
+        ({"path": "/../etc/passwd"}, 404),
+        ({"path": "/?x"}, 200),
+    ],
 )
 def test_it_answers_to_this_machine_and_with_one_page(tmp_path: Path, asked: dict[str, str], status: int) -> None:
     assert page_of(ledger(tmp_path / "results", []), **asked)[0] == status
+
+
+def test_whoever_asks_too_early_gets_what_was_made_last_and_a_failure_rests_too(
+    begun: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, made = [100.0], []
+
+    def takes_two_seconds(self: Showing, began: float) -> str:
+        made.append(began)
+        now[0] += 2.0
+        if len(made) == 2:
+            raise OSError("the disk has gone")
+        return f"page {len(made)}"
+
+    monkeypatch.setattr("posefit.report.live.server.monotonic", lambda: now[0])
+    monkeypatch.setattr(Showing, "_page", takes_two_seconds)
+    showing = Showing(begun, lambda _: None)
+    assert [showing.page(), showing.page()] == ["page 1", "page 1"]
+    now[0] = 108.0  # of eight seconds two were work
+    for _ in range(2):
+        with pytest.raises(ValueError, match="the disk has gone"):
+            showing.page()
+    assert made == [100.0, 108.0]
+    now[0] = 116.0
+    assert showing.page() == "page 3"
+
+
+def test_a_reader_who_has_gone_away_is_no_fault(capsys: pytest.CaptureFixture[str], begun: Path) -> None:
+    class Gone(Handler):
+        def __init__(self) -> None:
+            self.path, self.request_version, self.requestline, self.command = "/", "HTTP/1.1", "GET / HTTP/1.1", "GET"
+            self.headers = Message()
+            self.headers["Host"] = "localhost"
+            self.shown, self.wfile = Showing(begun, lambda _: None), Closed()
+
+    class Closed(io.BytesIO):
+        def write(self, _: object) -> int:
+            written.append(1)
+            raise BrokenPipeError
+
+    written: list[int] = []
+    Gone().do_GET()
+    assert len(written) == 1  # no second answer, which would say 500
+    assert capsys.readouterr().err == ""
+
+
+def test_a_file_is_no_ledger_and_that_is_said_once(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text("[product]\n")
+    said = fails("report", tmp_path / "plan.toml", "--serve")
+    assert said.strip().endswith("plan.toml: expected a ledger, a folder that posefit sweep wrote, got a file")
+    assert said.count("plan.toml") == 1
 
 
 def test_a_port_that_is_taken_is_told_in_one_line(begun: Path) -> None:
@@ -137,6 +202,23 @@ def test_ctrl_c_ends_it_with_status_0_after_one_line_with_the_address(begun: Pat
         assert process.wait(60) == 0
         assert process.stdout.read() == process.stderr.read() == ""
     assert sorted(begun.rglob("*")) == before
+
+
+@pytest.mark.parametrize("early", [True, False])
+def test_ctrl_c_ends_it_with_status_0_before_and_after_it_answers_too(
+    begun: Path, monkeypatch: pytest.MonkeyPatch, early: bool
+) -> None:
+    @contextmanager
+    def interrupted(*_: object) -> Iterator[ThreadingHTTPServer]:
+        if early:
+            raise KeyboardInterrupt
+        with serving(begun, 0, lambda _: None) as server:
+            server.serve_forever = lambda *_: None  # type: ignore[method-assign]
+            yield server
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("posefit.report.live.server.serving", interrupted)
+    assert run("report", begun, "--serve").exit_code == 0
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """The report in a real browser: it loads without a complaint, and what it promises works."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import pytest
 from posefit.report.repeat import repeat_command
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import run
-from tests.report.browser import browser, ledger, opened, result, sure
+from tests.report.browser import EVIL, ledger, opened, result, sure
 from tests.sweep.fake import cells
 
 PLAN = """
@@ -26,13 +25,6 @@ methods = ["sapso@pca", "sapso@full", "particle@full", "random@pca"]
 motions = ["walk", { motion = "run", view_degrees = [0, 90] }]
 seeds = 3
 """
-EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028'\"&"
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """The viewer of a track in a real browser: it opens without a complaint, and video, body and curves move together."""
 
 import base64
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,19 +11,12 @@ import numpy as np
 import pytest
 
 from posefit.silhouette.cost import project
-from tests.report.browser import Watched, browser, opened
+from tests.report.browser import EVIL, Watched, opened
 from tests.tracking.viewing import SIZE, doubting, right, viewed, walk
 
 FRAMES = 12
 MIRRORED = [0.0, 0.0, 0.3, 0.4, 0.15, *[0.0] * 7]
 LOST, HELD = 5, 1
-EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028'\"&"
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

@@ -27,9 +27,9 @@ def lead_sentence(contest: Contest, board: Rows, bases: Rows, tests: Mapping[str
     error, low, high = first["error"], first["low"], first["high"]
     sure = "" if low is None or not np.isfinite(low) else f" (95 % interval {low:.2f}° to {high:.2f}°)"
     motions = sorted({str(contest.runs.places[i]["motion"]) for i in contest.instances})
-    of = f" of {_listed(motions)}" if len(motions) <= NAMED else f" of {len(motions)} motions"
+    of = f" of {listed(motions)}" if len(motions) <= NAMED else f" of {len(motions)} motions"
     each = "one seed" if seeds == 1 else f"{seeds} seeds each"
-    on = f"{_count(instances, 'instance')}{of} with {each}"
+    on = f"{counted(instances, 'instance')}{of} with {each}"
     said = f"{first['name']} leads with an error of {error:.2f}°{sure} on {on}{_others(contest, first, tests)}."
     return said + _held_against(error, bases)
 
@@ -44,31 +44,50 @@ def three_tracks(contest: Contest, method: int) -> list[tuple[str, int]]:
     return [(name, ranked[place]) for name, place in zip(EXAMPLES, places, strict=False)]
 
 
-def _others(contest: Contest, first: Mapping[str, Any], tests: Mapping[str, Any] | None) -> str:
-    """Return what the sentence says of all other methods."""
-    if len(contest.methods) == 1:
-        return "; no other method shares its runs"
+def alike(tests: Mapping[str, Any] | None, method: int) -> list[int]:
+    """Return the methods that no paired test tells apart from one; none where there are no tests."""
+    return [] if tests is None else _sides(tests, method)[0]
+
+
+def others_said(names: Sequence[str], method: int, tests: Mapping[str, Any] | None, what: str) -> str:
+    """Return what a sentence about the leader says of all other methods, from a semicolon on.
+
+    `names` are those of methods by their numbers, `tests` paired tests of at least two methods, as of `paired_tests`:
+    None where there are too few runs for any; `what` is what was paired, such as "runs".
+    """
     if tests is None:
-        return "; one shared run is too few to tell it apart from any other method"
-    mine = contest.methods.index(first["method"])
-    alike: list[str] = []
-    worse: list[str] = []
-    better: list[str] = []
-    for one, other, difference, _, adjusted, *_ in tests["pairs"]:
-        if mine not in (one, other):
-            continue
-        name = contest.runs.methods[contest.methods[other if one == mine else one]]
-        ahead = (difference if one == mine else -difference) < 0.0
-        (alike if adjusted >= LEVEL else worse if ahead else better).append(name)
-    how = f"(Wilcoxon's signed ranks over {tests['blocks']} paired runs, after Holm, at 5 %)"
-    told = f"; {_listed(alike)} cannot be told apart from it" if alike else "; every other method can be told apart"
+        return f"; one shared {what[:-1]} is too few to tell it apart from any other method"
+    same, worse, better = ([names[m] for m in side] for side in _sides(tests, method))
+    how = f"(Wilcoxon's signed ranks over {tests['blocks']} paired {what}, after Holm, at 5 %)"
+    told = f"; {listed(same)} cannot be told apart from it" if same else "; every other method can be told apart"
     if better:
-        told += f", and on most runs {_listed(better)} {'is' if len(better) == 1 else 'are'} better"
-    if worse and (alike or better):
-        told += f", and {_count(len(worse), 'other')} {'is' if len(worse) == 1 else 'are'} worse"
+        told += f", and on most {what} {listed(better)} {'is' if len(better) == 1 else 'are'} better"
+    if worse and (same or better):
+        told += f", and {counted(len(worse), 'other')} {'is' if len(worse) == 1 else 'are'} worse"
     elif worse:
         told += " and is worse"
     return f"{told} {how}"
+
+
+def _sides(tests: Mapping[str, Any], method: int) -> tuple[list[int], list[int], list[int]]:
+    """Return the methods that are not told apart from one, that are worse, and that are better."""
+    mine = tests["methods"].index(method)
+    same: list[int] = []
+    worse: list[int] = []
+    better: list[int] = []
+    for one, other, difference, _, adjusted, *_ in tests["pairs"]:
+        if mine not in (one, other):
+            continue
+        ahead = (difference if one == mine else -difference) < 0.0
+        side = same if adjusted >= LEVEL else worse if ahead else better
+        side.append(tests["methods"][other if one == mine else one])
+    return same, worse, better
+
+
+def _others(contest: Contest, first: Mapping[str, Any], tests: Mapping[str, Any] | None) -> str:
+    if len(contest.methods) == 1:
+        return "; no other method shares its runs"
+    return others_said(contest.runs.methods, first["method"], tests, "runs")
 
 
 def _held_against(error: float, bases: Rows) -> str:
@@ -83,11 +102,13 @@ def _held_against(error: float, bases: Rows) -> str:
     return f" It does not beat the baselines: {said}."
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
+    """Return names as a sentence lists them; of many the first and how many others."""
     if len(names) > NAMED:
         return f"{', '.join(names[: NAMED - 1])} and {len(names) - NAMED + 1} others"
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def _count(count: int, word: str) -> str:
+def counted(count: int, word: str) -> str:
+    """Return so many of something, in words."""
     return f"{count} {word}" if count == 1 else f"{count} {word}s"

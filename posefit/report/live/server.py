@@ -1,12 +1,14 @@
 """A server of this machine alone that shows how far a sweep is, and the report of the cells that are done.
 
-The page is made anew when it is asked for and something has changed, but never so often that making it takes more than
-a quarter of the time. Nothing is written, neither to the ledger nor elsewhere.
+The page is made anew when it is asked for, but never so often that making it takes more than a quarter of the time,
+whether it could be made or not: whoever asks too early gets what was made last. Nothing is written, neither to the
+ledger nor elsewhere.
 """
 
+import re
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -20,6 +22,7 @@ LOOPBACK = "127.0.0.1"
 AGAIN = 5.0  # seconds after which a page loads itself anew, at least
 REST = 3.0  # times as long as making a report took, until the next one is made
 LARGEST_PORT = 65_535
+THIS_MACHINE = re.compile(r"(127\.0\.0\.1|localhost)(:\d+)?", re.IGNORECASE)  # what a request may ask for
 
 
 class Showing:
@@ -30,25 +33,48 @@ class Showing:
         self._lock = threading.Lock()
         self._state: tuple[int, int] | None = None
         self._data: dict[str, Any] = {}
+        self._document: Callable[[dict[str, Any]], str] = str
+        self._made, self._failed = "", ""
         self._took, self._ready = 0.0, 0.0
 
     def page(self) -> str:
+        """Return the page. Raises ValueError where the ledger cannot be read."""
+        with self._lock:
+            if monotonic() >= self._ready:
+                began = monotonic()
+                try:
+                    self._made, self._failed = self._page(began), ""
+                except (ValueError, OSError) as error:  # the ledger has gone away
+                    self._failed = str(error)
+                finally:
+                    self._took = monotonic() - began
+                    self._ready = began + (1.0 + REST) * self._took
+            if self._failed:
+                raise ValueError(self._failed)
+            return self._made
+
+    def _page(self, began: float) -> str:
         """Return the page as it is now."""
+        progress = progress_so_far(self._ledger)
+        state = len(self._ledger), len(self._ledger.sentenced())
+        if state != self._state:
+            self._data, self._document = self._report()
+            self._state = state
+        again = max(AGAIN, REST * self._took, REST * (monotonic() - began))
+        return self._document({**self._data, "live": {**asdict(progress), "again": again}})
+
+    def _report(self) -> tuple[dict[str, Any], Callable[[dict[str, Any]], str]]:
+        """Return what the report says so far, and what makes a page of it."""
         from posefit.report.content import data_of
         from posefit.report.page.webpage import document
         from posefit.report.runs import runs_so_far
+        from posefit.report.search.content import data_of_searches
+        from posefit.report.search.page.webpage import search_document
+        from posefit.report.search.rows import holds_searches, searches_of
 
-        with self._lock:
-            progress = progress_so_far(self._ledger)
-            state = len(self._ledger), len(self._ledger.sentenced())
-            if state != self._state and monotonic() >= self._ready:
-                began = monotonic()
-                self._data = data_of(self._ledger, runs_so_far(self._ledger), self._say)
-                self._state, self._took = state, monotonic() - began
-                self._ready = monotonic() + REST * self._took
-            rows = len(self._data["rows"]["key"])
-            live = {**asdict(progress), "rows": rows, "again": max(AGAIN, REST * self._took)}
-            return document({**self._data, "live": live})
+        if holds_searches(self._ledger):
+            return data_of_searches(searches_of(self._ledger)), search_document
+        return data_of(self._ledger, runs_so_far(self._ledger), self._say), document
 
 
 @contextmanager
@@ -61,11 +87,11 @@ def serving(path: str | Path, port: int, say: Callable[[str], None]) -> Iterator
         raise ValueError(f"--port must be 0 to {LARGEST_PORT}, got {port}")
     showing = Showing(path, say)
 
-    class Handler(_Handler):
+    class Shown(Handler):
         shown = showing
 
     try:
-        server = ThreadingHTTPServer((LOOPBACK, port), Handler)
+        server = ThreadingHTTPServer((LOOPBACK, port), Shown)
     except OSError as error:
         raise ValueError(f"--port must be one that is free, got {port}: {error.strerror or error}") from None
     with server:
@@ -77,32 +103,33 @@ def address_of(server: ThreadingHTTPServer) -> str:
     return f"http://{LOOPBACK}:{server.server_address[1]}/"
 
 
-class _Handler(BaseHTTPRequestHandler):
+class Handler(BaseHTTPRequestHandler):
     """Answers with the page, to who asks for this machine: a name that somebody else points here is refused."""
 
     shown: Showing
 
     def do_GET(self) -> None:
         """Answer a request."""
-        port = self.server.server_address[1]  # type: ignore[index]
-        if self.headers.get("Host") not in (f"{LOOPBACK}:{port}", f"localhost:{port}"):
+        if not THIS_MACHINE.fullmatch(self.headers.get("Host", "")):
             self._answer(403, "this server answers to its own machine alone", "text/plain")
         elif self.path.partition("?")[0] != "/":
             self._answer(404, "there is one page here: /", "text/plain")
         else:
             try:
-                self._answer(200, self.shown.page(), "text/html")
-            except (ValueError, OSError) as error:  # the ledger has gone away
-                self._answer(500, str(error), "text/plain")
+                status, text, kind = 200, self.shown.page(), "text/html"
+            except ValueError as error:
+                status, text, kind = 500, str(error), "text/plain"
+            self._answer(status, text, kind)
 
     def _answer(self, status: int, text: str, kind: str) -> None:
         content = text.encode()
-        self.send_response(status)
-        self.send_header("Content-Type", f"{kind}; charset=utf-8")
-        self.send_header("Content-Length", str(len(content)))
-        self.send_header("Cache-Control", "no-store")
-        self.end_headers()
-        self.wfile.write(content)
+        with suppress(ConnectionError):  # nobody waits for it any more
+            self.send_response(status)
+            self.send_header("Content-Type", f"{kind}; charset=utf-8")
+            self.send_header("Content-Length", str(len(content)))
+            self.send_header("Cache-Control", "no-store")
+            self.end_headers()
+            self.wfile.write(content)
 
     def log_message(self, *_: object) -> None:
         """Say nothing of each request."""

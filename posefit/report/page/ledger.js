@@ -1,13 +1,11 @@
-// What every part of the report uses: names, colours and marks of methods, and the command that runs a row again.
+// What every part of a report uses: names, colours and marks of methods, and what they are judged by.
 const METHODS = D.methods.map((one) => one.name);
 const INSTANCES = D.instances.map((one) => one.name);
+// A method's score with its unit, in a sentence or a figure.
+const scored = (value) => `${number(value, D.score.digits)}${D.score.unit}`;
 const DASHES = ["", "7 3", "2 3", "8 3 2 3"];
 const colour = (m) => `var(--c${m % D.colours})`;
 const dash = (m) => DASHES[Math.floor(m / D.colours) % DASHES.length];
-
-const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
-// A probability in a sentence.
-const stated = (p) => `p ${p < 0.001 ? "" : "= "}${probability(p)}`;
 
 // Corners of marks about 0, 0, of which a disc has the area: seven colours and eight marks make 56 pairs.
 const polygon = (count, radius, turn = 0) =>
@@ -88,46 +86,3 @@ function spread(wanted, gap, low, high) {
 }
 
 const shortened = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}…` : name);
-
-// The command that runs a row again: the beginning that it shares with others, then its instance and seed.
-function commandOf(row) {
-  const R = D.rows;
-  const place = D.instances[R.instance[row]];
-  return `${D.heads[R.head[row]]}instance = ${place.number}\nseed = ${D.seeds[R.seed[row]]}\nEND`;
-}
-
-const called = (row) =>
-  `${METHODS[D.rows.method[row]]} on ${INSTANCES[D.rows.instance[row]]}, seed ${D.seeds[D.rows.seed[row]]}`;
-
-function showCommand(title, text) {
-  $("again-what").textContent = title;
-  $("command").textContent = text;
-  $("copied").textContent = "";
-  $("again").showModal();
-}
-
-async function copy() {
-  const text = $("command").textContent;
-  try {
-    await navigator.clipboard.writeText(text);
-  } catch {
-    const area = make("textarea", {});
-    area.value = text;
-    $("again").append(area);
-    area.select();
-    document.execCommand("copy");
-    area.remove();
-  }
-  $("copied").textContent = "copied";
-}
-
-const again = (row) =>
-  make(
-    "button",
-    {
-      type: "button",
-      title: "The command that runs it again",
-      on: { click: () => showCommand(called(row), commandOf(row)) },
-    },
-    "command",
-  );

@@ -23,8 +23,6 @@ function live() {
     $("live-bar").max = L.cells;
     $("live-bar").value = settled;
   } else $("live-bar").remove();
-  if (L.rows < L.done)
-    $("live-said").append(` What follows is of ${whole(L.rows)} cells; it is made anew when that is quick enough.`);
   if (!L.left && given(L.cells)) return $("live-again").remove();
   const kept = "posefit-stands-still";
   const box = $("live-stop");

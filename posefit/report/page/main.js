@@ -1,6 +1,4 @@
 // Puts the page together.
-const NAMED = 20; // instances that a note names
-const REASONS = 5; // warnings that it names
 // what there is not where nothing can be compared
 const ABSENT = [
   "overview",
@@ -60,53 +58,8 @@ function header() {
   if (H.budgets.length > 1) notes.push("Budgets differ: compare methods of one budget only.");
   if (H.versions.length > 1) notes.push("Commands run rows again where the same versions are installed.");
   $("notes").append(...notes.map((text) => make("p", { class: "note" }, text)));
-  trouble(H, words);
+  trouble();
   $("foot").textContent = `posefit ${H.version}. This file holds everything it shows and asks the network for nothing.`;
-}
-
-// What failed and what is left out, with the reasons.
-function trouble(H, words) {
-  if (H.failed) {
-    const by = Object.entries(H.failed_by).map(([method, count]) => `${method} ${whole(count)}`);
-    $("trouble").append(
-      make(
-        "div",
-        { class: "note warn" },
-        `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join(", ")}. `,
-        make("a", { href: "#failures" }, "Which ones"),
-        make("ul", {}, ...H.reasons.map(([reason, count]) => make("li", {}, `${whole(count)} × ${reason}`))),
-      ),
-    );
-  }
-  if (H.dropped.length) {
-    const named = H.dropped.slice(0, NAMED).map(({ instance, missing }) => {
-      const why = missing.length ? `no run of ${words(missing.map((m) => METHODS[m]))}` : "no seed in common";
-      return make("li", {}, `${INSTANCES[instance]}: ${why}`);
-    });
-    if (H.dropped.length > NAMED) named.push(make("li", {}, `and ${whole(H.dropped.length - NAMED)} more`));
-    $("trouble").append(
-      make(
-        "div",
-        { class: "note warn" },
-        `${counted(H.dropped.length, "instance")} left out of the comparison, for every method:`,
-        make("ul", {}, ...named),
-      ),
-    );
-  }
-  if (H.unfinished.length)
-    $("trouble").append(
-      make("p", { class: "note warn" }, `No cell finished, so not on the leaderboard: ${words(H.unfinished)}.`),
-    );
-  const warned = Object.keys(D.warned).length;
-  if (warned)
-    $("trouble").append(
-      make(
-        "div",
-        { class: "note" },
-        `${counted(warned, "run")} with a warning, marked ⚠ below:`,
-        make("ul", {}, ...D.warnings.slice(0, REASONS).map((text) => make("li", {}, text))),
-      ),
-    );
 }
 
 header();
@@ -130,13 +83,9 @@ if (D.leaderboard) {
 if (METHODS.length) runs();
 else ["gallery", "author", "rows"].forEach((id) => $(id).remove());
 failures();
+closing();
 for (const link of document.querySelectorAll("nav a")) if (!document.querySelector(link.hash)) link.remove();
 addEventListener("beforeprint", () => $("what").setAttribute("open", ""));
-$("copy").onclick = copy;
-document.querySelectorAll("dialog .close").forEach((button) => {
-  button.onclick = () => button.closest("dialog").close();
-});
-
 function runs() {
   gallery();
   viewer();

@@ -1,4 +1,8 @@
 // Who is better than whom: mean ranks with the critical difference, and paired tests of one method with all others.
+const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
+// A probability in a sentence.
+const stated = (p) => `p ${p < 0.001 ? "" : "= "}${probability(p)}`;
+
 function differenceDiagram(P, room) {
   const order = P.ranks.map((rank, k) => [rank, k]).sort((a, b) => a[0] - b[0]);
   const count = order.length;

@@ -2,12 +2,13 @@
 
 from typing import Any
 
-from posefit.page.document import as_one, assembled, part
+from posefit.page.document import SHARED, as_one, assembled, part
 from posefit.report import colours
 
-SCRIPTS = (  # in this order
-    *("ledger", "tables", "charts", "certainty", "ranks", "scene", "gallery"),
-    *("lead", "selection", "author", "live", "main"),
+COMMON = ("ledger", "table", "failures", "chart", "standing", "live")  # scripts of every report
+SCRIPTS = (  # in this order, after those
+    *("tables", "charts", "certainty", "ranks", "scene", "gallery"),
+    *("lead", "selection", "author", "main"),
 )
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
 
@@ -20,4 +21,4 @@ def document(data: dict[str, Any]) -> str:
 
 def script() -> str:
     """Return the page's script."""
-    return as_one(__package__, SCRIPTS)
+    return as_one(SHARED, (__package__, (*COMMON, *SCRIPTS)))

@@ -20,12 +20,13 @@ def search_runs(ledger: "Ledger") -> Iterator[SuiteRun]:
         if not is_search(row["spec"]):
             raise ValueError(f"{ledger.path}: expected a ledger of single searches, got one of tracks: posefit report")
         count += 1
-        yield _run(row)
+        yield search_run(row)
     if not count:
         raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
 
 
-def _run(row: Mapping[str, Any]) -> SuiteRun:
+def search_run(row: Mapping[str, Any]) -> SuiteRun:
+    """Return the run that a row of a single search tells of."""
     spec, trace = row["spec"], row["trace"]
     return SuiteRun(
         spec["method"],

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from posefit.page.document import as_one, assembled, colour_style, part
+from posefit.page.document import SHARED, as_one, assembled, colour_style, part
 from posefit.tracking.page.colours import DARK, LIGHT
 
 SCRIPTS = ("panels", "curves", "main")  # in this order
@@ -17,4 +17,4 @@ def viewer_document(data: dict[str, Any]) -> str:
 
 def viewer_script() -> str:
     """Return the page's script."""
-    return as_one(__package__, SCRIPTS)
+    return as_one(SHARED, (__package__, SCRIPTS))
