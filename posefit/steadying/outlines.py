@@ -22,7 +22,7 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, areas
 from posefit.steadying import kernels
 from posefit.steadying.borders import Borders
-from posefit.steadying.path import SeenFrames, add_root, add_standing, windows
+from posefit.steadying.path import SeenFrames, add_root, add_standing, windows_over
 from posefit.steadying.shown import NUMBERS, STARTS, build_slopes, drawn_numbers, drawn_slopes
 from posefit.steadying.squares import Squares
 from posefit.steadying.stance import stances
@@ -78,7 +78,7 @@ def outlined(
     """
     if len(motion) < 3 or not seen.usable.any():
         return motion, shape
-    parts = windows(len(motion), WINDOW, OVERLAP)
+    parts = windows_over(len(motion), WINDOW, OVERLAP)
     fitted: dict[int, _Part] = {}
     if shape is not None:
         best = int(np.argmax([seen.usable[rows].sum() for rows, _ in parts]))

@@ -54,14 +54,14 @@ def steadied(motion: Motion, seen: SeenFrames) -> Motion:
         return motion
     motion = replace(motion, translations=_bridged(motion.translations, seen.usable))
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for rows, kept in windows(len(motion), WINDOW, OVERLAP):
+    for rows, kept in windows_over(len(motion), WINDOW, OVERLAP):
         part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
         found = _window(part, SeenFrames(seen.usable[rows], seen.eyes[rows]))
         poses[rows[kept]], places[rows[kept]] = found.poses[kept], found.translations[kept]
     return replace(motion, poses=poses, translations=places)
 
 
-def windows(count: int, size: int, overlap: int) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
+def windows_over(count: int, size: int, overlap: int) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
     """Return the frames (n,) of windows over `count` frames, and which of them (n,) are a window's own.
 
     Each has `size` frames of its own, the last one what is left, and before and after them up to `overlap` that are
