@@ -43,7 +43,7 @@ def listing(found: Registry) -> Iterator[str]:
             yield from _wrapped(", ".join(map(_typed, offer.settings)), "    --set ", 10 * " ")
 
 
-def explained(found: Registry, name: str) -> Iterator[str]:
+def explanation(found: Registry, name: str) -> Iterator[str]:
     """Yield the lines of `posefit plugins show`: whatever has the name. Raises ValueError listing the known names."""
     offers = [offer for kind in KINDS for offer in found.offers[kind].values()]
     mine = [offer for offer in offers if offer.name == name]

@@ -33,11 +33,11 @@ def plugins(context: click.Context, as_json: bool) -> None:
 @click.argument("name")
 def show(name: str) -> None:
     """Say what one of them does, and what each of its settings means, may be and is by default."""
-    from posefit.cli.inspection import explained
+    from posefit.cli.inspection import explanation
     from posefit.registry import registry
 
     with results_alone():
-        lines = list(explained(registry(), name))
+        lines = list(explanation(registry(), name))
     click.echo("\n".join(lines))
 
 
