@@ -1,7 +1,7 @@
 """Mutants of the program, and the test that each must fail: `python -m tests.mutants [WORD ...]`.
 
-The program is copied into a temporary folder. Its tests pass there as it is; then one mutant after the other is put
-into the copy as a replacement of text, its own test is run and has to fail. Prints a table, and exits with 1 where a
+The program is copied into a temporary folder, once for each core. Its tests pass there as it is; then one mutant after
+the other is put into a copy as a replacement of text, its own test is run and has to fail. Prints a table, and exits with 1 where a
 mutant lives; with 2 where a text that a mutant replaces is no longer there, or stands there more than once. Words
 choose the mutants whose descriptions hold one of them.
 """
@@ -12,12 +12,14 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 COPIED = ("posefit", "plugins", "envs", "tests", "pyproject.toml")
 PATHS = (".", "plugins", "envs")
+MOST_COPIES = 4  # each compiles anew what its tests call
 
 
 @dataclass(frozen=True)
@@ -403,36 +405,45 @@ def passes(root: Path, tests: Sequence[str], cache: Path) -> bool:
     return ran.returncode == 0
 
 
+def tried(mutants: Sequence[Mutant], folder: Path) -> int:
+    """Return how many of some mutants live, each put into a copy of the program in a folder; prints of each whether.
+
+    Raises ValueError where a test fails without a mutant.
+    """
+    root, clean = folder / "copy", folder / "cache"
+    for name in COPIED:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, root / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(ROOT / name, root / name)
+    if not passes(root, [mutant.test for mutant in mutants], clean):
+        raise ValueError("expected the tests to pass without a mutant, but one fails")
+    lived = 0
+    for mutant in mutants:
+        file = root / mutant.path
+        text = file.read_text("utf-8")
+        file.write_text(changed(text, mutant), "utf-8")
+        compiled = "@jit" in text
+        killed = not passes(root, [mutant.test], folder / "its own" if compiled else clean)
+        file.write_text(text, "utf-8")
+        lived += not killed
+        print(f"{'killed' if killed else 'LIVES '}  {mutant.what}\n        {mutant.test}", flush=True)
+    return lived
+
+
 def main(words: Sequence[str]) -> int:
-    """Try the mutants, all or those that a word chooses; return the exit status."""
+    """Try the mutants, all or those that a word chooses, one a core at a time; return the exit status."""
     chosen = [mutant for mutant in MUTANTS if not words or any(word in mutant.what for word in words)]
     try:
         for mutant in chosen:
             changed((ROOT / mutant.path).read_text("utf-8"), mutant)
+        workers = max(min(os.cpu_count() or 1, MOST_COPIES, len(chosen)), 1)
+        with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(workers) as pool:
+            folders = (Path(folder) / str(k) for k in range(workers))
+            lived = sum(pool.map(tried, (chosen[k::workers] for k in range(workers)), folders))
     except (OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 2
-    lived = 0
-    with tempfile.TemporaryDirectory() as folder:
-        root = Path(folder) / "copy"
-        for name in COPIED:
-            if (ROOT / name).is_dir():
-                shutil.copytree(ROOT / name, root / name, ignore=shutil.ignore_patterns("__pycache__"))
-            else:
-                shutil.copy(ROOT / name, root / name)
-        clean = Path(folder) / "cache"
-        if not passes(root, [mutant.test for mutant in chosen], clean):
-            print("expected the tests to pass without a mutant, but one fails", file=sys.stderr)
-            return 2
-        for mutant in chosen:
-            file = root / mutant.path
-            text = file.read_text("utf-8")
-            file.write_text(changed(text, mutant), "utf-8")
-            compiled = "@jit" in text
-            killed = not passes(root, [mutant.test], Path(folder) / "its own" if compiled else clean)
-            file.write_text(text, "utf-8")
-            lived += not killed
-            print(f"{'killed' if killed else 'LIVES '}  {mutant.what}\n        {mutant.test}", flush=True)
     print(f"{len(chosen) - lived} of {len(chosen)} mutants killed")
     return int(lived > 0)
 

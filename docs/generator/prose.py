@@ -2,21 +2,11 @@
 
 import re
 from collections.abc import Iterator
-from typing import NamedTuple
 
 _ARRAY = re.compile(
     r"~?(?:numpy\.)?ndarray\[~?tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?(?:numpy\.)?dtype\[~?(?:numpy\.)?(\w+)\]\]"
 )
 _COLUMNS = re.compile(r"\S {2,}\S")
-_ENTRY = re.compile(r"(?P<name>[A-Za-z_]\w*)(?: \((?P<symbol>[^()]*)\))?: (?P<meaning>.*)")
-SETTINGS = "Settings:"
-
-
-class Entry(NamedTuple):
-    """What a docstring's list of settings says of one of them."""
-
-    symbol: str  # the source's letter; "" where it has none
-    meaning: str
 
 
 def restructured(lines: list[str]) -> list[str]:
@@ -35,46 +25,6 @@ def shortened(signature: str) -> str:
     """Return a signature with `Array` for numpy's longer name of it, and without the defaults that have no text."""
     named = _ARRAY.sub(lambda one: "Array" if one[1] == "float64" else f"Array[{one[1]}]", signature)
     return named.replace("<factory>", "...")
-
-
-def without_settings(text: str) -> str:
-    """Return a docstring without its list of settings."""
-    lines = text.splitlines()
-    start, stop = _section(lines)
-    return "\n".join([*lines[:start], *lines[stop:]]).strip()
-
-
-def settings_in(text: str) -> dict[str, Entry]:
-    """Return what the list of settings of a docstring says, by the settings' names; empty where it has no list.
-
-    Such a list is a line `Settings:`, then an indented line `name (symbol): meaning` for each, which may go on in lines
-    that are indented more.
-    """
-    lines = text.splitlines()
-    start, stop = _section(lines)
-    found: dict[str, Entry] = {}
-    indents = [len(line) - len(line.lstrip()) for line in lines[start + 1 : stop] if line.strip()]
-    name = ""
-    for line in lines[start + 1 : stop]:
-        entry = _ENTRY.fullmatch(line.strip())
-        if entry is not None and len(line) - len(line.lstrip()) == min(indents):
-            name = entry["name"]
-            found[name] = Entry(entry["symbol"] or "", entry["meaning"])
-        elif name and line.strip():
-            found[name] = found[name]._replace(meaning=f"{found[name].meaning} {line.strip()}")
-    return found
-
-
-def _section(lines: list[str]) -> tuple[int, int]:
-    """Return where the list of settings begins and ends, both the end of the lines where there is none."""
-    start = next((k for k, line in enumerate(lines) if line.strip() == SETTINGS), len(lines))
-    if start == len(lines):
-        return start, start
-    base = len(lines[start]) - len(lines[start].lstrip())
-    stop = start + 1
-    while stop < len(lines) and (not lines[stop].strip() or len(lines[stop]) - len(lines[stop].lstrip()) > base):
-        stop += 1
-    return start, stop
 
 
 def _blocks(lines: list[str]) -> Iterator[list[str]]:

@@ -4,11 +4,10 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from generator.prose import settings_in, without_settings
 from posefit.entries import PROJECT
 from posefit.fitting.tracker import Prediction
 from posefit.registry import KINDS, Offer, registry
-from posefit.settings import settings_of
+from posefit.settings import settings_in, settings_of, without_settings
 from posefit.sweep.cell import setting_text
 
 

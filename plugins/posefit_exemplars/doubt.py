@@ -25,6 +25,7 @@ from posefit_exemplars.look import Look
 FILE = "doubt.json"
 LEAST_COST = 0.1  # per cent
 LEAST_SPREAD = 0.002  # metres
+MOST_ODDS = 30.0  # logarithm
 
 
 def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float, cameras: int) -> Array:
@@ -37,6 +38,11 @@ def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float,
 def none_signs(log: float) -> Array:
     """Return what it follows from that no mode is right (3,): 1, the logarithm of the doubt, and its square."""
     return np.array([1.0, log, log * log])
+
+
+def likely(odds: float) -> float:
+    """Return how likely something is whose odds have this logarithm; beyond `MOST_ODDS` they count as that."""
+    return 1.0 / (1.0 + math.exp(-min(max(odds, -MOST_ODDS), MOST_ODDS)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +64,7 @@ class Doubt:
 
     def none_right(self, log: float) -> float:
         """Return how likely no mode is right, at the logarithm of a doubt."""
-        odds = self.none @ none_signs(log)
-        return 1.0 / (1.0 + math.exp(-min(max(float(odds), -30.0), 30.0)))
+        return likely(float(self.none @ none_signs(log)))
 
     def recalibration(self, log: float) -> Recalibration:
         """Return what a frame does not know of its error, by the logarithm of its doubt."""

@@ -26,6 +26,7 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.posterior.calibration import Recalibration
 from posefit.posterior.modes import Posterior
 from posefit.posterior.sides import second_side
+from posefit_exemplars.doubt import likely
 
 FITTED = Path(__file__).with_name("lost.json")  # made by `posefit reproduce lost --store`
 REACHES: Mapping[str, float] = {
@@ -141,7 +142,7 @@ class Detector:
 
     def probability(self, features: Array) -> float:
         """Return how likely it is of a frame with these features (3 E,)."""
-        return 1.0 / (1.0 + math.exp(-min(max(float(features[self.rows] @ self.weights) + self.bias, -30.0), 30.0)))
+        return likely(float(features[self.rows] @ self.weights) + self.bias)
 
     @classmethod
     def from_dict(cls, told: Mapping[str, Any]) -> Self:

@@ -4,7 +4,8 @@ import os
 import shutil
 import textwrap
 from collections.abc import Iterator, Sequence
-from inspect import Parameter
+from difflib import get_close_matches
+from inspect import Parameter, getdoc
 from typing import Any
 
 import click
@@ -12,6 +13,7 @@ import click
 from posefit.claims import ClaimedOrder, order_name
 from posefit.entries import BLOCK, LOAD, STRICT, Plugin
 from posefit.registry import KINDS, Offer, Registry
+from posefit.settings import Setting, settings_in, without_settings
 
 
 def described(offer: Offer) -> dict[str, Any]:
@@ -35,17 +37,49 @@ def described(offer: Offer) -> dict[str, Any]:
 
 def listing(found: Registry) -> Iterator[str]:
     """Yield the lines of `posefit plugins`."""
-    width = min(shutil.get_terminal_size((100, 24)).columns, 120)
     for kind in KINDS:
         for offer in found.offers[kind].values():
-            missing = f" [not installed: python -m pip install '{offer.missing}']" if offer.missing else ""
-            yield f"{kind} {offer.name} ({offer.distribution} {offer.version}){missing}"
-            yield from textwrap.wrap(offer.summary, width, initial_indent="    ", subsequent_indent="    ")
-            settings = ", ".join(
-                f"{one.name}: {one.type}" + ("" if one.default is Parameter.empty else f" = {one.default}")
-                for one in offer.settings
-            )
-            yield from textwrap.wrap(settings, width, initial_indent="    --set ", subsequent_indent="          ")
+            yield _head(offer)
+            yield from _wrapped(offer.summary, 4 * " ", 4 * " ")
+            yield from _wrapped(", ".join(map(_typed, offer.settings)), "    --set ", 10 * " ")
+
+
+def explanation(found: Registry, name: str) -> Iterator[str]:
+    """Yield the lines of `posefit plugins show`: whatever has the name. Raises ValueError listing the known names."""
+    offers = [offer for kind in KINDS for offer in found.offers[kind].values()]
+    mine = [offer for offer in offers if offer.name == name]
+    if not mine:
+        known = sorted({offer.name for offer in offers})
+        near = get_close_matches(name, known, 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ValueError(f"plugin must be one of {', '.join(known)}, got {name!r}{hint}")
+    for offer in mine:
+        text = getdoc(offer.factory) or ""
+        said = settings_in(text)
+        yield _head(offer)
+        yield from (f"    {line}".rstrip() for line in without_settings(text).splitlines())
+        if not offer.settings:
+            yield "    It has no settings."
+        for setting in offer.settings:
+            yield f"    --set {name}.{_typed(setting)}"
+            symbol, meaning = said.get(setting.name, ("", ""))
+            yield from _wrapped(f"({symbol}) {meaning}" if symbol else meaning, 8 * " ", 8 * " ")
+
+
+def _head(offer: Offer) -> str:
+    missing = f" [not installed: python -m pip install '{offer.missing}']" if offer.missing else ""
+    return f"{offer.kind} {offer.name} ({offer.distribution} {offer.version}){missing}"
+
+
+def _typed(setting: Setting) -> str:
+    """Return a setting with its type, or what it may be, and its default."""
+    default = "" if setting.default is Parameter.empty else f" = {setting.default}"
+    return f"{setting.name}: {setting.type}{default}"
+
+
+def _wrapped(text: str, first: str, other: str) -> list[str]:
+    width = min(shutil.get_terminal_size((100, 24)).columns, 120)
+    return textwrap.wrap(text, width, initial_indent=first, subsequent_indent=other)
 
 
 def diagnosis(

@@ -11,7 +11,10 @@ from posefit.cli.output import json_line, results_alone
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
 def plugins(context: click.Context, as_json: bool) -> None:
-    """List the optimisers, priors, trackers and segmenters that are installed, with their settings."""
+    """List the optimisers, priors, trackers and segmenters that are installed, with their settings.
+
+    `show NAME` says what the settings of one mean.
+    """
     if context.invoked_subcommand is not None:
         return
     from posefit.cli.inspection import described, listing
@@ -24,6 +27,18 @@ def plugins(context: click.Context, as_json: bool) -> None:
         return
     for line in listing(registry()):
         click.echo(line)
+
+
+@plugins.command()
+@click.argument("name")
+def show(name: str) -> None:
+    """Say what one of them does, and what each of its settings means, may be and is by default."""
+    from posefit.cli.inspection import explanation
+    from posefit.registry import registry
+
+    with results_alone():
+        lines = list(explanation(registry(), name))
+    click.echo("\n".join(lines))
 
 
 @plugins.command()

@@ -81,10 +81,18 @@ def jitter(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with an edge that wanders in and out."""
     _, top, _, bottom = _extent(mask)
     reach = EDGE * strength * (bottom - top)
+    return wandering(mask, 0.0, 2.0 * reach, max(1.0, reach), rng)
+
+
+def wandering(mask: Mask, rim: float, reach: float, length: float, rng: np.random.Generator) -> Mask:
+    """Return a mask (height, width) whose border is `rim` pixels outside of where it was, and wanders around that.
+
+    `reach` is the standard deviation of how many pixels it wanders, and `length` the pixels over which it does.
+    """
     inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
     outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
-    smooth = cv2.GaussianBlur(rng.standard_normal(mask.shape), (0, 0), max(1.0, reach))
-    return np.asarray(inside - outside + 2.0 * reach * smooth / max(float(smooth.std()), 1e-9) > 0.0)
+    smooth = cv2.GaussianBlur(rng.standard_normal(mask.shape), (0, 0), length)
+    return np.asarray(inside - outside + rim + reach * smooth / max(float(smooth.std()), 1e-9) > 0.0)
 
 
 CORRUPTIONS: dict[str, Callable[[Mask, float, np.random.Generator], Mask]] = {

@@ -19,19 +19,10 @@ from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
-from posefit.motion.steadiness import BALLS
 from posefit.silhouette.cost import BETA, areas
 from posefit.steadying import kernels
 from posefit.steadying.borders import Borders
-from posefit.steadying.path import (
-    ACCELERATION,
-    LEGS,
-    STANDING,
-    STRANGE,
-    SeenFrames,
-    moving_feet,
-    root_precisions,
-)
+from posefit.steadying.path import SeenFrames, add_root, add_standing, windows_over
 from posefit.steadying.shown import NUMBERS, STARTS, build_slopes, drawn_numbers, drawn_slopes
 from posefit.steadying.squares import Squares
 from posefit.steadying.stance import stances
@@ -87,22 +78,18 @@ def outlined(
     """
     if len(motion) < 3 or not seen.usable.any():
         return motion, shape
-    starts = range(0, len(motion), WINDOW)
-    windows = [np.arange(max(s - OVERLAP, 0), min(s + WINDOW + OVERLAP, len(motion))) for s in starts]
+    parts = windows_over(len(motion), WINDOW, OVERLAP)
     fitted: dict[int, _Part] = {}
     if shape is not None:
-        best = int(np.argmax([seen.usable[rows].sum() for rows in windows]))
-        found = _fitted(scene, motion, seen, windows[best], scene.body, shape, beta)
+        best = int(np.argmax([seen.usable[rows].sum() for rows, _ in parts]))
+        found = _fitted(scene, motion, seen, parts[best][0], scene.body, shape, beta)
         if found.body is not scene.body:  # else no build was found that fits better, and only poses are fitted
             shape = replace(shape, body=found.body, factors=np.exp(found.factors))
             fitted[best] = found
     body = scene.body if shape is None else shape.body
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for k, (start, rows) in enumerate(zip(starts, windows, strict=True)):
-        if len(rows) < 3:
-            continue
+    for k, (rows, kept) in enumerate(parts):
         part = fitted.get(k) or _fitted(scene, motion, seen, rows, body, None, beta)
-        kept = (rows >= start) & (rows < start + WINDOW)
         poses[rows[kept]], places[rows[kept]] = part.poses[kept], part.places[kept]
     return replace(motion, skeleton=body.skeleton, poses=poses, translations=places), shape
 
@@ -192,25 +179,14 @@ def _stepped(part: _Part, pulled: _Pulled, *, build: bool) -> _Part:
 def _squares(part: _Part, pulled: _Pulled) -> Squares:
     """Return what borders, smoothness and standing feet ask of poses and way together."""
     fps, angles = part.motion.fps, part.angles
-    root, turned = slice(0, 3), slice(3, 3 + len(angles))
+    turned = slice(3, 3 + len(angles))
     squares = Squares.of(len(part.poses), 3 + len(angles))
     squares.add(slice(None), *pulled.poses)
-    moved, change = part.places - part.motion.translations, wrapped(part.poses - part.motion.poses)[:, angles]
-    precision = root_precisions(part.motion, SeenFrames(part.usable, part.eyes), AWAY)
-    off = np.einsum("ti,tij,tj->t", moved, precision, moved)
-    precision /= (1.0 + off / STRANGE**2)[:, None, None]
-    squares.add(root, precision, np.einsum("tij,tj->ti", precision, moved))
-    squares.add_bends(root, part.places, fps**2 / ACCELERATION)
+    add_root(squares, part.motion, SeenFrames(part.usable, part.eyes), AWAY, part.places - part.motion.translations)
+    change = wrapped(part.poses - part.motion.poses)[:, angles]
     squares.add(turned, np.eye(len(angles)) / GIVING**2, change / GIVING**2)
     squares.add_bends(turned, change, fps**2 / SHAKING)
-    skeleton = part.body.skeleton
-    stands = stances(skeleton.joints(part.poses, part.places), fps, part.eyes)
-    legs = [angle for angle in LEGS if angle in angles]
-    columns = [0, 1, 2, *(3 + angles.index(angle) for angle in legs)]
-    for side, ball in enumerate(BALLS):
-        both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
-        feet, slopes = moving_feet(skeleton, part.poses, part.places, ball, legs)
-        ways = np.zeros((*feet.shape, 3 + len(angles)))
-        ways[..., columns] = slopes
-        squares.add_steps(both, feet, ways, fps / (30.0 * STANDING))
+    now = Motion(part.motion.name, part.body.skeleton, part.poses, part.places, fps)
+    stands = stances(now.skeleton.joints(now.poses, now.translations), fps, part.eyes)
+    add_standing(squares, now, stands, angles)
     return squares

@@ -52,16 +52,26 @@ def steadied(motion: Motion, seen: SeenFrames) -> Motion:
     """
     if len(motion) < 3:
         return motion
-    whole = np.arange(len(motion))
     motion = replace(motion, translations=_bridged(motion.translations, seen.usable))
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for start in range(0, len(motion), WINDOW):
-        rows = whole[max(start - OVERLAP, 0) : start + WINDOW + OVERLAP]
+    for rows, kept in windows_over(len(motion), WINDOW, OVERLAP):
         part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
         found = _window(part, SeenFrames(seen.usable[rows], seen.eyes[rows]))
-        kept = (rows >= start) & (rows < start + WINDOW)
         poses[rows[kept]], places[rows[kept]] = found.poses[kept], found.translations[kept]
     return replace(motion, poses=poses, translations=places)
+
+
+def windows_over(count: int, size: int, overlap: int) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
+    """Return the frames (n,) of windows over `count` frames, and which of them (n,) are a window's own.
+
+    Each has `size` frames of its own, the last one what is left, and before and after them up to `overlap` that are
+    those of its neighbours.
+    """
+    parts = []
+    for start in range(0, count, size):
+        rows = np.arange(max(start - overlap, 0), min(start + size + overlap, count))
+        parts.append((rows, (rows >= start) & (rows < start + size)))
+    return parts
 
 
 def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
@@ -74,8 +84,6 @@ def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
 
 def _window(motion: Motion, seen: SeenFrames) -> Motion:
     """Return a motion steadied: first its root alone, which tells who stands, then the legs as well."""
-    if len(motion) < 3:
-        return motion
     smooth = _solved(motion, seen, np.zeros((len(motion), 2), dtype=bool))
     stands = stances(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, seen.eyes)
     return _solved(motion, seen, stands)
@@ -86,32 +94,50 @@ def _solved(motion: Motion, seen: SeenFrames, stands: NDArray[np.bool_]) -> Moti
     skeleton, fps, count = motion.skeleton, motion.fps, len(motion)
     angles = [angle for angle in LEGS if skeleton.free[angle]]
     root, legs = slice(0, 3), slice(3, 3 + len(angles))
-    precision = root_precisions(motion, seen, ACROSS)
     change = np.zeros((count, 3 + len(angles)))  # of the root, and of the angles
     poses, places = motion.poses.copy(), motion.translations.copy()
     for _ in range(ROUNDS):
         squares = Squares.of(*change.shape)
-        off = np.einsum("ti,tij,tj->t", change[:, root], precision, change[:, root])
-        precise = precision / (1.0 + off / STRANGE**2)[:, None, None]
-        squares.add(root, precise, np.einsum("tij,tj->ti", precise, change[:, root]))
-        squares.add_bends(root, places, fps**2 / ACCELERATION)
+        add_root(squares, motion, seen, ACROSS, change[:, root])
         squares.add(legs, np.eye(len(angles)) / TURNING**2, change[:, legs] / TURNING**2)
         squares.add_bends(legs, change[:, legs], fps**2 / SHAKING)
-        for side, ball in enumerate(BALLS):
-            both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
-            feet, slopes = moving_feet(skeleton, poses, places, ball, angles)
-            squares.add_steps(both, feet, slopes, fps / (30.0 * STANDING))
+        add_standing(squares, Motion(motion.name, skeleton, poses, places, fps), stands, angles)
         change = change - squares.least()
         poses[:, angles] = motion.poses[:, angles] + change[:, 3:]
         places = motion.translations + change[:, root]
     return Motion(motion.name, skeleton, poses, places, fps)
 
 
-def root_precisions(motion: Motion, seen: SeenFrames, deviation: float) -> Array:
-    """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance.
+def add_root(squares: Squares, motion: Motion, seen: SeenFrames, deviation: float, moved: Array) -> None:
+    """Add what is asked of a root, `moved` (T, 3) from where a motion has it: to be there, and to go smoothly.
 
-    `deviation` is how many metres it may be off across the line of sight, and where no camera is alone in depth.
+    `deviation` is how many metres it may be off across the line of sight, and where no camera is alone in depth. The
+    root's place is the first three numbers of each frame.
     """
+    root, precision = slice(0, 3), _root_precisions(motion, seen, deviation)
+    off = np.einsum("ti,tij,tj->t", moved, precision, moved)
+    precision /= (1.0 + off / STRANGE**2)[:, None, None]
+    squares.add(root, precision, np.einsum("tij,tj->ti", precision, moved))
+    squares.add_bends(root, motion.translations + moved, motion.fps**2 / ACCELERATION)
+
+
+def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], angles: Sequence[int]) -> None:
+    """Add what is asked of feet that stand (T, 2) as a motion goes now: not to move.
+
+    The numbers of each frame are the root's place and these angles of it.
+    """
+    legs = [angle for angle in LEGS if angle in angles]
+    columns = [0, 1, 2, *(3 + angles.index(angle) for angle in legs)]
+    for side, ball in enumerate(BALLS):
+        both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
+        feet, slopes = _moving_feet(motion.skeleton, motion.poses, motion.translations, ball, legs)
+        ways = np.zeros((*feet.shape, 3 + len(angles)))
+        ways[..., columns] = slopes
+        squares.add_steps(both, feet, ways, motion.fps / (30.0 * STANDING))
+
+
+def _root_precisions(motion: Motion, seen: SeenFrames, deviation: float) -> Array:
+    """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance."""
     across = np.where(seen.usable, deviation, UNSEEN)
     precise = np.eye(3) / across[:, None, None] ** 2
     alone = np.isfinite(seen.eyes).all(axis=1)
@@ -124,7 +150,7 @@ def root_precisions(motion: Motion, seen: SeenFrames, deviation: float) -> Array
     return np.asarray(precise)
 
 
-def moving_feet(
+def _moving_feet(
     skeleton: Skeleton, poses: Array, places: Array, ball: int, angles: Sequence[int]
 ) -> tuple[Array, Array]:
     """Return where a foot is (T, 3), and how that changes with the root and the angles (T, 3, 3 + angles)."""

@@ -333,6 +333,20 @@ def test_plugins_say_where_they_come_from_and_what_can_be_set() -> None:
     assert all(row["summary"] for row in rows.values())
 
 
+def test_one_plugin_is_shown_with_what_each_setting_means_whatever_its_kind() -> None:
+    text = run("plugins", "show", "sapso").stdout
+    assert text.startswith("optimiser sapso (posefit")
+    told = " ".join(text.split())
+    assert "--set sapso.cooling: float = 0.95 (gamma) factor on the temperature" in told
+    assert "--set sapso.cool: iteration | acceptance = iteration" in told
+    assert "Settings:" not in text
+    assert all(len(line) <= 120 for line in text.splitlines())
+    assert "It has no settings." in run("plugins", "show", "masks").stdout
+    said = fails("plugins", "show", "sapzo")
+    assert "plugin must be one of annealed, " in said
+    assert said.endswith("got 'sapzo'; did you mean 'sapso'?")
+
+
 def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
     result = run("plugins", "doctor")
     assert result.exit_code == 0

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from generator import angles, commands, environments, equations, figures, joints, python, settings
-from generator.prose import restructured, settings_in, shortened, without_settings
+from generator.prose import restructured, shortened
 
 from posefit import track
 from posefit.geometry.skeleton import JOINTS
@@ -81,19 +81,6 @@ def test_every_setting_of_every_method_is_told() -> None:
     for kind in KINDS:
         for offer in registry().offers[kind].values():
             assert {f"{offer.name}.{one.name}" for one in offer.settings} <= told or offer.distribution != "posefit"
-
-
-def test_a_list_of_settings_is_read_from_a_docstring() -> None:
-    text = (
-        "A swarm.\n\nSettings:\n    cooling (gamma): factor on the temperature\n        after each iteration: 5.2.\n"
-        "    seed: any.\n\nMore."
-    )
-    assert settings_in(text) == {
-        "cooling": ("gamma", "factor on the temperature after each iteration: 5.2."),
-        "seed": ("", "any."),
-    }
-    assert without_settings(text) == "A swarm.\n\nMore."
-    assert settings_in("Settings are told in prose.") == {}
 
 
 def test_every_equation_has_a_line_and_a_test() -> None:

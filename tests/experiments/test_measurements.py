@@ -87,7 +87,7 @@ def test_accuracy_is_that_of_the_tracks_of_all_seeds(
     monkeypatch.setattr(accuracy, "VIEWS", (45.0,))
     monkeypatch.setattr(accuracy, "WALKS", accuracy.WALKS[:1])
     ledger = tmp_path / "ledger"
-    found = told("accuracy", "--seeds", 3, "--ledger", ledger, cmu=str(cmu))
+    found = told("accuracy", "--seeds", 3, "--workers", 1, "--ledger", ledger, cmu=str(cmu))
     tracks = [
         posefit.track(
             cmu / "16" / "16_17.amc",
@@ -132,7 +132,7 @@ def test_methods_are_compared_at_one_budget(cmu: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(methods, "FRAMES", 2)
     monkeypatch.setattr(methods, "VIEWS", (0.0, 90.0))
     monkeypatch.setattr(methods, "OPTIMISERS", ("sapso",))
-    result = run("methods", "--seeds", 1, "--first-pose", "given", "--clips", cmu, "--json")
+    result = run("methods", "--seeds", 1, "--workers", 1, "--first-pose", "given", "--clips", cmu, "--json")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     assert [row["prior"] for row in found["rows"]] == list(methods.PRIORS)
@@ -163,7 +163,7 @@ def test_damage_makes_tracks_worse_and_is_drawn(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(degradation, "KINDS", ("dropped frames",))
     monkeypatch.setattr(degradation, "STRENGTHS", (0.0, 1.0))
     out = tmp_path / "damage.png"
-    result = run("degradation", "--seeds", 1, "--out", out, "--json")
+    result = run("degradation", "--seeds", 1, "--workers", 1, "--out", out, "--json")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     ((none,), (all_,)) = found["kinds"]["dropped frames"]

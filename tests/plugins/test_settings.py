@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 import pytest
 
-from posefit.settings import accepts, check, parse, planned, settings_of
+from posefit.settings import accepts, check, parse, planned, settings_in, settings_of, without_settings
 from posefit_filters.particle import Particle
 from posefit_swarm.sapso import SAPSO
 
@@ -114,3 +114,16 @@ def test_a_budget_becomes_iterations(
 def test_a_budget_becomes_evaluations_where_an_optimiser_plans_with_them() -> None:
     assert planned(Particle, {"noise": 0.2}, 500, 20) == {"noise": 0.2, "evaluations": 500}
     assert planned(lambda space, rng: None, {}, 500, 20) == {}
+
+
+def test_a_list_of_settings_is_read_from_a_docstring() -> None:
+    text = (
+        "A swarm.\n\nSettings:\n    cooling (gamma): factor on the temperature\n        after each iteration: 5.2.\n"
+        "    seed: any.\n\nMore."
+    )
+    assert settings_in(text) == {
+        "cooling": ("gamma", "factor on the temperature after each iteration: 5.2."),
+        "seed": ("", "any."),
+    }
+    assert without_settings(text) == "A swarm.\n\nMore."
+    assert settings_in("Settings are told in prose.") == {}

@@ -20,6 +20,7 @@ from tests.sweep.fake import cells
 
 ROOT = Path(__file__).parents[2]
 METHODS = 10
+PROPOSED, FALLING = list(range(40, 2480, 40)), 20.0 / np.arange(1.0, 62.0)  # of the trace of every row
 counted = pytest.mark.skipif(not Path("/proc/self/io").exists(), reason="reads what it took from /proc")
 REPORT = """
 import json, sys, time
@@ -39,8 +40,7 @@ def rows(instances: int, seeds: int, methods: int = METHODS) -> Iterator[CellRes
     for m in range(methods):
         for i in range(instances):
             for s, error in enumerate(rng.gamma(2.0, 1.0, seeds).tolist()):
-                cost = [float(f"{20.0 / k + error:.6g}") for k in range(1, 62)]
-                trace: dict[str, Any] = {"evaluations": list(range(40, 2480, 40)), "cost": cost}
+                trace: dict[str, Any] = {"evaluations": PROPOSED, "cost": np.round(FALLING + error, 4).tolist()}
                 cell = replace(first, method=f"m{m}@pca", instance=i, seed=s)
                 yield CellResult(row_of(cell, error, trace=trace), picture)
 

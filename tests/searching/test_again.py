@@ -53,7 +53,9 @@ def followed(folder: Path, comes: str, **given: Any) -> tuple[posefit.Track, Arr
 @pytest.mark.slow
 @pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
 def test_who_comes_back_faces_where_he_goes_in_nine_of_ten_seeds(tmp_path: Path, optimiser: str) -> None:
-    right = [followed(tmp_path, "back", optimiser=optimiser, seed=seed)[1][AFTER].mean() for seed in range(10)]
+    # which way he is followed is decided before the track is steadied
+    tracks = [followed(tmp_path, "back", optimiser=optimiser, seed=seed, steady=False) for seed in range(10)]
+    right = [faces[AFTER].mean() for _, faces in tracks]
     assert np.mean(np.array(right) > 0.95) >= 0.9, right
 
 

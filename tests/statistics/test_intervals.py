@@ -9,28 +9,24 @@ from posefit.statistics.intervals import iqm, iqm_intervals
 from tests.statistics.studies import DRAWS, INSTANCES, studies, truth
 
 COUNT = 1000
+RESAMPLES = 399  # of 399 pivots ten lie beyond each end of a 95 % interval; more change what it holds by 0.1 %
 
 
-def coverage(kind: str, seeds: int, count: int = COUNT) -> float:
+def coverage(kind: str, seeds: int, count: int) -> float:
     """Return the share of studies whose interval holds the truth."""
     true, rng = truth(kind), np.random.default_rng(12)
     held = 0
     for errors in studies(kind, seeds, count, rng):
-        found = iqm_intervals(errors, rng, resamples=1000)
+        found = iqm_intervals(errors, rng, resamples=RESAMPLES)
         held += found.low[0] <= true <= found.high[0]
     return held / count
-
-
-@pytest.mark.slow
-def test_intervals_hold_the_truth_in_93_to_97_percent_of_1000_studies():
-    assert 0.93 <= coverage("with lost runs", 10) <= 0.97
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seeds", [5, 10, 20])
 @pytest.mark.parametrize("kind", DRAWS)
 def test_intervals_hold_the_truth_whatever_the_noise_and_the_number_of_seeds(kind, seeds):
-    share = coverage(kind, seeds, 3 * COUNT)  # so that chance moves the share by 0.4 % only
+    share = coverage(kind, seeds, 2 * COUNT)  # so that chance moves the share by 0.5 % only
     print(f"{kind}, {seeds} seeds: {100 * share:.1f} %")
     assert 0.93 <= share <= 0.97
 

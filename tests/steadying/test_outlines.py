@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from posefit.fitting.shape import NAMES, Shape, shaped
 from posefit.fitting.tracker import Frame, Observation
@@ -160,6 +162,69 @@ def test_the_gradient_of_the_borders_squares_is_that_of_their_sum() -> None:
         expected = (half_sum(numbers + step) - half_sum(numbers - step)) / 2e-4
         assert slopes[0, k] == pytest.approx(expected, abs=1e-3 + 1e-3 * abs(expected))
     assert np.linalg.eigvalsh(curves[0]).min() > -1e-6
+
+
+def point_of(joints, radii, parents, bone, share, normal):  # type: ignore[no-untyped-def]
+    """Return the point of a bone's border at a share of it, in the direction of a normal."""
+    ends = np.array([1.0 - share, share])
+    return ends @ joints[[parents[bone], bone + 1]] + (ends @ radii[bone]) * normal
+
+
+def field_at(field: np.ndarray, x: float, y: float, corner: np.ndarray) -> float:
+    """Return what a field says between the middles of four pixels."""
+    where = [[y - corner[1] - 0.5], [x - corner[0] - 0.5]]
+    return float(map_coordinates(field.astype(np.float64), where, order=1)[0])
+
+
+def border_of(joint: np.ndarray, radii: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return points of the border of a bone between two joints (2, 2): their shares of the bone, normals and pixels."""
+    way = joint[1] - joint[0]
+    length = float(np.linalg.norm(way))
+    axis = way / length
+    tilt = np.arccos((radii[0] - radii[1]) / length)
+    sides, caps = max(int(length / spacing) + 1, 2), (np.arange(3) + 0.5) / 3.0
+    ends = np.full(sides + 1, length * np.sin(tilt) / sides)
+    ends[[0, -1]] *= 0.5  # the sides' points are closed off by half a step at either end
+    near, far = (np.pi - tilt) / 3.0, tilt / 3.0
+    shares = np.concatenate([np.arange(sides + 1) / sides, np.ones(3), np.zeros(3)])
+    angles = np.concatenate([np.full(sides + 1, tilt), tilt * caps, tilt + (np.pi - tilt) * caps])
+    weights = np.concatenate([ends, np.full(3, radii[1] * far), np.full(3, radii[0] * near)])
+    both = [np.cos(angles)[:, None] * axis + side * np.sin(angles)[:, None] * [-axis[1], axis[0]] for side in (1, -1)]
+    return np.tile(shares, 2), np.concatenate(both), np.tile(weights, 2)
+
+
+def test_the_gradient_of_the_bones_squares_is_that_of_their_points_in_the_field() -> None:
+    parents, rng = np.array([0, 1]), np.random.default_rng(5)
+    joints, radii = np.array([[12.3, 14.1], [30.2, 20.4], [44.6, 41.7]]), np.array([[4.2, 3.1], [2.9, 5.3]])
+    field = cv2.GaussianBlur(rng.normal(0.0, 30.0, (64, 70)), (0, 0), 6.0).astype(np.float32)
+    corner, scale = np.array([-3, -4]), 1.5
+    seen = []  # (bone, share, normal, weight) of the points that no other bone covers
+    for b, parent in enumerate(parents):
+        other = 1 - b
+        for share, normal, weight in zip(*border_of(joints[[parent, b + 1]], radii[b], 2.0), strict=True):
+            x, y = point_of(joints, radii, parents, b, share, normal)
+            off = kernels.cone_distance(
+                x, y, *joints[parents[other]], radii[other, 0], *joints[other + 1], radii[other, 1]
+            )
+            if off[0] >= -kernels.COVERED:
+                seen.append((b, share, normal, weight / (1.0 + (field_at(field, x, y, corner) / scale) ** 2)))
+    assert 20 < len(seen) < 100
+
+    def offs(numbers: np.ndarray) -> np.ndarray:
+        """Return how far the points are outside, each times the root of its weight: normals stay as they were."""
+        moved, grown = numbers[:6].reshape(3, 2), numbers[6:].reshape(2, 2)
+        places = [point_of(moved, grown, parents, b, share, normal) for b, share, normal, _ in seen]
+        return np.array(
+            [np.sqrt(one[-1]) * field_at(field, x, y, corner) for one, (x, y) in zip(seen, places, strict=True)]
+        )
+
+    out = np.zeros((1, 10, 10)), np.zeros((1, 10))
+    kernels._pull_bones(field, corner, np.array(field.shape), parents, joints, radii, 2.0, scale, out[0][0], out[1][0])
+    here = np.concatenate([joints.ravel(), radii.ravel()])
+    steps = 1e-4 * np.eye(10)
+    slopes = np.array([(offs(here + step) - offs(here - step)) / 2e-4 for step in steps])
+    np.testing.assert_allclose(out[1][0], slopes @ offs(here), rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(out[0][0], slopes @ slopes.T, rtol=1e-4, atol=1e-4)
 
 
 def test_steps_for_other_slopes_are_those_that_they_alone_would_ask_for() -> None:

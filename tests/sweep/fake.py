@@ -1,7 +1,7 @@
 """Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
 
 `python -m tests.sweep.fake DIR pebble|dask CELLS` drives a sweep of such cells; what a cell does follows from its
-`frames`: see `behave`.
+`frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
 import ctypes
@@ -11,16 +11,16 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from posefit.sweep.cell import Cell, CellResult, packed_joints
-from posefit.sweep.drive import Tally, drive_cells
-from posefit.sweep.driver import Driver
-from posefit.sweep.engines.cluster import Cluster
-from posefit.sweep.engines.engine import Engine
 from posefit.sweep.engines.limits import Limits
-from posefit.sweep.engines.processes import Processes
+
+if TYPE_CHECKING:
+    from posefit.sweep.drive import Tally
+    from posefit.sweep.engines.engine import Engine
 
 STARTS = "POSEFIT_STARTS"
 SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND, TOGETHER = 1001, 1002, 1003, 1004, 1005, 1006, 1007
@@ -98,8 +98,11 @@ def result(cell: Cell) -> CellResult:
     return CellResult(row, packed_joints(estimate=joints, truth=joints))
 
 
-def swept(out: Path, chosen: Sequence[Cell], engine: Engine) -> Tally:
+def swept(out: Path, chosen: Sequence[Cell], engine: "Engine") -> "Tally":
     """Return how a sweep ended."""
+    from posefit.sweep.drive import drive_cells
+    from posefit.sweep.driver import Driver
+
     with Driver(out) as driver:
         return drive_cells(chosen, driver, engine, print, lambda _: None)
 
@@ -110,10 +113,18 @@ def starts(path: Path) -> list[tuple[str, int]]:
     return [(key, int(process)) for key, process in (line.split() for line in lines)]
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """Drive a sweep as the command line says, and return its exit status."""
+    from posefit.sweep.engines.cluster import Cluster
+    from posefit.sweep.engines.processes import Processes
+
     where, kind, many = sys.argv[1:4]
     made: Engine = Processes(2, LIMITS, behave)
     if kind == "dask":
         made = Cluster(workers=2, limits=LIMITS, run=behave, patience=300.0)
     tally = swept(Path(where), cells(int(many), SLOW if len(sys.argv) > 4 else 60), made)
-    sys.exit(1 if tally.quarantined else 130 if tally.stopped else 0)
+    return 1 if tally.quarantined else 130 if tally.stopped else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 
 from posefit.fitting.tracker import Observation
-from posefit.silhouette.corruption import shadow
+from posefit.silhouette.corruption import shadow, wandering
 from posefit.silhouette.mask import Mask, Silhouette
 
 SALT = 2026  # part of every seed
-HELD = 10  # frames for which the same is wrong
+HELD = 10  # frames for which the same is wrong: a third of a second, as all clips of the experiment have 30 a second
 RIM = 0.006  # of the person's height: the standard deviation of how far all borders of a track are outside
 EDGE = 0.004  # and of how far a border wanders besides, in each frame anew
 SMOOTH = 0.02  # over which length it does
@@ -47,16 +47,8 @@ def worn(mask: Mask, rim: float, held: np.random.Generator, fresh: np.random.Gen
         ends = (columns.argmin(), columns.argmax(), rows.argmax())
         where = ends[int(end * len(ends))]
         _disc(spoilt, columns[where], rows[where], _radius(size, tall), False)
-    spoilt = _edged(spoilt, rim * tall, tall, fresh)
+    spoilt = wandering(spoilt, rim * tall, EDGE * tall, SMOOTH * tall, fresh)
     return spoilt if spoilt.sum() > 0.5 * mask.sum() else mask
-
-
-def _edged(mask: Mask, rim: float, tall: int, rng: np.random.Generator) -> Mask:
-    """Return a mask whose border is so many pixels outside, and wanders."""
-    inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
-    outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
-    wander = cv2.GaussianBlur(rng.standard_normal(mask.shape), (0, 0), SMOOTH * tall)
-    return np.asarray(inside - outside + rim + EDGE * tall * wander / max(float(wander.std()), 1e-9) > 0.0)
 
 
 def _radius(share: float, tall: int) -> int:

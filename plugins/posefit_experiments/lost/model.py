@@ -14,7 +14,7 @@ Row = Mapping[str, Any]
 Flags = NDArray[np.bool_]
 
 STRENGTH = 0.03  # of the weights' prior, a normal one: its variance
-SWAPPED = 0.05  # of the frames whose sides are not called unknown, at most
+SWAPPED = 0.05  # of the frames whose sides are not called unknown: about, for `BOUNDS` come first, and footage differs
 BOUNDS = (0.01, 0.5)  # of how likely exchanged sides have to be for that; from a half on they are likelier than not
 DIGITS = 6
 # What each model looks at, of the evidence of a frame: now, and its means
@@ -99,7 +99,7 @@ def _fitted(rows: Sequence[Row], known: Sequence[Array]) -> dict[str, Any]:
 
 
 def _unknown(exchanged: Array, swapped: Flags) -> float:
-    """Return from which probability of exchanged sides on they are unknown: few of the other frames are swapped."""
+    """Return from which probability of exchanged sides on they are unknown: of the rest about `SWAPPED` are swapped."""
     order = np.argsort(exchanged, kind="stable")
     shares = np.cumsum(swapped[order]) / np.arange(1, len(order) + 1)
     few = np.flatnonzero(shares <= SWAPPED)
