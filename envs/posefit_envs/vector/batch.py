@@ -150,7 +150,7 @@ def chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int 
         return [None] * count
     if isinstance(chosen, int | np.integer) or not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
         return [instance_number(chosen)] * count
-    if np.ndim(chosen) != 1 or len(chosen) != count:
+    if (isinstance(chosen, np.ndarray) and chosen.ndim != 1) or len(chosen) != count:
         raise ArgumentError(f"instance must be one number or {count}, one for each environment, got {quoted(chosen)}")
     return [instance_number(one) for one in chosen]
 

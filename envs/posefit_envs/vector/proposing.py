@@ -63,18 +63,19 @@ class ProposalVectorEnv(SearchVectorEnv):
                 for memory, action, steps in zip(self._memories, given, stepping, strict=True)
             ]
         )
-        seen = self._look(proposals, np.ones(self.num_envs, dtype=bool), ~stepping)
+        seen = self._look(proposals, ~stepping)
         rewards = np.zeros(self.num_envs)
         for i in np.flatnonzero(stepping).tolist():
             rewards[i] = self._memories[i].take(proposals[i], float(seen.costs[i]))
         terminated = stepping & (np.array([memory.used for memory in self._memories]) >= self._most)
         truncated = stepping & (self._steps >= self._longest)
         self._ended = terminated | truncated
-        return self._states(seen.pictures), rewards, terminated, truncated, self._infos(seen)
+        infos = masked(np.ones_like(stepping), self._infos(seen))
+        return self._states(seen.pictures), rewards, terminated, truncated, infos
 
-    def _look(self, proposals: Array, rows: Flags, begun: Flags) -> Evaluated:
-        """Evaluate proposals (n, d) of some environments; in those that have begun they are the first ones."""
-        seen = self._last = self._stage.look(proposals, np.flatnonzero(rows))
+    def _look(self, proposals: Array, begun: Flags) -> Evaluated:
+        """Evaluate proposals (n, d); in environments that have begun they are the first ones."""
+        seen = self._last = self._stage.look(proposals, self._stage.everyone)
         for i in np.flatnonzero(begun).tolist():
             self._memories[i] = ProposalMemory(self._dimensions, float(seen.costs[i]), self._most)
         return seen
@@ -92,7 +93,7 @@ class ProposalVectorEnv(SearchVectorEnv):
         }
         if self._selection.errors:
             values["error_degrees"] = pose_error_degrees(self._truths, seen.poses)
-        return masked(np.ones(self.num_envs, dtype=bool), values)
+        return values
 
     def _begin(self, i: int, number: int) -> None:
         episode = self._episodes[i] = Episode(self.world, number, self._most)
@@ -100,7 +101,9 @@ class ProposalVectorEnv(SearchVectorEnv):
         self._truths[i] = episode.instance.truth.poses[0]
 
     def _opened(self, begun: Flags) -> tuple[Any, Infos]:
-        seen = self._look(np.zeros((self.num_envs, self._dimensions)), begun, begun)
+        # who goes on is shown his last proposal once more, which counts for nothing
+        last = np.stack([memory.last[0] for memory in self._memories])
+        seen = self._look(np.where(begun[:, None], 0.0, last), begun)
         return self._states(seen.pictures), self._infos(seen)
 
     def render(self) -> Any:
