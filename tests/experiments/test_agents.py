@@ -142,10 +142,40 @@ def test_what_makes_no_sense_is_named_before_anything_is_measured(arguments: lis
         raise ran.exception or AssertionError(ran.output)
 
 
-def test_a_file_that_holds_no_rows_is_refused(tmp_path: Any) -> None:
+ROW: dict[str, Any] = Training("fit", "random actions", 0, 0, 2)._asdict()
+ROW |= {"costs": [1.0, 2.0], "curve": [[0, [3.0, 4.0]]], "minutes": 0.1}
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        {"task": "fit"},
+        *({name: value for name, value in ROW.items() if name != left} for left in ("costs", "curve", "minutes")),
+        ROW | {"costs": [1.0]},
+        ROW | {"costs": ["1.0", "2.0"]},
+        ROW | {"curve": [[0, [3.0]]]},
+        ROW | {"curve": [0]},
+        ROW | {"minutes": None},
+    ],
+)
+def test_a_file_that_holds_no_rows_is_refused_before_anything_is_measured(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, row: Any
+) -> None:
     path = tmp_path / "rows.jsonl"
-    path.write_text('{"task": "fit"}\n')
-    with pytest.raises(ValueError, match="line 1 must be a row with task, agent, seed, steps, instances, costs"):
-        experiment.agents((), ("random actions",), 1, 1, 1, False, str(path), 1)
-    with pytest.raises(ValueError, match="expected a file for rows, got"):
-        experiment.agents((), ("random actions",), 1, 1, 1, False, str(tmp_path / "none" / "rows.jsonl"), 1)
+    path.write_text(f"{json.dumps(ROW)}\n{json.dumps(row)}\n")
+    monkeypatch.setattr(experiment, "each", None)
+    wanted = "line 2 must be a row with task, agent, seed, steps, instances, costs, curve, minutes, got another text"
+    with pytest.raises(ValueError, match=wanted):
+        experiment.agents((), ("random actions",), 1, 1, 2, False, str(path), 1)
+
+
+def test_what_is_asked_for_twice_is_a_row_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    def each(jobs: Any, workers: Any, progress: Any) -> Any:
+        return {
+            turn: turn._asdict() | {"costs": [float(len(turn.agent))], "curve": [], "minutes": 0.0} for turn in jobs
+        }
+
+    monkeypatch.setattr(experiment, "each", each)
+    once, twice = (experiment.agents(("fit",) * n, ("gaussian",) * n, 2, 1, 1, False, None, 1) for n in (1, 2))
+    assert len(once["rows"]) == 5  # two agents, two seeds, and what is best known
+    assert twice == once

@@ -1,10 +1,8 @@
 """Baseline agents are trained and evaluated: `posefit reproduce agents`, a row an agent and seed, kept as they come."""
 
-import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -12,7 +10,6 @@ import numpy as np
 
 import posefit_envs  # noqa: F401, registers the environments
 from posefit import minimise
-from posefit.reading import parsed_json, read_text
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs.instance import instance, select
@@ -41,10 +38,10 @@ from posefit_experiments.agents.design import (
 )
 from posefit_experiments.agents.learners import check_learners, trained
 from posefit_experiments.agents.tables import agent_tables
-from posefit_experiments.grid import Progress, each
+from posefit_experiments.grid import Progress, each, earlier, kept
 
-LARGEST_ROWS = 50_000_000  # bytes of a file of rows
 BEST = "best known"
+FIGURES = ("costs", "curve", "minutes")  # of a row, beside what was asked for
 SAMPLED = ("fit",)  # tasks in which a learner's actions are drawn, as its noise is what searches
 
 
@@ -64,16 +61,16 @@ def agents(
     `rows` is a file for a row a line as they come; what it holds already is not measured again. Raises ValueError where
     something asked for is not there.
     """
-    asked = environments or tuple(TASKS)
+    asked = tuple(dict.fromkeys(environments)) or tuple(TASKS)
     check_design(asked, names, {"seeds": seeds, "steps": steps, "instances": instances})
     if quick:
         seeds, steps, instances = min(seeds, 2), QUICK_STEPS, QUICK_INSTANCES
     turns = agent_turns(asked, names, seeds, steps, instances)
     check_learners({turn.agent for turn in turns})
     turns += [Training(name, BEST, 0, 0, instances) for name in asked]
-    done = _earlier(rows)
+    done = earlier(rows, (*Training._fields, *FIGURES), turn_of)
     jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
-    done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
+    done |= each(jobs, workers, partial(kept, rows, progress)) if jobs else {}
     found = [done[turn] for turn in turns]
     return {"seeds": seeds, "steps": steps, "instances": instances, "rows": found} | agent_tables(found)
 
@@ -151,37 +148,14 @@ def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> li
     return found
 
 
-def _earlier(path: str | None) -> dict[Training, dict[str, Any]]:
-    """Return the rows of a file, which is made where there is none.
-
-    Raises ValueError where it cannot be written to, or a line is no row.
-    """
-    if path is None:
-        return {}
-    try:
-        Path(path).touch()
-    except OSError as error:
-        raise ValueError(f"{path}: expected a file for rows, got {error.strerror}") from None
-    found = {}
-    for number, line in enumerate(read_text(path, LARGEST_ROWS).splitlines(), 1):
-        try:
-            row = parsed_json(line)
-            turn = Training(*(row[name] for name in Training._fields))
-            if len(row["costs"]) != turn.instances:
-                raise ValueError("costs")
-            found[turn] = row
-        except (ValueError, TypeError, KeyError):
-            wanted = ", ".join((*Training._fields, "costs"))
-            raise ValueError(f"{path}: line {number} must be a row with {wanted}, got another text") from None
-    return found
-
-
-def _kept(
-    path: str | None, progress: Progress | None, ended: Iterator[tuple[Training, dict[str, Any]]], count: int
-) -> Iterator[tuple[Training, dict[str, Any]]]:
-    """Yield rows as they come, each written to a file at once where one is named."""
-    for turn, row in progress(ended, count) if progress else ended:
-        if path is not None:
-            with Path(path).open("a", encoding="utf-8") as file:
-                file.write(f"{json.dumps(row)}\n")
-        yield turn, row
+def turn_of(row: Mapping[str, Any]) -> Training:
+    """Return whose row it is. Raises ValueError where its figures are none, or not as many as it has instances."""
+    turn = Training(*(row[name] for name in Training._fields))
+    looks = min(turn.instances, CURVE_INSTANCES)
+    counts = [((), row["minutes"]), ((turn.instances,), row["costs"])]
+    counts += [count for steps, costs in row["curve"] for count in (((), steps), ((looks,), costs))]
+    for shape, numbers in counts:
+        array = np.array(numbers)
+        if array.shape != shape or array.dtype.kind not in "if":
+            raise ValueError(f"figures must be numbers of shape {shape}")
+    return turn
