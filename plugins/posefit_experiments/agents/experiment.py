@@ -22,9 +22,9 @@ from posefit_envs.policies import (
     sapso_policy,
     uniform_policy,
 )
-from posefit_experiments.agents.constants import bandit, evolved
+from posefit_experiments.agents.constants import bandit, evolved, generation
 from posefit_experiments.agents.design import (
-    BEST_KNOWN_TIMES,
+    BEST_KNOWN_EVALUATIONS,
     CURVE,
     CURVE_INSTANCES,
     HELD_OUT,
@@ -36,7 +36,7 @@ from posefit_experiments.agents.design import (
     agent_turns,
     check_design,
 )
-from posefit_experiments.agents.learners import check_learners, trained
+from posefit_experiments.agents.learners import ROLLOUT, check_learners, trained
 from posefit_experiments.agents.tables import agent_tables
 from posefit_experiments.grid import Progress, each, earlier, kept
 
@@ -71,7 +71,7 @@ def agents(
     done = earlier(rows, (*Training._fields, *FIGURES), turn_of)
     jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
     done |= each(jobs, workers, partial(kept, rows, progress)) if jobs else {}
-    found = [done[turn] for turn in turns]
+    found = [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
     return {"seeds": seeds, "steps": steps, "instances": instances, "rows": found} | agent_tables(found)
 
 
@@ -82,13 +82,14 @@ def agent_row(turn: Training) -> dict[str, Any]:
     row: dict[str, Any] = turn._asdict() | {"curve": []}
     evaluations = TASKS[turn.task].evaluations
     if turn.agent == BEST:
-        row["costs"] = _searched(STRONGEST, BEST_KNOWN_TIMES * 2440, numbers, turn.seed)
+        row["costs"] = _searched(STRONGEST, BEST_KNOWN_EVALUATIONS, numbers, turn.seed)
     elif turn.agent in ("random search", "sapso", "cma") and not _is_policy(turn):
         row["costs"] = _searched(turn.agent.split()[0], evaluations, numbers, turn.seed)
     else:
         row["costs"] = _costs(turn, _policy(turn, row["curve"]), numbers)
         if row["curve"]:
-            row["curve"].append([turn.steps, row["costs"][:CURVE_INSTANCES]])
+            last = [steps_taken(turn), row["costs"][:CURVE_INSTANCES]]
+            row["curve"] = [look for look in row["curve"] if look[0] < last[0]] + [last]
     return row | {"minutes": round((time.perf_counter() - began) / 60.0, 2)}
 
 
@@ -116,13 +117,21 @@ def _policy(turn: Training, curve: list[Any]) -> Policy:
 
     if turn.agent in ("bandit", "cma over constants"):
         learn = bandit if turn.agent == "bandit" else evolved
-        return learn(turn.task, env, _length(turn.task), turn.steps, turn.seed, look)
+        return learn(turn.task, env, TASKS[turn.task].length, steps_taken(turn), turn.seed, look)
     return trained(turn.agent, env, turn.steps, turn.seed, turn.task not in SAMPLED, look)
 
 
-def _length(task: str) -> int:
-    """Return how many steps an episode has."""
-    return 12 if task == "configure" else TASKS[task].evaluations - 1
+def steps_taken(turn: Training) -> int:
+    """Return how many steps of training an agent takes of those asked for: whole episodes, generations or rollouts."""
+    length = TASKS[turn.task].length
+    if turn.agent == "bandit":
+        return max(1, turn.steps // length) * length
+    if turn.agent == "cma over constants":
+        whole = generation(turn.task, length)
+        return turn.steps // whole * whole
+    if turn.agent == "ppo":
+        return -(-turn.steps // ROLLOUT) * ROLLOUT
+    return turn.steps
 
 
 def _made(task: str) -> gym.Env[Any, Any]:
