@@ -12,6 +12,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.utils.seeding import np_random
 
 import posefit_envs  # noqa: F401, registers it
+from posefit_envs.configuring import herd
 from posefit_envs.configuring.moves import differential, normal
 from posefit_envs.configuring.orders import Order, action_of, order_of
 from posefit_envs.policies import sapso_action, sapso_action_v0
@@ -35,11 +36,13 @@ def test_the_checkers_of_gymnasium_and_stable_baselines3_pass_without_a_warning(
 
 
 @pytest.mark.parametrize("every", [1, 5])
-def test_with_sapsos_own_schedule_it_finds_what_sapso_finds_bit_for_bit(every: int) -> None:
+def test_with_sapsos_own_schedule_it_costs_what_sapso_does_and_proposes_it_but_for_rounding(every: int) -> None:
     for number in range(2):
         env = made(instance=number, every=every)
         env.reset(seed=number)
-        ended, step, found = False, 0, []
+        ended, step, asked, found = False, 0, [], []
+        ask = env._herd.ask
+        env._herd.ask = lambda ask=ask, asked=asked: asked.append(ask().copy()) or asked[-1]
         while not ended:
             _, _, ended, _, info = env.step(sapso_action(step, every=every))
             found.append(env._herd.costs)
@@ -48,10 +51,12 @@ def test_with_sapsos_own_schedule_it_finds_what_sapso_finds_bit_for_bit(every: i
         rng, _ = np_random(number)
         sapso = SAPSO(env._herd.space, np.random.default_rng(int(rng.integers(2**63))))
         problem = env._herd.episode.scenery.problem(env._herd.space)
-        costs = []
+        proposed, costs = [], []
         while len(proposals := sapso.ask()):
+            proposed.append(proposals.copy())
             costs.append(problem.evaluate(proposals))
             sapso.tell(proposals, costs[-1])
+        np.testing.assert_allclose(np.concatenate(asked), np.concatenate(proposed[1:]), rtol=0.0, atol=1e-12)
         np.testing.assert_array_equal(np.concatenate(found), np.concatenate(costs[1:]))
         assert info["best_cost"] == np.min(costs)
         assert info["evaluations"] == 2440
@@ -126,7 +131,7 @@ def test_all_begin_anew_and_the_best_of_all_is_kept() -> None:
     assert env._herd.flock.best_cost.min() > best
     half = made(particles=40, every=1)
     half.reset(seed=0)
-    known, order = half._herd.flock.best.copy(), half._herd.flock.best_cost.argsort()
+    order = half._herd.flock.best_cost.argsort()
     still = {k: half._herd.flock.best_cost[k] for k in order[:20]}
     half.step(action_of(Order(restart=0.5)))
     assert all(half._herd.flock.best_cost[k] <= cost for k, cost in still.items())
@@ -138,14 +143,44 @@ def test_a_kick_goes_into_its_layer_alone() -> None:
     for layer, columns in enumerate((slice(0, 3), slice(3, 6), slice(6, 9))):
         env = made(particles=40, every=1)
         env.reset(seed=0)
-        herd = env._herd
-        leader, row = herd.leader.copy(), int(herd.flock.best_cost.argmin())
+        mine = env._herd
+        leader, row = mine.leader.copy(), int(mine.flock.best_cost.argmin())
         kick = [0.0, 0.0, 0.0]
         kick[layer] = 0.03
-        herd.follow(Order(stride=0.0, diffusion=(kick[0], kick[1], kick[2])))
-        moved = herd.ask()[row] - leader
+        mine.follow(Order(stride=0.0, diffusion=(kick[0], kick[1], kick[2])))
+        moved = mine.ask()[row] - leader
         assert (np.abs(moved[columns]) > 1e-6).all()
         assert np.count_nonzero(np.abs(moved) > 1e-12) == 3  # but for rounding, where the box is folded
+
+
+@pytest.mark.parametrize(
+    ("shares", "differences", "draws"),
+    [
+        ((0.26, 0.37, 0.37), 15, 15),  # of 40: 10.4, 14.8, and what is left
+        ((0.5125, 0.4875, 0.0), 20, 0),  # 20.5 and 19.5, both rounded to 20
+        ((0.0, 0.4875, 0.5125), 20, 20),
+    ],
+)
+def test_shares_become_whole_numbers_of_particles(
+    monkeypatch: pytest.MonkeyPatch, shares: Any, differences: int, draws: int
+) -> None:
+    counted = {"differences": 0, "draws": 0}
+
+    def different(space: Any, rng: Any, mine: Any, *others: Any) -> Any:
+        counted["differences"] = len(mine)
+        return mine
+
+    def drawn(space: Any, rng: Any, bests: Any, order: Any, count: int, stride: float) -> Any:
+        counted["draws"] = count
+        return bests[:count]
+
+    monkeypatch.setattr(herd, "differential", different)
+    monkeypatch.setattr(herd, "normal", drawn)
+    env = made(particles=40, every=1)
+    env.reset(seed=0)
+    env._herd.follow(Order(shares))
+    env._herd.ask()
+    assert counted == {"differences": differences, "draws": draws}
 
 
 def test_differences_and_draws_are_those_of_their_formulas() -> None:

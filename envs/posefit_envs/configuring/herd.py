@@ -77,6 +77,13 @@ class Herd:
         return part.moved
 
     def _move(self, part: Flock) -> None:
+        """Move the particles of a part, whose shares become whole numbers of them in the order of the optimisers.
+
+        Of n particles the swarm has the first round(n share), differential evolution the next round(n share), or all
+        that are left if these are fewer, and the normal distribution has the rest. Halves are rounded to even. A part
+        of the population is in the order of its bests, the best first, behind those that begin anew; the whole
+        population is in its own order, which never changes. Who begins anew is counted, and proposes where he is.
+        """
         flock, order, space, count = self.flock, self.order, self.space, len(part.moved)
         known = np.flatnonzero(np.isfinite(flock.best_cost))
         bests = flock.best[known]

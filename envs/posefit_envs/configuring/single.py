@@ -24,7 +24,8 @@ class OptimiserEnv(gym.Env[State, Any]):
     ## Description
     A population searches for the pose in one silhouette. Each step is `every` iterations of it, and the action says
     which optimisers move it, how far, how much of it at a time, what is scattered and what begins anew: dynamic
-    algorithm configuration with a choice of algorithms. `posefit_envs.policies.sapso_action` is SAPSO, bit for bit.
+    algorithm configuration with a choice of algorithms. With `posefit_envs.policies.sapso_action` it is SAPSO: its
+    proposals are SAPSO's but for rounding, as stride and temperature come back from an action, and cost the same.
 
     ## Action Space
     `Box(-1, 1, (10,), float32)`
@@ -41,7 +42,10 @@ class OptimiserEnv(gym.Env[State, Any]):
     | 7 | standard deviation of a random kick in the root, in half-ranges of the box | 0 | 0.3 |
     | 8, 9 | the same in the first and in the second half of the latents | 0 | 0.3 |
 
-    The shares are e^(5 a) of the first three numbers over their sum. Number 3 has come to its ends at -0.5 and 0.5.
+    The shares are e^(5 a) of the first three numbers over their sum. Of the n particles that move at a time the first
+    round(n share) are the swarm's, the next round(n share) differential evolution's, the rest are drawn from the normal
+    distribution. They stand in the order of their bests where a part of the population moves, those that begin anew
+    first, and in an order that never changes where all of it does. Number 3 has come to its ends at -0.5 and 0.5.
     Numbers 6 to 9 stand for nothing from 0 down.
 
     A step always has `every * particles` evaluations: so a smaller part moves more often. Stride and temperature fall

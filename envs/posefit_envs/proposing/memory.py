@@ -17,7 +17,11 @@ PATIENCE = 50.0  # proposals without a gain that show as 1
 
 
 class ProposalMemory:
-    """The proposals of one search and their costs; it begins with the middle of the box, which was evaluated."""
+    """The proposals of one search and their costs; it begins with the middle of the box, which was evaluated.
+
+    `best` and `last` hold four proposals each and begin as four copies of the middle. A copy among the best gives way
+    only to what costs less than the middle; one among the last gives way to any proposal.
+    """
 
     def __init__(self, dimensions: int, cost: float, evaluations: int) -> None:
         self.best = np.zeros((SHOWN, dimensions))

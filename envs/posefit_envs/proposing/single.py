@@ -40,11 +40,15 @@ class ProposalEnv(gym.Env[Any, Any]):
 
     | Num | Meaning |
     |---|---|
-    | 0 to 4 d - 1 | the four best proposals so far, the best first |
-    | 4 d to 8 d - 1 | the last four, the last first |
+    | 0 to 4 d - 1 | the four best proposals of those that cost less than the middle of the box, the best first |
+    | 4 d to 8 d - 1 | the last four proposals, the last first |
     | 8 d to 8 d + 7 | what these eight cost: 2 ln(1 + cost) / ln 101 - 1 |
     | 8 d + 8 | budget left: from 1 to -1 |
     | 8 d + 9 | proposals since the best cost fell: from -1 to 1 for 50 or more |
+
+    Both fours begin as four copies of the middle of the box, with its cost. So what costs as much or more is never
+    among the best, where copies fill the places behind those that cost less; among the last they stand behind the first
+    three proposals. Of proposals that cost the same the earlier one is the better.
 
     ## Rewards
     ln((1 + best cost before) / (1 + best cost after)): 0 where the proposal is no better than the best so far. The sum
