@@ -14,6 +14,7 @@ from posefit.fitting.check import whole
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.fit import Episode
 from posefit_envs.instance import Arguments, World, approved, select
+from posefit_envs.scales import scaled
 from posefit_envs.search import Doorkeeper
 from posefit_swarm.flock import Flock, speed_limits
 
@@ -200,8 +201,8 @@ class SteeredSwarm:
 
 def steering(actions: Array) -> tuple[list[float], list[float], list[float]]:
     """Return the inertias, temperatures and deviations of kicks that actions (n, 3) in [-1, 1] stand for."""
-    low, high = np.array([INERTIA, LOG_TEMPERATURE, SPREAD]).T
-    inertias, powers, spreads = (low + 0.5 * (actions + 1.0) * (high - low)).T.tolist()
+    columns = zip((INERTIA, LOG_TEMPERATURE, SPREAD), actions.T, strict=True)
+    inertias, powers, spreads = (scaled(bounds, column).tolist() for bounds, column in columns)
     return inertias, [10.0**power for power in powers], spreads
 
 

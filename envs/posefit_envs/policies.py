@@ -14,6 +14,7 @@ from posefit.fitting.check import positive
 from posefit_envs.configure import INERTIA, ITERATIONS, LOG_TEMPERATURE
 from posefit_envs.configuring.orders import Order, action_of
 from posefit_envs.configuring.single import EVERY
+from posefit_envs.scales import unscaled
 from posefit_swarm.sapso import COOLING, TEMPERATURE
 from posefit_swarm.swarm import inertia
 
@@ -35,9 +36,8 @@ def sapso_action(step: int, *, iterations: int = ITERATIONS, every: int = EVERY)
 def sapso_action_v0(step: int, *, iterations: int = ITERATIONS) -> Array:
     """Return the action (3,), float64, that makes iteration `step` of Configure-v0 what SAPSO does there."""
     now = min(step, iterations)
-    values = inertia(now, iterations), np.log10(TEMPERATURE * COOLING**now)
-    ranges = zip(values, (INERTIA, LOG_TEMPERATURE), strict=True)
-    return np.array([*(2.0 * (value - low) / (high - low) - 1.0 for value, (low, high) in ranges), -1.0])
+    temperature = np.log10(TEMPERATURE * COOLING**now)
+    return np.array([unscaled(INERTIA, inertia(now, iterations)), unscaled(LOG_TEMPERATURE, temperature), -1.0])
 
 
 def constant_policy(action: Any) -> Policy:

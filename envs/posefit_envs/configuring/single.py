@@ -3,7 +3,6 @@
 from typing import Any, Unpack
 
 import gymnasium as gym
-import numpy as np
 from gymnasium import error
 
 from posefit.fitting.check import whole
@@ -13,6 +12,7 @@ from posefit_envs.configuring.herd import LEAST, Herd
 from posefit_envs.configuring.orders import NUMBERS, order_of, space_of_orders
 from posefit_envs.drawing import MODES, Screen, check_mode, portray
 from posefit_envs.instance import ArgumentError, Arguments, approved, select
+from posefit_envs.scales import gained
 from posefit_envs.search import Doorkeeper
 from posefit_envs.stage import Stage
 
@@ -167,11 +167,6 @@ class OptimiserEnv(gym.Env[State, Any]):
         if self._herd is None:
             raise error.ResetNeeded("reset must come before anything else")
         return self._herd
-
-
-def gained(before: float, after: float) -> float:
-    """Return the reward of a best cost that falls: ln((1 + before) / (1 + after))."""
-    return float(np.log1p(before) - np.log1p(after))
 
 
 def check_herd(particles: int, iterations: int, every: int) -> None:

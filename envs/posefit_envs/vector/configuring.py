@@ -13,9 +13,10 @@ from posefit_envs.configure import ITERATIONS, PARTICLES
 from posefit_envs.configuring.features import State, instance_features, observed_state, space_of_features
 from posefit_envs.configuring.herd import Herd
 from posefit_envs.configuring.orders import order_of, space_of_orders
-from posefit_envs.configuring.single import EVERY, check_herd, gained
+from posefit_envs.configuring.single import EVERY, check_herd
 from posefit_envs.drawing import portray
 from posefit_envs.instance import Arguments, select
+from posefit_envs.scales import gained
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import error
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from posefit_envs.checker import part_of
+from posefit_envs.vector.checker import part_of
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
