@@ -25,6 +25,7 @@ with single ones. `posefit_envs.policies` has references to beat.
 | references as policies | policies.py |
 | the arguments; what an instance's number stands for (as in sweeps: `posefit.footage.instance`) | instance.py |
 | what is seen in a frame; actions that are not allowed | search.py |
+| what single environments share: their arguments, the door for actions, the window | base.py |
 | proposals become poses, costs and pictures, in many scenes at once; compiled | stage.py, kernels.py |
 | what is rendered | drawing.py |
 | optimisers that search an environment, trackers as references | driving.py, searched/ |

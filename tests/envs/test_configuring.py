@@ -41,16 +41,16 @@ def test_with_sapsos_own_schedule_it_costs_what_sapso_does_and_proposes_it_but_f
         env = made(instance=number, every=every)
         env.reset(seed=number)
         ended, step, asked, found = False, 0, [], []
-        ask = env._herd.ask
-        env._herd.ask = lambda ask=ask, asked=asked: asked.append(ask().copy()) or asked[-1]
+        ask = env._search.ask
+        env._search.ask = lambda ask=ask, asked=asked: asked.append(ask().copy()) or asked[-1]
         while not ended:
             _, _, ended, _, info = env.step(sapso_action(step, every=every))
-            found.append(env._herd.costs)
+            found.append(env._search.costs)
             step += 1
         # the same draws: an environment's generator begins with the seed, and hands one number on to its search
         rng, _ = np_random(number)
-        sapso = SAPSO(env._herd.space, np.random.default_rng(int(rng.integers(2**63))))
-        problem = env._herd.episode.scenery.problem(env._herd.space)
+        sapso = SAPSO(env._search.space, np.random.default_rng(int(rng.integers(2**63))))
+        problem = env._search.episode.scenery.problem(env._search.space)
         proposed, costs = [], []
         while len(proposals := sapso.ask()):
             proposed.append(proposals.copy())
@@ -106,13 +106,13 @@ def test_a_step_has_the_same_evaluations_whatever_part_of_the_population_moves(p
 def test_of_a_quarter_only_the_best_particles_move_and_more_often() -> None:
     env = made(particles=40, every=1)
     env.reset(seed=0)
-    before = env._herd.flock.best_cost.copy()
+    before = env._search.flock.best_cost.copy()
     asked = []
-    ask = env._herd.ask
-    env._herd.ask = lambda: asked.append(ask()) or asked[-1]
+    ask = env._search.ask
+    env._search.ask = lambda: asked.append(ask()) or asked[-1]
     env.step(action_of(Order(population=0.25)))
     assert [len(one) for one in asked] == [10, 10, 10, 10]
-    changed = np.flatnonzero(env._herd.flock.best_cost != before)
+    changed = np.flatnonzero(env._search.flock.best_cost != before)
     # the best ten of the first turn are among the best ten of every other, as bests only get better
     assert set(changed) <= set(before.argsort()[:10])
     assert len(changed) > 2
@@ -123,18 +123,18 @@ def test_all_begin_anew_and_the_best_of_all_is_kept() -> None:
     env.reset(seed=0)
     for k in range(20):
         best = env.step(sapso_action(k, every=1))[4]["best_cost"]
-    known = env._herd.flock.best.copy()
+    known = env._search.flock.best.copy()
     _, reward, _, _, info = env.step(action_of(Order(restart=1.0)))
     assert info["best_cost"] == best
     assert reward == 0.0
-    assert not (known[:, None] == env._herd.flock.best).all(axis=2).any()
-    assert env._herd.flock.best_cost.min() > best
+    assert not (known[:, None] == env._search.flock.best).all(axis=2).any()
+    assert env._search.flock.best_cost.min() > best
     half = made(particles=40, every=1)
     half.reset(seed=0)
-    order = half._herd.flock.best_cost.argsort()
-    still = {k: half._herd.flock.best_cost[k] for k in order[:20]}
+    order = half._search.flock.best_cost.argsort()
+    still = {k: half._search.flock.best_cost[k] for k in order[:20]}
     half.step(action_of(Order(restart=0.5)))
-    assert all(half._herd.flock.best_cost[k] <= cost for k, cost in still.items())
+    assert all(half._search.flock.best_cost[k] <= cost for k, cost in still.items())
 
 
 def test_a_kick_goes_into_its_layer_alone() -> None:
@@ -143,7 +143,7 @@ def test_a_kick_goes_into_its_layer_alone() -> None:
     for layer, columns in enumerate((slice(0, 3), slice(3, 6), slice(6, 9))):
         env = made(particles=40, every=1)
         env.reset(seed=0)
-        mine = env._herd
+        mine = env._search
         leader, row = mine.leader.copy(), int(mine.flock.best_cost.argmin())
         kick = [0.0, 0.0, 0.0]
         kick[layer] = 0.03
@@ -178,15 +178,15 @@ def test_shares_become_whole_numbers_of_particles(
     monkeypatch.setattr(herd, "normal", drawn)
     env = made(particles=40, every=1)
     env.reset(seed=0)
-    env._herd.follow(Order(shares))
-    env._herd.ask()
+    env._search.follow(Order(shares))
+    env._search.ask()
     assert counted == {"differences": differences, "draws": draws}
 
 
 def test_differences_and_draws_are_those_of_their_formulas() -> None:
     env = made()
     env.reset(seed=0)
-    space, rng = env._herd.space, np.random.default_rng(0)
+    space, rng = env._search.space, np.random.default_rng(0)
     # of bests that are all the same neither has anywhere to go
     same = np.repeat(space.draw(rng, 1), 20, axis=0)
     order = np.arange(20)

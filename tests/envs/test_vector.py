@@ -268,7 +268,7 @@ def test_an_optimiser_through_the_environment_is_the_optimiser_through_the_libra
     env = gym.make_vec("posefit/Fit-v0", num_envs=width, instance=3, max_evaluations=10**6, target_cost=-1.0)
     driven = drive(env, name, seed=5)
     unwrapped: Any = env.unwrapped
-    episode = unwrapped._episodes[0]
+    episode = unwrapped._searches[0]
     problem = episode.scenery.problem(episode.space)
     factory = registry().optimiser(name)
     alone = minimise(

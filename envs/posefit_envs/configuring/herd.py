@@ -8,6 +8,7 @@ from posefit.fitting.box import REDRAWS
 from posefit_envs.configure import ACCELERATION, ALPHA, FIRST
 from posefit_envs.configuring.moves import differential, normal
 from posefit_envs.configuring.orders import Order
+from posefit_envs.drawing import Picture, portray
 from posefit_envs.fit import Episode
 from posefit_envs.instance import World
 from posefit_swarm.flock import Flock, speed_limits
@@ -124,6 +125,12 @@ class Herd:
         self._told.append((costs, accepted))
         self.used += len(costs)
         self.open -= len(costs)
+
+    def portrait(self) -> Picture:
+        """Return the picture (height, width, 3) of the best pose."""
+        scenery = self.episode.scenery
+        poses, places = scenery.problem(self.space).decode(self.leader[None])
+        return portray(scenery, poses[0], places[0], f"best {self.best:.1f}, {self.used} evaluations")
 
     @property
     def costs(self) -> Array:
