@@ -15,6 +15,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for item in items:
             if item.get_closest_marker("slow"):
                 item.add_marker(pytest.mark.skip(reason="slow: --all runs it"))
+    if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1":
+        for item in items:
+            if item.get_closest_marker("simulated"):
+                item.add_marker(pytest.mark.skip(reason="simulated: NUMBA_ENABLE_CUDASIM=1 and -m simulated run it"))
 
 
 @pytest.fixture(scope="session")

@@ -57,6 +57,8 @@ class PoseProblem:
         proposals = writeable(proposals)
         if proposals.shape[1:] != (self.space.dimensions,):
             self.space.decode(proposals)  # says what is wrong
+        if self.on_device:
+            return self.cost(*self.decode(proposals))
         parts = parts_of(len(proposals), self.threads)
         if len(parts) == 1:
             return self._cost(*self.decode(proposals))  # SAPSO (5)
@@ -111,6 +113,11 @@ class PoseProblem:
             areas(self.body, camera, silhouette, poses, translations, self.threads)
             for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
         ]
+
+    @cached_property
+    def on_device(self) -> bool:
+        """Whether a GPU draws the poses: then all of them at once, and threads have nothing to share."""
+        return any(silhouette.device != "cpu" for silhouette in self.silhouettes)
 
     @cached_property
     def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:

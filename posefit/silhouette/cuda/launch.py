@@ -5,14 +5,12 @@ from numba import cuda, float32, float64, int32, uint32
 
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.cuda.cones import (
-    BLOCK_ROWS,
     BOUNDS,
     FIRST,
     LAST,
     LINES,
     ROW,
     STOP,
-    STRIP,
     TOP,
     crossing,
     project_joint,
