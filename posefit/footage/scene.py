@@ -15,6 +15,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.cuda.device import check_device
+from posefit.silhouette.cuda.moving import moved_to
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
@@ -109,7 +110,7 @@ class OnDevice(Sequence[Observation]):
 
     def __getitem__(self, k):  # type: ignore[no-untyped-def]
         seen = self.observations[k]
-        return replace(seen, silhouettes=[silhouette.on(self.device) for silhouette in seen.silhouettes])
+        return replace(seen, silhouettes=[moved_to(silhouette, self.device) for silhouette in seen.silhouettes])
 
 
 def seen_on(scene: Scene, device: str) -> Scene:

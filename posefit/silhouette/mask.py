@@ -1,6 +1,6 @@
 """Masks, and the silhouette of one view as the kernel wants it: bits."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import cv2
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Bits
-from posefit.silhouette.cuda.device import check_device
 from posefit.silhouette.rasteriser import STRIP_PIXELS, strips_and_words
 
 Mask = NDArray[np.bool_]  # (height, width)
@@ -55,14 +54,6 @@ class Silhouette:
         if known.shape != seen.shape:
             raise ValueError(f"valid must have the mask's shape {seen.shape}, got {known.shape}")
         return cls((seen != 0) & known, known)
-
-    def on(self, device: str) -> "Silhouette":
-        """Return the silhouette on a device, "cpu" or "cuda": poses are drawn and counted there.
-
-        Raises ValueError where there is no such device.
-        """
-        check_device(device)
-        return self if device == self.device else replace(self, device=device)
 
     @property
     def size(self) -> tuple[int, int]:

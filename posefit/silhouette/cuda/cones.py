@@ -85,8 +85,9 @@ def write_cone(k, start, radii, ends, strips, width, height, lines, bounds):
 
 @cuda.jit(device=True)
 def crossing(k, y, lines):
-    """Return from where to where cone k spans row y (float32), counted from its own first: in float32, a huge one
-    before its negative where it does not.
+    """Return from where to where cone k spans row y, counted from its own first; a huge column first where it does not.
+
+    All are float32, as on a CPU.
     """
     low, high = _HUGE, -_HUGE
     if lines[PA, k] <= y <= lines[PB, k]:
