@@ -10,7 +10,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
-from posefit.silhouette.cost import Areas, areas
+from posefit.silhouette.cost import areas
 from posefit.silhouette.cuda.device import check_device
 from posefit.silhouette.cuda.moving import moved_to
 from posefit.sweep.command import cores
@@ -99,7 +99,7 @@ def _on(problem: PoseProblem, device: str) -> PoseProblem:
     return replace(problem, silhouettes=[moved_to(one, device) for one in problem.silhouettes])
 
 
-def _resident(problem: PoseProblem, poses: Any, places: Any) -> Callable[[], Areas]:
+def _resident(problem: PoseProblem, poses: Any, places: Any) -> Callable[[], object]:
     """Return what counts poses that lie on the device already, as a library of them does, and copies their areas."""
     from numba import cuda
 
@@ -107,8 +107,8 @@ def _resident(problem: PoseProblem, poses: Any, places: Any) -> Callable[[], Are
     from posefit.silhouette.cuda.held import drawing_on_device
 
     drawing = drawing_on_device(problem.body, problem.cameras[0], problem.silhouettes)
-    given = [cuda.to_device(one) for one in (poses, places)]
-    return lambda: launched(drawing, *given, 1).copy_to_host()  # type: ignore[no-any-return]
+    there, where = cuda.to_device(poses), cuda.to_device(places)
+    return lambda: launched(drawing, there, where, 1).copy_to_host()
 
 
 def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -> dict[str, Any]:
@@ -154,7 +154,7 @@ def _megabytes() -> float:
     from numba import cuda
 
     free, total = cuda.current_context().get_memory_info()
-    return (total - free) / 1e6
+    return float(total - free) / 1e6
 
 
 def _name() -> str:

@@ -53,8 +53,8 @@ def _count(drawing: Sequence[Any], poses: Array, translations: Array, out: NDArr
 
     for k, first in enumerate(range(0, len(poses), PART)):
         part, stream = slice(first, first + PART), streams[k % 2]
-        given = [cuda.to_device(one[part], stream=stream) for one in (poses, translations)]
-        waiting.append((part, launched(drawing, *given, out.shape[1], stream), stream))
+        there, where = (cuda.to_device(one[part], stream=stream) for one in (poses, translations))
+        waiting.append((part, launched(drawing, there, where, out.shape[1], stream), stream))
         if len(waiting) == len(streams):
             collect()
     while waiting:
