@@ -65,11 +65,12 @@ class PCA:
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
         least = int(self._components) + 1 if self._components >= 1 else 2
         angles = angles_of(angles, max(self._clusters, least))
-        self.mean = alike(angles.mean(axis=0))  # SAPSO 2.1.1
+        self.mean = to_decimals(angles.mean(axis=0))  # SAPSO 2.1.1
         self.components, self.explained = principal(angles - self.mean, self._components)
-        latents = alike(self.transform(angles))
-        self.low, self.high = latents.min(axis=0), latents.max(axis=0)  # SAPSO 2.2 constraint 1
-        self.centres = alike(clustered(latents, self._clusters, self._seed)[0])
+        latents = to_decimals(self.transform(angles))
+        unit = 10.0**-DECIMALS  # by which rounding may have moved a frame inwards
+        self.low, self.high = latents.min(axis=0) - unit, latents.max(axis=0) + unit  # SAPSO 2.2 constraint 1
+        self.centres = to_decimals(clustered(latents, self._clusters, self._seed)[0])
         self.reach = reach_of(self.centres, latents, self._quantile)
         return self
 
@@ -138,10 +139,10 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
     kept = int(components) if components >= 1 else int(np.searchsorted(share.cumsum(), components)) + 1
     directions = directions[:kept]
     longest = np.take_along_axis(directions, np.abs(directions).argmax(axis=1)[:, None], axis=1)
-    return _orthonormal(alike(np.where(longest < 0.0, -directions, directions))), alike(share[:kept])
+    return _orthonormal(to_decimals(np.where(longest < 0.0, -directions, directions))), to_decimals(share[:kept])
 
 
-def alike(numbers: Array) -> Array:
+def to_decimals(numbers: Array) -> Array:
     """Return numbers with seven decimals.
 
     Libraries of linear algebra differ in the last digits from processor to processor, and a search that follows a track

@@ -95,9 +95,9 @@ def _on_device(
     body: Body, camera: Camera, silhouettes: Sequence[Silhouette], poses: Array, translations: Array
 ) -> Areas:
     """Return R, B, Y (n, silhouettes, 3), counted by a GPU. Only here is what that needs imported."""
-    from posefit.silhouette.cuda.counted import counted
+    from posefit.silhouette.cuda.counted import areas_on_device
 
-    return counted(body, camera, silhouettes, poses, translations)
+    return areas_on_device(body, camera, silhouettes, poses, translations)
 
 
 def _checked(

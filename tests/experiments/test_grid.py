@@ -35,7 +35,7 @@ def test_rows_come_in_the_order_of_the_plan_and_are_kept(tmp_path: Path, monkeyp
     found = rows(plan, 2, str(ledger), said)
     assert [row["key"] for row in found] == [cell.key for cell in plan]
     assert [(row["spec"]["method"], row["spec"]["seed"]) for row in found] == [
-        ("sapso@pca", 1), ("sapso@pca", 0), ("random@pca", 1), ("random@pca", 0),
+        ("sapso@pca", 1), ("random@pca", 1), ("sapso@pca", 0), ("random@pca", 0),
     ]  # fmt: skip
     assert len(Ledger(ledger)) == 4
     # nothing is run again, so no row has another time

@@ -18,7 +18,7 @@ from posefit.silhouette.mask import Silhouette
 PART = 65_536  # poses: 35 MB; two parts at a time are on the device, however many there are
 
 
-def counted(
+def areas_on_device(
     body: Body, camera: Camera, silhouettes: Sequence[Silhouette], poses: Array, translations: Array
 ) -> NDArray[np.int64]:
     """Return R, B, Y (n, silhouettes, 3) in pixels of poses (n, 66) at translations (n, 3), counted on the device.
