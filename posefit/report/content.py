@@ -109,9 +109,8 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
 def _compared(contest: Contest) -> dict[str, Any]:
     some = _some(contest)
     evaluations = curves.grid(some)
-    enough = len(contest.methods) > 1 and contest.rows[0].size > 1
     board, bases = leaderboard(contest), baseline_rows(contest)
-    tests = paired_tests(contest) if enough else None
+    tests = paired_tests(contest) if contest.testable else None
     return {
         "answer": lead_sentence(contest, board, bases, tests),
         "alike": alike(tests, board[0]["method"]),

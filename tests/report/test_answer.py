@@ -21,8 +21,7 @@ ORDER = ClaimedOrder("a paper", "c beats b, and b beats a", ("a", "b", "c"))
 
 
 def sentence(found: Contest) -> str:
-    enough = len(found.methods) > 1 and found.rows[0].size > 1
-    tests = paired_tests(found) if enough else None
+    tests = paired_tests(found) if found.testable else None
     return lead_sentence(found, leaderboard(found), baseline_rows(found), tests)
 
 
