@@ -13,6 +13,7 @@ from posefit.report import curves
 from posefit.report.answer.claimed import claim_results
 from posefit.report.answer.lead import alike, lead_sentence, three_tracks
 from posefit.report.answer.selection import selection_of
+from posefit.report.answer.unpaired import unpaired_sentence
 from posefit.report.colours import METHODS
 from posefit.report.columns import COLUMNS
 from posefit.report.contest import (
@@ -97,6 +98,7 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
             np.nansum(runs.figures["ms"] * np.array([place["frames"] for place in runs.places])[runs.instance]) / 3.6e6
         ),
         "shared": None if contest is None else int(contest.rows.size),
+        "unpaired": "" if contest is None else _unpaired(contest),
         "shared_instances": None if contest is None else contest.rows.shape[1],
         "shared_seeds": None if contest is None else contest.rows.shape[2],
         "apart": [] if contest is None else [m for m in range(len(runs.methods)) if m not in contest.methods],
@@ -104,6 +106,11 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
         "drawn": None if contest is None else _some(contest).rows.shape[1:],
         "pictures": len(pictures["tracks"]),
     }
+
+
+def _unpaired(contest: Contest) -> str:
+    spare = contest.blocks.size - contest.rows.size
+    return unpaired_sentence(contest.left_out, spare, contest.rows.shape[2], tested=True)
 
 
 def _compared(contest: Contest) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """What `posefit report` does: a page, and where they are asked for figures, tables and files for other tools."""
 
 from collections.abc import Callable, Iterator
+from math import comb
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from posefit.report.search.write import board_lines, write_searches
 from posefit.sweep.ledger import Ledger
 
 NAMED = 20  # instances that are named where they are not compared
-ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired {}, Holm, 5 %"
+ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired {}, Holm over {}, 5 %"
 
 Say = Callable[[str], None]
 
@@ -81,9 +82,14 @@ def leaderboard_lines(found: dict[str, Any]) -> list[str]:
     board = found["leaderboard"] or []
     searched = "times" in found
     lines = board_lines(board) if searched else _board_lines(board)
-    lines += [ALIKE.format("instances" if searched else "runs")] if any(row["letters"] for row in board) else []
+    if any(row["letters"] for row in board):
+        lines.append(ALIKE.format("instances" if searched else "runs", _pairs(board)))
     answer = [found["answer"]] if found["answer"] else []
     return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
+
+
+def _pairs(board: list[dict[str, Any]]) -> str:
+    return _counted(comb(sum(row["taking_part"] for row in board), 2), "pair")
 
 
 def _board_lines(board: list[dict[str, Any]]) -> list[str]:
@@ -104,6 +110,7 @@ def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:
         by = ", ".join(f"{method} {count}" for method, count in header["failed_by"].items())
         lines.append(f"{_counted(header['failed'], 'cell')} failed, left out of all figures: {by}")
         lines += [f"  {count} x {reason}" for reason, count in header["reasons"]]
+    lines += [header["unpaired"]] if header["unpaired"] else []
     if gaps:
         lines.append(f"left out of the comparison, for every method: {_counted(len(gaps), 'instance')}")
         for gap in gaps[:NAMED]:

@@ -63,7 +63,9 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     done = run("report", results, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert done.stdout.splitlines()[-1] == f"written to {out}: open it in any browser"
-    assert done.stdout.startswith("sapso@pca leads with an error of 1.06° on 2 instances of walk with 2 seeds each; ")
+    assert done.stdout.startswith(
+        "sapso@pca leads with an error of 1.06°, 1.00° ahead of random@pca, on 2 instances of walk with 2 seeds each; "
+    )
     assert done.stdout.splitlines()[1] == "1 cell failed, left out of all figures: random@pca 1"
     assert [line.split()[:2] for line in done.stdout.splitlines()[4:-2]] == [
         ["sapso@pca", "1.06"],
@@ -100,9 +102,10 @@ def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_abo
     ]
     lost = [(replace(FIRST, method="sapso@pca", instance=1, seed=s), ["its process died of SIGSEGV"]) for s in range(2)]
     done = run("report", ledger(tmp_path / "results", found, lost), "--out", tmp_path / "report.html")
-    assert done.stdout.splitlines()[1:6] == [
+    assert done.stdout.splitlines()[1:7] == [
         "2 cells failed, left out of all figures: sapso@pca 2",
         "  2 x its process died of SIGSEGV",
+        "2 finished runs are left out of the comparison, as some method has no run to pair them with",
         "left out of the comparison, for every method: 1 instance",
         "  walk, view 45, instance 1: no run of sapso@pca",
         f"{'':32} error deg   95 % interval   skill  alike",
