@@ -107,7 +107,7 @@ def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_abo
         "  2 x its process died of SIGSEGV",
         "2 finished runs are left out of the comparison, as some method has no run to pair them with",
         "left out of the comparison, for every method: 1 instance",
-        "  walk, view 45, instance 1: no run of sapso@pca",
+        "  walk, view 45°, instance 1: no run of sapso@pca",
         f"{'':32} error deg   95 % interval   skill  alike",
     ]
     header = Page(tmp_path / "report.html").data["header"]
@@ -209,7 +209,10 @@ def test_a_ledger_from_before_there_were_posteriors_has_no_such_columns(results:
         (["RESULTS", "--out", "OUT.html", "--iohprofiler", "none/OUT"], "expected a place to write to, got one in "),
     ],
 )  # fmt: skip
-def test_mistakes_are_one_line_and_write_nothing(words: list[str], message: str, results: Path, tmp_path: Path) -> None:
+def test_mistakes_are_one_line_and_write_nothing(
+    words: list[str], message: str, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.report.live.server.PATIENCE", 0.0)
     ledger(tmp_path / "EMPTY", [])
     (tmp_path / "OTHER.html").write_text("<p>mine</p>")
     (tmp_path / "DIR.html").mkdir()
