@@ -11,7 +11,7 @@ from posefit.claims import claimed_orders
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
 from posefit.report.answer.claimed import claim_results
-from posefit.report.answer.lead import alike, lead_sentence, three_tracks
+from posefit.report.answer.lead import lead_sentence, not_told_apart, three_tracks
 from posefit.report.answer.selection import selection_of
 from posefit.report.answer.unpaired import unpaired_sentence
 from posefit.report.colours import METHODS
@@ -120,7 +120,7 @@ def _compared(contest: Contest) -> dict[str, Any]:
     tests = paired_tests(contest) if contest.testable else None
     return {
         "answer": lead_sentence(contest, board, bases, tests),
-        "alike": alike(tests, board[0]["method"]),
+        "alike": not_told_apart(tests, board[0]["method"]),
         "tracks": three_tracks(contest, board[0]["method"]),
         "leaderboard": board,
         "baselines": bases,

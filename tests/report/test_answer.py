@@ -9,7 +9,7 @@ import pytest
 
 from posefit.claims import ClaimedOrder
 from posefit.report.answer.claimed import claim_results
-from posefit.report.answer.lead import alike, lead_sentence, others_said, three_tracks
+from posefit.report.answer.lead import lead_sentence, not_told_apart, others_said, three_tracks
 from posefit.report.answer.selection import features_of, selected, selection_of
 from posefit.report.answer.unpaired import unpaired_sentence
 from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard, paired_tests
@@ -63,9 +63,9 @@ def test_of_those_that_are_not_alike_it_is_said_how_many_are_worse_and_who_is_be
         "; b is not shown to be worse, and on most runs d is better, and 1 other is worse (Wilcoxon's signed ranks "
         "over 9 paired runs, after Holm, at 5 %)"
     )
-    assert alike(tests, 0) == [1]
-    assert alike(tests, 3) == []
-    assert alike(None, 0) == []
+    assert not_told_apart(tests, 0) == [1]
+    assert not_told_apart(tests, 3) == []
+    assert not_told_apart(None, 0) == []
 
 
 def test_one_method_alone_and_one_run_alone_are_not_compared(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def three_tracks(contest: Contest, method: int) -> list[tuple[str, int]]:
     return [(name, ranked[place]) for name, place in zip(EXAMPLES, places, strict=False)]
 
 
-def alike(tests: Mapping[str, Any] | None, method: int) -> list[int]:
+def not_told_apart(tests: Mapping[str, Any] | None, method: int) -> list[int]:
     """Return the methods that no paired test tells apart from one; none where there are no tests."""
     return [] if tests is None else _sides(tests, method)[0]
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.report.answer.lead import alike
+from posefit.report.answer.lead import not_told_apart
 from posefit.report.answer.unpaired import unpaired_sentence
 from posefit.report.colours import METHODS
 from posefit.report.content import REASONS
@@ -108,7 +108,7 @@ def _compared(match: Match) -> dict[str, Any]:
     evaluations = _grid(match)
     return {
         "answer": search_sentence(match, board, bases, tests),
-        "alike": alike(tests, board[0]["method"]),
+        "alike": not_told_apart(tests, board[0]["method"]),
         "leaderboard": board,
         "baselines": bases,
         "taking_part": match.methods,
