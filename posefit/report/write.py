@@ -23,7 +23,7 @@ Say = Callable[[str], None]
 
 def write_report(
     path: str,
-    out: str,
+    out: str | None,
     *,
     figures: str | None = None,
     iohprofiler: str | None = None,
@@ -32,10 +32,10 @@ def write_report(
 ) -> dict[str, Any]:
     """Write the report of a ledger to a file, and return its answer, leaderboard, baselines, claims and selection.
 
-    An earlier report of that name is replaced; nothing else is. `figures` is a new folder for figures (PNG, PDF) and
-    tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new file of all rows. Raises ValueError
-    where the ledger has no finished row or something cannot be written, and ImportError where figures need matplotlib:
-    before anything is written, if that can be known.
+    Where `out` is None no page is written. An earlier report of that name is replaced; nothing else is. `figures` is a
+    new folder for figures (PNG, PDF) and tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new
+    file of all rows. Raises ValueError where the ledger has no finished row or something cannot be written, and
+    ImportError where figures need matplotlib: before anything is written, if that can be known.
     """
     _check(Path(path), out, [figures, iohprofiler, csv])
     if figures is not None:
@@ -47,8 +47,9 @@ def write_report(
         return _searches(ledger, out, {"figures": figures, "iohprofiler": iohprofiler}, csv)
     runs = runs_of(ledger)
     data = data_of(ledger, runs, say)
-    with replaced_file(out, MARK.encode()) as building:
-        building.write_text(document(data), encoding="utf-8", newline="\n")
+    if out is not None:
+        with replaced_file(out, MARK.encode()) as building:
+            building.write_text(document(data), encoding="utf-8", newline="\n")
     if figures is not None:
         from posefit.report.portfolio import write_portfolio
 
@@ -65,7 +66,7 @@ def write_report(
     return {"out": out, **dict(plain(said)), "gaps": gaps}
 
 
-def _searches(ledger: Ledger, out: str, others: dict[str, str | None], csv: str | None) -> dict[str, Any]:
+def _searches(ledger: Ledger, out: str | None, others: dict[str, str | None], csv: str | None) -> dict[str, Any]:
     """Write the report of single searches, and return what it says."""
     for name, place in others.items():
         if place is not None:
@@ -78,14 +79,15 @@ def _searches(ledger: Ledger, out: str, others: dict[str, str | None], csv: str 
 
 
 def leaderboard_lines(found: dict[str, Any]) -> list[str]:
-    """Return the lines that the command prints: who leads, what is left out, the leaderboard, and where the page is."""
+    """Return the lines that the command prints: who leads, what is left out, the leaderboard, and where a page is."""
     board = found["leaderboard"] or []
     searched = "times" in found
     lines = board_lines(board) if searched else _board_lines(board)
     if any(row["letters"] for row in board):
         lines.append(ALIKE.format("instances" if searched else "runs", _pairs(board)))
     answer = [found["answer"]] if found["answer"] else []
-    return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
+    written = [] if found["out"] is None else [_written(found["out"])]
+    return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, *written]
 
 
 def _pairs(board: list[dict[str, Any]]) -> str:
@@ -128,11 +130,10 @@ def _written(out: str) -> str:
     return f"written to {out}: open it in any browser"
 
 
-def _check(ledger: Path, out: str, others: list[str | None]) -> None:
-    target = Path(out)
-    if target.suffix.lower() not in (".html", ".htm"):
+def _check(ledger: Path, out: str | None, others: list[str | None]) -> None:
+    if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"--out must be a file that ends in .html, got {out}")
-    if not replaceable(target, MARK.encode()):
+    if out is not None and not replaceable(Path(out), MARK.encode()):
         raise ValueError(f"{out}: expected a new name or an earlier report, got something else")
     places = [one for one in (out, *others) if one is not None]
     for place in places:

@@ -81,6 +81,15 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
 
 
+def test_without_a_file_it_prints_the_same_and_writes_nothing(results: Path, tmp_path: Path) -> None:
+    done = run("report", results)
+    assert done.exit_code == 0, done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["results"]
+    assert json.loads(run("report", results, "--json").stdout)["out"] is None
+    written = run("report", results, "--out", tmp_path / "report.html").stdout.splitlines()
+    assert done.stdout.splitlines() == written[:-1]
+
+
 def test_the_same_ledger_gives_the_same_bytes_and_replaces_an_earlier_report(results: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     run("report", results, "--out", out)
@@ -192,7 +201,7 @@ def test_a_ledger_from_before_there_were_posteriors_has_no_such_columns(results:
     [
         (["NONE", "--out", "OUT.html"], "expected a ledger, a folder that posefit sweep wrote, got none"),
         (["EMPTY", "--out", "OUT.html"], "expected a ledger with finished rows, got one with none"),
-        (["RESULTS"], "--out must name a file for the page, got none; --serve shows one without a file"),
+        (["NONE"], "expected a ledger, a folder that posefit sweep wrote, got none"),
         (["RESULTS", "--out", "OUT.html", "--port", "1"], "--port must be given with --serve, got it without"),
         (["RESULTS", "--serve", "--out", "OUT.html"], "--serve must be given without --out, which it does not write"),
         (["RESULTS", "--serve", "--csv", "OUT.csv"], "--serve must be given without --csv, which it does not write"),
