@@ -1,6 +1,7 @@
 """What several folders of tests share, and which tests a plain run leaves out."""
 
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for item in items:
             if item.get_closest_marker("slow"):
                 item.add_marker(pytest.mark.skip(reason="slow: --all runs it"))
+    if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1" and shutil.which("nvidia-smi") is None:
+        for item in items:
+            if item.get_closest_marker("device"):
+                item.add_marker(pytest.mark.skip(reason="no GPU: NUMBA_ENABLE_CUDASIM=1 and -m device simulate one"))
 
 
 @pytest.fixture(scope="session")

@@ -21,14 +21,15 @@ with single ones. `posefit_envs.policies` has references to beat.
 | Modes-v0: niching | modes.py |
 | Configure-v0: dynamic algorithm configuration | configure.py |
 | Configure-v1: with a choice of optimisers | configuring/ |
-| all but Modes-v0 many at once; seeds and masks of vector environments | vector/ |
+| all but Modes-v0 many at once, their seeds and masks, a checker of them; Stable-Baselines3 | vector/ |
 | references as policies | policies.py |
 | the arguments; what an instance's number stands for (as in sweeps: `posefit.footage.instance`) | instance.py |
 | what is seen in a frame; actions that are not allowed | search.py |
+| what single environments share: their arguments, the door for actions, the window | base.py |
 | proposals become poses, costs and pictures, in many scenes at once; compiled | stage.py, kernels.py |
 | what is rendered | drawing.py |
-| optimisers that search an environment, trackers as references; Stable-Baselines3 | driving.py, searched/, sb3.py |
-| a checker for vector environments | checker.py |
+| optimisers that search an environment, trackers as references | driving.py, searched/ |
+| what numbers of actions stand for, how a cost shows, what its fall earns | scales.py |
 """
 
 from importlib import import_module
@@ -37,18 +38,18 @@ from typing import TYPE_CHECKING, Any
 from gymnasium.envs.registration import register
 
 if TYPE_CHECKING:
-    from posefit_envs.checker import check_vector_env as check_vector_env
     from posefit_envs.driving import drive as drive
     from posefit_envs.driving import drive_each as drive_each
     from posefit_envs.driving import track_reference as track_reference
-    from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
+    from posefit_envs.vector.checker import check_vector_env as check_vector_env
+    from posefit_envs.vector.sb3 import to_sb3_vec_env as to_sb3_vec_env
 
 _HOME = {
-    "check_vector_env": "checker",
+    "check_vector_env": "vector.checker",
     "drive": "driving",
     "drive_each": "driving",
     "track_reference": "driving",
-    "to_sb3_vec_env": "sb3",
+    "to_sb3_vec_env": "vector.sb3",
 }
 __all__ = list(_HOME)
 

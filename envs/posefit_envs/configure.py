@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Unpack
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import error, spaces
 from numpy.typing import NDArray
@@ -11,10 +10,11 @@ from numpy.typing import NDArray
 from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit_envs.drawing import MODES, Screen, check_mode, portray
+from posefit_envs.base import SearchEnv
+from posefit_envs.drawing import Picture, portray
 from posefit_envs.fit import Episode
 from posefit_envs.instance import Arguments, World, approved, select
-from posefit_envs.search import Doorkeeper
+from posefit_envs.scales import scaled
 from posefit_swarm.flock import Flock, speed_limits
 
 PARTICLES, ITERATIONS = 40, 60
@@ -27,7 +27,7 @@ SPREAD = (0.0, 0.3)  # the third: standard deviations in half-ranges of the box
 State = NDArray[np.float32]
 
 
-class ConfigureEnv(gym.Env[State, Any]):
+class ConfigureEnv(SearchEnv["SteeredSwarm"]):
     """
     ## Description
     A swarm searches for the pose in one silhouette. Each step is one iteration of the swarm, and the action sets how it
@@ -80,8 +80,6 @@ class ConfigureEnv(gym.Env[State, Any]):
       Its vector form and `errors` came later, before its release as well, and change nothing by default.
     """
 
-    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
-
     def __init__(
         self,
         *,
@@ -90,16 +88,9 @@ class ConfigureEnv(gym.Env[State, Any]):
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        check_mode(render_mode)
         check_swarm(particles, iterations)
-        self.render_mode = render_mode
-        self._selection = select(**arguments)
-        self.world = self._selection.world
+        super().__init__(select(**arguments), spaces_of_swarm(), render_mode)
         self._particles, self._iterations = int(particles), int(iterations)
-        self.action_space, self.observation_space = spaces_of_swarm()  # type: ignore[assignment]
-        self._door = Doorkeeper(3)
-        self._search: SteeredSwarm | None = None
-        self._screen = Screen(self.metadata["render_fps"])
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[State, dict[str, Any]]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
@@ -107,8 +98,7 @@ class ConfigureEnv(gym.Env[State, Any]):
         number = self._selection.number(options, lambda: self.np_random)
         search = self._search = SteeredSwarm(self.world, number, self.np_random, self._particles, self._iterations)
         search.settle(search.problem.evaluate(search.flock.moved), FIRST)
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return standings([search]).states[0], self._info(search)
 
     def step(self, action: Any) -> tuple[State, float, bool, bool, dict[str, Any]]:
@@ -116,42 +106,25 @@ class ConfigureEnv(gym.Env[State, Any]):
         search = self._current()
         if search.left == 0:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
-        (inertia,), (temperature,), (spread,) = steering(self._door.proposals(action, (3,))[None])
+        (inertia,), (temperature,), (spread,) = steering(self._door.proposals(action, self._shape)[None])
         before = search.best
         search.fly(inertia)
-        flock, space = search.flock, search.episode.space
+        flock, space = search.flock, search.space
         if spread > 0.0:
             flock.moved = space.scatter(search.rng, flock.moved, np.full(space.dimensions, spread))
         search.settle(search.problem.evaluate(flock.moved), temperature)
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return standings([search]).states[0], before - search.best, search.left == 0, False, self._info(search)
 
     def _info(self, search: "SteeredSwarm") -> dict[str, Any]:
         info = {"best_cost": search.best, "evaluations": search.used, "instance": search.episode.instance.number}
         if self._selection.errors:
-            poses, _ = search.episode.space.decode(search.leader[None])
+            poses, _ = search.space.decode(search.leader[None])
             info |= search.episode.instance.errors(0, poses[0])
         return info
 
-    def render(self) -> Any:
-        """Return the picture (height, width, 3) of the best pose, or show it, as `render_mode` asks."""
-        if self.render_mode is None:
-            return None
-        search = self._current()
-        poses, places = search.problem.decode(search.leader[None])
-        label = f"best {search.best:.1f}, {search.used} evaluations"
-        picture = portray(search.episode.scenery, poses[0], places[0], label)
-        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._screen.close()
-
-    def _current(self) -> "SteeredSwarm":
-        if self._search is None:
-            raise error.ResetNeeded("reset must come before anything else")
-        return self._search
+    def _portrait(self, search: "SteeredSwarm") -> Picture:
+        return search.portrait()
 
 
 class SteeredSwarm:
@@ -162,14 +135,19 @@ class SteeredSwarm:
     ) -> None:
         self.episode = Episode(world, number, particles * (iterations + 1))
         self.rng = np.random.default_rng(int(generator.integers(2**63)))
-        space = self.episode.space
+        space = self.space = self.episode.space
         self.flock = Flock(space, self.rng, particles, speed_limits(space, ALPHA, "symmetric"), REDRAWS, "dimension")
         self.left, self.used, self._iterations = iterations, 0, iterations
+
+    def portrait(self) -> Picture:
+        """Return the picture (height, width, 3) of the best pose."""
+        poses, places = self.problem.decode(self.leader[None])
+        return portray(self.episode.scenery, poses[0], places[0], f"best {self.best:.1f}, {self.used} evaluations")
 
     @property
     def problem(self) -> PoseProblem:
         """The problem that is searched."""
-        return self.episode.scenery.problem(self.episode.space)
+        return self.episode.scenery.problem(self.space)
 
     @property
     def best(self) -> float:
@@ -200,8 +178,8 @@ class SteeredSwarm:
 
 def steering(actions: Array) -> tuple[list[float], list[float], list[float]]:
     """Return the inertias, temperatures and deviations of kicks that actions (n, 3) in [-1, 1] stand for."""
-    low, high = np.array([INERTIA, LOG_TEMPERATURE, SPREAD]).T
-    inertias, powers, spreads = (low + 0.5 * (actions + 1.0) * (high - low)).T.tolist()
+    columns = zip((INERTIA, LOG_TEMPERATURE, SPREAD), actions.T, strict=True)
+    inertias, powers, spreads = (scaled(bounds, column).tolist() for bounds, column in columns)
     return inertias, [10.0**power for power in powers], spreads
 
 

@@ -2,23 +2,23 @@
 
 from typing import Any, Unpack
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import error, spaces
 
 from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.check import finite_number, whole
-from posefit_envs.drawing import MODES, Screen, check_mode, portray
+from posefit_envs.base import SearchEnv
+from posefit_envs.drawing import Picture, portray
 from posefit_envs.instance import Arguments, Instance, World, approved, instance, select
-from posefit_envs.search import Doorkeeper, Image
+from posefit_envs.search import Image
 from posefit_envs.stage import Evaluated, Stage
 
 MAX_EVALUATIONS = 200
 TARGET_COST = 2.0
 
 
-class FitEnv(gym.Env[Image, Any]):
+class FitEnv(SearchEnv["Episode"]):
     """
     ## Description
     A person was seen as a silhouette. Each step proposes a pose; its body is projected, and what does not overlap with
@@ -76,8 +76,6 @@ class FitEnv(gym.Env[Image, Any]):
       `errors` came later, before its release as well, and changes nothing by default.
     """
 
-    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
-
     def __init__(
         self,
         *,
@@ -87,17 +85,10 @@ class FitEnv(gym.Env[Image, Any]):
         **arguments: Unpack[Arguments],
     ) -> None:
         check_budget(target_cost, "max_evaluations", max_evaluations)
-        check_mode(render_mode)
-        self.render_mode = render_mode
-        self._selection = select(**arguments)
-        self.world = self._selection.world
+        selection = select(**arguments)
+        super().__init__(selection, spaces_of(selection.world), render_mode)
         self._target, self._most = float(target_cost), int(max_evaluations)
-        self.action_space, self.observation_space = spaces_of(self.world)  # type: ignore[assignment]
-        self._shape = action_shape(self.world)
-        self._door = Doorkeeper(self._shape[0])
         self._stage = Stage(self.world, 1)
-        self._episode: Episode | None = None
-        self._screen = Screen(self.metadata["render_fps"])
 
     @property
     def search_space(self) -> SearchSpace:
@@ -108,11 +99,10 @@ class FitEnv(gym.Env[Image, Any]):
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        self._episode = Episode(self.world, number, self._most)
-        self._stage.put(0, self._episode.scenery, self._episode.space)
-        if self.render_mode == "human":
-            self.render()
-        return self._episode.scenery.picture, {"instance": number}
+        episode = self._search = Episode(self.world, number, self._most)
+        self._stage.put(0, episode.scenery, episode.space)
+        self._show()
+        return episode.scenery.picture, {"instance": number}
 
     def step(self, action: Any) -> tuple[Image, float, bool, bool, dict[str, Any]]:
         """Propose a pose."""
@@ -125,26 +115,11 @@ class FitEnv(gym.Env[Image, Any]):
         terminated = episode.best_cost <= self._target
         truncated = not terminated and episode.evaluations >= self._most
         episode.ended = terminated or truncated
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return outcome.pictures[0], -info["cost"], terminated, truncated, info
 
-    def render(self) -> Any:
-        """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
-        if self.render_mode is None:
-            return None
-        episode = self._current()
-        picture = portray(episode.scenery, episode.pose, episode.translation, episode.label)
-        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._screen.close()
-
-    def _current(self) -> "Episode":
-        if self._episode is None:
-            raise error.ResetNeeded("reset must come before anything else")
-        return self._episode
+    def _portrait(self, search: "Episode") -> Picture:
+        return portray(search.scenery, search.pose, search.translation, search.label)
 
 
 class Episode:

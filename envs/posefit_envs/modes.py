@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import error, spaces
 
@@ -13,16 +12,17 @@ from posefit.niching.instance import SIZE, niche_instance, niche_space
 from posefit.niching.scores import LEAST, LEVELS_MM, scored
 from posefit.posterior.modes import Posterior
 from posefit.silhouette.cost import project
-from posefit_envs.drawing import MODES, Screen, check_mode, portray
+from posefit_envs.base import SearchEnv
+from posefit_envs.drawing import Picture, portray
 from posefit_envs.instance import RESERVED, ArgumentError, Selection, World, approved, instance_number
-from posefit_envs.search import Doorkeeper, Image, Scenery
+from posefit_envs.search import Image, Scenery
 
 MAX_EVALUATIONS = 2000
 MAX_REPORTS = 10
 NOTHING = 2.0  # the Brier score of a report of nothing: as of one whose weight is all in the wrong place
 
 
-class ModesEnv(gym.Env[Image, Any]):
+class ModesEnv(SearchEnv["Quest"]):
     """
     ## Description
     A person was seen as a silhouette that two or more known poses have, or nearly have: a stride and the one half a
@@ -74,8 +74,6 @@ class ModesEnv(gym.Env[Image, Any]):
     - v0: first version.
     """
 
-    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
-
     def __init__(
         self,
         *,
@@ -90,17 +88,11 @@ class ModesEnv(gym.Env[Image, Any]):
         if approved(whole, "max_reports", max_reports, 1) > MAX_REPORTS:
             raise ArgumentError(f"max_reports must be at most {MAX_REPORTS}, got {max_reports}")
         approved(whole, "max_evaluations", max_evaluations, 2)
-        check_mode(render_mode)
-        self.render_mode = render_mode
         number = None if instance is None else instance_number(instance)
-        self._selection = Selection(World(), number, split, errors=True)
+        actions = spaces.Box(-1.0, 1.0, (niche_space().dimensions + 1,), np.float32)
+        pictures = spaces.Box(0, 255, (SIZE[1], SIZE[0], 2), np.uint8)
+        super().__init__(Selection(World(), number, split, errors=True), (actions, pictures), render_mode)
         self._reports, self._most = int(max_reports), int(max_evaluations)
-        self._shape = (niche_space().dimensions + 1,)
-        self.action_space = spaces.Box(-1.0, 1.0, self._shape, np.float32)
-        self.observation_space = spaces.Box(0, 255, (SIZE[1], SIZE[0], 2), np.uint8)  # type: ignore[assignment]
-        self._door = Doorkeeper(self._shape[0])
-        self._quest: Quest | None = None
-        self._screen = Screen(self.metadata["render_fps"])
 
     @property
     def search_space(self) -> SearchSpace:
@@ -111,10 +103,9 @@ class ModesEnv(gym.Env[Image, Any]):
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        self._quest = Quest(number)
-        if self.render_mode == "human":
-            self.render()
-        return self._quest.scenery.picture, {"instance": number}
+        quest = self._search = Quest(number)
+        self._show()
+        return quest.scenery.picture, {"instance": number}
 
     def step(self, action: Any) -> tuple[Image, float, bool, bool, dict[str, Any]]:
         """Propose a pose, and report it where the last number is above 0."""
@@ -137,26 +128,11 @@ class ModesEnv(gym.Env[Image, Any]):
         if quest.ended:
             reward -= quest.brier
             info |= {"peak_ratio": quest.peak_ratio, "brier": quest.brier, "log_score": quest.log_score}
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return quest.picture, reward, terminated, truncated, info
 
-    def render(self) -> Any:
-        """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
-        if self.render_mode is None:
-            return None
-        quest = self._current()
-        picture = portray(quest.scenery, quest.pose, quest.posed.problem.space.anchor, quest.label)
-        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._screen.close()
-
-    def _current(self) -> "Quest":
-        if self._quest is None:
-            raise error.ResetNeeded("reset must come before anything else")
-        return self._quest
+    def _portrait(self, search: "Quest") -> Picture:
+        return portray(search.scenery, search.pose, search.posed.problem.space.anchor, search.label)
 
 
 class Quest:

@@ -14,6 +14,7 @@ from posefit.fitting.check import positive
 from posefit_envs.configure import INERTIA, ITERATIONS, LOG_TEMPERATURE
 from posefit_envs.configuring.orders import Order, action_of
 from posefit_envs.configuring.single import EVERY
+from posefit_envs.scales import unscaled
 from posefit_swarm.sapso import COOLING, TEMPERATURE
 from posefit_swarm.swarm import inertia
 
@@ -23,7 +24,11 @@ PROPOSED = 1.0  # the last number of an action of Fit-v1 whose others are the pr
 
 
 def sapso_action(step: int, *, iterations: int = ITERATIONS, every: int = EVERY) -> Array:
-    """Return the action (10,), float64, that makes step `step` of Configure-v1 what SAPSO does there."""
+    """Return the action (10,), float64, that makes step `step` of Configure-v1 what SAPSO does there.
+
+    Its stride and temperature are SAPSO's but for rounding, and so are the proposals, within 1e-12 half-ranges. What
+    they cost is the same, unless a pixel lies as near as that to a silhouette's edge.
+    """
     now = min(step * every, iterations)
     return action_of(Order(stride=inertia(now, iterations), temperature=TEMPERATURE * COOLING**now))
 
@@ -31,9 +36,8 @@ def sapso_action(step: int, *, iterations: int = ITERATIONS, every: int = EVERY)
 def sapso_action_v0(step: int, *, iterations: int = ITERATIONS) -> Array:
     """Return the action (3,), float64, that makes iteration `step` of Configure-v0 what SAPSO does there."""
     now = min(step, iterations)
-    values = inertia(now, iterations), np.log10(TEMPERATURE * COOLING**now)
-    ranges = zip(values, (INERTIA, LOG_TEMPERATURE), strict=True)
-    return np.array([*(2.0 * (value - low) / (high - low) - 1.0 for value, (low, high) in ranges), -1.0])
+    temperature = np.log10(TEMPERATURE * COOLING**now)
+    return np.array([unscaled(INERTIA, inertia(now, iterations)), unscaled(LOG_TEMPERATURE, temperature), -1.0])
 
 
 def constant_policy(action: Any) -> Policy:

@@ -2,7 +2,6 @@
 
 from typing import Any, Unpack
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import error
 
@@ -11,17 +10,18 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.check import whole
 from posefit.fitting.tracker import Follower, Prediction
-from posefit_envs.drawing import MODES, Screen, check_mode, portray
-from posefit_envs.fit import action_shape, check_budget, spaces_of
+from posefit_envs.base import SearchEnv
+from posefit_envs.drawing import Picture, portray
+from posefit_envs.fit import check_budget, spaces_of
 from posefit_envs.instance import Arguments, Instance, World, approved, instance, select
-from posefit_envs.search import Doorkeeper, Image
+from posefit_envs.search import Image
 from posefit_envs.stage import Evaluated, Stage
 
 FRAMES = 20
 EVALUATIONS = 100  # a frame
 
 
-class TrackEnv(gym.Env[Image, Any]):
+class TrackEnv(SearchEnv["TrackEpisode"]):
     """
     ## Description
     A person walks by, seen as a silhouette a frame. For each frame some poses may be proposed; the best of them is
@@ -59,7 +59,7 @@ class TrackEnv(gym.Env[Image, Any]):
       `errors` came later, before its release as well, and changes nothing by default.
     """
 
-    metadata = {"render_modes": list(MODES), "render_fps": 30}  # noqa: RUF012, as Gymnasium has it
+    metadata = SearchEnv.metadata | {"render_fps": 30}
 
     def __init__(
         self,
@@ -70,18 +70,11 @@ class TrackEnv(gym.Env[Image, Any]):
         **arguments: Unpack[Arguments],
     ) -> None:
         check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
-        check_mode(render_mode)
         approved(whole, "frames", frames, 1)
-        self.render_mode = render_mode
-        self._selection = select(**arguments)
-        self.world = self._selection.world
+        selection = select(**arguments)
+        super().__init__(selection, spaces_of(selection.world), render_mode)
         self._frames, self._most = int(frames), int(evaluations_per_frame)
-        self.action_space, self.observation_space = spaces_of(self.world)  # type: ignore[assignment]
-        self._shape = action_shape(self.world)
-        self._door = Doorkeeper(self._shape[0])
         self._stage = Stage(self.world, 1)
-        self._episode: TrackEpisode | None = None
-        self._screen = Screen(self.metadata["render_fps"])
 
     @property
     def instance(self) -> Instance:
@@ -98,10 +91,9 @@ class TrackEnv(gym.Env[Image, Any]):
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
         passage = Passage(self.world, number, self._frames, self._most)
-        self._episode = TrackEpisode(passage, self._most, self._selection.errors)
+        self._search = TrackEpisode(passage, self._most, self._selection.errors)
         self._stage.put(0, passage.scenery, passage.space)
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return passage.scenery.picture, {"instance": number, "frame": 0}
 
     def step(self, action: Any) -> tuple[Image, float, bool, bool, dict[str, Any]]:
@@ -118,26 +110,11 @@ class TrackEnv(gym.Env[Image, Any]):
             assert episode.place is not None
             stage.put(0, passage.scenery, passage.space)
             stage.show(episode.pose[None], episode.place[None], stage.everyone, outcome.pictures)
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return outcome.pictures[0], -info["cost"], passage.ended, False, info
 
-    def render(self) -> Any:
-        """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
-        if self.render_mode is None:
-            return None
-        episode = self._current()
-        picture = portray(episode.passage.scenery, episode.pose, episode.place, episode.label)
-        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._screen.close()
-
-    def _current(self) -> "TrackEpisode":
-        if self._episode is None:
-            raise error.ResetNeeded("reset must come before anything else")
-        return self._episode
+    def _portrait(self, search: "TrackEpisode") -> Picture:
+        return portray(search.passage.scenery, search.pose, search.place, search.label)
 
 
 class Passage:

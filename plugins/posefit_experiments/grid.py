@@ -2,15 +2,19 @@
 
 A cell is told by names and numbers, its row holds figures, and a ledger keeps it: `rows` runs a plan of them, and the
 same plan into the same ledger goes on where it was. What a cell cannot say (poses to draw, motions made for the
-occasion, a build to be found) is a job: a function without arguments whose result comes back as it is, by `each`.
+occasion, a build to be found) is a job: a function without arguments whose result comes back as it is, by `each`. Jobs
+whose results are rows can have a file, to which `kept` writes each as it comes; `earlier` reads it when they go on.
 """
 
+import json
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import closing, nullcontext
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
+from posefit.reading import parsed_json, read_text
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import cores, swept
 from posefit.sweep.engines.engine import Run
@@ -20,7 +24,9 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 
 PATIENCE = 0.2  # seconds between two looks at whether somebody wants to stop
+LARGEST_ROWS = 50_000_000  # bytes of a file of rows
 
+Row = dict[str, Any]
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 Say = Callable[[str], None]
 K = TypeVar("K", bound=Hashable)
@@ -80,6 +86,42 @@ def _ended(jobs: Mapping[K, Callable[[], T]], engine: Processes[tuple[K, Callabl
 
 def _called(job: tuple[K, Callable[[], T]]) -> T:
     return job[1]()
+
+
+def earlier(path: str | None, names: Sequence[str], key: Callable[[Row], K]) -> dict[K, Row]:
+    """Return the rows of a file, each under its key; the file is made where there is none.
+
+    Raises ValueError where it cannot be written to, or a line is no row: where one of the names is missing, or `key`
+    raises ValueError or TypeError.
+    """
+    if path is None:
+        return {}
+    try:
+        Path(path).touch()
+    except OSError as error:
+        raise ValueError(f"{path}: expected a file for rows, got {error.strerror}") from None
+    found = {}
+    for number, line in enumerate(read_text(path, LARGEST_ROWS).splitlines(), 1):
+        try:
+            row = {**parsed_json(line)}
+            if not row.keys() >= set(names):
+                raise ValueError("names")
+            found[key(row)] = row
+        except (ValueError, TypeError):
+            wanted = ", ".join(names)
+            raise ValueError(f"{path}: line {number} must be a row with {wanted}, got another text") from None
+    return found
+
+
+def kept(
+    path: str | None, progress: Progress | None, ended: Iterator[tuple[K, Row]], count: int
+) -> Iterator[tuple[K, Row]]:
+    """Yield rows under their keys as they come, each written to a file at once where one is named."""
+    for key, row in progress(ended, count) if progress else ended:
+        if path is not None:
+            with Path(path).open("a", encoding="utf-8") as file:
+                file.write(f"{json.dumps(row)}\n")
+        yield key, row
 
 
 def _check(workers: int | None) -> None:

@@ -97,6 +97,11 @@ class Loose:
         recover_loose(writeable(latents), self._pca.components, self._pca.mean, self.loose, angles)
         return angles
 
+    @property
+    def affine(self) -> tuple[Array, Array]:
+        """The weights (d, 63) of the latents, 1 for a loose angle's own, and the angles (63,) where all are 0."""
+        return np.vstack([self._pca.components, np.eye(len(self._pca.mean))[self.loose]]), self._pca.mean
+
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, d) the components allow and the joint limits too (n,)."""
         pca, allowed = self._pca, np.empty(len(latents), dtype=bool)

@@ -83,6 +83,11 @@ class PCA:
         recover(writeable(latents), self.components, self.mean, angles)
         return angles
 
+    @property
+    def affine(self) -> tuple[Array, Array]:
+        """The weights (m, 63) of the latents and the angles (63,) where all of them are 0. SAPSO 2.1."""
+        return self.components, self.mean
+
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
         allowed = np.empty(len(latents), dtype=bool)

@@ -125,6 +125,7 @@ TRACK = (
     click.option("--passes", type=int, default=1, show_default=True, help="How often a steady track is followed."),
     click.option("--seed", type=int, default=0, show_default=True),
     click.option("--threads", type=int, default=1, show_default=True, help="The result is the same with any number."),
+    click.option("--device", default="cpu", show_default=True, help="Where poses are drawn: cpu, or cuda with a GPU."),
     click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),
     click.option("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
     click.option("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),

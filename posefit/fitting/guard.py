@@ -130,11 +130,11 @@ class GuardedPrior:
     def __init__(self, prior: Prior, name: str) -> None:
         self._prior, self._name = prior, name
         self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
+        self.affine = getattr(prior, "affine", None)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn anew, and return itself."""
-        self._prior = self._asked("fit", angles, skeleton)
-        self.low, self.high = np.asarray(self._prior.low), np.asarray(self._prior.high)
+        GuardedPrior.__init__(self, self._asked("fit", angles, skeleton), self._name)
         return self
 
     def transform(self, angles: Array) -> Array:

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -104,8 +104,23 @@ def minimise(
     Raises BudgetError where the budget does not hold one
     population, and ValueError where every cost is nan.
     """
+    found = minimum_of(populations(optimiser, evaluate, evaluations))
+    if not told and 2 * found.evaluations < evaluations:
+        warnings.warn(
+            f"the optimiser ended its search after {found.evaluations} of {evaluations} evaluations: if its schedule "
+            "follows the budget, build it with it, as factory(space, rng, evaluations=...) or iterations=...",
+            stacklevel=2,
+        )
+    return found
+
+
+def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
+    """Return the best of the proposals (n, d) of populations, one or more, that come in turn with their costs (n,).
+
+    A cost that is nan never counts as best. Raises ValueError where every cost is nan.
+    """
     best, cost, used, history, spent = None, np.inf, 0, [], []
-    for proposals, costs in populations(optimiser, evaluate, evaluations):
+    for proposals, costs in searched:
         used += len(proposals)
         lowest = int(costs.argmin())
         if math.isnan(costs[lowest]):  # argmin prefers nan to any number
@@ -116,10 +131,4 @@ def minimise(
         spent.append(used)
     if best is None or math.isnan(cost):
         raise ValueError(f"costs must be numbers, got nan for all {used} proposals")
-    if not told and 2 * used < evaluations:
-        warnings.warn(
-            f"the optimiser ended its search after {used} of {evaluations} evaluations: if its schedule follows the "
-            "budget, build it with it, as factory(space, rng, evaluations=...) or iterations=...",
-            stacklevel=2,
-        )
     return Minimum(best, cost, used, np.array(history), np.array(spent))

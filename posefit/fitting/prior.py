@@ -26,6 +26,9 @@ class Prior(Protocol):
     It is built as `factory(**settings)`, settings keyword-only. `low`, `high` and the methods below `fit` may be used
     only after `fit`. `inverse_transform` and `feasible` must give the same bits for a row whatever rows stand
     beside it.
+
+    A prior whose joint angles are affine in the latents may say so: by an attribute `affine`, the weights (m, 63) that
+    latents are multiplied with and the angles (63,) where all of them are 0. Then a GPU decodes, where one draws.
     """
 
     low: Array  # (m,) the range of the latents, constraint 1

@@ -57,6 +57,8 @@ class PoseProblem:
         proposals = writeable(proposals)
         if proposals.shape[1:] != (self.space.dimensions,):
             self.space.decode(proposals)  # says what is wrong
+        if self.on_device:
+            return self.combined(self._areas_on_device(proposals))
         parts = parts_of(len(proposals), self.threads)
         if len(parts) == 1:
             return self._cost(*self.decode(proposals))  # SAPSO (5)
@@ -113,6 +115,11 @@ class PoseProblem:
         ]
 
     @cached_property
+    def on_device(self) -> bool:
+        """Whether a GPU draws the poses: then all of them at once, and threads have nothing to share."""
+        return any(silhouette.device != "cpu" for silhouette in self.silhouettes)
+
+    @cached_property
     def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:
         """The views that have a say, as the kernel wants them."""
         views = [
@@ -124,6 +131,14 @@ class PoseProblem:
     def _cost(self, poses: Array, translations: Array) -> Array:
         """Return the cost (n,) of decoded poses (n, 66) at translations (n, 3), on one thread."""
         return mean_of([costs_in(*view, poses, translations, self.beta) for view in self._drawings])
+
+    def _areas_on_device(self, proposals: Array) -> list[Areas]:
+        """Return R, B, Y (n, 3) of each view, of proposals (n, d) that a GPU decodes where it can."""
+        from posefit.fitting.cuda.evaluating import areas_of_proposals, decodes
+
+        if decodes(self.space):
+            return areas_of_proposals(self.body, self.cameras, self.silhouettes, self.space, proposals)
+        return self.areas(*self.decode(proposals))
 
     def _aligned(self, poses: Array, translations: Array) -> Array:
         """Return the translations (n, 3) of decoded poses (n, 66): other ones where the space has them aligned."""

@@ -1,7 +1,7 @@
 """A scene: everything a tracker needs to know of what is to be followed, a known motion or what cameras saw."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,8 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
+from posefit.silhouette.cuda.device import check_device
+from posefit.silhouette.cuda.moving import moved_to
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
@@ -94,6 +96,27 @@ class Rendered(Sequence[Observation]):
         pose, translation = self.motion.poses[k], self.motion.translations[k]
         masks = [project(self.body, camera, pose, translation) for camera in self.cameras]
         return Observation([Silhouette.of(mask) for mask in masks], translation)
+
+
+@dataclass(frozen=True, eq=False)
+class OnDevice(Sequence[Observation]):
+    """The same observations, their silhouettes on a device: poses are drawn and counted there."""
+
+    observations: Sequence[Observation]
+    device: str
+
+    def __len__(self) -> int:
+        return len(self.observations)
+
+    def __getitem__(self, k):  # type: ignore[no-untyped-def]
+        seen = self.observations[k]
+        return replace(seen, silhouettes=[moved_to(silhouette, self.device) for silhouette in seen.silhouettes])
+
+
+def seen_on(scene: Scene, device: str) -> Scene:
+    """Return a scene whose poses are drawn on a device, "cpu" or "cuda". Raises ValueError where there is none."""
+    check_device(device)
+    return scene if device == "cpu" else replace(scene, observations=OnDevice(scene.observations, device))
 
 
 def observed(

@@ -37,10 +37,13 @@ def areas(
     """Return R, B, Y (n, 3) in pixels of poses (n, 66) with their root at translations (n, 3). SAPSO (3).
 
     R is silhouette without body, B body without silhouette, Y both; unknown pixels are in none. A bone with an end
-    nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`.
+    nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`. They are made on
+    the silhouette's device.
     """
     poses, translations = _checked(camera, [silhouette], poses, translations)
     drawn.count_poses(len(poses), silhouette)
+    if silhouette.device == "cuda":
+        return _on_device(body, camera, [silhouette], poses, translations)[:, 0]
     out = np.empty((len(poses), 3), dtype=np.int64)
     drawing = drawing_of(body, camera, silhouette)
     parts = parts_of(len(poses), threads)
@@ -71,6 +74,8 @@ def areas_of_all(
     poses, translations = _checked(camera, silhouettes, poses, translations)
     for silhouette in silhouettes:
         drawn.count_poses(len(poses), silhouette)
+    if any(silhouette.device == "cuda" for silhouette in silhouettes):
+        return np.ascontiguousarray(_on_device(body, camera, silhouettes, poses, translations).transpose(1, 0, 2))
     out = np.empty((len(poses), len(silhouettes), 3), dtype=np.int64)
     chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
     if not silhouettes:
@@ -84,6 +89,15 @@ def areas_of_all(
         parts_of(len(poses), threads), threads, lambda part: (poses[part], translations[part], out[part]), count
     )
     return np.ascontiguousarray(out.transpose(1, 0, 2))
+
+
+def _on_device(
+    body: Body, camera: Camera, silhouettes: Sequence[Silhouette], poses: Array, translations: Array
+) -> Areas:
+    """Return R, B, Y (n, silhouettes, 3), counted by a GPU. Only here is what that needs imported."""
+    from posefit.silhouette.cuda.counted import counted
+
+    return counted(body, camera, silhouettes, poses, translations)
 
 
 def _checked(

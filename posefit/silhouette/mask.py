@@ -39,6 +39,7 @@ class Silhouette:
     mask: Mask = field(repr=False)  # (height, width); unknown pixels are False
     valid: Mask = field(repr=False)  # (height, width)
     scale: int = 1  # it has every so many pixels of every so many rows of what was seen
+    device: str = "cpu"  # where poses are drawn that are compared with it
 
     @classmethod
     def of(cls, mask: NDArray[np.generic], valid: NDArray[np.generic] | None = None) -> "Silhouette":

@@ -25,6 +25,7 @@ from posefit.listening import QUIET, Listener
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.reading import quoted
+from posefit.silhouette.cuda.device import check_device
 from posefit.tracking.identity import Told
 from posefit.tracking.method import Choice, usual
 from posefit.tracking.opening import Opening
@@ -76,6 +77,7 @@ def track(
     passes: int = 1,
     seed: int = 0,
     threads: int = 1,
+    device: str = "cpu",
     ask_seconds: float | None = None,
     optimiser_settings: Mapping[str, Any] | None = None,
     prior_settings: Mapping[str, Any] | None = None,
@@ -95,7 +97,8 @@ def track(
     from: built-in or recorded ones, files, folders of them, or people of the library, such as `library:-16`. The budget
     of a frame is `evaluations`, by default particles x (iterations + 1) = 40 x 61, the same for every method.
     `translation` is "known" where the truth is, else "aligned". A `first_pose` that is "given" starts the first frame
-    around the true one. `ask_seconds` is how long a plugin may take to propose a population.
+    around the true one. `ask_seconds` is how long a plugin may take to propose a population. Poses are drawn on a
+    `device`, "cpu" or "cuda".
 
     Where the truth is known the method is `sapso` with `pca`, which learns from the other styles of a built-in
     motion, else from the built-in walks. Where it is not, it is the tracker `exemplars`, which learns from the
@@ -128,6 +131,7 @@ def track(
         threads=threads,
         ask_seconds=ask_seconds,
     )
+    check_device(device)
     if isinstance(train, str | Path | Motion):
         raise ValueError(f"train must be a list of motions, got {quoted(train)}")
     viewing = Viewing(
@@ -192,6 +196,7 @@ def track(
             opening=opening,
             seed=seed,
             threads=threads,
+            device=device,
             output=output,
             listener=listener,
             source={

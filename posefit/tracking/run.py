@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.tracker import Frame, Task, Tracker
-from posefit.footage.scene import Scene
+from posefit.footage.scene import Scene, seen_on
 from posefit.geometry.skeleton import Skeleton
 from posefit.listening import QUIET, Listener
 from posefit.measuring.gait import gait_of
@@ -61,6 +61,7 @@ def follow(
     opening: Opening | None = None,
     seed: int = 0,
     threads: int = 1,
+    device: str = "cpu",
     output: Output | None = None,
     listener: Listener = QUIET,
     source: Mapping[str, Any] | None = None,
@@ -74,7 +75,8 @@ def follow(
     least; evaluations and times are those of all. `output` gets every frame as it comes and everything at the end;
     `source` is what the summary says of where the scene is from. What was found is `steady` in the end, by
     default where nobody knows the truth, and what is steady may be followed in several `passes`: see
-    `posefit.steadying.passes`. Raises ValueError where something does not fit.
+    `posefit.steadying.passes`. Poses are drawn on a `device`, "cpu" or "cuda". Raises ValueError where something does
+    not fit.
     """
     choice, opening = choice or Choice(), opening or Opening()
     if seed < 0:
@@ -82,6 +84,7 @@ def follow(
     for name, count in (("tracks", tracks), ("passes", passes)):
         if count < 1:
             raise ValueError(f"{name} must be at least 1, got {count}")
+    scene = seen_on(scene, device)
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         for warning in scene.warnings:
             listener.say(f"warning: {warning}")

@@ -247,6 +247,7 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
         (["walk", "--frames", "70:80"], "frames must choose some of the 60 frames, got 70:80"),
         (["walk", "--fps", "0"], "fps must be a positive number, got"),
         (["walk", "--threads", "0"], "threads must be at least 1, got 0"),
+        (["walk", "--device", "tpu"], "device must be one of cpu, cuda, got 'tpu'"),
         (["walk", "--translation", "free"], "translation must be one of known, searched, aligned, got 'free'"),
         (["walk", "--camera", "no.json"], "no.json"),
         (["walk-a", "--train", "walk-a"], "train must not contain the source itself, got walk-a"),

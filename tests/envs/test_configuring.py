@@ -12,6 +12,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.utils.seeding import np_random
 
 import posefit_envs  # noqa: F401, registers it
+from posefit_envs.configuring import herd
 from posefit_envs.configuring.moves import differential, normal
 from posefit_envs.configuring.orders import Order, action_of, order_of
 from posefit_envs.policies import sapso_action, sapso_action_v0
@@ -35,23 +36,27 @@ def test_the_checkers_of_gymnasium_and_stable_baselines3_pass_without_a_warning(
 
 
 @pytest.mark.parametrize("every", [1, 5])
-def test_with_sapsos_own_schedule_it_finds_what_sapso_finds_bit_for_bit(every: int) -> None:
+def test_with_sapsos_own_schedule_it_costs_what_sapso_does_and_proposes_it_but_for_rounding(every: int) -> None:
     for number in range(2):
         env = made(instance=number, every=every)
         env.reset(seed=number)
-        ended, step, found = False, 0, []
+        ended, step, asked, found = False, 0, [], []
+        ask = env._search.ask
+        env._search.ask = lambda ask=ask, asked=asked: asked.append(ask().copy()) or asked[-1]
         while not ended:
             _, _, ended, _, info = env.step(sapso_action(step, every=every))
-            found.append(env._herd.costs)
+            found.append(env._search.costs)
             step += 1
         # the same draws: an environment's generator begins with the seed, and hands one number on to its search
         rng, _ = np_random(number)
-        sapso = SAPSO(env._herd.space, np.random.default_rng(int(rng.integers(2**63))))
-        problem = env._herd.episode.scenery.problem(env._herd.space)
-        costs = []
+        sapso = SAPSO(env._search.space, np.random.default_rng(int(rng.integers(2**63))))
+        problem = env._search.episode.scenery.problem(env._search.space)
+        proposed, costs = [], []
         while len(proposals := sapso.ask()):
+            proposed.append(proposals.copy())
             costs.append(problem.evaluate(proposals))
             sapso.tell(proposals, costs[-1])
+        np.testing.assert_allclose(np.concatenate(asked), np.concatenate(proposed[1:]), rtol=0.0, atol=1e-12)
         np.testing.assert_array_equal(np.concatenate(found), np.concatenate(costs[1:]))
         assert info["best_cost"] == np.min(costs)
         assert info["evaluations"] == 2440
@@ -101,13 +106,13 @@ def test_a_step_has_the_same_evaluations_whatever_part_of_the_population_moves(p
 def test_of_a_quarter_only_the_best_particles_move_and_more_often() -> None:
     env = made(particles=40, every=1)
     env.reset(seed=0)
-    before = env._herd.flock.best_cost.copy()
+    before = env._search.flock.best_cost.copy()
     asked = []
-    ask = env._herd.ask
-    env._herd.ask = lambda: asked.append(ask()) or asked[-1]
+    ask = env._search.ask
+    env._search.ask = lambda: asked.append(ask()) or asked[-1]
     env.step(action_of(Order(population=0.25)))
     assert [len(one) for one in asked] == [10, 10, 10, 10]
-    changed = np.flatnonzero(env._herd.flock.best_cost != before)
+    changed = np.flatnonzero(env._search.flock.best_cost != before)
     # the best ten of the first turn are among the best ten of every other, as bests only get better
     assert set(changed) <= set(before.argsort()[:10])
     assert len(changed) > 2
@@ -118,18 +123,18 @@ def test_all_begin_anew_and_the_best_of_all_is_kept() -> None:
     env.reset(seed=0)
     for k in range(20):
         best = env.step(sapso_action(k, every=1))[4]["best_cost"]
-    known = env._herd.flock.best.copy()
+    known = env._search.flock.best.copy()
     _, reward, _, _, info = env.step(action_of(Order(restart=1.0)))
     assert info["best_cost"] == best
     assert reward == 0.0
-    assert not (known[:, None] == env._herd.flock.best).all(axis=2).any()
-    assert env._herd.flock.best_cost.min() > best
+    assert not (known[:, None] == env._search.flock.best).all(axis=2).any()
+    assert env._search.flock.best_cost.min() > best
     half = made(particles=40, every=1)
     half.reset(seed=0)
-    known, order = half._herd.flock.best.copy(), half._herd.flock.best_cost.argsort()
-    still = {k: half._herd.flock.best_cost[k] for k in order[:20]}
+    order = half._search.flock.best_cost.argsort()
+    still = {k: half._search.flock.best_cost[k] for k in order[:20]}
     half.step(action_of(Order(restart=0.5)))
-    assert all(half._herd.flock.best_cost[k] <= cost for k, cost in still.items())
+    assert all(half._search.flock.best_cost[k] <= cost for k, cost in still.items())
 
 
 def test_a_kick_goes_into_its_layer_alone() -> None:
@@ -138,20 +143,50 @@ def test_a_kick_goes_into_its_layer_alone() -> None:
     for layer, columns in enumerate((slice(0, 3), slice(3, 6), slice(6, 9))):
         env = made(particles=40, every=1)
         env.reset(seed=0)
-        herd = env._herd
-        leader, row = herd.leader.copy(), int(herd.flock.best_cost.argmin())
+        mine = env._search
+        leader, row = mine.leader.copy(), int(mine.flock.best_cost.argmin())
         kick = [0.0, 0.0, 0.0]
         kick[layer] = 0.03
-        herd.follow(Order(stride=0.0, diffusion=(kick[0], kick[1], kick[2])))
-        moved = herd.ask()[row] - leader
+        mine.follow(Order(stride=0.0, diffusion=(kick[0], kick[1], kick[2])))
+        moved = mine.ask()[row] - leader
         assert (np.abs(moved[columns]) > 1e-6).all()
         assert np.count_nonzero(np.abs(moved) > 1e-12) == 3  # but for rounding, where the box is folded
+
+
+@pytest.mark.parametrize(
+    ("shares", "differences", "draws"),
+    [
+        ((0.26, 0.37, 0.37), 15, 15),  # of 40: 10.4, 14.8, and what is left
+        ((0.5125, 0.4875, 0.0), 20, 0),  # 20.5 and 19.5, both rounded to 20
+        ((0.0, 0.4875, 0.5125), 20, 20),
+    ],
+)
+def test_shares_become_whole_numbers_of_particles(
+    monkeypatch: pytest.MonkeyPatch, shares: Any, differences: int, draws: int
+) -> None:
+    counted = {"differences": 0, "draws": 0}
+
+    def different(space: Any, rng: Any, mine: Any, *others: Any) -> Any:
+        counted["differences"] = len(mine)
+        return mine
+
+    def drawn(space: Any, rng: Any, bests: Any, order: Any, count: int, stride: float) -> Any:
+        counted["draws"] = count
+        return bests[:count]
+
+    monkeypatch.setattr(herd, "differential", different)
+    monkeypatch.setattr(herd, "normal", drawn)
+    env = made(particles=40, every=1)
+    env.reset(seed=0)
+    env._search.follow(Order(shares))
+    env._search.ask()
+    assert counted == {"differences": differences, "draws": draws}
 
 
 def test_differences_and_draws_are_those_of_their_formulas() -> None:
     env = made()
     env.reset(seed=0)
-    space, rng = env._herd.space, np.random.default_rng(0)
+    space, rng = env._search.space, np.random.default_rng(0)
     # of bests that are all the same neither has anywhere to go
     same = np.repeat(space.draw(rng, 1), 20, axis=0)
     order = np.arange(20)

@@ -74,6 +74,8 @@ def test_a_reset_gives_each_environment_its_instance(version: str) -> None:
     ("chosen", "message"),
     [
         ([1, 2], r"instance must be one number or 3, one for each environment, got \[1, 2\]"),
+        ([1, [2], 3], r"instance must be a whole number from 0 to 19999, got \[2\]"),
+        (np.zeros((3, 1)), r"instance must be one number or 3, one for each environment, got array"),
         ([1, 2, 30_000], "instance must lie in 0 to 19999, got 30000"),
         ([1, 2.5, 3], "instance must be a whole number from 0 to 19999, got 2.5"),
         ("all", "instance must be a whole number from 0 to 19999, got 'all'"),

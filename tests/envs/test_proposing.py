@@ -55,6 +55,15 @@ def test_it_shows_the_best_proposals_and_the_last_ones_with_their_costs() -> Non
     np.testing.assert_allclose(state[16:], [2.0 * 7.0 / 11.0 - 1.0, 2.0 / 50.0 - 1.0], rtol=1e-6)
 
 
+def test_what_costs_no_less_than_the_middle_is_never_among_the_best() -> None:
+    memory = ProposalMemory(1, 50.0, 11)
+    for place, cost in ((0.1, 50.0), (0.2, 70.0), (0.3, 30.0), (0.4, 30.0)):
+        memory.take(np.array([place]), cost)
+    np.testing.assert_array_equal(memory.best[:, 0], [0.3, 0.4, 0.0, 0.0])  # of equal ones the earlier first
+    np.testing.assert_array_equal(memory.best_costs, [30.0, 30.0, 50.0, 50.0])
+    np.testing.assert_array_equal(memory.last[:, 0], [0.4, 0.3, 0.2, 0.1])
+
+
 def test_the_budget_counts_the_middle_and_no_target_ends_it() -> None:
     env = gym.make(NAME, instance=3, max_evaluations=4).unwrapped
     _, info = env.reset(seed=0)

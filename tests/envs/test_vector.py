@@ -7,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import error, wrappers
+from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 
 import posefit_envs
@@ -84,6 +85,11 @@ def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
             infos["_cost"][0] = False
             return *rest, infos
 
+    class MaskedTwice(FitVectorEnv):
+        def step(self, actions: Any) -> Any:
+            *rest, infos = super().step(actions)
+            return *rest, infos | {"__cost": infos["_cost"]}
+
     class SameSeed(FitVectorEnv):
         def reset(self, *, seed: Any = None, options: Any = None) -> Any:
             return super().reset(seed=None if seed is None else [seed] * self.num_envs, options=options)
@@ -98,6 +104,7 @@ def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
     for wrong, message in (
         (Shifted, "reward must be"),
         (Masked, "info must have"),
+        (MaskedTwice, "info must have"),
         (SameSeed, "environment 1, reset"),
         (Reused, "step 1: the observations before it must be"),
     ):
@@ -178,6 +185,48 @@ def test_some_environments_can_be_reset_alone() -> None:
         assert before["evaluations"].tolist() == [first] * 3
 
 
+@pytest.mark.parametrize(("name", "arguments"), [(name, one) for name, many in CASES_V1.items() for one in many])
+def test_a_reset_of_some_says_and_shows_what_gymnasiums_own_does(name: str, arguments: dict[str, Any]) -> None:
+    native, own = (gym.make_vec(name, 3, kind, **arguments) for kind in (None, "sync"))
+    for vector in (native, own):
+        vector.reset(seed=0)
+        vector.action_space.seed(0)
+    for mask in ([False, True, False], [True, False, True]):
+        for vector in (native, own):
+            for _ in range(3):  # in some of these an episode ends and another begins
+                vector.step(vector.action_space.sample())
+        # whoever goes on observes what he observed before, his picture too
+        ours, theirs = (vector.reset(options={"reset_mask": np.array(mask)}) for vector in (native, own))
+        assert data_equivalence(ours[0], theirs[0])
+        assert sorted(ours[1]) == sorted(theirs[1])
+        for key, value in theirs[1].items():
+            np.testing.assert_array_equal(ours[1][key], value)
+
+
+@pytest.mark.parametrize("name", CASES | CASES_V1)
+def test_infos_have_masks_and_no_masks_of_masks(name: str) -> None:
+    ends: dict[str, Any] = {"max_evaluations": 2} if "Fit" in name else {}
+    vector = gym.make_vec(name, num_envs=3, **ends)
+    infos = [vector.reset(seed=0)[1], vector.reset(options={"reset_mask": np.array([False, True, False])})[1]]
+    infos += [vector.step(np.zeros(vector.action_space.shape or ()))[4] for _ in range(4)]
+    for one in infos:
+        names = {key for key in one if not key.startswith("_")}
+        assert set(one) == names | {f"_{key}" for key in names}
+
+
+def test_the_picture_of_who_goes_on_stays_in_the_window_too() -> None:
+    vector = gym.make_vec("posefit/Fit-v1", num_envs=2, render_mode="rgb_array")
+    vector.reset(seed=0)
+    vector.step(vector.action_space.sample())
+    before = vector.render()
+    vector.reset(options={"reset_mask": np.array([True, False])})
+    after = vector.render()
+    assert before is not None
+    assert after is not None
+    assert (before[0] != after[0]).any()
+    np.testing.assert_array_equal(before[1], after[1])
+
+
 @pytest.mark.parametrize(("name", "d"), [("posefit/Fit-v0", 9), ("posefit/Track-v0", 9), ("posefit/Configure-v0", 3)])
 def test_mistakes_are_named(name: str, d: int) -> None:
     vector = gym.make_vec(name, num_envs=3)
@@ -219,7 +268,7 @@ def test_an_optimiser_through_the_environment_is_the_optimiser_through_the_libra
     env = gym.make_vec("posefit/Fit-v0", num_envs=width, instance=3, max_evaluations=10**6, target_cost=-1.0)
     driven = drive(env, name, seed=5)
     unwrapped: Any = env.unwrapped
-    episode = unwrapped._episodes[0]
+    episode = unwrapped._searches[0]
     problem = episode.scenery.problem(episode.space)
     factory = registry().optimiser(name)
     alone = minimise(
@@ -302,6 +351,36 @@ def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
         assert infos[0]["TimeLimit.truncated"] is ("Fit" in name)
         assert adapted.get_attr("num_envs") == [2, 2]
         adapted.close()
+
+
+def test_stable_baselines3_sees_a_dict_past_an_episodes_end() -> None:
+    pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
+    arguments: dict[str, Any] = {"instance": 3, "image": True, "max_evaluations": 3}
+    adapted = to_sb3_vec_env(gym.make_vec("posefit/Fit-v1", num_envs=2, **arguments))
+    single = gym.make("posefit/Fit-v1", **arguments)
+    first = single.reset(seed=4)[0]
+    adapted.seed(4)
+    adapted.reset()
+    for ends in (False, True):
+        last = single.step(np.full(10, 0.3))[0]
+        observations, _, done, infos = adapted.step(np.full((2, 10), 0.3, dtype=np.float64))
+        assert done.tolist() == [ends] * 2
+    for i in range(2):
+        assert data_equivalence(infos[i]["terminal_observation"], last)
+        # the instance is one and the same, so that a new episode begins as the first one did
+        assert data_equivalence({name: one[i] for name, one in observations.items()}, first)
+    adapted.close()
+
+
+@pytest.mark.slow
+def test_an_agent_trains_on_a_dict_whose_episodes_are_cut() -> None:
+    sb3 = pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
+    made = gym.make_vec("posefit/Fit-v1", num_envs=4, image=True, size=(36, 36), max_episode_steps=10)
+    vector = to_sb3_vec_env(made)
+    model = sb3.PPO("MultiInputPolicy", vector, n_steps=32, batch_size=64, n_epochs=1, seed=0, device="cpu")
+    model.learn(200)  # where an episode is cut, PPO asks what its last observation is worth
+    assert model.num_timesteps >= 200
+    vector.close()
 
 
 def test_another_kind_of_vector_environment_is_refused() -> None:

@@ -21,7 +21,7 @@ from posefit.tracking.measures import Measures
 from posefit.tracking.run import Track
 from posefit_experiments.composites import experiment, ways
 from posefit_experiments.composites.clothes import TROUSERS, outfit
-from posefit_experiments.composites.experiment import Shot, asked, earlier, extraction_named
+from posefit_experiments.composites.experiment import Shot, asked, extraction_named
 from posefit_experiments.composites.figures import extraction_figures, steadiness, track_figures, uncut
 from posefit_experiments.composites.filming import BEFORE, film
 from posefit_experiments.composites.plates import Plate, check_video, plate
@@ -102,18 +102,15 @@ def test_another_video_than_the_demonstration_is_refused(tmp_path: Path) -> None
         check_video(str(path))
 
 
-def test_a_file_of_rows_is_gone_on_with_and_other_text_is_refused(tmp_path: Path) -> None:
+def test_a_folder_for_pictures_that_cannot_be_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
-    row = {"situation": "stands", "views": 1, "extraction": "mixture", "seed": 0, "refused": "nobody moves"}
-    path.write_text(f"{json.dumps(row)}\n")
-    assert earlier(str(path)) == {Shot("stands", 1, "mixture", 0): row}
-    path.write_text(f'{json.dumps(row)}\n{{"seed": 1}}\n')
-    with pytest.raises(ValueError, match="line 2 must be a row with situation, views, extraction, seed, got"):
-        earlier(str(path))
-    with pytest.raises(ValueError, match="expected a file for rows, got"):
-        earlier(str(tmp_path / "nowhere" / "rows.jsonl"))
+    path.touch()
     with pytest.raises(ValueError, match="expected a folder for pictures, got"):
         experiment._check_folder(path)
+
+
+def test_what_is_asked_for_twice_is_a_row_once() -> None:
+    assert asked(["stands", "stands"], [1, 1], ["mixture", "mixture"], 1, False) == [Shot("stands", 1, "mixture", 0)]
 
 
 def test_rows_are_written_as_they_come_and_not_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

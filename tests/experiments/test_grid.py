@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from posefit.sweep.driver import Claim, Driver
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit_experiments import grid
-from posefit_experiments.grid import each, rows
+from posefit_experiments.grid import each, earlier, kept, rows
 from posefit_experiments.same import differences, report_differences
 from tests.sweep.fake import cells, result
 
@@ -74,6 +75,28 @@ def test_jobs_come_back_under_their_keys_from_other_processes() -> None:
     assert list(found.items()) == [(5, (1, 2)), (4, (1, 1)), (9, (3, 0))]
     assert steps == [3, 3, 3]
     assert each({"who": os.getpid}, 1)["who"] != os.getpid()
+
+
+def test_rows_are_written_as_they_come_and_read_again(tmp_path: Path) -> None:
+    path = tmp_path / "rows.jsonl"
+    found = {name: {"name": name, "cost": cost} for name, cost in (("one", 1.5), ("other", 2.5))}
+    assert earlier(str(path), ("name", "cost"), itemgetter("name")) == {}
+    coming = kept(str(path), None, iter(found.items()), 2)
+    assert next(coming) == ("one", found["one"])
+    assert len(path.read_text().splitlines()) == 1
+    assert list(coming) == [("other", found["other"])]
+    assert earlier(str(path), ("name", "cost"), itemgetter("name")) == found
+    assert earlier(None, ("name", "cost"), itemgetter("name")) == {}
+
+
+@pytest.mark.parametrize("line", ["[]", "3", "null", "", '{"name": "one"}', '{"name": [1], "cost": 2.0}', "name"])
+def test_a_line_that_is_no_row_is_told_by_its_number(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "rows.jsonl"
+    path.write_text(f'{{"name": "one", "cost": 1.5}}\n{line}\n')
+    with pytest.raises(ValueError, match=r"rows.jsonl: line 2 must be a row with name, cost, got another text"):
+        earlier(str(path), ("name", "cost"), itemgetter("name"))
+    with pytest.raises(ValueError, match="expected a file for rows, got"):
+        earlier(str(tmp_path / "nowhere" / "rows.jsonl"), ("name", "cost"), itemgetter("name"))
 
 
 def test_a_job_that_fails_says_which_and_why() -> None:

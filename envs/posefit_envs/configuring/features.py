@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit_envs.configure import ALPHA
 from posefit_envs.configuring.herd import Herd
+from posefit_envs.scales import priced
 
 State = NDArray[np.float32]
 
 WIDEST = 1.0  # deviation of bests, in half-ranges, that shows as 1
 NARROWEST = 1e-3  # and as 0
-DEAREST = 100.0  # the cost that shows as 1
 INSTANCE_FEATURES = 9
 PROGRESS_FEATURES = 16
 FEATURES = INSTANCE_FEATURES + PROGRESS_FEATURES
@@ -52,7 +52,7 @@ def progress_features(herd: Herd) -> Array:
     spreads = flock.best.std(axis=0)
     layers = [_logged(float(spreads[layer].mean()), NARROWEST, WIDEST) for layer in herd.layers]
     speed = float(np.abs(flock.velocity).mean()) / ALPHA
-    paid = [_priced(one) for one in (herd.best, float(flock.best_cost.min()), costs.min(), costs.mean(), costs.std())]
+    paid = [priced(one) for one in (herd.best, float(flock.best_cost.min()), costs.min(), costs.mean(), costs.std())]
     order = herd.order
     waits = [herd.left / herd.steps, min(herd.stale / 10.0, 1.0)]
     return np.array([*paid, *layers, speed, float(herd.accepted.mean()), *waits, *order.shares, order.population])
@@ -62,10 +62,6 @@ def observed_state(features: Array, herd: Herd) -> State:
     """Return the observation (25,) of an instance's features and a search."""
     state: State = np.clip(np.concatenate([features, progress_features(herd)]), 0.0, 1.0).astype(np.float32)
     return state
-
-
-def _priced(cost: float) -> float:
-    return float(np.log1p(cost) / np.log1p(DEAREST))
 
 
 def _logged(value: float, low: float, high: float) -> float:

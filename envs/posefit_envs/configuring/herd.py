@@ -8,6 +8,7 @@ from posefit.fitting.box import REDRAWS
 from posefit_envs.configure import ACCELERATION, ALPHA, FIRST
 from posefit_envs.configuring.moves import differential, normal
 from posefit_envs.configuring.orders import Order
+from posefit_envs.drawing import Picture, portray
 from posefit_envs.fit import Episode
 from posefit_envs.instance import World
 from posefit_swarm.flock import Flock, speed_limits
@@ -77,6 +78,13 @@ class Herd:
         return part.moved
 
     def _move(self, part: Flock) -> None:
+        """Move the particles of a part, whose shares become whole numbers of them in the order of the optimisers.
+
+        Of n particles the swarm has the first round(n share), differential evolution the next round(n share), or all
+        that are left if these are fewer, and the normal distribution has the rest. Halves are rounded to even. A part
+        of the population is in the order of its bests, the best first, behind those that begin anew; the whole
+        population is in its own order, which never changes. Who begins anew is counted, and proposes where he is.
+        """
         flock, order, space, count = self.flock, self.order, self.space, len(part.moved)
         known = np.flatnonzero(np.isfinite(flock.best_cost))
         bests = flock.best[known]
@@ -117,6 +125,12 @@ class Herd:
         self._told.append((costs, accepted))
         self.used += len(costs)
         self.open -= len(costs)
+
+    def portrait(self) -> Picture:
+        """Return the picture (height, width, 3) of the best pose."""
+        scenery = self.episode.scenery
+        poses, places = scenery.problem(self.space).decode(self.leader[None])
+        return portray(scenery, poses[0], places[0], f"best {self.best:.1f}, {self.used} evaluations")
 
     @property
     def costs(self) -> Array:

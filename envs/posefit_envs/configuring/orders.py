@@ -7,13 +7,12 @@ from gymnasium import spaces
 
 from posefit.arrays import Array
 from posefit_envs.configure import INERTIA, LOG_TEMPERATURE
+from posefit_envs.scales import scaled, unscaled
 
-OPTIMISERS = ("swarm", "differential", "normal")
-LAYERS = ("root", "first", "second")  # the root, and either half of the prior's latents
 SPREAD = 0.3  # the largest diffusion, in half-ranges
 SHARPNESS = 5.0
 LOG_POPULATION = (0.0, -2.0)  # powers of two, of all particles
-NUMBERS = len(OPTIMISERS) + 4 + len(LAYERS)
+NUMBERS = 10  # of an action: three optimisers, four of the population, three layers
 
 
 @dataclass(frozen=True)
@@ -36,9 +35,9 @@ def order_of(action: Array) -> Order:
     first, second, third = (max(kick, 0.0) * SPREAD for kick in kicks)
     return Order(
         (float(shares[0]), float(shares[1]), float(shares[2])),
-        2.0 ** _between(LOG_POPULATION, min(max(2.0 * power, -1.0), 1.0)),
-        _between(INERTIA, stride),
-        10.0 ** _between(LOG_TEMPERATURE, log_temperature),
+        2.0 ** scaled(LOG_POPULATION, min(max(2.0 * power, -1.0), 1.0)),
+        scaled(INERTIA, stride),
+        10.0 ** scaled(LOG_TEMPERATURE, log_temperature),
         max(restart, 0.0),
         (first, second, third),
     )
@@ -51,9 +50,9 @@ def action_of(order: Order) -> Array:
     """
     shares = np.maximum(1.0 + np.log(np.maximum(np.array(order.shares) / max(order.shares), 1e-9)) / SHARPNESS, -1.0)
     ranged = [
-        0.5 * _back(LOG_POPULATION, np.log2(order.population)),
-        _back(INERTIA, order.stride),
-        _back(LOG_TEMPERATURE, np.log10(order.temperature)),
+        0.5 * unscaled(LOG_POPULATION, np.log2(order.population)),
+        unscaled(INERTIA, order.stride),
+        unscaled(LOG_TEMPERATURE, np.log10(order.temperature)),
     ]
     amounts = [amount if amount > 0.0 else -1.0 for amount in (order.restart, *np.array(order.diffusion) / SPREAD)]
     action = np.array([*shares, *ranged, *amounts])
@@ -65,11 +64,3 @@ def action_of(order: Order) -> Array:
 def space_of_orders() -> spaces.Box:
     """Return the action space."""
     return spaces.Box(-1.0, 1.0, (NUMBERS,), np.float32)
-
-
-def _between(bounds: tuple[float, float], number: float) -> float:
-    return bounds[0] + 0.5 * (number + 1.0) * (bounds[1] - bounds[0])
-
-
-def _back(bounds: tuple[float, float], value: float) -> float:
-    return float(2.0 * (value - bounds[0]) / (bounds[1] - bounds[0]) - 1.0)

@@ -2,29 +2,29 @@
 
 from typing import Any, Unpack
 
-import gymnasium as gym
-import numpy as np
 from gymnasium import error
 
 from posefit.fitting.check import whole
+from posefit_envs.base import SearchEnv
 from posefit_envs.configure import ITERATIONS, PARTICLES
 from posefit_envs.configuring.features import State, instance_features, observed_state, space_of_features
 from posefit_envs.configuring.herd import LEAST, Herd
-from posefit_envs.configuring.orders import NUMBERS, order_of, space_of_orders
-from posefit_envs.drawing import MODES, Screen, check_mode, portray
+from posefit_envs.configuring.orders import order_of, space_of_orders
+from posefit_envs.drawing import Picture
 from posefit_envs.instance import ArgumentError, Arguments, approved, select
-from posefit_envs.search import Doorkeeper
+from posefit_envs.scales import gained
 from posefit_envs.stage import Stage
 
 EVERY = 5  # iterations a step
 
 
-class OptimiserEnv(gym.Env[State, Any]):
+class OptimiserEnv(SearchEnv[Herd]):
     """
     ## Description
     A population searches for the pose in one silhouette. Each step is `every` iterations of it, and the action says
     which optimisers move it, how far, how much of it at a time, what is scattered and what begins anew: dynamic
-    algorithm configuration with a choice of algorithms. `posefit_envs.policies.sapso_action` is SAPSO, bit for bit.
+    algorithm configuration with a choice of algorithms. With `posefit_envs.policies.sapso_action` it is SAPSO: its
+    proposals are SAPSO's but for rounding, as stride and temperature come back from an action, and cost the same.
 
     ## Action Space
     `Box(-1, 1, (10,), float32)`
@@ -41,7 +41,10 @@ class OptimiserEnv(gym.Env[State, Any]):
     | 7 | standard deviation of a random kick in the root, in half-ranges of the box | 0 | 0.3 |
     | 8, 9 | the same in the first and in the second half of the latents | 0 | 0.3 |
 
-    The shares are e^(5 a) of the first three numbers over their sum. Number 3 has come to its ends at -0.5 and 0.5.
+    The shares are e^(5 a) of the first three numbers over their sum. Of the n particles that move at a time the first
+    round(n share) are the swarm's, the next round(n share) differential evolution's, the rest are drawn from the normal
+    distribution. They stand in the order of their bests where a part of the population moves, those that begin anew
+    first, and in an order that never changes where all of it does. Number 3 has come to its ends at -0.5 and 0.5.
     Numbers 6 to 9 stand for nothing from 0 down.
 
     A step always has `every * particles` evaluations: so a smaller part moves more often. Stride and temperature fall
@@ -90,8 +93,6 @@ class OptimiserEnv(gym.Env[State, Any]):
     - v0: `posefit/Configure-v0`, which stays as it is.
     """
 
-    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
-
     def __init__(
         self,
         *,
@@ -101,28 +102,20 @@ class OptimiserEnv(gym.Env[State, Any]):
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        check_mode(render_mode)
         check_herd(particles, iterations, every)
-        self.render_mode = render_mode
-        self._selection = select(**arguments)
-        self.world = self._selection.world
+        super().__init__(select(**arguments), (space_of_orders(), space_of_features()), render_mode)
         self._sizes = int(particles), int(iterations) // int(every), int(every)
-        self.action_space, self.observation_space = space_of_orders(), space_of_features()  # type: ignore[assignment]
-        self._door = Doorkeeper(NUMBERS)
         self._stage = Stage(self.world, 1)
-        self._herd: Herd | None = None
-        self._screen = Screen(self.metadata["render_fps"])
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[State, dict[str, Any]]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        herd = self._herd = Herd(self.world, number, self.np_random, *self._sizes)
+        herd = self._search = Herd(self.world, number, self.np_random, *self._sizes)
         self._stage.put(0, herd.episode.scenery, herd.space)
         herd.tell(self._stage.costs(herd.flock.moved[None], self._stage.everyone)[0])
         self._features = instance_features(herd)
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return observed_state(self._features, herd), self._info(herd)
 
     def step(self, action: Any) -> tuple[State, float, bool, bool, dict[str, Any]]:
@@ -130,13 +123,12 @@ class OptimiserEnv(gym.Env[State, Any]):
         herd = self._current()
         if herd.left == 0:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
-        order = order_of(self._door.proposals(action, (NUMBERS,)))
+        order = order_of(self._door.proposals(action, self._shape))
         before = herd.best
         herd.follow(order)
         while herd.open:
             herd.tell(self._stage.costs(herd.ask()[None], self._stage.everyone)[0])
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return observed_state(self._features, herd), gained(before, herd.best), herd.left == 0, False, self._info(herd)
 
     def _info(self, herd: Herd) -> dict[str, Any]:
@@ -146,28 +138,8 @@ class OptimiserEnv(gym.Env[State, Any]):
             info |= herd.episode.instance.errors(0, poses[0])
         return info
 
-    def render(self) -> Any:
-        """Return the picture (height, width, 3) of the best pose, or show it, as `render_mode` asks."""
-        if self.render_mode is None:
-            return None
-        herd = self._current()
-        poses, places = herd.episode.scenery.problem(herd.space).decode(herd.leader[None])
-        picture = portray(herd.episode.scenery, poses[0], places[0], f"best {herd.best:.1f}, {herd.used} evaluations")
-        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._screen.close()
-
-    def _current(self) -> Herd:
-        if self._herd is None:
-            raise error.ResetNeeded("reset must come before anything else")
-        return self._herd
-
-
-def gained(before: float, after: float) -> float:
-    """Return the reward of a best cost that falls: ln((1 + before) / (1 + after))."""
-    return float(np.log1p(before) - np.log1p(after))
+    def _portrait(self, search: Herd) -> Picture:
+        return search.portrait()
 
 
 def check_herd(particles: int, iterations: int, every: int) -> None:

@@ -7,17 +7,21 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit_envs.scales import gained, priced, scaled
 
 State = NDArray[np.float32]
 
 SHOWN = 4  # the best proposals, and the last ones
 LOG_REACH = (-2.0, 0.0)  # powers of ten that the last number of an action stands for
-DEAR = 100.0  # the cost that shows as 1
 PATIENCE = 50.0  # proposals without a gain that show as 1
 
 
 class ProposalMemory:
-    """The proposals of one search and their costs; it begins with the middle of the box, which was evaluated."""
+    """The proposals of one search and their costs; it begins with the middle of the box, which was evaluated.
+
+    `best` and `last` hold four proposals each and begin as four copies of the middle. A copy among the best gives way
+    only to what costs less than the middle; one among the last gives way to any proposal.
+    """
 
     def __init__(self, dimensions: int, cost: float, evaluations: int) -> None:
         self.best = np.zeros((SHOWN, dimensions))
@@ -33,12 +37,11 @@ class ProposalMemory:
         target, power = action[:-1], float(action[-1])
         if power >= 1.0:
             return np.array(target)
-        reach = 10.0 ** (LOG_REACH[0] + 0.5 * (power + 1.0) * (LOG_REACH[1] - LOG_REACH[0]))
-        proposed: Array = self.best[0] + reach * (target - self.best[0])
+        proposed: Array = self.best[0] + 10.0 ** scaled(LOG_REACH, power) * (target - self.best[0])
         return proposed
 
     def take(self, proposal: Array, cost: float) -> float:
-        """Remember what a proposal (d,) cost, and return the reward: ln((1 + before) / (1 + after)) of the best."""
+        """Remember what a proposal (d,) cost, and return what the best cost gained."""
         before = float(self.best_costs[0])
         self.used += 1
         self.stale = 0 if cost < before else self.stale + 1
@@ -48,11 +51,11 @@ class ProposalMemory:
         if place < SHOWN:
             self.best = np.insert(self.best, place, proposal, axis=0)[:SHOWN]
             self.best_costs = np.insert(self.best_costs, place, cost)[:SHOWN]
-        return float(np.log1p(before) - np.log1p(self.best_costs[0]))
+        return gained(before, float(self.best_costs[0]))
 
     def state(self) -> State:
         """Return what is shown (8 d + 10,): the best proposals, the last ones, their costs, and the budget left."""
-        costs = 2.0 * np.log1p(np.concatenate([self.best_costs, self.last_costs])) / np.log1p(DEAR) - 1.0
+        costs = 2.0 * priced(np.concatenate([self.best_costs, self.last_costs])) - 1.0
         ends = [2.0 * (1.0 - self.used / self.most) - 1.0, 2.0 * min(self.stale / PATIENCE, 1.0) - 1.0]
         shown = np.concatenate([self.best.ravel(), self.last.ravel(), costs, ends])
         state: State = np.clip(shown, -1.0, 1.0).astype(np.float32)

@@ -2,21 +2,20 @@
 
 from typing import Any, Unpack
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import Space, error, spaces
 
 from posefit import SearchSpace
 from posefit.fitting.check import whole
-from posefit_envs.drawing import MODES, Screen, check_mode, portray
+from posefit_envs.base import SearchEnv
+from posefit_envs.drawing import Picture, portray
 from posefit_envs.fit import MAX_EVALUATIONS, Episode, action_shape, spaces_of
 from posefit_envs.instance import ArgumentError, Arguments, World, approved, select
 from posefit_envs.proposing.memory import ProposalMemory, seen_with, space_of_memory
-from posefit_envs.search import Doorkeeper
 from posefit_envs.stage import Stage
 
 
-class ProposalEnv(gym.Env[Any, Any]):
+class ProposalEnv(SearchEnv[Episode]):
     """
     ## Description
     A person was seen as a silhouette. Each step proposes a pose; its body is projected, and what does not overlap with
@@ -40,11 +39,15 @@ class ProposalEnv(gym.Env[Any, Any]):
 
     | Num | Meaning |
     |---|---|
-    | 0 to 4 d - 1 | the four best proposals so far, the best first |
-    | 4 d to 8 d - 1 | the last four, the last first |
+    | 0 to 4 d - 1 | the four best proposals of those that cost less than the middle of the box, the best first |
+    | 4 d to 8 d - 1 | the last four proposals, the last first |
     | 8 d to 8 d + 7 | what these eight cost: 2 ln(1 + cost) / ln 101 - 1 |
     | 8 d + 8 | budget left: from 1 to -1 |
     | 8 d + 9 | proposals since the best cost fell: from -1 to 1 for 50 or more |
+
+    Both fours begin as four copies of the middle of the box, with its cost. So what costs as much or more is never
+    among the best, where copies fill the places behind those that cost less; among the last they stand behind the first
+    three proposals. Of proposals that cost the same the earlier one is the better.
 
     ## Rewards
     ln((1 + best cost before) / (1 + best cost after)): 0 where the proposal is no better than the best so far. The sum
@@ -69,8 +72,6 @@ class ProposalEnv(gym.Env[Any, Any]):
     - v0: `posefit/Fit-v0`, which stays as it is.
     """
 
-    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
-
     def __init__(
         self,
         *,
@@ -79,18 +80,11 @@ class ProposalEnv(gym.Env[Any, Any]):
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        check_mode(render_mode)
         check_proposing(max_evaluations, image)
-        self.render_mode = render_mode
-        self._selection = select(**arguments)
-        self.world = self._selection.world
-        self._most, self._image = int(max_evaluations), image
-        self.action_space, self.observation_space = spaces_of_proposing(self.world, image)
-        self._dimensions = action_shape(self.world)[0]
-        self._door = Doorkeeper(self._dimensions + 1)
+        selection = select(**arguments)
+        super().__init__(selection, spaces_of_proposing(selection.world, image), render_mode)
+        self._most, self._image, self._dimensions = int(max_evaluations), image, self._shape[0] - 1
         self._stage = Stage(self.world, 1)
-        self._episode: Episode | None = None
-        self._screen = Screen(self.metadata["render_fps"])
 
     @property
     def search_space(self) -> SearchSpace:
@@ -101,13 +95,12 @@ class ProposalEnv(gym.Env[Any, Any]):
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        episode = self._episode = Episode(self.world, number, self._most)
+        episode = self._search = Episode(self.world, number, self._most)
         self._stage.put(0, episode.scenery, episode.space)
         outcome = self._stage.look(np.zeros((1, self._dimensions)), self._stage.everyone)
         info = episode.take(outcome, self._selection.errors)
         self._memory = ProposalMemory(self._dimensions, episode.cost, self._most)
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return seen_with(self._memory.state(), outcome.pictures[0], self._image), info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -115,32 +108,17 @@ class ProposalEnv(gym.Env[Any, Any]):
         episode = self._current()
         if episode.ended:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
-        proposal = self._memory.proposal(self._door.proposals(action, (self._dimensions + 1,)))
+        proposal = self._memory.proposal(self._door.proposals(action, self._shape))
         outcome = self._stage.look(proposal[None], self._stage.everyone)
         info = episode.take(outcome, self._selection.errors)
         reward = self._memory.take(proposal, episode.cost)
         episode.ended = episode.evaluations >= self._most
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         seen = seen_with(self._memory.state(), outcome.pictures[0], self._image)
         return seen, reward, episode.ended, False, info
 
-    def render(self) -> Any:
-        """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
-        if self.render_mode is None:
-            return None
-        episode = self._current()
-        picture = portray(episode.scenery, episode.pose, episode.translation, episode.label)
-        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._screen.close()
-
-    def _current(self) -> Episode:
-        if self._episode is None:
-            raise error.ResetNeeded("reset must come before anything else")
-        return self._episode
+    def _portrait(self, search: Episode) -> Picture:
+        return portray(search.scenery, search.pose, search.translation, search.label)
 
 
 def spaces_of_proposing(world: World, image: bool) -> tuple[spaces.Box, Space[Any]]:

@@ -3,8 +3,9 @@
 import numpy as np
 from gymnasium import error
 
-from posefit import Minimum, Optimiser, minimise
+from posefit import Minimum, Optimiser
 from posefit.arrays import Array
+from posefit.fitting.optimiser import minimum_of
 
 
 class Stepwise:
@@ -43,22 +44,8 @@ class Stepwise:
             self._ask()
 
     def found(self) -> Minimum:
-        """Return what was found, by going through the populations once more."""
-        costs = iter([costs for _, costs in self._told])
-        spent = sum(len(proposals) for proposals, _ in self._told)
-        return minimise(lambda _: next(costs), _Again([one for one, _ in self._told]), spent, told=True)
+        """Return what was found. Raises ValueError where every cost is nan."""
+        return minimum_of(self._told)
 
     def _ask(self) -> None:
         self._asked, self._costs = self._optimiser.ask(), list[float]()
-
-
-class _Again:
-    """Proposes what was proposed before."""
-
-    def __init__(self, populations: list[Array]) -> None:
-        self._left, self._none = populations[::-1], populations[0][:0]
-
-    def ask(self) -> Array:
-        return self._left.pop() if self._left else self._none
-
-    def tell(self, proposals: Array, costs: Array) -> None: ...

@@ -1,8 +1,8 @@
-"""What vector environments share: seeds, instances, masks of a reset and of infos."""
+"""What vector environments share: seeds, instances, ends, masks of a reset and of infos."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from gymnasium import Space, error
@@ -11,9 +11,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from posefit import SearchSpace
+from posefit.arrays import Array
 from posefit.fitting.check import whole
+from posefit.fitting.metrics import pose_error_degrees
+from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted
-from posefit_envs.drawing import MODES, check_mode
+from posefit_envs.drawing import MODES, Picture, check_mode
+from posefit_envs.fit import Episode
 from posefit_envs.instance import ArgumentError, Selection, approved, instance_number
 from posefit_envs.search import Doorkeeper
 from posefit_envs.stage import Stage
@@ -22,8 +27,20 @@ Flags = NDArray[np.bool_]  # (n,)
 Infos = dict[str, Any]
 
 
-class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
-    """`num_envs` environments whose states are rows of arrays.
+class HasSpace(Protocol):
+    """The state of one environment's episode."""
+
+    @property
+    def space(self) -> SearchSpace:
+        """The space that is searched."""
+        ...
+
+
+S = TypeVar("S", bound=HasSpace)
+
+
+class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC, Generic[S]):
+    """`num_envs` environments, each with a search and a row of what is drawn together.
 
     Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an episode's last
     one resets, as `AutoresetMode.NEXT_STEP` says.
@@ -62,6 +79,19 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._numbers = np.zeros(num_envs, dtype=np.int64)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=bool)
+        self._searches: list[S | None] = [None] * num_envs
+        self._truths = np.empty((num_envs, ANGLES))
+
+    @property
+    def search_spaces(self) -> list[SearchSpace]:
+        """The space that each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return [search.space for search in self._current()]
+
+    def render(self) -> Any:
+        """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        return tuple(self._portrait(i, search) for i, search in enumerate(self._current()))
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -88,13 +118,39 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     def _renew_ended(self) -> Flags:
         """Begin the next episodes where one has ended; return which environments (n,) step, the others."""
-        if not self._begun:
-            raise error.ResetNeeded("reset must come before anything else")
+        self._current()
         stepping = ~self._ended
         for i in np.flatnonzero(self._ended).tolist():
             self._renew(i, None)
         self._steps += stepping
         return stepping
+
+    def _current(self) -> list[S]:
+        searches = [search for search in self._searches if search is not None]
+        if len(searches) < self.num_envs:
+            raise error.ResetNeeded("reset must come before anything else")
+        return searches
+
+    def _put(self, i: int, episode: Episode) -> None:
+        """Make an episode what environment i sees, and what its errors are told against."""
+        self._stage.put(i, episode.scenery, episode.space)
+        self._truths[i] = episode.instance.truth.poses[0]
+
+    def _ends(self, stepping: Flags, terminated: Flags, cut: Flags | bool = False) -> Flags:
+        """Note whose episode has ended; return whose is cut (n,).
+
+        The time limit of Gymnasium cuts an episode that ends by itself, too.
+        """
+        truncated = stepping & ((self._steps >= self._longest) | cut)
+        self._ended = terminated | truncated
+        return truncated
+
+    def _standings(self, best: Array, evaluations: NDArray[np.int64], poses: Callable[[], Array]) -> Infos:
+        """Return what is said of all searches; `poses` gives the poses (n, 66) whose errors are told, if any are."""
+        infos: Infos = {"best_cost": best, "evaluations": evaluations, "instance": self._numbers.copy()}
+        if self._selection.errors:
+            infos["error_degrees"] = pose_error_degrees(self._truths, poses())
+        return infos
 
     def _generator(self, i: int) -> np.random.Generator:
         mine = self._generators[i]
@@ -109,6 +165,10 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     @abstractmethod
     def _opened(self, begun: Flags) -> tuple[Any, Infos]:
         """Return observations (n, ...) after a reset of some environments, and what is said of those by name."""
+
+    @abstractmethod
+    def _portrait(self, i: int, search: S) -> Picture:
+        """Return the picture of environment i and its search."""
 
 
 def masked(mask: Flags, values: Infos, others: Infos | None = None) -> Infos:
@@ -150,7 +210,7 @@ def chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int 
         return [None] * count
     if isinstance(chosen, int | np.integer) or not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
         return [instance_number(chosen)] * count
-    if np.ndim(chosen) != 1 or len(chosen) != count:
+    if (isinstance(chosen, np.ndarray) and chosen.ndim != 1) or len(chosen) != count:
         raise ArgumentError(f"instance must be one number or {count}, one for each environment, got {quoted(chosen)}")
     return [instance_number(one) for one in chosen]
 

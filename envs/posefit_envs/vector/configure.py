@@ -3,14 +3,10 @@
 from typing import Any, Unpack
 
 import numpy as np
-from gymnasium import error
 from numpy.typing import NDArray
 
-from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.box import MANY, REDRAWS, fold
-from posefit.fitting.metrics import pose_error_degrees
-from posefit.geometry.skeleton import ANGLES
 from posefit_envs.configure import (
     FIRST,
     ITERATIONS,
@@ -22,12 +18,12 @@ from posefit_envs.configure import (
     standings,
     steering,
 )
-from posefit_envs.drawing import portray
+from posefit_envs.drawing import Picture
 from posefit_envs.instance import Arguments, select
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
 
-class ConfigureVectorEnv(SearchVectorEnv):
+class ConfigureVectorEnv(SearchVectorEnv[SteeredSwarm]):
     """`num_envs` environments as `posefit_envs.configure.ConfigureEnv`, with the same arguments.
 
     So many `threads` draw; it is one unless somebody says otherwise, and changes nothing but the time.
@@ -50,38 +46,30 @@ class ConfigureVectorEnv(SearchVectorEnv):
         selection = select(**arguments)
         super().__init__(num_envs, selection, spaces_of_swarm(), threads, render_mode, max_episode_steps)
         self.particles, self._iterations = int(particles), int(iterations)
-        self._swarms: list[SteeredSwarm | None] = [None] * num_envs
-        self._truths = np.empty((num_envs, ANGLES))
-
-    @property
-    def search_spaces(self) -> list[SearchSpace]:
-        """The space of each environment's instance. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return [swarm.episode.space for swarm in self._current()]
 
     def step(self, actions: Any) -> tuple[State, Array, Flags, Flags, Infos]:
         """Fly one iteration in each environment; one whose episode has ended resets instead."""
         inertias, temperatures, kicks = steering(self._door.proposals(actions, self._shape))
         stepping = self._renew_ended()
-        swarms, before = self._current(), self._standings.best
+        swarms, before = self._current(), self._reached.best
         for i in np.flatnonzero(stepping).tolist():
             swarms[i].fly(inertias[i])
         deviations = np.where(stepping, kicks, 0.0)
         self._kick(np.flatnonzero(deviations > 0.0), deviations)
         self._settle(np.where(stepping, temperatures, FIRST), self._stage.everyone)
         terminated = stepping & np.array([swarm.left == 0 for swarm in swarms])
-        truncated = stepping & (self._steps >= self._longest)
-        self._ended = terminated | truncated
-        best = self._standings.best
+        truncated = self._ends(stepping, terminated)
+        best = self._reached.best
         rewards = np.where(stepping, before - best, 0.0)
         infos = masked(np.ones_like(stepping), self._infos())
-        return self._standings.states, rewards, terminated, truncated, infos
+        return self._reached.states, rewards, terminated, truncated, infos
 
     def _kick(self, rows: NDArray[np.int64], deviations: Array) -> None:
         """Scatter the moves of some swarms, by so many half-ranges (n,): `box.scatter` for all of them together."""
         if not len(rows):
             return
         swarms = self._current()
-        flocks, space = [swarms[i].flock for i in rows.tolist()], swarms[0].episode.space
+        flocks, space = [swarms[i].flock for i in rows.tolist()], swarms[0].space
         means = np.stack([flock.moved for flock in flocks])
         shape, spread = means.shape, deviations[rows]
         noise = np.stack([swarms[i].rng.standard_normal(shape[1:]) for i in rows.tolist()])
@@ -114,40 +102,20 @@ class ConfigureVectorEnv(SearchVectorEnv):
         costs = self._stage.costs(np.stack([swarm.flock.moved for swarm in swarms]), rows)
         for i, temperature in zip(rows.tolist(), temperatures[rows].tolist(), strict=True):
             swarms[i].settle(costs[i], temperature)
-        self._standings = standings(swarms)
+        self._reached = standings(swarms)
 
     def _infos(self) -> Infos:
-        infos: Infos = {
-            "best_cost": self._standings.best,
-            "evaluations": np.array([swarm.used for swarm in self._current()]),
-            "instance": self._numbers.copy(),
-        }
-        if self._selection.errors:
-            infos["error_degrees"] = pose_error_degrees(self._truths, self._stage.poses(self._standings.leaders))
-        return infos
+        used = np.array([swarm.used for swarm in self._current()])
+        return self._standings(self._reached.best, used, lambda: self._stage.poses(self._reached.leaders))
 
     def _begin(self, i: int, number: int) -> None:
         swarm = SteeredSwarm(self.world, number, self._generator(i), self.particles, self._iterations)
-        self._swarms[i], self._truths[i] = swarm, swarm.episode.instance.truth.poses[0]
-        self._stage.put(i, swarm.episode.scenery, swarm.episode.space)
+        self._searches[i] = swarm
+        self._put(i, swarm.episode)
 
     def _opened(self, begun: Flags) -> tuple[State, Infos]:
         self._settle(np.full(self.num_envs, FIRST), np.flatnonzero(begun))
-        return self._standings.states, self._infos()
+        return self._reached.states, self._infos()
 
-    def render(self) -> Any:
-        """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
-        if self.render_mode is None:
-            return None
-        shown = []
-        for swarm in self._current():
-            poses, places = swarm.problem.decode(swarm.leader[None])
-            label = f"best {swarm.best:.1f}, {swarm.used} evaluations"
-            shown.append(portray(swarm.episode.scenery, poses[0], places[0], label))
-        return tuple(shown)
-
-    def _current(self) -> list[SteeredSwarm]:
-        swarms = [swarm for swarm in self._swarms if swarm is not None]
-        if len(swarms) < self.num_envs:
-            raise error.ResetNeeded("reset must come before anything else")
-        return swarms
+    def _portrait(self, i: int, search: SteeredSwarm) -> Picture:
+        return search.portrait()

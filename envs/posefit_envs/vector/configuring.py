@@ -3,23 +3,20 @@
 from typing import Any, Unpack
 
 import numpy as np
-from gymnasium import error
 
-from posefit import SearchSpace
 from posefit.arrays import Array
-from posefit.fitting.metrics import pose_error_degrees
-from posefit.geometry.skeleton import ANGLES
 from posefit_envs.configure import ITERATIONS, PARTICLES
 from posefit_envs.configuring.features import State, instance_features, observed_state, space_of_features
 from posefit_envs.configuring.herd import Herd
 from posefit_envs.configuring.orders import order_of, space_of_orders
-from posefit_envs.configuring.single import EVERY, check_herd, gained
-from posefit_envs.drawing import portray
+from posefit_envs.configuring.single import EVERY, check_herd
+from posefit_envs.drawing import Picture
 from posefit_envs.instance import Arguments, select
+from posefit_envs.scales import gained
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
 
-class OptimiserVectorEnv(SearchVectorEnv):
+class OptimiserVectorEnv(SearchVectorEnv[Herd]):
     """`num_envs` environments as `posefit_envs.configuring.single.OptimiserEnv`, with the same arguments.
 
     So many `threads` draw; it is one unless somebody says otherwise, and changes nothing but the time.
@@ -44,14 +41,7 @@ class OptimiserVectorEnv(SearchVectorEnv):
         spaces = space_of_orders(), space_of_features()
         super().__init__(num_envs, selection, spaces, threads, render_mode, max_episode_steps)
         self._sizes = int(particles), int(iterations) // int(every), int(every)
-        self._herds: list[Herd | None] = [None] * num_envs
         self._features: list[Array] = [np.empty(0)] * num_envs
-        self._truths = np.empty((num_envs, ANGLES))
-
-    @property
-    def search_spaces(self) -> list[SearchSpace]:
-        """The space of each environment's instance. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return [herd.space for herd in self._current()]
 
     def step(self, actions: Any) -> tuple[State, Array, Flags, Flags, Infos]:
         """Search on with an order in each environment; one whose episode has ended resets instead."""
@@ -65,8 +55,7 @@ class OptimiserVectorEnv(SearchVectorEnv):
             herds[i].follow(orders[i])
         self._search()
         terminated = stepping & np.array([herd.left == 0 for herd in herds])
-        truncated = stepping & (self._steps >= self._longest)
-        self._ended = terminated | truncated
+        truncated = self._ends(stepping, terminated)
         rewards = np.array([gained(was, herd.best) for was, herd in zip(before, herds, strict=True)])
         infos = masked(np.ones_like(stepping), self._infos())
         return self._states(), np.where(stepping, rewards, 0.0), terminated, truncated, infos
@@ -90,20 +79,12 @@ class OptimiserVectorEnv(SearchVectorEnv):
 
     def _infos(self) -> Infos:
         herds = self._current()
-        infos: Infos = {
-            "best_cost": np.array([herd.best for herd in herds]),
-            "evaluations": np.array([herd.used for herd in herds]),
-            "instance": self._numbers.copy(),
-        }
-        if self._selection.errors:
-            leaders = np.stack([herd.leader for herd in herds])
-            infos["error_degrees"] = pose_error_degrees(self._truths, self._stage.poses(leaders))
-        return infos
+        best, used = np.array([herd.best for herd in herds]), np.array([herd.used for herd in herds])
+        return self._standings(best, used, lambda: self._stage.poses(np.stack([herd.leader for herd in herds])))
 
     def _begin(self, i: int, number: int) -> None:
-        herd = self._herds[i] = Herd(self.world, number, self._generator(i), *self._sizes)
-        self._truths[i] = herd.episode.instance.truth.poses[0]
-        self._stage.put(i, herd.episode.scenery, herd.space)
+        herd = self._searches[i] = Herd(self.world, number, self._generator(i), *self._sizes)
+        self._put(i, herd.episode)
 
     def _opened(self, begun: Flags) -> tuple[State, Infos]:
         self._first(np.flatnonzero(begun).tolist())
@@ -118,19 +99,5 @@ class OptimiserVectorEnv(SearchVectorEnv):
             herds[i].tell(costs[i])
             self._features[i] = instance_features(herds[i])
 
-    def render(self) -> Any:
-        """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
-        if self.render_mode is None:
-            return None
-        pictures = []
-        for herd in self._current():
-            poses, places = herd.episode.scenery.problem(herd.space).decode(herd.leader[None])
-            label = f"best {herd.best:.1f}, {herd.used} evaluations"
-            pictures.append(portray(herd.episode.scenery, poses[0], places[0], label))
-        return tuple(pictures)
-
-    def _current(self) -> list[Herd]:
-        herds = [herd for herd in self._herds if herd is not None]
-        if len(herds) < self.num_envs:
-            raise error.ResetNeeded("reset must come before anything else")
-        return herds
+    def _portrait(self, i: int, search: Herd) -> Picture:
+        return search.portrait()

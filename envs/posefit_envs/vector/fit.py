@@ -3,13 +3,10 @@
 from typing import Any, Unpack
 
 import numpy as np
-from gymnasium import error
 
-from posefit import PoseProblem, SearchSpace
+from posefit import PoseProblem
 from posefit.arrays import Array
-from posefit.fitting.metrics import pose_error_degrees
-from posefit.geometry.skeleton import ANGLES
-from posefit_envs.drawing import portray
+from posefit_envs.drawing import Picture, portray
 from posefit_envs.fit import MAX_EVALUATIONS, TARGET_COST, Episode, check_budget, spaces_of
 from posefit_envs.instance import Arguments, select
 from posefit_envs.search import Image
@@ -17,7 +14,7 @@ from posefit_envs.stage import Evaluated
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
 
-class FitVectorEnv(SearchVectorEnv):
+class FitVectorEnv(SearchVectorEnv[Episode]):
     """`num_envs` environments as `posefit_envs.fit.FitEnv`, with the same arguments.
 
     So many `threads` draw; it is one unless somebody says otherwise, and changes nothing but the time.
@@ -40,14 +37,8 @@ class FitVectorEnv(SearchVectorEnv):
         selection = select(**arguments)
         super().__init__(num_envs, selection, spaces_of(selection.world), threads, render_mode, max_episode_steps)
         self._target, self._most = float(target_cost), int(max_evaluations)
-        self._episodes: list[Episode | None] = [None] * num_envs
-        self._truths, self._best = np.empty((num_envs, ANGLES)), np.full(num_envs, np.inf)
+        self._best = np.full(num_envs, np.inf)
         self._last: Evaluated | None = None
-
-    @property
-    def search_spaces(self) -> list[SearchSpace]:
-        """The space of each environment's instance. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return [episode.space for episode in self._current()]
 
     @property
     def problems(self) -> list[PoseProblem]:
@@ -61,44 +52,23 @@ class FitVectorEnv(SearchVectorEnv):
         seen = self._last = self._stage.look(proposals, np.flatnonzero(stepping))
         np.minimum(self._best, seen.costs, out=self._best, where=stepping)
         terminated = stepping & (self._best <= self._target)
-        # a time limit of Gymnasium's cuts an episode that ends by itself, too
-        truncated = stepping & ((self._steps >= self._longest) | (~terminated & (self._steps >= self._most)))
-        self._ended = terminated | truncated
-        values: Infos = {
-            "cost": seen.costs,
-            "best_cost": self._best.copy(),
-            "evaluations": self._steps.copy(),
-            "areas": seen.areas,
-            "instance": self._numbers.copy(),
-        }
-        if self._selection.errors:
-            values["error_degrees"] = pose_error_degrees(self._truths, seen.poses)
+        truncated = self._ends(stepping, terminated, ~terminated & (self._steps >= self._most))
+        values = {"cost": seen.costs, "areas": seen.areas}
+        values |= self._standings(self._best.copy(), self._steps.copy(), lambda: seen.poses)
         infos = masked(stepping, values, {"instance": self._numbers})
         return seen.pictures, np.where(stepping, -seen.costs, 0.0), terminated, truncated, infos
 
     def _begin(self, i: int, number: int) -> None:
-        episode = self._episodes[i] = Episode(self.world, number, self._most)
-        self._stage.put(i, episode.scenery, episode.space)
-        self._truths[i], self._best[i] = episode.instance.truth.poses[0], np.inf
+        episode = self._searches[i] = Episode(self.world, number, self._most)
+        self._put(i, episode)
+        self._best[i] = np.inf
 
     def _opened(self, begun: Flags) -> tuple[Image, Infos]:
         return self._stage.pictures(), {"instance": self._numbers.copy()}
 
-    def render(self) -> Any:
-        """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
-        if self.render_mode is None:
-            return None
-        shown = []
-        for i, episode in enumerate(self._current()):
-            if self._steps[i] and self._last is not None:
-                label = f"cost {self._last.costs[i]:.1f}, best {self._best[i]:.1f}, {self._steps[i]} evaluations"
-                shown.append(portray(episode.scenery, self._last.poses[i], self._last.translations[i], label))
-            else:
-                shown.append(portray(episode.scenery, None, None, episode.label))
-        return tuple(shown)
-
-    def _current(self) -> list[Episode]:
-        episodes = [episode for episode in self._episodes if episode is not None]
-        if len(episodes) < self.num_envs:
-            raise error.ResetNeeded("reset must come before anything else")
-        return episodes
+    def _portrait(self, i: int, search: Episode) -> Picture:
+        last = self._last
+        if not self._steps[i] or last is None:
+            return portray(search.scenery, None, None, search.label)
+        label = f"cost {last.costs[i]:.1f}, best {self._best[i]:.1f}, {self._steps[i]} evaluations"
+        return portray(search.scenery, last.poses[i], last.translations[i], label)

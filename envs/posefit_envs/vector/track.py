@@ -3,15 +3,12 @@
 from typing import Any, Unpack
 
 import numpy as np
-from gymnasium import error
 from numpy.typing import NDArray
 
-from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit.fitting.metrics import pose_error_degrees
 from posefit.geometry.skeleton import ANGLES
-from posefit_envs.drawing import portray
+from posefit_envs.drawing import Picture, portray
 from posefit_envs.fit import check_budget, spaces_of
 from posefit_envs.instance import Arguments, approved, select
 from posefit_envs.search import Image
@@ -19,7 +16,7 @@ from posefit_envs.track import EVALUATIONS, FRAMES, Passage, track_label
 from posefit_envs.vector.batch import Flags, Infos, SearchVectorEnv, masked
 
 
-class TrackVectorEnv(SearchVectorEnv):
+class TrackVectorEnv(SearchVectorEnv[Passage]):
     """`num_envs` environments as `posefit_envs.track.TrackEnv`, with the same arguments.
 
     So many `threads` draw; it is one unless somebody says otherwise, and changes nothing but the time.
@@ -45,18 +42,12 @@ class TrackVectorEnv(SearchVectorEnv):
         selection = select(**arguments)
         super().__init__(num_envs, selection, spaces_of(selection.world), threads, render_mode, max_episode_steps)
         self._frames, self._most = int(frames), int(evaluations_per_frame)
-        self._passages: list[Passage | None] = [None] * num_envs
-        # of the current frame: proposals made, the truth, what the last and the best proposal came to
+        # of the current frame: proposals made, what the last and the best proposal came to
         n, d = self._shape
-        self._used, self._truths = np.zeros(num_envs, dtype=np.int64), np.empty((n, ANGLES))
+        self._used = np.zeros(num_envs, dtype=np.int64)
         self._costs, self._poses, self._places = np.empty(n), np.empty((n, ANGLES)), np.empty((n, 3))
         self._best, self._best_proposals = np.empty(n), np.empty((n, d))
         self._best_poses, self._best_places = np.empty((n, ANGLES)), np.empty((n, 3))
-
-    @property
-    def search_spaces(self) -> list[SearchSpace]:
-        """The space of each environment's frame. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return [passage.space for passage in self._current()]
 
     def step(self, actions: Any) -> tuple[Image, Array, Flags, Flags, Infos]:
         """Propose a pose in each environment; one whose episode has ended resets instead."""
@@ -68,19 +59,11 @@ class TrackVectorEnv(SearchVectorEnv):
         better = np.flatnonzero(stepping & (seen.costs < self._best))
         self._best[better], self._best_proposals[better] = seen.costs[better], proposals[better]
         self._best_poses[better], self._best_places[better] = seen.poses[better], seen.translations[better]
-        values: Infos = {
-            "cost": seen.costs,
-            "best_cost": self._best.copy(),
-            "evaluations": self._used.copy(),
-            "areas": seen.areas,
-            "instance": self._numbers.copy(),
-        }
-        if self._selection.errors:
-            values["error_degrees"] = pose_error_degrees(self._truths, seen.poses)
+        values = {"cost": seen.costs, "areas": seen.areas}
+        values |= self._standings(self._best.copy(), self._used.copy(), lambda: seen.poses)
         committing = np.flatnonzero(stepping & (self._used >= self._most))
         told, terminated = self._commit(committing, seen.pictures)
-        truncated = stepping & (self._steps >= self._longest)
-        self._ended = terminated | truncated
+        truncated = self._ends(stepping, terminated)
         frames = np.array([passage.frame for passage in self._current()])
         others = {"instance": self._numbers, "frame": frames}
         infos = masked(stepping, values | {"frame": frames}, others) | told
@@ -91,7 +74,7 @@ class TrackVectorEnv(SearchVectorEnv):
         infos: Infos = {}
         ended, errors = np.zeros(self.num_envs, dtype=bool), self._selection.errors
         for i in rows.tolist():
-            passage = self._passages[i]
+            passage = self._searches[i]
             assert passage is not None
             self._poses[i], self._places[i] = self._best_poses[i], self._best_places[i]
             info = passage.commit(
@@ -105,7 +88,7 @@ class TrackVectorEnv(SearchVectorEnv):
         return infos, ended
 
     def _begin(self, i: int, number: int) -> None:
-        passage = self._passages[i] = Passage(self.world, number, self._frames, self._most)
+        passage = self._searches[i] = Passage(self.world, number, self._frames, self._most)
         self._enter(i, passage)
 
     def _enter(self, i: int, passage: Passage) -> None:
@@ -116,21 +99,8 @@ class TrackVectorEnv(SearchVectorEnv):
         frames = np.zeros(self.num_envs, dtype=np.int64)
         return self._stage.pictures(), {"instance": self._numbers.copy(), "frame": frames}
 
-    def render(self) -> Any:
-        """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
-        if self.render_mode is None:
-            return None
-        shown = []
-        for i, passage in enumerate(self._current()):
-            if self._steps[i]:
-                label = track_label(passage, float(self._costs[i]), float(self._best[i]))
-                shown.append(portray(passage.scenery, self._poses[i], self._places[i], label))
-            else:
-                shown.append(portray(passage.scenery, None, None, track_label(passage, None, np.inf)))
-        return tuple(shown)
-
-    def _current(self) -> list[Passage]:
-        passages = [passage for passage in self._passages if passage is not None]
-        if len(passages) < self.num_envs:
-            raise error.ResetNeeded("reset must come before anything else")
-        return passages
+    def _portrait(self, i: int, search: Passage) -> Picture:
+        if not self._steps[i]:
+            return portray(search.scenery, None, None, track_label(search, None, np.inf))
+        label = track_label(search, float(self._costs[i]), float(self._best[i]))
+        return portray(search.scenery, self._poses[i], self._places[i], label)

@@ -12,11 +12,13 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.evolution.constants import usual_population
 from posefit.evolution.strategy import Strategy
-from posefit_envs.configuring.orders import Order, action_of
+from posefit_envs.configuring.orders import NUMBERS, Order, action_of
 from posefit_envs.policies import Policy, constant_policy, played
+from posefit_experiments.agents.design import HELD_OUT
 
 WIDE = 0.5  # the first step size of CMA-ES, of a box from -1 to 1
 EPISODES = 4  # that a setting of CMA-ES is tried in, the same instances for a whole generation
+SIZES = {"configure": NUMBERS, "fit": 2}  # numbers of a setting
 CURIOSITY = 0.5  # of the bandit: how many deviations of rewards an arm that was never tried is worth
 
 Look = Callable[[int, Policy], None]
@@ -48,7 +50,7 @@ def setting_policy(task: str, setting: Array, rng: np.random.Generator, dimensio
 
 
 def bandit(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
-    """Return the best arm by UCB1 over whole episodes of a training environment, `steps` of its steps.
+    """Return the best arm by UCB1 over the whole episodes that `steps` steps of a training environment are.
 
     `length` is how many an episode has; `look` is called with the steps so far and the policy of then.
     """
@@ -57,12 +59,12 @@ def bandit(task: str, env: Any, length: int, steps: int, seed: int, look: Look) 
     policies = [setting_policy(task, arm, rng, d, length) for arm in choices]
     shown = [setting_policy(task, arm, _apart(seed), d, length) for arm in choices]
     sums, squares, counts = np.zeros(len(choices)), np.zeros(len(choices)), np.zeros(len(choices))
-    for episode in range(max(1, steps // length)):
+    for episode in range(steps // length):
         tried = np.maximum(counts, 1.0)
         deviation = np.sqrt(max(squares.sum() / max(episode, 1) - (sums.sum() / max(episode, 1)) ** 2, 0.0))
         bonus = CURIOSITY * deviation * np.sqrt(2.0 * np.log(episode + 1.0) / tried)
         arm = int(np.where(counts > 0, sums / tried + bonus, np.inf).argmax())
-        gain = played(env, policies[arm], int(rng.integers(10_000)), int(rng.integers(2**31)))["gain"]
+        gain = played(env, policies[arm], int(rng.integers(HELD_OUT)), int(rng.integers(2**31)))["gain"]
         sums[arm], squares[arm], counts[arm] = sums[arm] + gain, squares[arm] + gain**2, counts[arm] + 1
         look((episode + 1) * length, shown[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
     return shown[int(np.where(counts > 0, sums / np.maximum(counts, 1.0), -np.inf).argmax())]
@@ -73,16 +75,23 @@ def _apart(seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, 2])
 
 
+def generation(task: str, length: int) -> int:
+    """Return how many steps a generation of CMA-ES over settings takes, where an episode has `length`."""
+    return usual_population(SIZES[task]) * EPISODES * length
+
+
 def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
-    """Return the setting at the mean of CMA-ES after `steps` steps of a training environment."""
+    """Return the setting at the mean of CMA-ES after the whole generations that `steps` steps of an environment are.
+
+    Without one it is the middle.
+    """
     rng, other = np.random.default_rng(seed), _apart(seed)
-    d = env.action_space.shape[0]
-    size = 2 if task == "fit" else d
+    d, size, whole = env.action_space.shape[0], SIZES[task], generation(task, length)
     population = usual_population(size)
-    strategy, used = Strategy(np.zeros(size), np.full(size, WIDE), population), 0
-    while used + population * EPISODES * length <= steps:
+    strategy = Strategy(np.zeros(size), np.full(size, WIDE), population)
+    for number in range(1, steps // whole + 1):
         settings = np.clip(strategy.sample(rng, population), -1.0, 1.0)
-        numbers, seeds = rng.integers(10_000, size=EPISODES), rng.integers(2**31, size=EPISODES)
+        numbers, seeds = rng.integers(HELD_OUT, size=EPISODES), rng.integers(2**31, size=EPISODES)
         costs = [
             -np.mean(
                 [
@@ -93,6 +102,5 @@ def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look)
             for setting in settings
         ]
         strategy.learn(settings, np.array(costs))
-        used += population * EPISODES * length
-        look(used, setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length))
+        look(number * whole, setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length))
     return setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length)

@@ -3,35 +3,41 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from posefit_envs.configure import ITERATIONS, PARTICLES
+from posefit_envs.configuring.single import EVERY
+from posefit_envs.fit import MAX_EVALUATIONS
+
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES, SEEDS, STEPS = 40, 5, 20_000
 QUICK_INSTANCES, QUICK_STEPS = 4, 300
 CURVE = 5  # looks at an agent while it learns
 CURVE_INSTANCES = 16  # that each look takes, the first of those held out
-BEST_KNOWN_TIMES = 10  # budgets of the strongest method, for what is best known
-STRONGEST = "cma"
+STRONGEST, BEST_KNOWN_EVALUATIONS = "cma", 24_400  # the method, and its budget, for what is best known
 UNTRAINED = 0  # steps of training of a reference
 
 
 @dataclass(frozen=True)
 class Contested:
-    """An environment, the budget of its episodes in evaluations, and who plays it."""
+    """An environment, the budget of its episodes in evaluations and in steps, and who plays it."""
 
     name: str
     evaluations: int
+    length: int  # steps of an episode
     references: tuple[str, ...]  # not trained
     learners: tuple[str, ...]
 
 
 CONFIGURE = Contested(
     "posefit/Configure-v1",
-    2440,
+    PARTICLES * (ITERATIONS + 1),
+    ITERATIONS // EVERY,
     ("random search", "random actions", "middle", "sapso"),
     ("bandit", "cma over constants", "ppo", "sac"),
 )
 FIT = Contested(
     "posefit/Fit-v1",
-    200,
+    MAX_EVALUATIONS,
+    MAX_EVALUATIONS - 1,
     ("random search", "random actions", "gaussian", "sapso", "cma"),
     ("bandit", "cma over constants", "ppo", "sac"),
 )
@@ -39,7 +45,7 @@ TASKS = {"configure": CONFIGURE, "fit": FIT}
 
 
 class Training(NamedTuple):
-    """One row: an agent in an environment, with a seed of its training and evaluation, and its steps of training."""
+    """One row: an agent in an environment, a seed of its training and evaluation, and the steps it is asked to take."""
 
     task: str
     agent: str

@@ -1,10 +1,8 @@
 """Baseline agents are trained and evaluated: `posefit reproduce agents`, a row an agent and seed, kept as they come."""
 
-import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -12,7 +10,6 @@ import numpy as np
 
 import posefit_envs  # noqa: F401, registers the environments
 from posefit import minimise
-from posefit.reading import parsed_json, read_text
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs.instance import instance, select
@@ -25,9 +22,9 @@ from posefit_envs.policies import (
     sapso_policy,
     uniform_policy,
 )
-from posefit_experiments.agents.constants import bandit, evolved
+from posefit_experiments.agents.constants import bandit, evolved, generation
 from posefit_experiments.agents.design import (
-    BEST_KNOWN_TIMES,
+    BEST_KNOWN_EVALUATIONS,
     CURVE,
     CURVE_INSTANCES,
     HELD_OUT,
@@ -39,12 +36,12 @@ from posefit_experiments.agents.design import (
     agent_turns,
     check_design,
 )
-from posefit_experiments.agents.learners import check_learners, trained
+from posefit_experiments.agents.learners import ROLLOUT, check_learners, trained
 from posefit_experiments.agents.tables import agent_tables
-from posefit_experiments.grid import Progress, each
+from posefit_experiments.grid import Progress, each, earlier, kept
 
-LARGEST_ROWS = 50_000_000  # bytes of a file of rows
 BEST = "best known"
+FIGURES = ("costs", "curve", "minutes")  # of a row, beside what was asked for
 SAMPLED = ("fit",)  # tasks in which a learner's actions are drawn, as its noise is what searches
 
 
@@ -64,17 +61,17 @@ def agents(
     `rows` is a file for a row a line as they come; what it holds already is not measured again. Raises ValueError where
     something asked for is not there.
     """
-    asked = environments or tuple(TASKS)
+    asked = tuple(dict.fromkeys(environments)) or tuple(TASKS)
     check_design(asked, names, {"seeds": seeds, "steps": steps, "instances": instances})
     if quick:
         seeds, steps, instances = min(seeds, 2), QUICK_STEPS, QUICK_INSTANCES
     turns = agent_turns(asked, names, seeds, steps, instances)
     check_learners({turn.agent for turn in turns})
     turns += [Training(name, BEST, 0, 0, instances) for name in asked]
-    done = _earlier(rows)
+    done = earlier(rows, (*Training._fields, *FIGURES), turn_of)
     jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
-    done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
-    found = [done[turn] for turn in turns]
+    done |= each(jobs, workers, partial(kept, rows, progress)) if jobs else {}
+    found = [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
     return {"seeds": seeds, "steps": steps, "instances": instances, "rows": found} | agent_tables(found)
 
 
@@ -85,13 +82,14 @@ def agent_row(turn: Training) -> dict[str, Any]:
     row: dict[str, Any] = turn._asdict() | {"curve": []}
     evaluations = TASKS[turn.task].evaluations
     if turn.agent == BEST:
-        row["costs"] = _searched(STRONGEST, BEST_KNOWN_TIMES * 2440, numbers, turn.seed)
+        row["costs"] = _searched(STRONGEST, BEST_KNOWN_EVALUATIONS, numbers, turn.seed)
     elif turn.agent in ("random search", "sapso", "cma") and not _is_policy(turn):
         row["costs"] = _searched(turn.agent.split()[0], evaluations, numbers, turn.seed)
     else:
         row["costs"] = _costs(turn, _policy(turn, row["curve"]), numbers)
         if row["curve"]:
-            row["curve"].append([turn.steps, row["costs"][:CURVE_INSTANCES]])
+            last = [steps_taken(turn), row["costs"][:CURVE_INSTANCES]]
+            row["curve"] = [look for look in row["curve"] if look[0] < last[0]] + [last]
     return row | {"minutes": round((time.perf_counter() - began) / 60.0, 2)}
 
 
@@ -119,13 +117,21 @@ def _policy(turn: Training, curve: list[Any]) -> Policy:
 
     if turn.agent in ("bandit", "cma over constants"):
         learn = bandit if turn.agent == "bandit" else evolved
-        return learn(turn.task, env, _length(turn.task), turn.steps, turn.seed, look)
+        return learn(turn.task, env, TASKS[turn.task].length, steps_taken(turn), turn.seed, look)
     return trained(turn.agent, env, turn.steps, turn.seed, turn.task not in SAMPLED, look)
 
 
-def _length(task: str) -> int:
-    """Return how many steps an episode has."""
-    return 12 if task == "configure" else TASKS[task].evaluations - 1
+def steps_taken(turn: Training) -> int:
+    """Return how many steps of training an agent takes of those asked for: whole episodes, generations or rollouts."""
+    length = TASKS[turn.task].length
+    if turn.agent == "bandit":
+        return max(1, turn.steps // length) * length
+    if turn.agent == "cma over constants":
+        whole = generation(turn.task, length)
+        return turn.steps // whole * whole
+    if turn.agent == "ppo":
+        return -(-turn.steps // ROLLOUT) * ROLLOUT
+    return turn.steps
 
 
 def _made(task: str) -> gym.Env[Any, Any]:
@@ -151,37 +157,14 @@ def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> li
     return found
 
 
-def _earlier(path: str | None) -> dict[Training, dict[str, Any]]:
-    """Return the rows of a file, which is made where there is none.
-
-    Raises ValueError where it cannot be written to, or a line is no row.
-    """
-    if path is None:
-        return {}
-    try:
-        Path(path).touch()
-    except OSError as error:
-        raise ValueError(f"{path}: expected a file for rows, got {error.strerror}") from None
-    found = {}
-    for number, line in enumerate(read_text(path, LARGEST_ROWS).splitlines(), 1):
-        try:
-            row = parsed_json(line)
-            turn = Training(*(row[name] for name in Training._fields))
-            if len(row["costs"]) != turn.instances:
-                raise ValueError("costs")
-            found[turn] = row
-        except (ValueError, TypeError, KeyError):
-            wanted = ", ".join((*Training._fields, "costs"))
-            raise ValueError(f"{path}: line {number} must be a row with {wanted}, got another text") from None
-    return found
-
-
-def _kept(
-    path: str | None, progress: Progress | None, ended: Iterator[tuple[Training, dict[str, Any]]], count: int
-) -> Iterator[tuple[Training, dict[str, Any]]]:
-    """Yield rows as they come, each written to a file at once where one is named."""
-    for turn, row in progress(ended, count) if progress else ended:
-        if path is not None:
-            with Path(path).open("a", encoding="utf-8") as file:
-                file.write(f"{json.dumps(row)}\n")
-        yield turn, row
+def turn_of(row: Mapping[str, Any]) -> Training:
+    """Return whose row it is. Raises ValueError where its figures are none, or not as many as it has instances."""
+    turn = Training(*(row[name] for name in Training._fields))
+    looks = min(turn.instances, CURVE_INSTANCES)
+    counts = [((), row["minutes"]), ((turn.instances,), row["costs"])]
+    counts += [count for steps, costs in row["curve"] for count in (((), steps), ((looks,), costs))]
+    for shape, numbers in counts:
+        array = np.array(numbers)
+        if array.shape != shape or array.dtype.kind not in "if":
+            raise ValueError(f"figures must be numbers of shape {shape}")
+    return turn

@@ -8,6 +8,7 @@ from posefit.arrays import Array
 from posefit_envs.policies import Policy
 
 DISCOUNT = 0.99  # their default, stated
+ROLLOUT = 2048  # steps that PPO takes before it learns of them; its default, stated
 
 
 def check_learners(agents: set[str]) -> None:
@@ -19,7 +20,7 @@ def check_learners(agents: set[str]) -> None:
 def trained(
     agent: str, env: Any, steps: int, seed: int, deterministic: bool, look: Callable[[int, Policy], None]
 ) -> Policy:
-    """Return the policy of "ppo" or "sac" after so many steps in an environment.
+    """Return the policy of "ppo" or "sac" after so many steps in an environment, of "ppo" in whole rollouts.
 
     `deterministic` takes the middle of its distribution in place of a draw. `look` is called with the steps so far and
     the policy of then.
@@ -29,8 +30,8 @@ def trained(
     from stable_baselines3.common.callbacks import BaseCallback
 
     torch.set_num_threads(1)
-    learner = {"ppo": PPO, "sac": SAC}[agent]
-    model = learner("MlpPolicy", env, seed=seed, device="cpu", gamma=DISCOUNT)
+    common: dict[str, Any] = {"policy": "MlpPolicy", "env": env, "seed": seed, "device": "cpu", "gamma": DISCOUNT}
+    model = PPO(**common, n_steps=ROLLOUT) if agent == "ppo" else SAC(**common)
 
     def act(observation: Any, _: int) -> Array:
         chosen: Array = model.predict(observation, deterministic=deterministic)[0]

@@ -8,6 +8,7 @@
     many.py          thousands of poses, several silhouettes, limbs, half and quarter size
     growth.py        how the time of a pose grows: `posefit bench --growth`
     processor.py     which instructions the loops are compiled for
+    device.py        a GPU beside the CPU: `posefit bench --device cuda`
     timing.py        jobs take turns, and the fastest run of each counts
 
 Nothing here runs beside anything else, so nothing is given to the sweep engine.

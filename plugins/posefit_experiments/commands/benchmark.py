@@ -18,8 +18,15 @@ from posefit.cli.output import json_line, say
 @click.option("--pictures", metavar="DIR", help="With --growth: write a figure of each, growth-*.png, to DIR.")
 @click.option("--compile", "compiling", is_flag=True, help="Time what compiles for the default sweep instead.")
 @click.option("--follow", type=int, metavar="FRAMES", help="Time and weigh the tracker of the library instead.")
+@click.option("--device", metavar="cuda", help="Time a GPU beside the CPU instead, and compare what they count.")
 def bench_command(
-    threads: int | None, as_json: bool, growth: bool, pictures: str | None, compiling: bool, follow: int | None
+    threads: int | None,
+    as_json: bool,
+    growth: bool,
+    pictures: str | None,
+    compiling: bool,
+    follow: int | None,
+    device: str | None,
 ) -> None:
     """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
 
@@ -27,6 +34,7 @@ def bench_command(
     one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
     """
     _check(threads, growth, pictures, compiling, follow)
+    _check_device(device, {"growth": growth, "compile": compiling, "follow": follow is not None, "threads": threads})
     if growth:
         _growth(as_json, pictures)
         return
@@ -35,6 +43,9 @@ def bench_command(
         return
     if follow is not None:
         _follow(as_json, follow)
+        return
+    if device is not None:
+        _device(as_json, device)
         return
     from posefit_experiments.bench.experiment import loop_figures
 
@@ -67,6 +78,19 @@ def _check(threads: int | None, growth: bool, pictures: str | None, compiling: b
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, got {threads}")
     check_named()
+
+
+def _check_device(device: str | None, others: Mapping[str, Any]) -> None:
+    """Return nothing. Raises ValueError where no GPU can be timed, or something else is to be timed as well."""
+    from posefit.silhouette.cuda.device import check_device
+
+    if device is None:
+        return
+    if beside := next((name for name, given in others.items() if given), None):
+        raise ValueError(f"device must not be given beside --{beside}, got --device {device}")
+    if device == "cpu":
+        raise ValueError("device must be cuda, which is timed beside the CPU, got 'cpu'")
+    check_device(device)
 
 
 def _named(figures: Mapping[str, Any], group: str = "") -> Iterator[tuple[str, Any]]:
@@ -122,3 +146,12 @@ def _follow(as_json: bool, frames: int) -> None:
         if as_json
         else "\n".join(f"{name:12} {round(value, 3):,g}" for name, value in figures.items())
     )
+
+
+def _device(as_json: bool, device: str) -> None:
+    from posefit_experiments.bench.device import device_figures, device_lines
+
+    say("timing the GPU beside the CPU; this takes a minute or more ...")
+    figures = device_figures(device)
+    for line in [json_line(figures)] if as_json else device_lines(figures):
+        click.echo(line)

@@ -1,9 +1,8 @@
 """Footage made from the truth is tracked as any footage: row by row, each kept as it comes."""
 
-import json
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -14,7 +13,6 @@ import numpy as np
 from posefit.footage.extract import extract
 from posefit.footage.segmentation import Extraction
 from posefit.motion import recorded
-from posefit.reading import parsed_json, read_text
 from posefit.registry import registry
 from posefit.settings import parse_texts
 from posefit.tracking.front import track
@@ -24,9 +22,8 @@ from posefit_experiments.composites.plates import check_video, plate
 from posefit_experiments.composites.situations import PLACES, SHOWS, SIZE, check_situation, situation
 from posefit_experiments.composites.stills import stills
 from posefit_experiments.composites.tables import by_presence
-from posefit_experiments.grid import Progress, check_seeds, each
+from posefit_experiments.grid import Progress, check_seeds, each, earlier, kept
 
-LARGEST = 50_000_000  # bytes of a file of rows
 GIVEN = "mean"  # the extraction that is given pictures without anybody
 QUICK = (("through", 1), ("stands", 1))  # situations and numbers of cameras of a quick look
 
@@ -62,11 +59,11 @@ def composites(
     """
     shots = asked(situations, views, extractions, seeds, quick)
     check_video(video)
-    done = earlier(rows)
+    done = earlier(rows, Shot._fields, shot_of)
     if pictures is not None:
         _check_folder(Path(pictures))
     jobs = {shot: partial(measured, video, shot, pictures) for shot in shots if shot not in done}
-    done |= each(jobs, workers, partial(_kept, rows, progress)) if jobs else {}
+    done |= each(jobs, workers, partial(kept, rows, progress)) if jobs else {}
     found = [done[shot] for shot in shots]
     return {"rows": found, "groups": by_presence(found)}
 
@@ -82,7 +79,13 @@ def asked(
     for method in extractions:
         extraction_named(method)
     places = [place for place in grid if not quick or place in QUICK]
-    return [Shot(*place, method, seed) for seed in range(seeds) for method in extractions for place in places]
+    shots = [Shot(*place, method, seed) for seed in range(seeds) for method in extractions for place in places]
+    return list(dict.fromkeys(shots))
+
+
+def shot_of(row: Mapping[str, Any]) -> Shot:
+    """Return whose row it is."""
+    return Shot(*(row[name] for name in Shot._fields))
 
 
 def measured(video: str, shot: Shot, pictures: str | None) -> dict[str, Any]:
@@ -140,45 +143,12 @@ def extraction_named(text: str) -> Extraction:
     return Extraction(name, settings=settings)
 
 
-def earlier(path: str | None) -> dict[Shot, dict[str, Any]]:
-    """Return the rows of a file, which is made where there is none.
-
-    Raises ValueError where it cannot be written to, or a line is no row.
-    """
-    if path is None:
-        return {}
-    try:
-        Path(path).touch()
-    except OSError as error:
-        raise ValueError(f"{path}: expected a file for rows, got {error.strerror}") from None
-    found = {}
-    for number, line in enumerate(read_text(path, LARGEST).splitlines(), 1):
-        try:
-            row = parsed_json(line)
-            found[Shot(*(row[name] for name in Shot._fields))] = row
-        except (ValueError, TypeError, KeyError):
-            wanted = ", ".join(Shot._fields)
-            raise ValueError(f"{path}: line {number} must be a row with {wanted}, got another text") from None
-    return found
-
-
 def _check_folder(path: Path) -> None:
     """Return nothing. Raises ValueError where a path is no folder and none can be made."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ValueError(f"{path}: expected a folder for pictures, got {error.strerror}") from None
-
-
-def _kept(
-    path: str | None, progress: Progress | None, ended: Iterator[tuple[Shot, dict[str, Any]]], count: int
-) -> Iterator[tuple[Shot, dict[str, Any]]]:
-    """Yield rows as they come, each written to a file at once where one is named."""
-    for shot, row in progress(ended, count) if progress else ended:
-        if path is not None:
-            with Path(path).open("a", encoding="utf-8") as file:
-                file.write(f"{json.dumps(row)}\n")
-        yield shot, row
 
 
 def _taken_out(videos: Sequence[Path], how: Extraction, frames: Any, folder: Path) -> tuple[Any, Any]:

@@ -29,7 +29,7 @@ def check_vector_env(
     assert observations in vector.observation_space, "reset must return observations of the observation space"
     for i, single in enumerate(singles):
         observation, info = single.reset(seed=seed + i)
-        _same(f"environment {i}, reset: observation", _part(observations, i), observation)
+        _same(f"environment {i}, reset: observation", part_of(observations, i), observation)
         _same_info(f"environment {i}, reset", infos, info, i)
     ended = np.zeros(n, dtype=bool)
     vector.action_space.seed(seed)
@@ -50,7 +50,7 @@ def check_vector_env(
                 _same(f"{where}: final observation", infos["final_obs"][i], observation)
                 _same_info(f"{where}: final info", infos["final_info"], info, i)
                 observation, info = single.reset()
-            _same(f"{where}: observation", _part(observations, i), observation)
+            _same(f"{where}: observation", part_of(observations, i), observation)
             _same(f"{where}: reward", rewards[i], reward)
             _same(f"{where}: terminated", terminated[i], ends)
             _same(f"{where}: truncated", truncated[i], cut)
@@ -62,17 +62,17 @@ def check_vector_env(
         single.close()
 
 
+def part_of(observations: Any, i: int) -> Any:
+    """Return what environment i observes, of observations (n, ...); of a Dict, by name."""
+    return {name: one[i] for name, one in observations.items()} if isinstance(observations, dict) else observations[i]
+
+
 def _same_later(where: str, now: Any, then: Any) -> None:
     """Compare what was returned a step ago, observations and infos, with its copy."""
     _same(f"{where}: the observations before it", now[0], then[0])
     for key, value in then[1].items():
         if not key.startswith(("final_", "_final_")):  # objects, which a reset makes anew
             _same(f"{where}: the info {key} before it", now[1][key], value)
-
-
-def _part(observations: Any, i: int) -> Any:
-    """Return what environment i observes; of a Dict, by name."""
-    return {name: one[i] for name, one in observations.items()} if isinstance(observations, dict) else observations[i]
 
 
 def _same(where: str, ours: Any, theirs: Any) -> None:
@@ -85,8 +85,8 @@ def _same(where: str, ours: Any, theirs: Any) -> None:
 
 
 def _same_info(where: str, infos: dict[str, Any], info: dict[str, Any], i: int) -> None:
-    given = {key for key in infos if not key.startswith("_") and key not in ("final_obs", "final_info")}
-    present = {key for key in given if np.asarray(infos.get(f"_{key}", np.zeros(i + 1)))[i]}
+    masks = {key: np.asarray(infos[f"_{key}"]) for key in infos if f"_{key}" in infos}
+    present = {key for key, mask in masks.items() if mask[i] and key not in ("final_obs", "final_info")}
     assert present == set(info), f"{where}: info must have {sorted(info)}, got {sorted(present)}"
     for key, value in info.items():
         _same(f"{where}: info {key}", infos[key][i], value)

@@ -1,11 +1,14 @@
 """Hands a vector environment of Gymnasium to Stable-Baselines3, which has its own kind."""
 
 from collections.abc import Sequence
+from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import error
 from gymnasium.vector import AutoresetMode, VectorEnv
+
+from posefit_envs.vector.checker import part_of
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
@@ -56,10 +59,10 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             done = terminated | truncated
             if done.any():
                 for i in np.flatnonzero(done):
-                    rows[i]["terminal_observation"] = observations[i].copy()
+                    rows[i]["terminal_observation"] = deepcopy(part_of(observations, int(i)))
                     rows[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
                 fresh, fresh_infos = vector.reset(options={"reset_mask": done})
-                observations = np.where(done.reshape(-1, *[1] * (observations.ndim - 1)), fresh, observations)
+                observations = _mixed(done, fresh, observations)
                 for i in np.flatnonzero(done):
                     self.reset_infos[i] = _row(fresh_infos, int(i))
             return observations, rewards.astype(np.float32), done, rows
@@ -86,6 +89,13 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             return list(self._get_indices(indices))
 
     return Adapted()
+
+
+def _mixed(mask: Any, these: Any, others: Any) -> Any:
+    """Return observations (n, ...), these where the mask (n,) is true and others elsewhere; of a Dict, by name."""
+    if isinstance(these, dict):
+        return {name: _mixed(mask, one, others[name]) for name, one in these.items()}
+    return np.where(mask.reshape(-1, *[1] * (these.ndim - 1)), these, others)
 
 
 def _row(infos: dict[str, Any], i: int) -> dict[str, Any]:

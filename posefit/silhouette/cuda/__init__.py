@@ -1,0 +1,15 @@
+"""The areas of poses, counted on an NVIDIA GPU: the same loops as beside this folder, one block of threads a pose.
+
+Nothing here is imported unless a silhouette lies on a device.
+
+| looking for | file |
+|---|---|
+| whether there is a device, and what is said where there is none | device.py |
+| a silhouette on a device | moving.py |
+| arrays that a device is given once: bodies, cameras, silhouettes | held.py |
+| thousands of poses in parts, there and back | counted.py |
+| one pose: what its threads do, one after the other | launch.py |
+| forward kinematics | kinematics.py |
+| cones, and where a row of pixels crosses them | cones.py |
+| what a device says in one instruction and Python in several | arithmetic.py |
+"""

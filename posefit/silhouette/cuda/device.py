@@ -1,0 +1,26 @@
+"""Whether there is a device, and what is said where there is none."""
+
+from importlib.util import find_spec
+
+DEVICES = ("cpu", "cuda")
+
+
+def check_device(device: str) -> None:
+    """Return nothing. Raises ValueError for a device that nobody knows, and for one that is not there."""
+    if device not in DEVICES:
+        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
+    if device == "cuda" and (missing := _missing()):
+        raise ValueError(f"device cuda needs an NVIDIA GPU and posefit[gpu], got {missing}")
+
+
+def _missing() -> str | None:
+    """Return what there is instead of a device; None where there is one, which may be numba's simulator of one."""
+    if find_spec("numba_cuda") is None:
+        return "no library numba-cuda"
+    try:
+        from numba import cuda
+    except ImportError as error:
+        return f"numba-cuda without what it needs: {error}"
+    if cuda.is_available():
+        return None
+    return "no driver of NVIDIA's that answers, or no GPU"

@@ -1,0 +1,61 @@
+"""What is said where there is no GPU, and that nothing of one is needed as long as nobody asks for it."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from posefit.footage.scene import seen_on, synthetic
+from posefit.motion import built_in
+from posefit.silhouette.cuda.device import check_device
+from posefit.silhouette.cuda.moving import moved_to
+from posefit.silhouette.mask import Silhouette
+from posefit.tracking.run import follow
+
+NEEDED = "device cuda needs an NVIDIA GPU and posefit[gpu], got no library numba-cuda"
+QUIET = """
+import sys, numpy as np
+from posefit.testing.problem import pose_problem
+problem = pose_problem()
+problem.evaluate(np.zeros((1, problem.space.dimensions)))
+print(sorted(name for name in sys.modules if name.startswith(("numba.cuda", "numba_cuda.", "cuda."))))
+"""
+
+
+@pytest.fixture
+def no_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posefit.silhouette.cuda.device.find_spec", lambda name: None)
+
+
+@pytest.mark.usefixtures("no_library")
+def test_one_line_says_what_a_gpu_needs() -> None:
+    silhouette = Silhouette.of(np.ones((4, 4)))
+    scene = synthetic(built_in.motion("walk", frames=1), (45.0,), (64, 48), [], (None, None))
+    for ask in (
+        lambda: check_device("cuda"),
+        lambda: moved_to(silhouette, "cuda"),
+        lambda: seen_on(scene, "cuda"),
+        lambda: follow(scene, [], device="cuda"),
+    ):
+        with pytest.raises(ValueError) as error:
+            ask()
+        assert str(error.value) == NEEDED
+    check_device("cpu")
+    assert moved_to(silhouette, "cpu") is silhouette
+
+
+def test_a_scene_on_a_device_has_its_silhouettes_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posefit.silhouette.cuda.device._missing", lambda: None)
+    scene = synthetic(built_in.motion("walk", frames=2), (45.0, 90.0), (64, 48), [], (None, None))
+    there = seen_on(scene, "cuda")
+    assert len(there.observations) == 2
+    assert [[one.device for one in seen.silhouettes] for seen in there.observations] == [["cuda", "cuda"]] * 2
+    np.testing.assert_array_equal(there.observations[1].translation, scene.observations[1].translation)
+    assert seen_on(scene, "cpu") is scene
+
+
+@pytest.mark.slow
+def test_a_cpu_imports_nothing_of_a_gpu() -> None:
+    ran = subprocess.run([sys.executable, "-c", QUIET], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"

@@ -1,0 +1,134 @@
+"""The loops for a GPU, on one where there is one, else in numba's simulator: the areas that a CPU counts, all pixels.
+
+`NUMBA_ENABLE_CUDASIM=1 python -m pytest -m device` asks for the simulator. No figure of a speed comes from it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit.fitting.prior import Tilt
+from posefit.fitting.space import Translation
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import ANGLES
+from posefit.motion import built_in
+from posefit.registry import registry
+from posefit.silhouette.cost import areas, areas_of_all, project
+from posefit.silhouette.cuda.moving import moved_to
+from posefit.silhouette.drawn import PoseCount
+from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.pyramid import coarser_silhouette
+from posefit.testing.problem import pose_problem, walking_angles
+
+pytestmark = [
+    pytest.mark.device,
+    # a body far off the image has coordinates that no float32 holds: on a device as on a CPU these are infinite
+    pytest.mark.filterwarnings("ignore::RuntimeWarning"),
+]
+
+
+def some_poses(rng: np.random.Generator, count: int) -> Array:
+    poses = rng.normal(0.0, 0.4, (count, ANGLES))
+    poses[:, 0] = rng.uniform(-np.pi, np.pi, count)
+    return poses
+
+
+def seen_by(body: Body, camera: Camera, pose: Array, rng: np.random.Generator) -> Silhouette:
+    """Return the silhouette of a pose, of which a tenth is not known."""
+    mask = project(body, camera, pose, np.zeros(3))
+    return Silhouette.of(mask, rng.random(mask.shape) < 0.9)
+
+
+def assert_equals_the_cpu(body: Body, camera: Camera, poses: Array, places: Array) -> None:
+    silhouette = seen_by(body, camera, poses[0], np.random.default_rng(1))
+    expected = areas(body, camera, silhouette, poses, places)
+    np.testing.assert_array_equal(areas(body, camera, moved_to(silhouette, "cuda"), poses, places), expected)
+
+
+# widths about those of a word and of what a thread fills at a time; the body is as large as the image, or larger
+@pytest.mark.parametrize("size", [(40, 30), (1, 9), (63, 17), (65, 8), (97, 24), (129, 20), (161, 16)])
+@pytest.mark.parametrize("depth", [3.0, 0.6])
+def test_200_poses_have_the_areas_that_a_cpu_counts(body: Body, size: tuple[int, int], depth: float) -> None:
+    rng = np.random.default_rng(2)
+    camera = Camera.around(np.zeros(3), 0.4, depth, size, field_of_view=0.9)
+    count = 32 if size == (40, 30) else 12
+    assert_equals_the_cpu(body, camera, some_poses(rng, count), rng.normal(0.0, 0.4, (count, 3)) * [1.0, 1.0, 0.2])
+
+
+def test_a_body_off_the_image_across_the_near_plane_or_behind_the_camera_has_the_same_areas(body: Body) -> None:
+    camera = Camera.around(np.zeros(3), 0.4, 4.0, (40, 30))
+    towards = camera.rotation.T @ np.array([0.0, 0.0, -1.0])
+    across = np.array([[0.9, 0.5, 0.0], [-0.9, 0.3, 0.0], [0.2, -0.9, 0.0], [9.0, 0.0, 0.0], [0.0, -9.0, 0.0]])
+    places = [*across, *(depth * towards for depth in (3.2, 3.7, 3.95, 4.0, 4.4, 9.0)), np.full(3, 1e300)]
+    assert_equals_the_cpu(body, camera, some_poses(np.random.default_rng(3), len(places)), np.array(places))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_pose_that_is_no_number_draws_nothing_and_spoils_no_other(body: Body, camera: Camera, bad: float) -> None:
+    poses, places = some_poses(np.random.default_rng(4), 3), np.zeros((3, 3))
+    places[1] = bad
+    assert_equals_the_cpu(body, camera, poses, places)
+
+
+def test_several_silhouettes_are_compared_with_one_drawing(body: Body) -> None:
+    rng = np.random.default_rng(5)
+    camera = Camera.around(np.zeros(3), 0.4, 3.0, (40, 30))
+    poses = some_poses(rng, 4)
+    seen = [seen_by(body, camera, pose, rng) for pose in np.tile(poses, (9, 1))]  # more than one launch compares
+    expected = areas_of_all(body, camera, seen, poses, np.zeros((4, 3)))
+    found = areas_of_all(body, camera, [moved_to(one, "cuda") for one in seen], poses, np.zeros((4, 3)))
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_parts_on_their_way_are_put_together_in_order(body: Body, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posefit.silhouette.cuda.counted.PART", 3)
+    rng = np.random.default_rng(6)
+    camera = Camera.around(np.zeros(3), 0.4, 3.0, (24, 20))
+    assert_equals_the_cpu(body, camera, some_poses(rng, 13), rng.normal(0.0, 0.2, (13, 3)))
+
+
+def test_no_poses_have_no_areas(body: Body, camera: Camera) -> None:
+    silhouette = moved_to(Silhouette.of(np.ones((camera.height, camera.width))), "cuda")
+    assert areas(body, camera, silhouette, np.empty((0, ANGLES)), np.empty((0, 3))).shape == (0, 3)
+
+
+def test_a_problem_of_several_views_costs_the_same_bits_on_a_device() -> None:
+    one = pose_problem().coarser(4)
+    seen, around = one.silhouettes[0], Camera.around(one.space.anchor, 2.0, 3.5, (33, 20))
+    problem = replace(one, cameras=[*one.cameras, around], silhouettes=[seen, Silhouette.of(np.eye(20, 33))])
+    on_device = replace(problem, silhouettes=[moved_to(view, "cuda") for view in problem.silhouettes])
+    proposals = problem.space.draw(np.random.default_rng(7), 6)
+    count = PoseCount()
+    with count.counting():
+        np.testing.assert_array_equal(on_device.evaluate(proposals), problem.evaluate(proposals))
+    assert count.poses == 2 * (6 + 6 / 16)  # of each view on the device and on the CPU, in one a quarter as large
+    np.testing.assert_array_equal(on_device.evaluate_at(proposals, (2,)), problem.evaluate_at(proposals, (2,)))
+
+
+@pytest.mark.parametrize("translation", ["known", "searched", "aligned"])
+@pytest.mark.parametrize("name", ["pca", "loose"])
+def test_proposals_that_a_device_decodes_cost_what_they_cost_on_a_cpu(
+    name: str, translation: Translation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.fitting.cuda.evaluating.PART", 3)
+    one = pose_problem().coarser(4)
+    prior = registry().prior(name)().fit(walking_angles(), one.body.skeleton)
+    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
+    space = replace(one.space, prior=prior, translation=translation, tilt=Tilt.of(prior, walks, 0.99, 0.1))
+    problem = replace(one, space=space)
+    on_device = replace(problem, silhouettes=[moved_to(view, "cuda") for view in problem.silhouettes])
+    proposals = np.random.default_rng(8).uniform(-1.0, 1.0, (4, space.dimensions))
+    np.testing.assert_array_equal(on_device.evaluate(proposals), problem.evaluate(proposals))
+    with pytest.raises(ValueError, match="proposals must be finite, got nan or infinity"):
+        on_device.evaluate(np.full((2, space.dimensions), np.nan))
+
+
+def test_a_smaller_picture_stays_on_its_device_and_has_its_borders_there() -> None:
+    silhouette = moved_to(Silhouette.of(np.eye(8)[::-1, 2:]), "cuda")
+    assert coarser_silhouette(silhouette, 2).device == "cuda"
+    small = coarser_silhouette(Silhouette.of(np.eye(12)[3:9]), 2)
+    assert moved_to(small, "cuda").extent == small.extent != Silhouette.of(small.mask).extent
+    assert moved_to(silhouette, "cpu").device == "cpu"
