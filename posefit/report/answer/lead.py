@@ -102,8 +102,8 @@ def _ahead(board: Rows) -> str:
 
 
 def _lost_said(contest: Contest, rows: Rows) -> str:
-    """Return a sentence of how many tracks of the first methods have lost frames; none where none has."""
-    lost = contest.of("lost") > 0.0
+    """Return a sentence of how many of all compared tracks of the first methods lost frames; none where none did."""
+    lost = contest.runs.figures["lost"][contest.blocks] > 0.0
     counts = [(row["name"], int(lost[contest.methods.index(row["method"])].sum())) for row in rows]
     if not any(count for _, count in counts):
         return ""

@@ -8,7 +8,7 @@ function differenceDiagram(P, room) {
   const count = order.length;
   const half = Math.ceil(count / 2);
   const width = Math.max(290, Math.min(760, room));
-  const side = Math.min(250, 0.36 * width);
+  const side = Math.min(250, 0.4 * width);
   const [left, right] = [side, width - side];
   const step = 20;
   const x = (rank) => left + ((right - left) * (rank - 1)) / Math.max(count - 1, 1);
@@ -56,7 +56,7 @@ function differenceDiagram(P, room) {
     const best = place < half;
     const at = names + step * (best ? place : count - 1 - place) + 6;
     const edge = best ? left - 14 : right + 14;
-    const name = fitted(METHODS[m], side - 24 - textWidth("  00.00"));
+    const name = fitted(METHODS[m], side - 22 - textWidth(` ${rank.toFixed(2)}`));
     svg.append(
       draw("polyline", {
         points: `${x(rank)},${axis} ${x(rank)},${at} ${edge},${at}`,
