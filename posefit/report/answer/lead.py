@@ -30,7 +30,7 @@ def lead_sentence(contest: Contest, board: Rows, bases: Rows, tests: Mapping[str
     motions = sorted({str(contest.runs.places[i]["motion"]) for i in contest.instances})
     of = f" of {listed(motions)}" if len(motions) <= NAMED else f" of {len(motions)} motions"
     each = "one seed" if seeds == 1 else f"{seeds} seeds each"
-    on = f"{counted(instances, 'instance')}{of} with {each}"
+    on = f"{so_many(instances, 'instance')}{of} with {each}"
     ahead = "" if len(contest.methods) == 1 else _ahead(board)
     told = _others(contest, first, tests)
     said = f"{first['name']} {leads(contest.methods)} an error of {error:.2f}°{sure}{ahead} on {on}{told}."
@@ -67,7 +67,7 @@ def others_said(names: Sequence[str], method: int, tests: Mapping[str, Any] | No
         return f"; one shared {what[:-1]} is too few to tell it apart from any other method"
     same, worse, better = ([names[m] for m in side] for side in _sides(tests, method))
     if too_few(tests):
-        pairs = counted(len(tests["pairs"]), "pair")
+        pairs = so_many(len(tests["pairs"]), "pair")
         return (
             f"; too few {what} to tell any methods apart (over {tests['blocks']} paired {what} Wilcoxon's p cannot be "
             f"below {least_p(tests):.2g} after Holm over {pairs}, and 0.05 is asked for)"
@@ -79,7 +79,7 @@ def others_said(names: Sequence[str], method: int, tests: Mapping[str, Any] | No
     if better:
         told += f", and on most {what} {listed(better)} {'is' if len(better) == 1 else 'are'} better"
     if worse and (same or better):
-        told += f", and {counted(len(worse), 'other')} {'is' if len(worse) == 1 else 'are'} worse"
+        told += f", and {so_many(len(worse), 'other')} {'is' if len(worse) == 1 else 'are'} worse"
     elif worse:
         told += " and is worse"
     return f"{told} {how}"
@@ -108,7 +108,7 @@ def _lost_said(contest: Contest, rows: Rows) -> str:
     if not any(count for _, count in counts):
         return ""
     told = " and ".join(f"{name} in {count}" for name, count in counts)
-    return f" Frames are lost by {told} of {counted(lost[0].size, 'track')}."
+    return f" Frames are lost by {told} of {so_many(lost[0].size, 'track')}."
 
 
 def _sides(tests: Mapping[str, Any], method: int) -> tuple[list[int], list[int], list[int]]:
@@ -151,6 +151,6 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def counted(count: int, word: str) -> str:
+def so_many(count: int, word: str) -> str:
     """Return so many of something, in words."""
     return f"{count} {word}" if count == 1 else f"{count} {word}s"

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.report.answer.lead import counted, leads, others_said
+from posefit.report.answer.lead import leads, others_said, so_many
 from posefit.report.search.match import Match, is_random
 
 Rows = Sequence[Mapping[str, Any]]
@@ -37,7 +37,7 @@ def _where(match: Match) -> str:
     seeds = match.shared.rows.shape[2]
     on = "function" if len(functions) == 1 else "functions"
     return (
-        f"{on} {_series(functions)} in {_series(dimensions)} dimensions, {counted(len(instances), 'instance')} in all "
+        f"{on} {_series(functions)} in {_series(dimensions)} dimensions, {so_many(len(instances), 'instance')} in all "
         f"with {'one seed' if seeds == 1 else f'{seeds} seeds each'}"
     )
 
