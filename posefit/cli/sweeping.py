@@ -75,6 +75,8 @@ def _next(lines: Iterator[str], as_json: bool) -> str:
 def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json: bool, **others: Any) -> None:
     """Write what a sweep to DIR found, of tracks or of single searches, as one page that any browser opens, offline.
 
+    Without --out it prints who leads and the leaderboard, as it does with it, and writes no page.
+
     It may be written while the sweep goes on, of the cells that are done. With --serve a page shows how far it is, what
     failed and the report so far, and loads itself anew until Ctrl-C ends it.
     """
@@ -83,8 +85,6 @@ def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json:
         if twice := [name for name, value in given.items() if value is not None]:
             raise click.UsageError(f"--serve must be given without --{twice[0]}, which it does not write")
         return _serve(ledger, port or 0)
-    if out is None:
-        raise click.UsageError("--out must name a file for the page, got none; --serve shows one without a file")
     if port is not None:
         raise click.UsageError("--port must be given with --serve, got it without")
     from posefit.report.write import leaderboard_lines, write_report

@@ -11,8 +11,9 @@ from posefit.claims import claimed_orders
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.report import curves
 from posefit.report.answer.claimed import claim_results
-from posefit.report.answer.lead import alike, lead_sentence, three_tracks
+from posefit.report.answer.lead import lead_sentence, not_told_apart, three_tracks
 from posefit.report.answer.selection import selection_of
+from posefit.report.answer.unpaired import unpaired_sentence
 from posefit.report.colours import METHODS
 from posefit.report.columns import COLUMNS
 from posefit.report.contest import (
@@ -97,6 +98,7 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
             np.nansum(runs.figures["ms"] * np.array([place["frames"] for place in runs.places])[runs.instance]) / 3.6e6
         ),
         "shared": None if contest is None else int(contest.rows.size),
+        "unpaired": "" if contest is None else _unpaired(contest),
         "shared_instances": None if contest is None else contest.rows.shape[1],
         "shared_seeds": None if contest is None else contest.rows.shape[2],
         "apart": [] if contest is None else [m for m in range(len(runs.methods)) if m not in contest.methods],
@@ -106,15 +108,19 @@ def _header(runs: Runs, contest: Contest | None, pictures: dict[str, Any]) -> di
     }
 
 
+def _unpaired(contest: Contest) -> str:
+    spare = contest.blocks.size - contest.rows.size
+    return unpaired_sentence(contest.left_out, spare, contest.rows.shape[2], tested=True)
+
+
 def _compared(contest: Contest) -> dict[str, Any]:
     some = _some(contest)
     evaluations = curves.grid(some)
-    enough = len(contest.methods) > 1 and contest.rows[0].size > 1
     board, bases = leaderboard(contest), baseline_rows(contest)
-    tests = paired_tests(contest) if enough else None
+    tests = paired_tests(contest) if contest.testable else None
     return {
         "answer": lead_sentence(contest, board, bases, tests),
-        "alike": alike(tests, board[0]["method"]),
+        "alike": not_told_apart(tests, board[0]["method"]),
         "tracks": three_tracks(contest, board[0]["method"]),
         "leaderboard": board,
         "baselines": bases,

@@ -24,17 +24,27 @@ LEAST_SEEDS = 3  # below, a probability of improvement has no interval: two seed
 
 @dataclass(frozen=True, eq=False)
 class Contest:
-    """The runs that some methods share, paired by instance and seed."""
+    """The runs that some methods share, paired by instance and seed: means of `rows`, tests of `blocks`."""
 
     runs: Runs
     methods: tuple[int, ...]  # that take part
     instances: tuple[int, ...]
     rows: Array  # (methods, instances, seeds) which row of `runs` each is
+    blocks: Array  # (methods, blocks) the same of every instance and seed that all have finished
     left_out: int  # runs of these methods that not all of them have
 
     def of(self, figure: str) -> Array:
         """Return a figure of all runs (methods, instances, seeds)."""
         return np.asarray(self.runs.figures[figure][self.rows])
+
+    def errors_of_blocks(self) -> Array:
+        """Return the errors (methods, blocks, 1) that tests compare, each block by itself."""
+        return np.asarray(self.runs.figures["error"][self.blocks][:, :, None])
+
+    @property
+    def testable(self) -> bool:
+        """Whether there are methods and blocks enough for a paired test."""
+        return bool(min(self.blocks.shape) > 1)
 
     def fewer(self, points: int) -> Self:
         """Return the contest of so few seeds, or instances too, that intervals at so many points are little work.
@@ -54,7 +64,9 @@ def contest_of(runs: Runs) -> Contest | None:
     A method with which less than half of the runs that the others share would be left does not take part.
     """
     found = most_shared(_rows(runs))
-    return None if found is None else Contest(runs, found.methods, found.instances, found.rows, found.left_out)
+    if found is None:
+        return None
+    return Contest(runs, found.methods, found.instances, found.rows, found.blocks, found.left_out)
 
 
 def dropped(contest: Contest) -> list[dict[str, Any]]:
@@ -115,9 +127,9 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
 
 def _letters(contest: Contest, best_first: Sequence[int]) -> dict[int, str]:
     """Return the letters of each method that takes part; none where too few runs are shared for any test."""
-    if len(best_first) < 2 or contest.rows[0].size < 2:
+    if not contest.testable:
         return {}
-    errors = contest.of("error")[[contest.methods.index(m) for m in best_first]]
+    errors = contest.errors_of_blocks()[[contest.methods.index(m) for m in best_first]]
     apart = [(one.first, one.second) for one in wilcoxon(errors) if one.adjusted < LEVEL]
     return dict(zip(best_first, compact_letters(len(best_first), apart), strict=True))
 
@@ -139,13 +151,14 @@ def baseline_rows(contest: Contest) -> list[dict[str, Any]]:
 def paired_tests(contest: Contest) -> dict[str, Any]:
     """Return ranks, paired tests and probabilities of improvement of a contest of at least two methods and blocks.
 
-    `wilcoxon` lists first, second, median difference in degrees, p, and p after Holm; `improvement` how probably first
-    is better than second, with its interval where that is cheap.
+    `pairs` lists first, second, median difference in degrees, p, p after Holm, how probably first is better than
+    second, and the ends of its interval, nan where that is not cheap. Tests and ranks are of all `blocks`, the
+    probabilities of as many seeds of every instance.
     """
-    errors = contest.of("error")
-    ranking, rng = friedman(errors), np.random.default_rng(SEED)
+    errors, tested = contest.of("error"), contest.errors_of_blocks()
+    ranking, rng = friedman(tested), np.random.default_rng(SEED)
     better = probability_of_improvement(errors)
-    compared = wilcoxon(errors)
+    compared = wilcoxon(tested)
     count = int(min(WORK / (errors[0].size * errors.shape[2] * len(compared)), RESAMPLES))
     bounded = errors.shape[2] >= LEAST_SEEDS and count >= LEAST_RESAMPLES
     listed = []
@@ -158,7 +171,7 @@ def paired_tests(contest: Contest) -> dict[str, Any]:
         )
     return {
         "methods": contest.methods,
-        "blocks": errors[0].size,
+        "blocks": tested[0].size,
         "ranks": ranking.mean_ranks,
         "friedman": ranking.p_value,
         "statistic": ranking.statistic,

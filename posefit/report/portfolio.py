@@ -49,8 +49,9 @@ def write_portfolio(runs: Runs, path: str | Path) -> None:
     drawn["profile"] = figures.profile_figure(names, levels, performance_profile(errors, levels))
     if joints := joint_errors(contest):
         drawn["joints"] = figures.joint_errors_figure(names, JOINTS, joints)
-    if len(names) > 1 and errors[0].size > 1:
-        drawn["critical-difference"] = figures.critical_difference_figure(names, friedman(errors))
+    if contest.testable:
+        ranking = friedman(contest.errors_of_blocks())
+        drawn["critical-difference"] = figures.critical_difference_figure(names, ranking)
     drawn |= _certain(names, certainty(contest))
     rows, table = leaderboard(contest), _table(runs)
     with new_folder(path) as folder:

@@ -210,7 +210,7 @@ def _rank(place: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def _place(place: Mapping[str, Any]) -> str:
-    views = ", ".join(f"{view:g}" for view in place["view_degrees"])
+    views = ", ".join(f"{view:g}°" for view in place["view_degrees"])
     damage = "".join(f", {kind} {strength:g}" for kind, strength in sorted(place["corruption"].items()))
     return f"{place['motion']}, view {views}{damage}, instance {place['instance']}"
 

@@ -1,6 +1,7 @@
 """What `posefit report` does: a page, and where they are asked for figures, tables and files for other tools."""
 
 from collections.abc import Callable, Iterator
+from math import comb
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,14 @@ from posefit.report.search.write import board_lines, write_searches
 from posefit.sweep.ledger import Ledger
 
 NAMED = 20  # instances that are named where they are not compared
-ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired {}, Holm, 5 %"
+ALIKE = "methods that share a letter are not told apart: Wilcoxon's signed ranks on paired {}, Holm over {}, 5 %"
 
 Say = Callable[[str], None]
 
 
 def write_report(
     path: str,
-    out: str,
+    out: str | None,
     *,
     figures: str | None = None,
     iohprofiler: str | None = None,
@@ -31,10 +32,10 @@ def write_report(
 ) -> dict[str, Any]:
     """Write the report of a ledger to a file, and return its answer, leaderboard, baselines, claims and selection.
 
-    An earlier report of that name is replaced; nothing else is. `figures` is a new folder for figures (PNG, PDF) and
-    tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new file of all rows. Raises ValueError
-    where the ledger has no finished row or something cannot be written, and ImportError where figures need matplotlib:
-    before anything is written, if that can be known.
+    Where `out` is None no page is written. An earlier report of that name is replaced; nothing else is. `figures` is a
+    new folder for figures (PNG, PDF) and tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new
+    file of all rows. Raises ValueError where the ledger has no finished row or something cannot be written, and
+    ImportError where figures need matplotlib: before anything is written, if that can be known.
     """
     _check(Path(path), out, [figures, iohprofiler, csv])
     if figures is not None:
@@ -46,8 +47,9 @@ def write_report(
         return _searches(ledger, out, {"figures": figures, "iohprofiler": iohprofiler}, csv)
     runs = runs_of(ledger)
     data = data_of(ledger, runs, say)
-    with replaced_file(out, MARK.encode()) as building:
-        building.write_text(document(data), encoding="utf-8", newline="\n")
+    if out is not None:
+        with replaced_file(out, MARK.encode()) as building:
+            building.write_text(document(data), encoding="utf-8", newline="\n")
     if figures is not None:
         from posefit.report.portfolio import write_portfolio
 
@@ -64,7 +66,7 @@ def write_report(
     return {"out": out, **dict(plain(said)), "gaps": gaps}
 
 
-def _searches(ledger: Ledger, out: str, others: dict[str, str | None], csv: str | None) -> dict[str, Any]:
+def _searches(ledger: Ledger, out: str | None, others: dict[str, str | None], csv: str | None) -> dict[str, Any]:
     """Write the report of single searches, and return what it says."""
     for name, place in others.items():
         if place is not None:
@@ -77,13 +79,19 @@ def _searches(ledger: Ledger, out: str, others: dict[str, str | None], csv: str 
 
 
 def leaderboard_lines(found: dict[str, Any]) -> list[str]:
-    """Return the lines that the command prints: who leads, what is left out, the leaderboard, and where the page is."""
+    """Return the lines that the command prints: who leads, what is left out, the leaderboard, and where a page is."""
     board = found["leaderboard"] or []
     searched = "times" in found
     lines = board_lines(board) if searched else _board_lines(board)
-    lines += [ALIKE.format("instances" if searched else "runs")] if any(row["letters"] for row in board) else []
+    if any(row["letters"] for row in board):
+        lines.append(ALIKE.format("instances" if searched else "runs", _pairs(board)))
     answer = [found["answer"]] if found["answer"] else []
-    return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, _written(found["out"])]
+    written = [] if found["out"] is None else [_written(found["out"])]
+    return [*answer, *_gap_lines(found["header"], found["gaps"]), *lines, *written]
+
+
+def _pairs(board: list[dict[str, Any]]) -> str:
+    return _counted(comb(sum(row["taking_part"] for row in board), 2), "pair")
 
 
 def _board_lines(board: list[dict[str, Any]]) -> list[str]:
@@ -104,6 +112,7 @@ def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:
         by = ", ".join(f"{method} {count}" for method, count in header["failed_by"].items())
         lines.append(f"{_counted(header['failed'], 'cell')} failed, left out of all figures: {by}")
         lines += [f"  {count} x {reason}" for reason, count in header["reasons"]]
+    lines += [header["unpaired"]] if header["unpaired"] else []
     if gaps:
         lines.append(f"left out of the comparison, for every method: {_counted(len(gaps), 'instance')}")
         for gap in gaps[:NAMED]:
@@ -121,11 +130,10 @@ def _written(out: str) -> str:
     return f"written to {out}: open it in any browser"
 
 
-def _check(ledger: Path, out: str, others: list[str | None]) -> None:
-    target = Path(out)
-    if target.suffix.lower() not in (".html", ".htm"):
+def _check(ledger: Path, out: str | None, others: list[str | None]) -> None:
+    if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"--out must be a file that ends in .html, got {out}")
-    if not replaceable(target, MARK.encode()):
+    if out is not None and not replaceable(Path(out), MARK.encode()):
         raise ValueError(f"{out}: expected a new name or an earlier report, got something else")
     places = [one for one in (out, *others) if one is not None]
     for place in places:

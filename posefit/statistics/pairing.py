@@ -4,7 +4,7 @@ Everything that compares methods takes errors (methods, instances, seeds), or on
 judged by, an angle, a distance or a cost; lower is better.
 """
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,21 +68,36 @@ def shared(rows: Iterable[Row]) -> tuple[list[Row], int]:
     """
     table, methods = _table(rows)
     finished: dict[Hashable, list[int]] = {}
-    for method, instance, seed in table:
-        kept = finished.setdefault(instance, [])
-        if method == methods[0] and all(np.isfinite(table.get((one, instance, seed), np.nan)) for one in methods):
-            kept.append(seed)
-    finished = {instance: sorted(seeds) for instance, seeds in finished.items() if seeds}
-    if not finished:
-        raise ValueError(f"methods must share an instance and a seed to be compared, got none of {', '.join(methods)}")
+    for instance, seed in _complete(table, methods):
+        finished.setdefault(instance, []).append(seed)
     count = min(map(len, finished.values()))
     chosen = [
         (method, instance, seed, table[method, instance, seed])
         for method in methods
         for instance, seeds in finished.items()
-        for seed in seeds[:count]
+        for seed in sorted(seeds)[:count]
     ]
     return chosen, len(table) - len(chosen)
+
+
+def complete(rows: Iterable[Row]) -> list[tuple[Hashable, int]]:
+    """Return every block, an instance with a seed, that all methods have finished with a finite error.
+
+    Instances come as they do in the rows and may have different numbers of seeds, which a test that works on blocks
+    can use though `paired` cannot. Raises ValueError where nothing is shared.
+    """
+    return _complete(*_table(rows))
+
+
+def _complete(table: Mapping[tuple[str, Hashable, int], float], methods: Sequence[str]) -> list[tuple[Hashable, int]]:
+    found = [
+        (instance, seed)
+        for method, instance, seed in table
+        if method == methods[0] and all(np.isfinite(table.get((one, instance, seed), np.nan)) for one in methods)
+    ]
+    if not found:
+        raise ValueError(f"methods must share an instance and a seed to be compared, got none of {', '.join(methods)}")
+    return found
 
 
 def finite(name: str, values: ArrayLike, dimensions: tuple[str, ...], least: tuple[int, ...] | None = None) -> Array:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.statistics.pairing import paired, shared
+from posefit.statistics.pairing import complete, paired, shared
 
 LEAST_SHARE = 0.5  # of the runs of all methods but one, that are shared with it; below, it does not take part
 
@@ -23,11 +23,16 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """The runs that some methods share, paired by instance and seed."""
+    """The runs that some methods share, paired by instance and seed.
+
+    Means and intervals need as many seeds of every instance and have `rows`; tests work on blocks, an instance with a
+    seed, and have all `blocks` that every method has finished.
+    """
 
     methods: tuple[int, ...]  # that take part
     instances: tuple[int, ...]
     rows: Array  # (methods, instances, seeds) which row each is
+    blocks: Array  # (methods, blocks) the same of each block; these are more where instances differ in their seeds
     left_out: int  # runs of these methods that not all of them have
 
 
@@ -76,7 +81,7 @@ def _of(rows: Rows, methods: Sequence[int]) -> Shared | None:
     }
     listed = sorted((str(m), i, s, float(rows.error[k])) for (m, i, s), k in index.items())
     try:
-        kept, left_out = shared(listed)
+        kept, _ = shared(listed)
     except ValueError:  # they have nothing in common
         return None
     block = paired(kept)
@@ -86,4 +91,6 @@ def _of(rows: Rows, methods: Sequence[int]) -> Shared | None:
         [[index[int(block.methods[m]), i, s] for s in seeds] for i, seeds in zip(instances, block.seeds, strict=True)]
         for m in order
     ]
-    return Shared(tuple(int(block.methods[m]) for m in order), tuple(instances), np.array(table), left_out)
+    named = tuple(int(block.methods[m]) for m in order)
+    blocks = np.array([[index[m, int(str(i)), s] for i, s in complete(listed)] for m in named])
+    return Shared(named, tuple(instances), np.array(table), blocks, len(listed) - blocks.size)

@@ -9,8 +9,9 @@ import pytest
 
 from posefit.claims import ClaimedOrder
 from posefit.report.answer.claimed import claim_results
-from posefit.report.answer.lead import alike, lead_sentence, others_said, three_tracks
+from posefit.report.answer.lead import lead_sentence, not_told_apart, others_said, three_tracks
 from posefit.report.answer.selection import features_of, selected, selection_of
+from posefit.report.answer.unpaired import unpaired_sentence
 from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard, paired_tests
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
@@ -21,8 +22,7 @@ ORDER = ClaimedOrder("a paper", "c beats b, and b beats a", ("a", "b", "c"))
 
 
 def sentence(found: Contest) -> str:
-    enough = len(found.methods) > 1 and found.rows[0].size > 1
-    tests = paired_tests(found) if enough else None
+    tests = paired_tests(found) if found.testable else None
     return lead_sentence(found, leaderboard(found), baseline_rows(found), tests)
 
 
@@ -33,8 +33,8 @@ def test_who_leads_and_who_cannot_be_told_apart_is_one_sentence(tmp_path: Path) 
     found = contest(tmp_path, errors)
     first = leaderboard(found)[0]
     assert sentence(found) == (
-        f"a leads with an error of 1.26° (95 % interval {first['low']:.2f}° to {first['high']:.2f}°) on 6 instances of "
-        "walk with 2 seeds each; c cannot be told apart from it, and 1 other is worse (Wilcoxon's signed ranks over 12 "
+        f"a leads with an error of 1.26° (95 % interval {first['low']:.2f}° to {first['high']:.2f}°), 0.00° ahead of "
+        "c, on 6 instances of walk with 2 seeds each; c is not shown to be worse, and 1 other is worse (Wilcoxon's signed ranks over 12 "
         "paired runs, after Holm, at 5 %). The best baseline, the mean training pose, has 4.00°."
     )
 
@@ -60,17 +60,17 @@ def test_of_those_that_are_not_alike_it_is_said_how_many_are_worse_and_who_is_be
         "pairs": [[0, 1, 0.1, 0.2, 0.2], [0, 2, -3.0, 0.01, 0.01], [0, 3, 2.0, 0.01, 0.01], [1, 2, 0.0, 1.0, 1.0]],
     }
     assert others_said(("a", "b", "c", "d"), 0, tests, "runs") == (
-        "; b cannot be told apart from it, and on most runs d is better, and 1 other is worse (Wilcoxon's signed ranks "
+        "; b is not shown to be worse, and on most runs d is better, and 1 other is worse (Wilcoxon's signed ranks "
         "over 9 paired runs, after Holm, at 5 %)"
     )
-    assert alike(tests, 0) == [1]
-    assert alike(tests, 3) == []
-    assert alike(None, 0) == []
+    assert not_told_apart(tests, 0) == [1]
+    assert not_told_apart(tests, 3) == []
+    assert not_told_apart(None, 0) == []
 
 
 def test_one_method_alone_and_one_run_alone_are_not_compared(tmp_path: Path) -> None:
     alone = sentence(contest(tmp_path / "a", full({"a": 1.0})))
-    assert alone.startswith("a leads with an error of 1.06° on 2 instances of walk with 2 seeds each; no other method")
+    assert alone.startswith("a has an error of 1.06° on 2 instances of walk with 2 seeds each; no other method")
     once = sentence(contest(tmp_path / "b", full({"a": 1.0, "b": 2.0}, instances=1, seeds=1)))
     assert "on 1 instance of walk with one seed; one shared run is too few" in once
 
@@ -214,3 +214,38 @@ def test_what_a_plan_says_of_instances_is_told_by_name(tmp_path: Path, change: d
     names, values = features_of(runs, range(6))
     assert names == [name]
     assert len(np.unique(values, axis=0)) == 2
+
+
+def test_where_no_test_could_see_a_difference_the_runs_are_too_few_and_nobody_is_called_alike(tmp_path: Path) -> None:
+    # of eight pairs the least p is 2 / 2^8, times ten after Holm; of nine it is half of that, and below 5 %
+    errors = full(dict.fromkeys("abcde", 1.0) | {"e": 2.0}, instances=4, seeds=2)
+    assert (
+        "; too few runs to tell any methods apart (over 8 paired runs Wilcoxon's p cannot be below 0.078 after Holm over "
+        "10 pairs, and 0.05 is asked for)."
+    ) in sentence(contest(tmp_path / "eight", errors))
+    errors |= full(dict.fromkeys("abcde", 1.0) | {"e": 2.0}, instances=3, seeds=3)
+    said = sentence(contest(tmp_path / "eleven", errors))
+    assert "b, c and d are not shown to be worse, and 1 other is worse (" in said
+
+
+def test_the_lead_is_told_in_degrees_and_so_are_lost_frames_of_the_first_two(tmp_path: Path) -> None:
+    lost = {("b", 1): 0.2, ("c", 0): 0.5}
+    made = [
+        result(replace(FIRST, method=m, instance=i), error + 0.1 * i, lost_rate=lost.get((m, i), 0.0))
+        for m, error in {"a": 1.0, "b": 1.5, "c": 2.0}.items()
+        for i in range(2)
+    ]
+    found = contest_of(runs_of(Ledger(ledger(tmp_path / "results", made))))
+    assert found is not None
+    said = sentence(found)
+    assert "a leads with an error of 1.05°, 0.50° ahead of b, on 2 instances" in said
+    assert "Frames are lost by a in 0 and b in 1 of 2 tracks." in said
+
+
+def test_what_a_gap_costs_is_counted() -> None:
+    assert unpaired_sentence(0, 0, 3, tested=True) == ""
+    assert unpaired_sentence(4, 15, 2, tested=True) == (
+        "4 finished runs are left out of the comparison, as some method has no run to pair them with; 15 more count in "
+        "tests, but not in means and intervals, which are of 2 seeds of every instance"
+    )
+    assert unpaired_sentence(0, 3, 1, tested=False) == "3 count in no figure, which are of one seed of every instance"

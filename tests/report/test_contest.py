@@ -165,3 +165,27 @@ def test_very_many_runs_are_drawn_of_some(tmp_path: Path) -> None:
     fewer = found.fewer(50_000)  # 10 runs: two seeds of every second instance
     assert fewer.rows.shape == (2, 5, 2)
     assert fewer.instances == (0, 2, 4, 6, 8)
+
+
+def lossy() -> Errors:
+    """Return five methods on four instances with three seeds, of which the worst has lost one run."""
+    errors = {
+        (name, i, s): k + 0.1 * i + 0.01 * s
+        for k, name in enumerate("abcde", start=1)
+        for i in range(4)
+        for s in range(3)
+    }
+    del errors["e", 3, 2]
+    return errors
+
+
+def test_one_lost_run_takes_one_block_from_the_tests_and_not_a_seed_of_every_instance(tmp_path: Path) -> None:
+    found = contest(tmp_path, lossy())
+    assert found.rows.shape == (5, 4, 2)  # means have as many seeds of every instance
+    assert found.blocks.shape == (5, 11)
+    assert found.left_out == 4  # what the others made of the lost run's instance and seed
+    tests = paired_tests(found)
+    assert tests["blocks"] == 11
+    # all eleven differences have one sign; of eight, ten pairs after Holm could never fall below 10 x 2 / 2^8 = 0.078
+    assert [pair[4] for pair in tests["pairs"]] == pytest.approx([10 * 2 / 2**11] * 10)
+    assert [row["letters"] for row in leaderboard(found)] == list("abcde")

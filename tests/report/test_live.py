@@ -69,11 +69,24 @@ def test_progress_is_of_the_plan_that_was_begun_last(begun: Path) -> None:
     (plan,) = Ledger(begun).plans()
     assert (plan.cells, plan.settled) == (6, 1)
     found = progress_so_far(Ledger(begun), now=plan.begun + 30.0)
-    assert found == Progress(6, 3, 1, 2, 0, None)  # nobody works on it
+    assert found == Progress(6, 3, 1, 2, 0, 0, None)  # nobody works on it
     with Driver(begun) as driver:
         assert isinstance(driver.claim(PLAN[4]), Claim)
         # three cells were settled in half a minute, so the two that are left take twenty seconds
-        assert progress_so_far(Ledger(begun), now=plan.begun + 30.0) == Progress(6, 3, 1, 2, 1, 20.0)
+        assert progress_so_far(Ledger(begun), now=plan.begun + 30.0) == Progress(6, 3, 1, 2, 1, 0, 20.0)
+
+
+def test_attempts_that_failed_are_counted_until_their_cell_is_settled(begun: Path) -> None:
+    with Driver(begun) as driver:
+        for _ in range(2):
+            claim = driver.claim(PLAN[4])
+            assert isinstance(claim, Claim)
+            driver.fail(claim, "ValueError: it had to")
+        assert progress_so_far(Ledger(begun)).failed == 2
+        again = driver.claim(PLAN[4])
+        assert isinstance(again, Claim)
+        driver.finish(again, result(PLAN[4], 1.0))
+        assert progress_so_far(Ledger(begun)).failed == 0
 
 
 def test_a_plan_that_is_gone_on_with_is_one_plan_and_a_later_one_comes_first(begun: Path) -> None:
@@ -82,16 +95,16 @@ def test_a_plan_that_is_gone_on_with_is_one_plan_and_a_later_one_comes_first(beg
         assert [(plan.cells, plan.settled) for plan in driver.ledger.plans()] == [(6, 4)]
         driver.ledger.begin(cell.key for cell in PLAN[4:])
     assert [plan.cells for plan in Ledger(begun).plans()] == [2, 6]
-    assert progress_so_far(Ledger(begun)) == Progress(2, 0, 0, 2, 0, None)
+    assert progress_so_far(Ledger(begun)) == Progress(2, 0, 0, 2, 0, 0, None)
 
 
 def test_a_ledger_of_earlier_days_has_no_plan_and_a_damaged_one_is_none(begun: Path) -> None:
     (path,) = (begun / PLANS).iterdir()
     path.write_bytes(path.read_bytes()[:-3])
-    assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, None)
+    assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, 0, None)
     path.unlink()
     (begun / PLANS).rmdir()
-    assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, None)
+    assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, 0, None)
     with Driver(begun) as driver:
         driver.ledger.begin(cell.key for cell in PLAN)
         assert len(driver.ledger.plans()) == 1
@@ -101,7 +114,7 @@ def test_the_page_is_the_report_with_the_progress_and_reasons(begun: Path) -> No
     status, text = page_of(begun)
     data = data_in(text)
     assert status == 200
-    assert data["live"] == {"cells": 6, "done": 3, "quarantined": 1, "left": 2, "running": 0, "seconds": None,
+    assert data["live"] == {"cells": 6, "done": 3, "quarantined": 1, "left": 2, "running": 0, "failed": 0, "seconds": None,
                             "again": data["live"]["again"]}  # fmt: skip
     assert data["live"]["again"] >= 5.0
     assert data["failures"][0]["reasons"] == ["ValueError: it had to"]
@@ -181,6 +194,26 @@ def test_a_file_is_no_ledger_and_that_is_said_once(tmp_path: Path) -> None:
     said = fails("report", tmp_path / "plan.toml", "--serve")
     assert said.strip().endswith("plan.toml: expected a ledger, a folder that posefit sweep wrote, got a file")
     assert said.count("plan.toml") == 1
+
+
+def test_a_ledger_that_a_sweep_is_about_to_begin_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def begin(seconds: float) -> None:
+        ledger(tmp_path / "results", [])
+
+    monkeypatch.setattr("posefit.report.live.server.sleep", begin)
+    with serving(tmp_path / "results", 0, lambda _: None) as server:
+        assert address_of(server).startswith("http://127.0.0.1:")
+
+
+def test_a_ledger_that_never_comes_is_not_waited_for_without_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.report.live.server.PATIENCE", 0.0)
+    with (
+        pytest.raises(ValueError, match="expected a ledger, a folder that posefit sweep wrote, got none"),
+        serving(tmp_path / "none", 0, lambda _: None),
+    ):
+        pass
 
 
 def test_a_port_that_is_taken_is_told_in_one_line(begun: Path) -> None:

@@ -118,7 +118,7 @@ def test_the_gallery_plays_and_the_skeleton_turns(chromium: Any, swept: Path) ->
     with opened(chromium, swept / "report.html", 390, has_touch=True) as seen:
         page = seen.page
         page.locator(".card").nth(0).click()
-        assert page.locator("#viewer-title").inner_text().startswith("run, view 0, 90, instance 0")
+        assert page.locator("#viewer-title").inner_text().startswith("run, view 0°, 90°, instance 0")
         picture = "id => document.getElementById(id).toDataURL()"
 
         def changes(canvas: str, act: Any) -> bool:
@@ -266,3 +266,23 @@ def test_a_page_of_failures_alone_loads_and_shows_them(chromium: Any, tmp_path: 
         assert "random@pca on walk" in watched.page.inner_text("#failures")
         assert watched.page.locator("#leaderboard").count() == 0
         assert watched.complaints == []
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_names_fit_into_the_figures_bold_ones_too(chromium: Any, tmp_path: Path, width: int) -> None:
+    first = replace(cells(1)[0], frames=4)
+    names = ["particle@mmmmmmmmmmmmmmmmmmmm", "WWWW@WWWW", "sapso+vsmm", "random@pca"]
+    made = [
+        result(replace(first, method=name, instance=i), 1.0 + 0.1 * i + 0.001 * k)
+        for k, name in enumerate(names)
+        for i in range(2)
+    ]
+    out = tmp_path / "report.html"
+    assert run("report", ledger(tmp_path / "results", made), "--out", out).exit_code == 0
+    outside = """id => [...document.querySelectorAll(`#${id} svg text`)].filter((text) => {
+        const [own, all] = [text, text.ownerSVGElement].map((one) => one.getBoundingClientRect());
+        return own.left < all.left - 1 || own.right > all.right + 1;
+    }).map((text) => text.textContent)"""
+    with opened(chromium, out, width) as seen:
+        for figure in ("standing", "difference", "ecdf"):
+            assert seen.page.evaluate(outside, figure) == []

@@ -55,10 +55,10 @@ def test_instances_are_told_apart_by_all_that_a_method_does_not_choose(tmp_path:
         ],
     )
     assert found.instances == (
-        "walk, view 45, instance 0, frames 30",
-        "walk, view 45, instance 0, frames 60",
-        "walk, view 45, instance 2",
-        "walk, view 45, holes 0.5, instance 0",
+        "walk, view 45°, instance 0, frames 30",
+        "walk, view 45°, instance 0, frames 60",
+        "walk, view 45°, instance 2",
+        "walk, view 45°, holes 0.5, instance 0",
     )
     assert np.bincount(found.instance).tolist() == [1, 2, 1, 1]
 

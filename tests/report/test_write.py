@@ -63,7 +63,9 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     done = run("report", results, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert done.stdout.splitlines()[-1] == f"written to {out}: open it in any browser"
-    assert done.stdout.startswith("sapso@pca leads with an error of 1.06° on 2 instances of walk with 2 seeds each; ")
+    assert done.stdout.startswith(
+        "sapso@pca leads with an error of 1.06°, 1.00° ahead of random@pca, on 2 instances of walk with 2 seeds each; "
+    )
     assert done.stdout.splitlines()[1] == "1 cell failed, left out of all figures: random@pca 1"
     assert [line.split()[:2] for line in done.stdout.splitlines()[4:-2]] == [
         ["sapso@pca", "1.06"],
@@ -77,6 +79,15 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert page.data["failures"][0]["reasons"] == ["its process died"]
     assert len(page.data["gallery"]["tracks"]) == 8
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
+
+
+def test_without_a_file_it_prints_the_same_and_writes_nothing(results: Path, tmp_path: Path) -> None:
+    done = run("report", results)
+    assert done.exit_code == 0, done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["results"]
+    assert json.loads(run("report", results, "--json").stdout)["out"] is None
+    written = run("report", results, "--out", tmp_path / "report.html").stdout.splitlines()
+    assert done.stdout.splitlines() == written[:-1]
 
 
 def test_the_same_ledger_gives_the_same_bytes_and_replaces_an_earlier_report(results: Path, tmp_path: Path) -> None:
@@ -100,11 +111,12 @@ def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_abo
     ]
     lost = [(replace(FIRST, method="sapso@pca", instance=1, seed=s), ["its process died of SIGSEGV"]) for s in range(2)]
     done = run("report", ledger(tmp_path / "results", found, lost), "--out", tmp_path / "report.html")
-    assert done.stdout.splitlines()[1:6] == [
+    assert done.stdout.splitlines()[1:7] == [
         "2 cells failed, left out of all figures: sapso@pca 2",
         "  2 x its process died of SIGSEGV",
+        "2 finished runs are left out of the comparison, as some method has no run to pair them with",
         "left out of the comparison, for every method: 1 instance",
-        "  walk, view 45, instance 1: no run of sapso@pca",
+        "  walk, view 45°, instance 1: no run of sapso@pca",
         f"{'':32} error deg   95 % interval   skill  alike",
     ]
     header = Page(tmp_path / "report.html").data["header"]
@@ -189,7 +201,7 @@ def test_a_ledger_from_before_there_were_posteriors_has_no_such_columns(results:
     [
         (["NONE", "--out", "OUT.html"], "expected a ledger, a folder that posefit sweep wrote, got none"),
         (["EMPTY", "--out", "OUT.html"], "expected a ledger with finished rows, got one with none"),
-        (["RESULTS"], "--out must name a file for the page, got none; --serve shows one without a file"),
+        (["NONE"], "expected a ledger, a folder that posefit sweep wrote, got none"),
         (["RESULTS", "--out", "OUT.html", "--port", "1"], "--port must be given with --serve, got it without"),
         (["RESULTS", "--serve", "--out", "OUT.html"], "--serve must be given without --out, which it does not write"),
         (["RESULTS", "--serve", "--csv", "OUT.csv"], "--serve must be given without --csv, which it does not write"),
@@ -206,7 +218,10 @@ def test_a_ledger_from_before_there_were_posteriors_has_no_such_columns(results:
         (["RESULTS", "--out", "OUT.html", "--iohprofiler", "none/OUT"], "expected a place to write to, got one in "),
     ],
 )  # fmt: skip
-def test_mistakes_are_one_line_and_write_nothing(words: list[str], message: str, results: Path, tmp_path: Path) -> None:
+def test_mistakes_are_one_line_and_write_nothing(
+    words: list[str], message: str, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.report.live.server.PATIENCE", 0.0)
     ledger(tmp_path / "EMPTY", [])
     (tmp_path / "OTHER.html").write_text("<p>mine</p>")
     (tmp_path / "DIR.html").mkdir()

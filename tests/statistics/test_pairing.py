@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefit.statistics.pairing import paired, shared
+from posefit.statistics.pairing import complete, paired, shared
 
 ROWS = [
     (method, instance, seed, 100.0 * (method == "b") + 10.0 * instance + seed)
@@ -67,3 +67,11 @@ def test_runs_that_do_not_pair_are_refused(rows, message):
 def test_methods_that_share_nothing_are_refused():
     with pytest.raises(ValueError, match="methods must share an instance and a seed to be compared, got none of a, b"):
         shared([("a", 0, 0, 1.0), ("b", 0, 1, 1.0)])
+
+
+def test_every_block_that_all_have_finished_is_complete_whatever_others_lack():
+    gaps = [row for row in ROWS if row[:3] != ("a", 2, 0)]
+    assert sorted(complete(gaps)) == [(2, 1), (7, 0), (7, 1)]
+    assert sorted(complete([*ROWS, ("a", 9, 0, 1.0), ("b", 9, 0, np.nan)])) == [(2, 0), (2, 1), (7, 0), (7, 1)]
+    with pytest.raises(ValueError, match="methods must share an instance and a seed to be compared, got none of a, b"):
+        complete([("a", 0, 0, 1.0), ("b", 0, 1, 1.0)])

@@ -3,6 +3,7 @@
 | looking for | file |
 |---|---|
 | the sentence about who leads; the three tracks of the leader that are shown beside it | lead.py |
+| how many finished runs count in no comparison, as others failed | unpaired.py |
 | how the orders came out that publications claim | claimed.py |
 | the best method of each instance, the best of all, and a selector between them | selection.py |
 """

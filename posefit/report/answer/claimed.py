@@ -24,8 +24,8 @@ def _result(contest: Contest, order: ClaimedOrder) -> dict[str, Any] | None:
     if not all(name in known for name in order.methods):
         return None
     chosen = [known.index(name) for name in order.methods]
-    errors = contest.of("error")[chosen]
-    if errors[0].size < 2:
+    errors, tested = contest.of("error")[chosen], contest.errors_of_blocks()[chosen]
+    if tested[0].size < 2:
         return None
     steps = [(k, k + 1) for k in range(len(chosen) - 1)]
     by_instance = wilcoxon(errors.mean(axis=2, keepdims=True), steps)
@@ -42,8 +42,8 @@ def _result(contest: Contest, order: ClaimedOrder) -> dict[str, Any] | None:
                 "by_instance": other.adjusted,
                 "seen": one.difference > 0.0 and one.adjusted < LEVEL,
             }
-            for one, other in zip(wilcoxon(errors, steps), by_instance, strict=True)
+            for one, other in zip(wilcoxon(tested, steps), by_instance, strict=True)
         ],
-        "blocks": errors[0].size,
+        "blocks": tested[0].size,
         "instances": errors.shape[1],
     }

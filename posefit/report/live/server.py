@@ -12,14 +12,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any
 
 from posefit.report.live.progress import progress_so_far
-from posefit.sweep.ledger import Ledger
+from posefit.sweep.ledger import INDEX, Ledger
 
 LOOPBACK = "127.0.0.1"
 AGAIN = 5.0  # seconds after which a page loads itself anew, at least
+PATIENCE = 3.0  # seconds that a ledger may take to appear: a sweep that is started needs some to begin it
+LOOK = 0.1  # seconds between looks for it
 REST = 3.0  # times as long as making a report took, until the next one is made
 LARGEST_PORT = 65_535
 THIS_MACHINE = re.compile(r"(127\.0\.0\.1|localhost)(:\d+)?", re.IGNORECASE)  # what a request may ask for
@@ -81,10 +83,12 @@ class Showing:
 def serving(path: str | Path, port: int, say: Callable[[str], None]) -> Iterator[ThreadingHTTPServer]:
     """Give a server that is ready for `serve_forever`; port 0 is any that is free.
 
-    Raises ValueError where the folder is no ledger, or the port cannot be had.
+    Where there is no ledger yet it is waited for, three seconds at most. Raises ValueError where the folder is none, or
+    the port cannot be had.
     """
     if not 0 <= port <= LARGEST_PORT:
         raise ValueError(f"--port must be 0 to {LARGEST_PORT}, got {port}")
+    _wait_for(Path(path))
     showing = Showing(path, say)
 
     class Shown(Handler):
@@ -96,6 +100,15 @@ def serving(path: str | Path, port: int, say: Callable[[str], None]) -> Iterator
         raise ValueError(f"--port must be one that is free, got {port}: {error.strerror or error}") from None
     with server:
         yield server
+
+
+def _wait_for(path: Path) -> None:
+    """Wait until a sweep that was started just now has begun its ledger; not for ever, and not for a file."""
+    if path.is_file() or (path / INDEX).exists():
+        return
+    until = monotonic() + PATIENCE
+    while monotonic() < until and not (path / INDEX).exists():
+        sleep(LOOK)
 
 
 def address_of(server: ThreadingHTTPServer) -> str:

@@ -47,7 +47,7 @@ function chart(width, series, most, { label, under, stepped }) {
   const height = Math.max(240, Math.min(380, 0.62 * width));
   const left = 46;
   const bottom = 40;
-  const top = 8;
+  const top = 24;
   const named = width >= 420 && series.length > 0 && series.length <= LABELLED;
   const right = named ? 124 : 12;
   const used = D.evaluations;
@@ -62,6 +62,7 @@ function chart(width, series, most, { label, under, stepped }) {
     role: "img",
     "aria-label": `${label} over ${under}`,
   });
+  svg.append(draw("text", { x: 2, y: 12, class: "soft" }, label));
   for (const value of steps(0, most, 5)) {
     svg.append(
       draw("line", { class: "rule", x1: left, x2: width - right, y1: y(value), y2: y(value) }),
@@ -96,7 +97,7 @@ function chart(width, series, most, { label, under, stepped }) {
       height - bottom - 2,
     ).forEach((at, k) => {
       const { m } = series[k];
-      svg.append(draw("text", { x: width - right + 8, y: at + 4, class: "name" }, shortened(METHODS[m], 17)));
+      svg.append(draw("text", { x: width - right + 8, y: at + 4, class: "name" }, fitted(METHODS[m], right - 12)));
     });
   return svg;
 }

@@ -15,6 +15,7 @@ function trouble() {
         `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join(", ")}. `,
         make("a", { href: "#failures" }, "Which ones"),
         make("ul", {}, ...H.reasons.map(([reason, count]) => make("li", {}, `${whole(count)} × ${reason}`))),
+        H.unpaired ? `${H.unpaired}.` : "",
       ),
     );
   }

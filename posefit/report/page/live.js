@@ -15,7 +15,8 @@ function live() {
       ? `${whole(L.running)} running, ${lasting(L.seconds) ?? "some time"} left`
       : "nobody works on it now"
     : "finished";
-  const sums = `${whole(L.done)} done, ${whole(L.quarantined)} quarantined`;
+  const again = L.failed ? `, ${counted(L.failed, "failed attempt")} to be repeated` : "";
+  const sums = `${whole(L.done)} done, ${whole(L.quarantined)} quarantined${again}`;
   $("live-said").textContent = given(L.cells)
     ? `${whole(settled)} of ${whole(L.cells)} cells: ${sums}; ${state}.`
     : `Cells: ${sums}. No plan is known, so nobody knows how many are left.`;

@@ -18,7 +18,7 @@ function header() {
   $("lead").textContent =
     `${whole(H.done)} runs of ${counted(METHODS.length, "method")} on ${counted(INSTANCES.length, "instance")}` +
     ` of ${counted(H.motions.length, "motion")}` +
-    `${H.failed ? `; ${whole(H.failed)} cells failed` : "; no cell failed"}.`;
+    `${H.failed ? `; ${counted(H.failed, "cell")} failed` : "; no cell failed"}.`;
   const facts = [
     ["methods", words(METHODS)],
     ["motions", words(H.motions)],
@@ -37,9 +37,9 @@ function header() {
   else {
     if (H.shared < H.done)
       notes.push(
-        `Methods are compared on the ${whole(H.shared)} runs that all of them share, ` +
-          `${whole(H.shared_instances)} instances with ${counted(H.shared_seeds, "seed")} each; ` +
-          `${whole(H.done - H.shared)} others count only below, in the list of all runs.`,
+        `Means and intervals are of the ${whole(H.shared)} runs that all methods share, ` +
+          `${counted(H.shared_instances, "instance")} with ${counted(H.shared_seeds, "seed")} each.` +
+          (H.unpaired ? ` ${H.unpaired}.` : ""),
       );
     if (H.apart.length)
       notes.push(

@@ -8,7 +8,7 @@ function differenceDiagram(P, room) {
   const count = order.length;
   const half = Math.ceil(count / 2);
   const width = Math.max(290, Math.min(760, room));
-  const side = Math.min(250, 0.36 * width);
+  const side = Math.min(250, 0.4 * width);
   const [left, right] = [side, width - side];
   const step = 20;
   const x = (rank) => left + ((right - left) * (rank - 1)) / Math.max(count - 1, 1);
@@ -24,14 +24,12 @@ function differenceDiagram(P, room) {
     "aria-label": `Mean ranks, best first: ${ranks.join(", ")}`,
   });
   const long = Math.min(P.critical_difference, count - 1);
+  const said =
+    `critical difference ${P.critical_difference.toFixed(2)}` +
+    (P.critical_difference > long ? ", longer than the line" : "");
   svg.append(
     draw("line", { class: "ink", x1: x(1), x2: x(1 + long), y1: 26, y2: 26, "stroke-width": 2 }),
-    draw(
-      "text",
-      { x: x(1), y: 17 },
-      `critical difference ${P.critical_difference.toFixed(2)}` +
-        (P.critical_difference > long ? ", longer than the line" : ""),
-    ),
+    draw("text", { x: Math.max(0, Math.min(x(1), width - textWidth(said) - 4)), y: 17 }, said),
     draw("line", { class: "ink", x1: x(1), x2: x(count), y1: axis, y2: axis }),
   );
   const every = Math.ceil(count / 14);
@@ -58,7 +56,7 @@ function differenceDiagram(P, room) {
     const best = place < half;
     const at = names + step * (best ? place : count - 1 - place) + 6;
     const edge = best ? left - 14 : right + 14;
-    const name = shortened(METHODS[m], Math.floor((side - 20) / 6.6) - 5);
+    const name = fitted(METHODS[m], side - 22 - textWidth(` ${rank.toFixed(2)}`));
     svg.append(
       draw("polyline", {
         points: `${x(rank)},${axis} ${x(rank)},${at} ${edge},${at}`,

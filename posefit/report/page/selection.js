@@ -8,6 +8,8 @@ function selection() {
   }
   const best = METHODS[S.best];
   const degrees = (value) => `${number(value, 2)}°`;
+  const closed = (part) =>
+    part < 0 ? "worse than the single best" : `${number(100 * part, 0)} % of the gap between them`;
   const gap = S.single - S.oracle;
   const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ");
   const pays =
@@ -17,16 +19,19 @@ function selection() {
         ? "does not pay here"
         : "might pay, but nothing here knows how";
   const apart = given(S.oracle_apart) ? `, or ${degrees(S.oracle_apart)} where it is picked on other seeds` : "";
+  const leader = D.leaderboard[0].method;
+  const other =
+    S.best === leader ? "" : `, the lowest plain mean (${METHODS[leader]} has the lowest interquartile mean),`;
   const learnt = given(S.selector)
     ? `, and a selector that knows ${listed(S.features)} ${degrees(S.selector)}` +
-      (given(S.closed) ? `, ${number(100 * S.closed, 0)} % of the gap between them` : "")
+      (given(S.closed) ? `, ${closed(S.closed)}` : "")
     : "";
   $("selection-said").textContent =
-    `Choosing a method by its instance ${pays}: ${best} alone has a mean error of ${degrees(S.single)} over ` +
+    `Choosing a method by its instance ${pays}: ${best} alone has a mean error of ${degrees(S.single)}${other} over ` +
     `${counted(S.instances, "instance")}, the best method of each ${degrees(S.oracle)} in hindsight${apart}${learnt}.` +
     (S.why ? ` There is no selector: ${S.why}.` : "");
   const ways = [
-    { name: `single best: ${best}`, error: S.single },
+    { name: `single best, by the plain mean: ${best}`, error: S.single },
     ...(given(S.selector) ? [{ name: "selector, on instances it has not seen", error: S.selector }] : []),
     ...(given(S.oracle_apart) ? [{ name: "oracle, scored on seeds it has not seen", error: S.oracle_apart }] : []),
     { name: "oracle", error: S.oracle },
@@ -39,7 +44,10 @@ function selection() {
       { title: "mean error °", show: (row) => number(row.error, 2) },
       {
         title: "gap closed",
-        show: (row) => (given(share(row)) ? `${number(100 * share(row), 0)} %` : "–"),
+        show: (row) => {
+          if (!given(share(row))) return "–";
+          return share(row) < 0 ? "worse than the single best" : `${number(100 * share(row), 0)} %`;
+        },
       },
     ],
     ways,

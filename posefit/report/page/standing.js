@@ -1,5 +1,6 @@
 // All methods by their scores with intervals, and the baselines: the figure of the first screen.
 const MANY = 20; // methods of the figure
+const BOLD = 700; // the weight of names that are not shown to be worse
 
 // Places of labels over a figure, each to the right of its line, which ends below every label that it would cross.
 function lanes(labels, high) {
@@ -11,6 +12,21 @@ function lanes(labels, high) {
     found.push({ lane: 1 + Math.max(-1, ...above.map((one) => one.lane)), from, end: from + wide });
   }
   return found;
+}
+
+const measuring = document.createElement("canvas").getContext("2d");
+
+// How many pixels a text of a figure is wide, as report.css has it.
+function textWidth(text, weight = 400) {
+  measuring.font = `${weight} 12px system-ui, sans-serif`;
+  return measuring.measureText(text).width;
+}
+
+// A text that is shortened until it is at most so many pixels wide.
+function fitted(text, room, weight = 400) {
+  let length = text.length;
+  while (length > 4 && textWidth(shortened(text, length), weight) > room) length -= 1;
+  return shortened(text, length);
 }
 
 // A scale of scores from 0, or of their logarithms where less is better and the worst is far from the best.
@@ -33,8 +49,8 @@ function standing(width) {
   const alike = new Set(D.alike);
   const narrow = width < 480;
   const step = narrow ? 38 : 26;
-  const longest = Math.min(27, Math.max(...rows.map((row) => row.name.length)));
-  const [left, right] = [narrow ? 14 : 7.4 * longest + 24, width - (narrow ? 12 : 66)];
+  const widest = Math.max(...rows.map((row) => textWidth(shortened(row.name, 27), BOLD)));
+  const [left, right] = [narrow ? 14 : widest + 24, width - (narrow ? 12 : 66)];
   const bases = D.baselines.filter((row) => given(row[of])).sort((a, b) => a[of] - b[of]);
   const spans = rows.flatMap((row) => [row[of], row.low, row.high].filter((one) => given(one) && one > 0));
   const scale = scoreScale([...spans, ...bases.map((row) => row[of])], left, right);

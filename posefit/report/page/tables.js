@@ -1,5 +1,6 @@
 // The leaderboard, and all runs with the command that runs one again.
 const FIGURES = Object.keys(D.columns);
+const pairsOf = (methods) => (methods * (methods - 1)) / 2;
 
 function leaderboard() {
   const warned = METHODS.map(() => 0);
@@ -39,7 +40,9 @@ function leaderboard() {
       {
         title: "alike",
         text: true,
-        about: "Methods that share a letter are not told apart: Wilcoxon's signed ranks, Holm, 5 %",
+        about:
+          "Methods that share a letter are not told apart: Wilcoxon's signed ranks, " +
+          `Holm over ${counted(pairsOf(D.taking_part.length), "pair")}, 5 %`,
         value: (row) => (row.base ? "" : row.letters),
         show: (row) => (row.base ? "" : row.letters),
       },

@@ -1,11 +1,11 @@
-"""Who reaches most targets, who cannot be told apart from him, on what, and how sure that is: in one sentence."""
+"""Who reaches most targets, who is not shown to be worse, on what, and how sure that is: in one sentence."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from posefit.report.answer.lead import counted, others_said
+from posefit.report.answer.lead import leads, others_said, so_many
 from posefit.report.search.match import Match, is_random
 
 Rows = Sequence[Mapping[str, Any]]
@@ -22,7 +22,8 @@ def search_sentence(match: Match, board: Rows, bases: Rows, tests: Mapping[str, 
     sure = ""
     if np.isfinite(first["low"]):
         sure = f" (95 % interval {first['low']:.1f} % to {first['high']:.1f} %)"
-    said = f"{first['name']} leads with {first['reached']:.1f} % of all targets reached{sure} on {_where(match)}{told}."
+    share = f"{first['reached']:.1f} % of all targets reached{sure}"
+    said = f"{first['name']} {leads(match.methods)} {share} on {_where(match)}{told}."
     if is_random(match.searches, first["method"]):
         return f"{said} That is random search: nobody does better."
     return said + "".join(f" Random search reached {row['reached']:.1f} %." for row in bases)
@@ -36,7 +37,7 @@ def _where(match: Match) -> str:
     seeds = match.shared.rows.shape[2]
     on = "function" if len(functions) == 1 else "functions"
     return (
-        f"{on} {_series(functions)} in {_series(dimensions)} dimensions, {counted(len(instances), 'instance')} in all "
+        f"{on} {_series(functions)} in {_series(dimensions)} dimensions, {so_many(len(instances), 'instance')} in all "
         f"with {'one seed' if seeds == 1 else f'{seeds} seeds each'}"
     )
 

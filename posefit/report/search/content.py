@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.report.answer.lead import alike
+from posefit.report.answer.lead import not_told_apart
+from posefit.report.answer.unpaired import unpaired_sentence
 from posefit.report.colours import METHODS
 from posefit.report.content import REASONS
 from posefit.report.search.answer import search_sentence
 from posefit.report.search.match import Match, instance_tests, left_out, match_of, random_rows, search_board
 from posefit.report.search.rows import Searches
 from posefit.statistics.profiles import attained
+from posefit.statistics.sharing import Shared
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.tally import SHOWN, suite_scores
@@ -85,9 +87,14 @@ def _header(searches: Searches, match: Match | None) -> dict[str, Any]:
         "reasons": Counter(reason for one in searches.failures for reason in one["reasons"]).most_common(REASONS),
         "unfinished": searches.unfinished,
         "dropped": [] if match is None else left_out(match),
+        "unpaired": "" if match is None else _unpaired(match.shared),
         "shared": None if match is None else int(match.shared.rows.size),
         "apart": [] if match is None else [m for m in range(len(searches.methods)) if m not in match.methods],
     }
+
+
+def _unpaired(shared: Shared) -> str:
+    return unpaired_sentence(shared.left_out, shared.blocks.size - shared.rows.size, shared.rows.shape[2], tested=False)
 
 
 def _name(function: int, dimension: int, instance: int, _: str) -> str:
@@ -101,7 +108,7 @@ def _compared(match: Match) -> dict[str, Any]:
     evaluations = _grid(match)
     return {
         "answer": search_sentence(match, board, bases, tests),
-        "alike": alike(tests, board[0]["method"]),
+        "alike": not_told_apart(tests, board[0]["method"]),
         "leaderboard": board,
         "baselines": bases,
         "taking_part": match.methods,

@@ -12,11 +12,15 @@ from posefit.report.search.rows import Searches
 _SAID = ("header", "answer", "leaderboard", "baselines", "times")
 
 
-def write_searches(searches: Searches, out: str) -> dict[str, Any]:
-    """Write the page of single searches to a file, and return its answer, leaderboard, baselines and running times."""
+def write_searches(searches: Searches, out: str | None) -> dict[str, Any]:
+    """Write the page of single searches to a file, and return its answer, leaderboard, baselines and running times.
+
+    Without a file to write to there is no page.
+    """
     data = data_of_searches(searches)
-    with replaced_file(out, MARK.encode()) as building:
-        building.write_text(search_document(data), encoding="utf-8", newline="\n")
+    if out is not None:
+        with replaced_file(out, MARK.encode()) as building:
+            building.write_text(search_document(data), encoding="utf-8", newline="\n")
     gaps = [
         {
             "instance": data["instances"][one["instance"]]["name"],

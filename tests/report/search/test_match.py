@@ -56,7 +56,7 @@ def test_random_search_that_leads_is_called_so_and_without_it_there_is_no_baseli
     assert said.endswith(" That is random search: nobody does better.")
     alone = match(searched(tmp_path / "b", {"cma": 3}, problems([1], [9], 1)))
     assert sentence(alone) == (
-        "cma leads with 17.2 % of all targets reached on function 1 in 9 dimensions, 1 instance in all with one seed; "
+        "cma has 17.2 % of all targets reached on function 1 in 9 dimensions, 1 instance in all with one seed; "
         "no other method shares its runs."
     )
     assert random_rows(alone, search_board(alone, None)) == []

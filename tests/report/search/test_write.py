@@ -34,7 +34,7 @@ def test_the_answer_the_failures_and_the_leaderboard_are_printed_and_a_page_is_w
     assert lines[1:3] == ["1 cell failed, left out of all figures: pso 1", "  1 x ValueError: it had to"]
     assert lines[3] == f"{'':32} targets %   95 % interval   above  alike"
     assert [line.split()[:2] for line in lines[4:6]] == [["cma", "37.9"], ["random", "10.3"]]
-    assert lines[6].endswith("Wilcoxon's signed ranks on paired instances, Holm, 5 %")
+    assert lines[6].endswith("Wilcoxon's signed ranks on paired instances, Holm over 1 pair, 5 %")
     data = data_in((tmp_path / "page.html").read_text("utf-8"))
     assert data["answer"] == lines[0]
     assert data["failures"][0]["name"] == "pso on f1 in 9D, instance 10001, seed 3"

@@ -46,7 +46,7 @@ function note() {
     : " There is no baseline, for the plan has no random search.";
   $("standing-note").textContent =
     `Share of all runs and targets that a method reached${sure}.${base} ` +
-    "Methods in bold cannot be told apart from the best one.";
+    "Methods in bold are not shown to be worse than the best one.";
 }
 
 header();

@@ -26,7 +26,9 @@ function leaderboard() {
       {
         title: "alike",
         text: true,
-        about: "Methods that share a letter are not told apart: Wilcoxon's signed ranks over instances, Holm, 5 %",
+        about:
+          "Methods that share a letter are not told apart: Wilcoxon's signed ranks over instances, " +
+          `Holm over ${counted((D.taking_part.length * (D.taking_part.length - 1)) / 2, "pair")}, 5 %`,
         value: (row) => row.letters,
         show: (row) => row.letters,
       },
