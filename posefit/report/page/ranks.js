@@ -32,7 +32,7 @@ function differenceDiagram(P, room) {
     draw("text", { x: Math.max(0, Math.min(x(1), width - textWidth(said) - 4)), y: 17 }, said),
     draw("line", { class: "ink", x1: x(1), x2: x(count), y1: axis, y2: axis }),
   );
-  const every = Math.ceil(count / 14);
+  const every = Math.ceil((textWidth(String(count)) + 4) / ((right - left) / Math.max(count - 1, 1)));
   for (let rank = 1; rank <= count; rank += every) {
     svg.append(
       draw("line", { class: "ink", x1: x(rank), x2: x(rank), y1: axis - 6, y2: axis }),
