@@ -68,7 +68,7 @@ def test_a_preview_lists_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> 
     assert result.exit_code == 0, result.stderr
     lines = result.stdout.splitlines()
     assert len(lines) == 9
-    assert "sapso@pca on walk, view 45, instance 0, seed 1, sapso.cooling=0.9, holes 0.5" in lines[3]
+    assert "sapso@pca on walk, view 45, instance 0, seed 1, sapso.cooling=0.9, holes 0.5" in lines[6]
     assert lines[-1].startswith("8 cells, 8 of them to run: about ")
     assert lines[-1].endswith(" on 2 workers")
     assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
