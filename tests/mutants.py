@@ -41,9 +41,9 @@ MUTANTS = (
     ),
     Mutant(
         "the other mode is the second one, whichever the told pose is of",
-        "posefit/posterior/modes.py",
+        "posefit/uncertainty/modes.py",
         (("    rest = [mode for k, mode in enumerate(modes) if k != mine]", "    rest = list(modes[1:])"),),
-        "tests/posterior/test_modes.py::test_the_other_mode_is_the_likeliest_that_a_pose_is_not_of",
+        "tests/uncertainty/test_modes.py::test_the_other_mode_is_the_likeliest_that_a_pose_is_not_of",
     ),
     Mutant(
         "runs count alike in a reliability diagram, however many frames they have of a bin",
@@ -71,7 +71,7 @@ MUTANTS = (
     ),
     Mutant(
         "a clip that is to come counts for nothing in a conformal factor",
-        "posefit/posterior/calibration.py",
+        "posefit/uncertainty/calibration.py",
         (("1.0 / (len(one) * (clips + 1))", "1.0 / (len(one) * clips)"),),
         "tests/sources/test_posterior.py::test_clips_count_alike_and_the_one_to_come_as_infinitely_far",
     ),

@@ -10,8 +10,8 @@ from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit.niching.instance import SIZE, niche_instance, niche_space
 from posefit.niching.scores import LEAST, LEVELS_MM, scored
-from posefit.posterior.modes import Posterior
 from posefit.silhouette.cost import project
+from posefit.uncertainty.modes import Posterior
 from posefit_envs.base import SearchEnv
 from posefit_envs.drawing import Picture, portray
 from posefit_envs.instance import RESERVED, ArgumentError, Selection, World, approved, instance_number

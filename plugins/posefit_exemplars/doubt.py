@@ -18,8 +18,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import Skeleton
-from posefit.posterior.calibration import Recalibration
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.look import Look
 
 FILE = "doubt.json"

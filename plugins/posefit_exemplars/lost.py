@@ -23,9 +23,9 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.alike import facing
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton
-from posefit.posterior.calibration import Recalibration
-from posefit.posterior.modes import Posterior
-from posefit.posterior.sides import second_side
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.sides import second_side
 from posefit_exemplars.doubt import likely
 
 FITTED = Path(__file__).with_name("lost.json")  # made by `posefit reproduce lost --store`

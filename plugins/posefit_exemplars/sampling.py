@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.codes import Rows
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.window import ALIKE, ALIKE_YAW, Seen

@@ -19,9 +19,9 @@ from posefit.niching.instance import APART_MM, COUNT, KINDS, NicheInstance, nich
 from posefit.niching.reports import best_apart, boltzmann
 from posefit.niching.scores import LEVELS_MM, scored
 from posefit.niching.space import ARMS, held_arms, stride_poses
-from posefit.posterior.modes import Posterior, modes_of
 from posefit.registry import registry
 from posefit.settings import planned
+from posefit.uncertainty.modes import Posterior, modes_of
 from posefit_experiments.grid import Progress, each
 
 KNOWN, LIBRARY = "known", "library"  # what is known itself, as a ceiling; the nearest poses of the library

@@ -9,7 +9,7 @@ from posefit.ambiguity.search import Moment, States
 from posefit.arrays import Array
 from posefit.geometry.alike import facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.geometry.skeleton import Skeleton
-from posefit.posterior.modes import Posterior, modes_of
+from posefit.uncertainty.modes import Posterior, modes_of
 
 COMPARED = 1500  # poses that are compared with each other; of more, so many that are drawn stand for all
 NEARER = 0.5  # of the way to the first mode: as near as this to an image of it, a mode is that image

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS
-from posefit.posterior.sides import nearer_mirrored
+from posefit.uncertainty.sides import nearer_mirrored
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
 

@@ -18,9 +18,9 @@ from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, SearchS
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
-from posefit.posterior.modes import Mode, Posterior
 from posefit.silhouette.cost import BETA, Areas
 from posefit.silhouette.mask import Silhouette
+from posefit.uncertainty.modes import Mode, Posterior
 
 SPREAD = 1.0  # k of Reading S5: Sigma's standard deviations, as multiples of the predicted step
 KEPT = 3  # frames: how far back a prediction looks

@@ -5,7 +5,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.problem import PoseProblem
 from posefit.niching.instance import APART_MM
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.modes import Posterior
 
 REPORTED = 10  # poses of a report that count: whoever names everything has told nothing
 TEMPERATURE = 1.0  # ours: units of silhouette cost

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.niching.instance import NicheInstance
 from posefit.niching.reports import REPORTED
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.modes import Posterior
 
 LEVELS_MM = (15.0, 30.0, 60.0)  # the mean over joints, both roots at one point
 LEAST = 1e-3  # ours: of a probability in the log score, so that a pose that was not found does not cost everything

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from posefit.posterior.calibration import LEVELS
 from posefit.tracking.measures import BASELINES, MEASURES, Measure
+from posefit.uncertainty.calibration import LEVELS
 
 NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)  # of intervals, as rows have them
 TOLD = "80"  # the interval that tables tell

@@ -9,11 +9,11 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
-from posefit.posterior.calibration import LEVELS
 from posefit.report.columns import NAMES
 from posefit.report.contest import SEED, Contest, mean, resamples
 from posefit.statistics.intervals import Intervals, iqm_intervals
 from posefit.statistics.profiles import Trace, attained, hits, targets
+from posefit.uncertainty.calibration import LEVELS
 
 POINTS = 41  # of a curve
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
-from posefit.posterior.calibration import BINS
 from posefit.report.columns import COLUMNS, FIGURES, SHOWN
 from posefit.report.repeat import LAST, command_head
 from posefit.sweep.cell import in_full, settings_text
 from posefit.sweep.table import is_search
+from posefit.uncertainty.calibration import BINS
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger

@@ -4,7 +4,7 @@
 
     posterior = modes(problem, factory, searches=8, evaluations=2440, rng=np.random.default_rng(0))
 
-`factory(space, rng)` builds any optimiser. What is told is a `posefit.posterior.modes.Posterior`.
+`factory(space, rng)` builds any optimiser. What is told is a `posefit.uncertainty.modes.Posterior`.
 
 | looking for | file |
 |---|---|

@@ -11,10 +11,10 @@ from posefit.fitting.box import Space
 from posefit.fitting.check import at_least, positive, whole
 from posefit.fitting.optimiser import BudgetError, Optimiser, populations
 from posefit.fitting.problem import PoseProblem
-from posefit.posterior.landscape import Landscape
-from posefit.posterior.modes import Posterior
-from posefit.posterior.searches import Searched, weighed
 from posefit.searching.twins import twins
+from posefit.uncertainty.landscape import Landscape
+from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.searches import Searched, weighed
 
 SEARCHES = 8  # ours
 SHARE = 8.0  # ours: evaluations of all else, over those of the first search

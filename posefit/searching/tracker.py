@@ -12,11 +12,11 @@ from posefit.fitting.box import Space
 from posefit.fitting.optimiser import Filter, Optimiser
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
-from posefit.posterior.modes import Posterior
-from posefit.posterior.searches import Searched, likelihoods
-from posefit.posterior.smc import systematic_rows
 from posefit.searching.doubt import lost_at
 from posefit.searching.modes import KEPT, MakeOptimiser, further, gathered, told
+from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.searches import Searched, likelihoods
+from posefit.uncertainty.smc import systematic_rows
 
 
 @dataclass(frozen=True, eq=False)

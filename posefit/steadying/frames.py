@@ -12,11 +12,11 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
-from posefit.posterior.modes import Posterior
 from posefit.searching.spent import mean_cost
 from posefit.silhouette.cost import areas
 from posefit.steadying.outlines import outlined
 from posefit.steadying.path import SeenFrames, steadied
+from posefit.uncertainty.modes import Posterior
 
 
 def steadied_frames(

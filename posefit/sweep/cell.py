@@ -264,8 +264,8 @@ def _mode_reliability(found: "list[Frame]", truth: "Array", skeleton: "Skeleton"
     """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
     import numpy as np
 
-    from posefit.posterior.calibration import reliability
-    from posefit.posterior.modes import likeliest_is_right
+    from posefit.uncertainty.calibration import reliability
+    from posefit.uncertainty.modes import likeliest_is_right
 
     told = [(frame.modes, joints) for frame, joints in zip(found, truth, strict=True) if frame.modes]
     if not told:

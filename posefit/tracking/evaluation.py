@@ -12,12 +12,12 @@ from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.motion.steadiness import acceleration, slides, standing
-from posefit.posterior.calibration import LEVELS
-from posefit.posterior.intervals import joint_intervals
-from posefit.posterior.sides import unknown_sides
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.measures import Measures, Spread
+from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.intervals import joint_intervals
+from posefit.uncertainty.sides import unknown_sides
 
 MANY = 8_000  # training poses, more than which are not all drawn at full size in every frame
 STRIDE = 4  # of so many poses each is looked at in a small picture

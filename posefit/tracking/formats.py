@@ -13,9 +13,9 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.motion.motion import Motion
-from posefit.posterior.calibration import LEVELS
-from posefit.posterior.intervals import angle_intervals, joint_intervals
 from posefit.tracking.evaluation import unseen
+from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 
 FILES = (
     "poses.npz",

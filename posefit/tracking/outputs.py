@@ -19,7 +19,6 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
 from posefit.motion.motion import Motion
-from posefit.posterior.modes import Posterior
 from posefit.reading import cut
 from posefit.tracking.formats import FILES, Rows, State, intervals_of, write_formats
 from posefit.tracking.identity import Told, difference
@@ -28,6 +27,7 @@ from posefit.tracking.page.content import track_data
 from posefit.tracking.page.webpage import viewer_document
 from posefit.tracking.picture import Painter
 from posefit.tracking.table import undetermined
+from posefit.uncertainty.modes import Posterior
 
 _FOUND, _WORK = "found.jsonl", "work"
 _MINE = (*FILES, _FOUND, _WORK)  # what a track writes to its folder

@@ -14,8 +14,6 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
-from posefit.posterior.calibration import LEVELS
-from posefit.posterior.modes import Mode, other_mode
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
@@ -23,6 +21,8 @@ from posefit.tracking.drawing.body import draw_body, draw_stick, opacities, side
 from posefit.tracking.drawing.chart import curve, doubts, says_doubts
 from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, OTHER, SPILLED, width_of, write
 from posefit.tracking.evaluation import LOST
+from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.modes import Mode, other_mode
 
 PANEL = 480  # pixels high
 STILLS = 6  # frames on the summary

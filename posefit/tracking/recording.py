@@ -15,12 +15,12 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import BONES, PARENTS, SIDES, Skeleton
 from posefit.motion.motion import Motion
-from posefit.posterior.intervals import joint_intervals
-from posefit.posterior.modes import other_mode
 from posefit.tracking.drawing.body import SIDE_COLOURS, opacities
 from posefit.tracking.drawing.colours import OTHER
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.picture import DRAWN, LIKELY
+from posefit.uncertainty.intervals import joint_intervals
+from posefit.uncertainty.modes import other_mode
 
 THIN = 0.006  # metres: how thick the lines are of what else it may be
 

@@ -16,7 +16,6 @@ from posefit.listening import QUIET, Listener
 from posefit.measuring.gait import gait_of
 from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
-from posefit.posterior.modes import TrackMode, modes_of, track_modes
 from posefit.searching.again import GAP, LOOKED, LookingTracker
 from posefit.searching.anew import Anew, followed_anew
 from posefit.searching.spent import spent_by_all
@@ -37,6 +36,7 @@ from posefit.tracking.tracks import (
     whole_cost,
 )
 from posefit.tracking.trust.evidence import trust_of
+from posefit.uncertainty.modes import TrackMode, modes_of, track_modes
 from posefit.version import __version__
 
 

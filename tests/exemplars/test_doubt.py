@@ -10,7 +10,7 @@ from posefit.fitting.tracker import Observation
 from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.doubt import evidence, learned, recalibrated
 from posefit_exemplars.factory import exemplars
 from posefit_exemplars.look import Look

@@ -11,8 +11,8 @@ import pytest
 from posefit.fitting.tracker import Frame
 from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.camera import Camera
-from posefit.posterior.modes import Posterior
-from posefit.posterior.sides import unknown_sides
+from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.sides import unknown_sides
 from posefit_exemplars.factory import exemplars
 from posefit_exemplars.lost import (
     EVIDENCE,

@@ -6,7 +6,7 @@ import pytest
 from posefit.niching.instance import APART_MM, apart_mm, niche_instance
 from posefit.niching.reports import REPORTED, best_apart, boltzmann
 from posefit.niching.scores import LEVELS_MM, scored
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.modes import Posterior
 
 
 def test_weights_are_those_of_boltzmann() -> None:

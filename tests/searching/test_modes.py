@@ -12,12 +12,12 @@ from posefit.geometry.alike import facing, reflected_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit.posterior.modes import Posterior, modes_of
 from posefit.registry import registry
 from posefit.searching.modes import modes
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import pose_problem, walking_angles
+from posefit.uncertainty.modes import Posterior, modes_of
 
 FEW = {"evaluations": 400, "particles": 40, "size": (160, 120)}
 

@@ -11,10 +11,10 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit.posterior.modes import Posterior
 from posefit.searching.anew import followed_anew, in_reverse
 from posefit.searching.whirls import FASTEST, agreeing, surest, whirling
 from posefit.silhouette.mask import Silhouette
+from posefit.uncertainty.modes import Posterior
 
 FPS = 30.0
 # at z = 6 on the z axis: whoever has yaw 0 faces it, and yaw t and 180 - t are reflections of each other

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.posterior.hill_valley import edge_length, same_valley, valleys
-from posefit.posterior.landscape import Landscape
 from posefit.testing.toy import Toy
+from posefit.uncertainty.hill_valley import edge_length, same_valley, valleys
+from posefit.uncertainty.landscape import Landscape
 
 
 def two_holes(proposals: Array) -> Array:

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from posefit.posterior.calibration import calibration_error, conformal_factor
+from posefit.uncertainty.calibration import calibration_error, conformal_factor
 from posefit_exemplars.sampling import messages, onward
 from tests.sources.test_exemplars_steps import SIZES, Model, model, ways
 

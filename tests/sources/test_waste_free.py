@@ -8,11 +8,11 @@ import pytest
 from scipy.stats import kstest, multivariate_normal, truncnorm
 
 from posefit.arrays import Array
-from posefit.posterior import smc
-from posefit.posterior.landscape import Landscape
-from posefit.posterior.mixture import NormalMixture
-from posefit.posterior.smc import next_step, reweighed, systematic_rows, tempered
 from posefit.testing.toy import Toy
+from posefit.uncertainty import smc
+from posefit.uncertainty.landscape import Landscape
+from posefit.uncertainty.mixture import NormalMixture
+from posefit.uncertainty.smc import next_step, reweighed, systematic_rows, tempered
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
-from posefit.posterior.modes import Posterior
 from posefit.silhouette.mask import Silhouette
 from posefit.steadying import kernels, outlines
 from posefit.steadying.borders import Borders, distances_outside
@@ -23,6 +22,7 @@ from posefit.steadying.outlines import outlined
 from posefit.steadying.path import SeenFrames
 from posefit.steadying.shown import STARTS, build_slopes, drawn_numbers, drawn_slopes
 from posefit.steadying.squares import Squares
+from posefit.uncertainty.modes import Posterior
 
 CAMERA = Camera.around(np.array([0.0, 0.9, 0.0]), 0.4, 4.0, (200, 200))
 

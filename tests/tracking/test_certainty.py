@@ -17,12 +17,12 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.alike import mirrored_poses, turned_poses
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
-from posefit.posterior.calibration import Recalibration
-from posefit.posterior.modes import Posterior
 from posefit.tracking.evaluation import Evaluation
 from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.run import follow
 from posefit.tracking.table import table, undetermined
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
 from tests.files import arrays
 from tests.tracking.test_evaluation import found
 

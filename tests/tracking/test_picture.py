@@ -12,11 +12,11 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
-from posefit.posterior.modes import Mode
 from posefit.tracking.drawing.body import FAINTEST, draw_body, opacities, solid_map
 from posefit.tracking.drawing.chart import HEAD, LEFT_MARGIN, RIGHT_MARGIN, doubts
 from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, OTHER, RIGHT
 from posefit.tracking.picture import PANEL, Painter
+from posefit.uncertainty.modes import Mode
 from tests.tracking.test_evaluation import found
 
 FRAMES = 7

@@ -12,11 +12,11 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
-from posefit.posterior.calibration import Recalibration
-from posefit.posterior.modes import Posterior
 from posefit.tracking import method
 from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.run import follow
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
 from tests.tracking.test_evaluation import found
 
 SPREAD = Recalibration(joint_spreads=np.full(len(JOINTS), 0.02))

@@ -6,8 +6,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.posterior.calibration import auroc, calibration_error, false_alarms, kept_errors
 from posefit.tracking.evaluation import LOST
+from posefit.uncertainty.calibration import auroc, calibration_error, false_alarms, kept_errors
 from posefit_experiments.lost.model import Said, lost_frames, swapped_frames
 
 Row = Mapping[str, Any]

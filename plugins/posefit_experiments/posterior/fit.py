@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS
-from posefit.posterior.calibration import LEVELS, Recalibration, conformal_factor
-from posefit.posterior.intervals import angle_intervals, joint_intervals
-from posefit.posterior.modes import APART, modes_of
-from posefit.posterior.sides import nearer_mirrored, second_side
+from posefit.uncertainty.calibration import LEVELS, Recalibration, conformal_factor
+from posefit.uncertainty.intervals import angle_intervals, joint_intervals
+from posefit.uncertainty.modes import APART, modes_of
+from posefit.uncertainty.sides import nearer_mirrored, second_side
 from posefit_exemplars.doubt import Doubt, evidence, none_signs
 from posefit_experiments.posterior.frames import Followed
 

@@ -13,12 +13,12 @@ from posefit.arrays import Array
 from posefit.footage.training import training_clips, training_motions
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import recorded
-from posefit.posterior.modes import Posterior
 from posefit.sweep.cell import cell_scene, parts, settings_text
 from posefit.sweep.check import cell_of
 from posefit.tracking.method import Choice, parse_settings
 from posefit.tracking.opening import Opening
 from posefit.tracking.run import follow
+from posefit.uncertainty.modes import Posterior
 from posefit_experiments.people.clips import Piece
 from posefit_experiments.posterior.design import OneTrack
 

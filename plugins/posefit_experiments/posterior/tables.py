@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.metrics import LOST_MM
-from posefit.posterior.calibration import LEVELS, auroc, calibration_error, kept_errors, reliability
-from posefit.posterior.modes import APART
 from posefit.searching.doubt import LEAST_COST, lost_at
+from posefit.uncertainty.calibration import LEVELS, auroc, calibration_error, kept_errors, reliability
+from posefit.uncertainty.modes import APART
 from posefit_exemplars.doubt import Doubt
 from posefit_experiments.posterior.design import METHOD
 from posefit_experiments.posterior.fit import (

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
-from posefit.posterior.calibration import LEVELS
 from posefit.silhouette.foreground import Image
 from posefit.tracking.drawing.colours import BACKGROUND, BOTH, LINES, MISSED, OTHER, RIGHT, TEXT, width_of, write
 from posefit.tracking.evaluation import LOST
+from posefit.uncertainty.calibration import LEVELS
 
 LEFT_MARGIN, RIGHT_MARGIN = 56, 16  # pixels
 HEAD, FOOT = 46, 50  # pixels of what is written above, and of the two rows of marks below

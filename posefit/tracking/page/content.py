@@ -13,13 +13,13 @@ from posefit.measuring.angles import COLUMNS, clinical_angles
 from posefit.measuring.centres import PLACES
 from posefit.motion.motion import Motion
 from posefit.page.bodies import camera_seen_from, in_16_bits
-from posefit.posterior.modes import other_mode
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.formats import Rows, State
 from posefit.tracking.measures import FRAME
 from posefit.tracking.page.album import Album
 from posefit.tracking.picture import LIKELY
 from posefit.tracking.table import undetermined
+from posefit.uncertainty.modes import other_mode
 from posefit.version import __version__
 
 TENTH = 0.1  # degrees: the unit of angles in a page

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.geometry.skeleton import ANGLES, Skeleton
-from posefit.posterior.calibration import Recalibration
-from posefit.posterior.kernels import mean_distances
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.kernels import mean_distances
 
 # ours: metres, the mean over joints, beyond which two poses are of two modes; a mirrored stride is 0.15 to 0.2 off
 APART = 0.1

@@ -2,8 +2,8 @@
 
 A silhouette seldom tells one pose. What it leaves open is a `Posterior`: poses of one frame, each with its weight.
 
-    from posefit.posterior.intervals import joint_intervals
-    from posefit.posterior.modes import modes_of
+    from posefit.uncertainty.intervals import joint_intervals
+    from posefit.uncertainty.modes import modes_of
 
     for mode in modes_of(skeleton, posterior):             # the likeliest first
         print(mode.weight, mode.pose[0])

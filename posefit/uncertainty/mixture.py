@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.posterior.kernels import log_parts, log_sums
-from posefit.posterior.landscape import Box
+from posefit.uncertainty.kernels import log_parts, log_sums
+from posefit.uncertainty.landscape import Box
 
 REDRAWS = 100  # Reading S7
 SPARE = 8  # ours: proposals that are drawn beyond those that are expected to be enough

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.posterior.landscape import Landscape
-from posefit.posterior.mixture import NormalMixture
-from posefit.posterior.searches import best_of_each, likelihoods, weighed, widths
-from posefit.posterior.smc import tempered
 from posefit.testing.toy import Toy
+from posefit.uncertainty.landscape import Landscape
+from posefit.uncertainty.mixture import NormalMixture
+from posefit.uncertainty.searches import best_of_each, likelihoods, weighed, widths
+from posefit.uncertainty.smc import tempered
 
 WEIGHTS = np.array([0.6, 0.3, 0.1])
 SPREADS = np.array([0.04, 0.1, 0.07])

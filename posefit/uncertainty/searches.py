@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.posterior.hill_valley import valleys
-from posefit.posterior.landscape import Box, Landscape
-from posefit.posterior.mixture import WIDEST, NormalMixture
-from posefit.posterior.smc import reweighed, systematic_rows, tempered
+from posefit.uncertainty.hill_valley import valleys
+from posefit.uncertainty.landscape import Box, Landscape
+from posefit.uncertainty.mixture import WIDEST, NormalMixture
+from posefit.uncertainty.smc import reweighed, systematic_rows, tempered
 
 EACH = 8  # ours: of each search, so many of its best proposals are sorted into valleys, at most
 TOUCHED = 12.0  # ours: evaluations for each pair of them that is; of a budget, no more than about one in eight

@@ -7,9 +7,9 @@ import pytest
 
 from posefit.geometry.skeleton import ANGLES, JOINTS
 from posefit.motion.built_in import average_skeleton
-from posefit.posterior.calibration import LEVELS, Recalibration
-from posefit.posterior.intervals import angle_intervals, joint_intervals
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.calibration import LEVELS, Recalibration
+from posefit.uncertainty.intervals import angle_intervals, joint_intervals
+from posefit.uncertainty.modes import Posterior
 
 SKELETON = average_skeleton()
 STILL = np.zeros(ANGLES)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefit.posterior.calibration import (
+from posefit.uncertainty.calibration import (
     Recalibration,
     auroc,
     conformal_factor,

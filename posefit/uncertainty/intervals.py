@@ -8,8 +8,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
-from posefit.posterior.calibration import LEVELS, Recalibration
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.calibration import LEVELS, Recalibration
+from posefit.uncertainty.modes import Posterior
 
 HALVINGS = 12  # of where a radius may be: to a quarter of a thousandth of the widest
 NARROWEST = 1e-6  # metres or radians: the least that every pose is blurred by

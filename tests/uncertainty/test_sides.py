@@ -5,9 +5,9 @@ import pytest
 
 from posefit.geometry.alike import mirrored_poses
 from posefit.motion.built_in import average_skeleton, motion
-from posefit.posterior.calibration import Recalibration
-from posefit.posterior.modes import Posterior
-from posefit.posterior.sides import nearer_mirrored, second_side, unknown_sides
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.sides import nearer_mirrored, second_side, unknown_sides
 
 SKELETON = average_skeleton()
 STRIDE = motion("walk-a", frames=30).poses

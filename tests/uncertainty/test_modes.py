@@ -7,8 +7,8 @@ import pytest
 
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, angle_index
 from posefit.motion.built_in import average_skeleton
-from posefit.posterior.calibration import Recalibration
-from posefit.posterior.modes import Mode, Posterior, likeliest_is_right, modes_of, other_mode, track_modes
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Mode, Posterior, likeliest_is_right, modes_of, other_mode, track_modes
 
 SKELETON = average_skeleton()
 STILL = np.zeros(ANGLES)

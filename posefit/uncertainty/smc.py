@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.posterior.kernels import covariance_within, effective, longest_step, taken, walked
-from posefit.posterior.landscape import Landscape
-from posefit.posterior.mixture import NormalMixture
+from posefit.uncertainty.kernels import covariance_within, effective, longest_step, taken, walked
+from posefit.uncertainty.landscape import Landscape
+from posefit.uncertainty.mixture import NormalMixture
 
 PARTICLES = 2048  # N, ours
 CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, MIRROR, SIDES, Skeleton
-from posefit.posterior.calibration import Recalibration
-from posefit.posterior.modes import Posterior
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
 
 _LEFT_HIP, _RIGHT_HIP = JOINTS.index("lhipjoint"), JOINTS.index("rhipjoint")
 _PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])

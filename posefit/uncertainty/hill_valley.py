@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.posterior.landscape import Landscape
+from posefit.uncertainty.landscape import Landscape
 
 
 @dataclass(frozen=True, eq=False)

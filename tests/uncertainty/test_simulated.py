@@ -10,11 +10,11 @@ from scipy.stats import chisquare
 
 from posefit.arrays import Array
 from posefit.fitting.optimiser import populations
-from posefit.posterior.landscape import Landscape
-from posefit.posterior.searches import weighed
 from posefit.registry import registry
 from posefit.searching.modes import gathered
 from posefit.testing.toy import Toy
+from posefit.uncertainty.landscape import Landscape
+from posefit.uncertainty.searches import weighed
 
 NOISE, DRAWS, TRUTHS = 0.2, 9, 400
 
