@@ -8,8 +8,7 @@ from gymnasium import error, spaces
 from posefit import Observation, SearchSpace, Task
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit.niching.instance import SIZE, niche_instance, niche_space
-from posefit.niching.scores import LEAST, LEVELS_MM, scored
+from posefit.niching import LEVELS_MM, MIN_PROBABILITY, SIZE, niche_instance, niche_space, scored
 from posefit.silhouette.cost import project
 from posefit.uncertainty.modes import Posterior
 from posefit_envs.base import SearchEnv
@@ -149,7 +148,7 @@ class Quest:
         self.pose: Array | None = None
         self.weights: list[float] = []
         self._poses: list[Array] = []
-        self.peak_ratio, self.brier, self.log_score = np.zeros(len(LEVELS_MM)), NOTHING, -float(np.log(LEAST))
+        self.peak_ratio, self.brier, self.log_score = np.zeros(len(LEVELS_MM)), NOTHING, -float(np.log(MIN_PROBABILITY))
 
     def look(self, proposal: Array, weight: float) -> None:
         """Evaluate a proposal (d,), and report it where its weight is above 0."""

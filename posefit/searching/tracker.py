@@ -15,7 +15,7 @@ from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
 from posefit.searching.doubt import lost_at
 from posefit.searching.modes import KEPT, MakeOptimiser, further, gathered, told
 from posefit.uncertainty.modes import Posterior
-from posefit.uncertainty.searches import Searched, likelihoods
+from posefit.uncertainty.searches import Searched, boltzmann_weights
 from posefit.uncertainty.smc import systematic_rows
 
 
@@ -60,7 +60,7 @@ class WeighingTracker:
         problem = self.tracker.problem(cast(SearchSpace, record.space), record.observation)
         if how.modes == 1 and self.tracker.next_frame == "carry":
             particles, costs = record.found[-1]
-            weights = likelihoods(costs, how.posterior_temperature)
+            weights = boltzmann_weights(costs, how.posterior_temperature)
             return told(problem, *_few(particles, weights)), 0
         own = beside(rng)  # the track itself is what it is without
         first, more = gathered(record.found), round(how.modes_share * evaluations)

@@ -117,7 +117,7 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
     return np.concatenate(chosen), np.concatenate(known)
 
 
-def likelihoods(costs: Array, temperature: float) -> Array:
+def boltzmann_weights(costs: Array, temperature: float) -> Array:
     """Return weights (n,) exp(-cost / temperature), which sum to 1; all weigh alike where no cost is finite."""
     rises = np.where(np.isfinite(costs), -costs / temperature, -np.inf)
     if rises.max() == -np.inf:

@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.vector import SyncVectorEnv
 
 import posefit_envs  # noqa: F401, registers it
-from posefit.niching.instance import niche_instance
+from posefit.niching import niche_instance
 from posefit_envs.instance import ArgumentError
 
 NAME = "posefit/Modes-v0"

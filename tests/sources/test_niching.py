@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefit.niching.scores import brier_score, log_score, peak_ratio, shares
+from posefit.niching import brier_score, log_score, peak_ratio, shares
 
 DISTANCES = np.array([[10.0, 90.0, 200.0], [20.0, 80.0, 200.0], [70.0, 50.0, 200.0]])  # three reported, three known
 

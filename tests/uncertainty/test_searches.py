@@ -7,7 +7,7 @@ from posefit.arrays import Array
 from posefit.testing.toy import Toy
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.mixture import NormalMixture
-from posefit.uncertainty.searches import best_of_each, likelihoods, weighed, widths
+from posefit.uncertainty.searches import best_of_each, boltzmann_weights, weighed, widths
 from posefit.uncertainty.smc import tempered
 
 WEIGHTS = np.array([0.6, 0.3, 0.1])
@@ -109,5 +109,5 @@ def test_searches_that_met_no_finite_cost_are_refused() -> None:
 
 
 def test_likelihoods_are_exponentials_and_what_is_not_finite_weighs_nothing() -> None:
-    np.testing.assert_allclose(likelihoods(np.array([0.0, 2.0 * np.log(3.0), np.nan]), 2.0), [0.75, 0.25, 0.0])
-    np.testing.assert_allclose(likelihoods(np.array([np.inf, np.nan]), 2.0), 0.5)
+    np.testing.assert_allclose(boltzmann_weights(np.array([0.0, 2.0 * np.log(3.0), np.nan]), 2.0), [0.75, 0.25, 0.0])
+    np.testing.assert_allclose(boltzmann_weights(np.array([np.inf, np.nan]), 2.0), 0.5)
