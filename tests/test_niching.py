@@ -31,7 +31,7 @@ from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.searches import boltzmann_weights
 
 
-@pytest.mark.parametrize("number", (0, 1, 2, 10_001))
+@pytest.mark.parametrize("number", [0, 1, 2, 10_001])
 def test_known_poses_cost_nearly_the_same_are_apart_and_have_hills_between_them(number: int) -> None:
     posed, space = niche_instance(number), niche_space()
     assert posed.kind == KINDS[number % 3]

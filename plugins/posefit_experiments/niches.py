@@ -15,13 +15,24 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.optimiser import populations
 from posefit.fitting.problem import PoseProblem
-from posefit.niching.instance import APART_MM, COUNT, KINDS, NicheInstance, niche_instance
-from posefit.niching.reports import best_apart, boltzmann
-from posefit.niching.scores import LEVELS_MM, scored
-from posefit.niching.space import ARMS, held_arms, stride_poses
+from posefit.niching import (
+    APART_MM,
+    ARMS,
+    COUNT,
+    KINDS,
+    LEVELS_MM,
+    TEMPERATURE,
+    NicheInstance,
+    best_apart,
+    box_arms,
+    niche_instance,
+    scored,
+    stride_poses,
+)
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit.uncertainty.modes import Posterior, modes_of
+from posefit.uncertainty.searches import boltzmann_weights
 from posefit_experiments.grid import Progress, each
 
 KNOWN, LIBRARY = "known", "library"  # what is known itself, as a ceiling; the nearest poses of the library
@@ -90,7 +101,8 @@ def reported(posed: NicheInstance, method: str, evaluations: int, rng: np.random
     """Return what a method reports of an instance."""
     (name, count), problem = parsed(method), posed.problem
     if name == KNOWN:
-        return Posterior(posed.known, np.tile(problem.space.anchor, (len(posed.known), 1)), boltzmann(posed.costs))
+        places = np.tile(problem.space.anchor, (len(posed.known), 1))
+        return Posterior(posed.known, places, boltzmann_weights(posed.costs, TEMPERATURE))
     if name == LIBRARY:
         drawn = _library(problem, evaluations, rng)
         return best_apart(problem, drawn, problem.evaluate(drawn))
@@ -115,7 +127,7 @@ def reported(posed: NicheInstance, method: str, evaluations: int, rng: np.random
 def _library(problem: PoseProblem, count: int, rng: np.random.Generator) -> Array:
     """Return proposals (count, d): poses of the library at any yaw."""
     poses = stride_poses()[rng.integers(len(stride_poses()), size=count)].copy()
-    poses[:, ARMS] = held_arms()[rng.integers(len(held_arms()), size=count)]
+    poses[:, ARMS] = box_arms()[rng.integers(len(box_arms()), size=count)]
     poses[:, 0] = rng.uniform(-np.pi, np.pi, count)
     latents = problem.space.prior.transform(poses[:, 3:])
     return problem.space.proposals(np.column_stack([poses[:, :3], latents]))
@@ -124,7 +136,7 @@ def _library(problem: PoseProblem, count: int, rng: np.random.Generator) -> Arra
 def _particles(problem: PoseProblem, proposals: Array, costs: Array) -> Posterior:
     """Return the modes of particles."""
     poses, translations = problem.decode(proposals)
-    particles = Posterior(poses, translations, boltzmann(costs))
+    particles = Posterior(poses, translations, boltzmann_weights(costs, TEMPERATURE))
     modes = modes_of(problem.body.skeleton, particles, APART_MM / 1e3)
     return Posterior(
         np.array([mode.pose for mode in modes]),
