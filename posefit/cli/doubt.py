@@ -32,9 +32,8 @@ def ambiguity(as_json: bool, out: str | None, **given: Any) -> None:
     Every pose of the library at every yaw whose cost is nearly the least, in groups of poses that are alike; and the
     spread of them all, which no search can know better, with a second camera as well. SOURCE is as for `track`.
     """
-    from posefit.ambiguity.outputs import written_to
-    from posefit.ambiguity.run import ambiguity_of
-    from posefit.ambiguity.table import ambiguity_table, summary_of
+    from posefit.ambiguity.estimate import ambiguity_of
+    from posefit.ambiguity.output import ambiguity_table, summary_of, written_to
     from posefit.footage.source import Viewing
 
     source = given["source"] or ("walk",)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from posefit.ambiguity.build import body_of
+from posefit.ambiguity.estimate import body_of
 from posefit.cli import main
 from posefit.fitting.shape import NAMES
 from posefit.geometry.body import Body

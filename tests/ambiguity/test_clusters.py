@@ -5,10 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit.ambiguity.clusters import clusters_of, distance_mm, floor_mm, spread_mm, total
-from posefit.ambiguity.library import LibraryPoses
-from posefit.ambiguity.run import RIGHT_ANGLE, camera_about
-from posefit.ambiguity.search import Moment, States, states_within
+from posefit.ambiguity.estimate import (
+    RIGHT_ANGLE,
+    LibraryPoses,
+    Moment,
+    States,
+    camera_about,
+    clusters_of,
+    distance_mm,
+    floor_mm,
+    spread_mm,
+    states_within,
+    total,
+)
 from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera

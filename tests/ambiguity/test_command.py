@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from posefit.ambiguity.run import ambiguity_of
+from posefit.ambiguity.estimate import ambiguity_of
 from posefit.cli import main
 from posefit.footage.source import Viewing
 from posefit.geometry.body import Body
@@ -36,38 +36,38 @@ def masks(folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--frame", 60], "frame must lie in 0 to 59 of walk, got 60"),
-        (["--frame", -1], "frame must be 0 or more, got -1"),
-        (["--frame", "x"], "Invalid value for '--frame': 'x' is not a valid integer."),
-        (["--within", -0.5], "within must be 0 or more, got -0.5"),
-        (["--within", "nan"], "within must be a finite number, got nan"),
-        (["--within", "inf"], "within must be a finite number, got inf"),
-        (["--within", 1e6], "within must be so little that at most 20,000 poses and yaws are left, got 1e+06, which "),
-        (["--temperature", 0], "temperature must be above 0, got 0"),
-        (["--temperature", "nan"], "temperature must be a finite number, got nan"),
-        (["--threads", 0], "threads must be at least 1, got 0"),
-        (["--translation", "searched"], "translation must be known or aligned, got searched"),
-        (["--height", 1.8], "height must be given for footage only, got 1.8 for a motion"),
-        (["--roi", "1,2,3,4"], "roi must be given for video only, got (1, 2, 3, 4) for a motion"),
-        (["--train", "nowhere"], "motion must be a file, a folder, a recorded one"),
-        (["--train", "walk"], "train must not contain the source itself, got walk"),
-        (["--without-subject", "16"], "without_subject must be given with --train library, got walk-a"),
-        (["walk"], "source must be one motion, or views of one person, got 2 motions"),
-        (["--view-degrees", "nan"], "view_degrees must be a finite number, got nan"),
-    ],
-)
-def test_a_mistake_is_one_line_and_leaves_nothing(words: list[object], said: str, tmp_path: Path) -> None:
-    train = ("--size", "64x48") if "--train" in words else ("--train", "walk-a", "--size", "64x48")
-    if words == ["--within", 1e6]:
-        train = ("--train", "library:16", "--size", "64x48")
-    result = run("walk", *train, *words, "--out", tmp_path / "out")
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert len(result.stderr.splitlines()) == 1
-    assert result.stderr.startswith(f"posefit: {said}")
-    assert list(tmp_path.iterdir()) == []
+MISTAKES: list[tuple[list[object], str]] = [
+    (["--frame", 60], "frame must lie in 0 to 59 of walk, got 60"),
+    (["--frame", -1], "frame must be 0 or more, got -1"),
+    (["--frame", "x"], "Invalid value for '--frame': 'x' is not a valid integer."),
+    (["--within", -0.5], "within must be 0 or more, got -0.5"),
+    (["--within", "nan"], "within must be a finite number, got nan"),
+    (["--within", "inf"], "within must be a finite number, got inf"),
+    (["--within", 1e6], "within must be so little that at most 20,000 poses and yaws are left, got 1e+06, which "),
+    (["--temperature", 0], "temperature must be above 0, got 0"),
+    (["--temperature", "nan"], "temperature must be a finite number, got nan"),
+    (["--threads", 0], "threads must be at least 1, got 0"),
+    (["--translation", "searched"], "translation must be known or aligned, got searched"),
+    (["--height", 1.8], "height must be given for footage only, got 1.8 for a motion"),
+    (["--roi", "1,2,3,4"], "roi must be given for video only, got (1, 2, 3, 4) for a motion"),
+    (["--train", "nowhere"], "motion must be a file, a folder, a recorded one"),
+    (["--train", "walk"], "train must not contain the source itself, got walk"),
+    (["--without-subject", "16"], "without_subject must be given with --train library, got walk-a"),
+    (["walk"], "source must be one motion, or views of one person, got 2 motions"),
+    (["--view-degrees", "nan"], "view_degrees must be a finite number, got nan"),
+]
+
+
+def test_a_mistake_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
+    for words, message in MISTAKES:
+        train = ("--size", "64x48") if "--train" in words else ("--train", "walk-a", "--size", "64x48")
+        if words == ["--within", 1e6]:
+            train = ("--train", "library:16", "--size", "64x48")
+        result = run("walk", *train, *words, "--out", tmp_path / "out")
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert len(result.stderr.splitlines()) == 1
+        assert result.stderr.startswith(f"posefit: {message}")
+        assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_a_folder_of_both_files_is_written_and_a_short_table_printed(tmp_path: P
     result = run("walk", "--frame", 5, "--within", 3, "--out", tmp_path / "out", *QUICK)
     assert result.exit_code == 0, result.stderr
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"ambiguity.json", "ambiguity.png"}
-    assert "weight spread mm from first mm from truth mm yaw deg seen from deg  image      example" in result.stdout
+    assert "weight spread mm from first mm from truth mm yaw deg      view deg  image      example" in result.stdout
     assert "walk-a frame " in result.stdout
     assert "by two cameras, the second at right angles: " in result.stdout
     picture = cv2.imread(str(tmp_path / "out" / "ambiguity.png"))
@@ -154,7 +154,7 @@ def test_json_says_everything_and_weights_sum_to_one() -> None:
     assert result.exit_code == 0, result.stderr
     summary = json.loads(result.stdout)
     assert sum(one["weight"] for one in summary["modes"]) == pytest.approx(1.0)
-    assert sum(one["poses"] for one in summary["modes"]) == summary["alike"] == summary["floor"][0]["alike"]
+    assert sum(one["poses"] for one in summary["modes"]) == summary["similar"] == summary["floor"][0]["similar"]
     assert summary["modes"][0]["away_mm"] == 0.0
     assert summary["modes"][0]["clip"] == "walk-a"
     assert [one["views"] for one in summary["floor"]] == ["one camera", "two cameras, the second at right angles"]

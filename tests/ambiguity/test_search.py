@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit.ambiguity.library import LibraryPoses, spaced_frames
-from posefit.ambiguity.search import YAWS, Moment, States, states_within, turned_to
+from posefit.ambiguity.estimate import YAWS, LibraryPoses, Moment, States, spaced_frames, states_within, turned_to
 from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera

@@ -1,0 +1,243 @@
+"""The results of `posefit ambiguity`: the printed table, the JSON summary and the picture."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+
+from posefit.ambiguity.estimate import YAWS, Ambiguity, Floor, PoseCluster
+from posefit.files import new_folder
+from posefit.geometry.alike import facing
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import JOINTS, kind
+from posefit.silhouette.foreground import Image
+from posefit.silhouette.mask import Silhouette
+from posefit.tracking.drawing.body import draw_body, side_view
+from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, write
+from posefit.tracking.picture import SOLID
+from posefit.version import __version__
+
+MIN_POSES = 10  # the spread of fewer depends more on the library than on the silhouette
+MAX_LINES = 8  # clusters printed one a line
+WIDEST = 3  # joints named
+
+
+def summary_of(result: Ambiguity) -> dict[str, Any]:
+    """Return everything as `--json` prints it: weights, millimetres and degrees."""
+    return {
+        "source": result.scene.name,
+        "frame": result.frame,
+        "within": result.within,
+        "temperature": result.temperature,
+        "translation": "known" if result.moment.known else "aligned",
+        "views": len(result.moment.cameras),
+        "library": {"clips": len(result.library.names), "poses": len(result.library), "yaws": YAWS},
+        "similar": len(result.states),
+        "least_cost": float(result.states.costs.min()),
+        "modes": [_mode(result, k) for k in range(len(result.clusters))],
+        "floor": [
+            {
+                "views": floor.views,
+                "similar": floor.count,
+                "least_cost": floor.least,
+                "spread_mm": floor.spread_mm,
+                "joints_mm": dict(zip(JOINTS, floor.joints_mm.tolist(), strict=True)),
+            }
+            for floor in result.floors
+        ],
+        "seconds": result.seconds,
+        "warnings": list(result.scene.warnings),
+        "version": __version__,
+    }
+
+
+def ambiguity_table(result: Ambiguity) -> str:
+    """Return the lines that `posefit ambiguity` prints."""
+    count, similar = len(result.library), len(result.states)
+    lines = [
+        f"{result.scene.name}, frame {result.frame}: {count:,} poses of the library at {YAWS} yaws, compared in "
+        f"{result.seconds:.1f} s",
+        f"{similar:,} cost at most {result.within:g} more than the least, {result.states.costs.min():.2f}, in "
+        f"{len(result.clusters)} {'mode' if len(result.clusters) == 1 else 'modes'}",
+    ]
+    known = result.truth_mm is not None
+    lines.append(
+        f"{'weight':>6} {'spread mm':>9} {'from first mm':>13} "
+        + (f"{'from truth mm':>13} " if known else "")
+        + f"{'yaw deg':>7} {'view deg':>13}  {'image':9}  example"
+    )
+    for k in range(min(MAX_LINES, len(result.clusters))):
+        one = _mode(result, k)
+        clip = f"{one['clip']} frame {one['clip_frame']}{', mirrored' if one['clip_mirrored'] else ''}"
+        lines.append(
+            f"{one['weight']:6.2f} {one['spread_mm']:9.0f} {one['away_mm']:13.0f} "
+            + (f"{one['truth_mm']:13.0f} " if known else "")
+            + f"{one['yaw_degrees']:7.0f} {one['view_degrees']:13.0f}  {one['image'] or '-':9}  {clip}"
+        )
+    if more := result.clusters[MAX_LINES:]:
+        lines.append(f"{sum(one.weight for one in more):6.2f} in {len(more)} more")
+    lines.append("spread of poses that cannot be distinguished, mm:")
+    for floor in result.floors:
+        lines.append(f"{floor.spread_mm:6.0f}  by {floor.views}: {_widest(floor.joints_mm)}; {floor.count:,} poses")
+    if min(floor.count for floor in result.floors) < MIN_POSES:
+        lines.append(
+            f"fewer than {MIN_POSES} poses depend more on the library than on the silhouette: try a larger --within"
+        )
+    return "\n".join(lines)
+
+
+def by_kind(joints_mm: Any) -> dict[str, float]:
+    """Return the spreads (27,) of joints without their sides: the root mean square of left and right."""
+    squares: dict[str, list[float]] = {}
+    for name, value in zip(JOINTS[1:], joints_mm[1:], strict=True):
+        squares.setdefault(kind(name), []).append(float(value) ** 2)
+    return {name: float(np.sqrt(np.mean(values))) for name, values in squares.items()}
+
+
+def _widest(joints_mm: Any) -> str:
+    spreads = by_kind(joints_mm)
+    names = sorted(spreads, key=lambda name: -spreads[name])[:WIDEST]
+    return ", ".join(f"{name} {spreads[name]:.0f}" for name in names)
+
+
+def _mode(result: Ambiguity, k: int) -> dict[str, Any]:
+    """Return the summary of a cluster."""
+    one: PoseCluster = result.clusters[k]
+    row, yaw = int(result.states.rows[one.best]), float(result.states.poses[one.best, 0])
+    towards = facing(result.moment.cameras[0], result.states.translations[one.best])
+    library = result.library
+    return {
+        "weight": one.weight,
+        "poses": len(one.members),
+        "spread_mm": one.spread_mm,
+        "away_mm": one.away_mm,
+        **({} if result.truth_mm is None else {"truth_mm": result.truth_mm[k]}),
+        "yaw_degrees": float(np.degrees(yaw)),
+        "view_degrees": float(np.degrees(wrapped(np.array(towards - yaw)))),
+        "image": one.image or None,
+        "cost": float(result.states.costs[one.best]),
+        "clip": library.names[library.clips[row]],
+        "clip_frame": int(library.frames[row]),
+        "clip_mirrored": library.is_mirrored(row),
+    }
+
+
+MAX_COLUMNS = 5  # clusters drawn
+MIN_COLUMNS = 3  # so that the text fits
+WIDTH, HEIGHT, BAND = 260, 320, 62  # pixels of a view, and of the text above the first
+MARGIN = 1.15  # the view is this much larger than the silhouette's box
+GREY = (120, 112, 108)  # the silhouette
+BARS = (BOTH, SPILLED, MISSED, (205, 205, 205), (225, 165, 85))  # one a floor, then the first again
+TITLE, LINE, LEGEND = 34, 20, 22  # pixels high
+LABEL, FIGURE = 110, 38  # pixels wide
+NUMBERED = 4  # floors whose numbers are written beside their bars
+
+
+def picture_of(result: Ambiguity) -> Image:
+    """Return the picture (height, width, 3)."""
+    shown = result.clusters[:MAX_COLUMNS]
+    camera, silhouette = nearer(result.moment.cameras[0], result.moment.silhouettes[0])
+    columns = [_column(result, k, camera, silhouette) for k in range(len(shown))]
+    columns += [_blank(len(columns[0]), WIDTH)] * (MIN_COLUMNS - len(columns))
+    bodies = np.hstack(columns)
+    title = _blank(TITLE, bodies.shape[1])
+    heading = (
+        f"{result.scene.name}, frame {result.frame}: {len(result.states):,} poses within {result.within:g} of the least"
+    )
+    rest = len(result.clusters) - len(shown)
+    write(title, f"{heading}, {rest} more modes" if rest else heading, (12, 23))
+    return np.vstack([title, bodies, floors_of(result.floors, bodies.shape[1])])
+
+
+def nearer(camera: Camera, silhouette: Silhouette) -> tuple[Camera, Image]:
+    """Return the camera cropped to the person, and the silhouette as it shows it (height, width)."""
+    left, top, wide, high = cv2.boundingRect(silhouette.mask.astype(np.uint8))
+    middle = np.array([left + 0.5 * wide, top + 0.5 * high])
+    zoom = min(WIDTH / wide, HEIGHT / high) / MARGIN
+    shift = np.array([WIDTH, HEIGHT]) / 2.0 - zoom * middle
+    near = replace(camera, width=WIDTH, height=HEIGHT, focal=camera.focal * zoom, centre=camera.centre * zoom + shift)
+    # pixel centres are at +0.5 here, and at whole numbers in OpenCV
+    matrix = np.column_stack([zoom * np.eye(2), shift + 0.5 * zoom - 0.5])
+    crop = cv2.warpAffine(silhouette.mask.astype(np.uint8), matrix, (WIDTH, HEIGHT), flags=cv2.INTER_NEAREST)
+    return near, np.asarray(crop, np.uint8)
+
+
+def _column(result: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Image:
+    """Return the column of a cluster: text, body before the silhouette, body from the side."""
+    one = result.clusters[k]
+    body, pose, place = result.moment.body, result.states.poses[one.best], result.states.translations[one.best]
+    head = _blank(BAND, WIDTH)
+    write(head, f"{one.weight:.2f}", (12, 26), scale=0.75)
+    write(head, one.image or ("first" if k == 0 else ""), (90, 26))
+    away = f", {one.away_mm:.0f} from first" if k else ""
+    write(head, f"spread {one.spread_mm:.0f} mm{away}", (12, 50), scale=0.42)
+    front = _blank(HEIGHT, WIDTH)
+    front[silhouette > 0] = GREY
+    drawn = front.copy()
+    draw_body(drawn, body, camera, pose, place)
+    front = np.asarray(cv2.addWeighted(drawn, SOLID, front, 1.0 - SOLID, 0.0), np.uint8)
+    edges, _ = cv2.findContours(silhouette, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(front, edges, -1, TEXT, 1, cv2.LINE_AA)
+    side = side_view(body, result.moment.cameras[0], pose, place, WIDTH)
+    write(front, "from the camera", (8, HEIGHT - 10), scale=0.4)
+    write(side, "from its right", (8, WIDTH - 10), scale=0.4)
+    column = np.vstack([head, front, side])
+    column[:, -1] = GREY
+    return column
+
+
+def floors_of(floors: Sequence[Floor], width: int) -> Image:
+    """Return bars of each joint's spread, one a set of cameras (height, width, 3)."""
+    spreads = [by_kind(floor.joints_mm) for floor in floors]
+    names, shown = list(spreads[0]), min(len(floors), NUMBERED)
+    longest = width - LABEL - FIGURE * shown - 20
+    bar = max(LINE // len(floors) - 1, 3)
+    row = len(floors) * bar + 5
+    image = _blank(LEGEND * (len(floors) + 1) + 20 + row * len(names), width)
+    write(image, "spread of what cannot be told apart, mm", (12, 20))
+    for k, floor in enumerate(floors):
+        told = f"{floor.spread_mm:.0f}  by {floor.views}, {floor.count:,} poses"
+        write(image, told, (12, 20 + LEGEND * (k + 1)), BARS[k % len(BARS)])
+    top = LEGEND * (len(floors) + 1) + 10
+    most = max(max(max(one.values()) for one in spreads), 1e-9)
+    for n, name in enumerate(names):
+        y = top + n * row
+        write(image, name, (12, y + row - 6), scale=0.4)
+        for k, one in enumerate(spreads):
+            end = LABEL + round(longest * one[name] / most)
+            cv2.rectangle(image, (LABEL, y + k * bar), (end, y + (k + 1) * bar - 2), BARS[k % len(BARS)], -1)
+            if k < NUMBERED:
+                write(image, f"{one[name]:4.0f}", (width - FIGURE * (shown - k) - 6, y + row - 6), scale=0.4)
+    return image
+
+
+def _blank(height: int, width: int) -> Image:
+    return np.full((height, width, 3), BACKGROUND, dtype=np.uint8)
+
+
+FILES = ("ambiguity.json", "ambiguity.png")
+
+
+@contextmanager
+def written_to(path: str | None) -> Iterator[Callable[[Ambiguity], None]]:
+    """Give a function that writes a result to the new folder `path`; without one, it writes nothing.
+
+    Raises ValueError where `path` exists or cannot be written.
+    """
+    if path is None:
+        yield lambda _result: None
+        return
+    with new_folder(path) as folder:
+
+        def save(result: Ambiguity) -> None:
+            text, picture = FILES
+            (folder / text).write_text(json.dumps(summary_of(result), indent=1) + "\n", encoding="utf-8")
+            if not cv2.imwrite(str(folder / picture), picture_of(result)):
+                raise OSError(f"no room for {picture}")
+
+        yield save
