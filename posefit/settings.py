@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
 HEADING = "Settings:"  # of a docstring's list of them
 _ENTRY = re.compile(r"(?P<name>[A-Za-z_]\w*)(?: \((?P<symbol>[^()]*)\))?: (?P<meaning>.*)")
-PARTICLES = 40  # a population where nobody says: N of the SAPSO paper, section 5.2
+POPULATION_SIZE = 40  # where none is chosen: N of the SAPSO paper, section 5.2
 
 
 @dataclass(frozen=True)
@@ -85,21 +85,21 @@ def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) ->
 
 
 def planned(
-    factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int, particles: int | None = None
+    factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int, population_size: int | None = None
 ) -> dict[str, Any]:
     """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
 
-    That is `evaluations` itself; `particles`, where somebody chose their number; and `iterations`, the populations
-    after the first. What is given stays as it is.
+    These are `evaluations` itself, `population_size` where one was chosen, and `iterations`, the populations after the
+    first. What is given stays as it is.
     """
     known = {setting.name: setting.default for setting in settings_of(factory)}
     filled = dict(given)
-    if particles is not None and "particles" in known:
-        filled.setdefault("particles", particles)
+    if population_size is not None and "population_size" in known:
+        filled.setdefault("population_size", population_size)
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)
     if "iterations" in known:
-        size = filled.get("particles", known.get("particles", PARTICLES))
+        size = filled.get("population_size", known.get("population_size", POPULATION_SIZE))
         if isinstance(size, int) and size > 0:
             filled.setdefault("iterations", max(1, evaluations // size - 1))
     return filled
@@ -108,8 +108,8 @@ def planned(
 def population(factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int) -> int:
     """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
     known = {setting.name: setting.default for setting in settings_of(factory)}
-    size = planned(factory, given, evaluations).get("particles", known.get("particles", 1))
-    return size if isinstance(size, int) else 1
+    size = planned(factory, given, evaluations).get("population_size", known.get("population_size", 1))
+    return size if isinstance(size, int) and size > 0 else 1
 
 
 def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) -> dict[str, Any]:
@@ -129,7 +129,7 @@ def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) ->
 
 
 def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) -> dict[str, Any]:
-    """Return settings that texts such as `particles=20` give; the plugin's name and a dot may stand before.
+    """Return settings that texts such as `population_size=20` give; the plugin's name and a dot may stand before.
 
     Raises ValueError where a text has another form, or `parse` does.
     """
@@ -137,7 +137,7 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
     for text in texts:
         setting, equals, value = text.partition("=")
         if not equals:
-            raise ValueError(f"--set must be SETTING=VALUE such as particles=20, got {text!r}")
+            raise ValueError(f"--set must be SETTING=VALUE such as population_size=20, got {text!r}")
         given[setting.rpartition(".")[2]] = value
     return parse(plugin, factory, given)
 

@@ -17,7 +17,7 @@ from posefit_envs.instance import Arguments, World, approved, select
 from posefit_envs.scales import scaled
 from posefit_swarm.flock import Flock, speed_limits
 
-PARTICLES, ITERATIONS = 40, 60
+POPULATION_SIZE, ITERATIONS = 40, 60
 ACCELERATION, ALPHA, REDRAWS = 2.0, 0.15, 20  # as SAPSO's, but for fewer redraws
 FIRST = 1.0  # the temperature at which a first population is settled, where nothing is refused
 INERTIA = (0.0, 1.2)  # what the first number of an action stands for
@@ -62,7 +62,7 @@ class ConfigureEnv(SearchEnv["SteeredSwarm"]):
     By how much the best cost fell in this iteration, 0 to 100.
 
     ## Starting State
-    A first population of `particles`, drawn uniformly and evaluated; the instance as in `Fit-v0`.
+    A first population of `population_size`, drawn uniformly and evaluated; the instance as in `Fit-v0`.
 
     ## Episode End
     Terminates after `iterations` iterations. It is never truncated.
@@ -72,7 +72,7 @@ class ConfigureEnv(SearchEnv["SteeredSwarm"]):
     truth; a reset too.
 
     ## Arguments
-    As in `Fit-v0`, with `particles=40` and `iterations=60` instead of `target_cost` and `max_evaluations`.
+    As in `Fit-v0`, with `population_size=40` and `iterations=60` instead of `target_cost` and `max_evaluations`.
 
     ## Version History
     - v0: first version. Before its release its instances changed: number n is now the motion, speed, phase and view of
@@ -83,20 +83,22 @@ class ConfigureEnv(SearchEnv["SteeredSwarm"]):
     def __init__(
         self,
         *,
-        particles: int = PARTICLES,
+        population_size: int = POPULATION_SIZE,
         iterations: int = ITERATIONS,
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        check_swarm(particles, iterations)
+        check_swarm(population_size, iterations)
         super().__init__(select(**arguments), spaces_of_swarm(), render_mode)
-        self._particles, self._iterations = int(particles), int(iterations)
+        self._population_size, self._iterations = int(population_size), int(iterations)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[State, dict[str, Any]]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        search = self._search = SteeredSwarm(self.world, number, self.np_random, self._particles, self._iterations)
+        search = self._search = SteeredSwarm(
+            self.world, number, self.np_random, self._population_size, self._iterations
+        )
         search.settle(search.problem.evaluate(search.flock.moved), FIRST)
         self._show()
         return standings([search]).states[0], self._info(search)
@@ -131,12 +133,14 @@ class SteeredSwarm:
     """A swarm in the middle of its search: whoever holds it has its moves evaluated, and settles them."""
 
     def __init__(
-        self, world: World, number: int, generator: np.random.Generator, particles: int, iterations: int
+        self, world: World, number: int, generator: np.random.Generator, population_size: int, iterations: int
     ) -> None:
-        self.episode = Episode(world, number, particles * (iterations + 1))
+        self.episode = Episode(world, number, population_size * (iterations + 1))
         self.rng = np.random.default_rng(int(generator.integers(2**63)))
         space = self.space = self.episode.space
-        self.flock = Flock(space, self.rng, particles, speed_limits(space, ALPHA, "symmetric"), REDRAWS, "dimension")
+        self.flock = Flock(
+            space, self.rng, population_size, speed_limits(space, ALPHA, "symmetric"), REDRAWS, "dimension"
+        )
         self.left, self.used, self._iterations = iterations, 0, iterations
 
     def portrait(self) -> Picture:
@@ -222,7 +226,7 @@ def spaces_of_swarm() -> tuple[spaces.Box, spaces.Box]:
     return spaces.Box(-1.0, 1.0, (3,), np.float32), spaces.Box(0.0, 1.0, (8,), np.float32)
 
 
-def check_swarm(particles: int, iterations: int) -> None:
+def check_swarm(population_size: int, iterations: int) -> None:
     """Return nothing. Raises ArgumentError where a number makes no sense."""
-    for name, value in (("particles", particles), ("iterations", iterations)):
+    for name, value in (("population_size", population_size), ("iterations", iterations)):
         approved(whole, name, value, 2)

@@ -28,7 +28,7 @@ class CMAES:
     mean until it keeps it; the strategy learns from where it was moved to.
 
     Settings:
-        population (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen 2016.
+        population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen 2016.
         spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
         growth: a restart's population is so many times as large, 1 or more. Auger and Hansen 2005.
         redraws: of a proposal that breaks a constraint before it is moved, 0 or more. Ours.
@@ -40,21 +40,21 @@ class CMAES:
         space: Space,
         rng: np.random.Generator,
         *,
-        population: int = 0,
+        population_size: int = 0,
         spread: float = SPREAD,
         growth: int = GROWTH,
         redraws: int = ATTEMPTS,
         lag: float = LAG,
     ) -> None:
-        if population != 0:
-            at_least("population", population, 5)
+        if population_size != 0:
+            at_least("population_size", population_size, 5)
         positive("spread", spread)
         at_least("growth", growth, 1)
         at_least("redraws", redraws, 0)
         at_least("lag", lag, 0.0)
         self._space, self._rng, self._spread, self._growth = space, rng, spread, growth
         self._redraws, self._lag = redraws, lag
-        self._population = max(population or usual_population(space.dimensions), 5)
+        self._population_size = max(population_size or usual_population(space.dimensions), 5)
         self._asked: Array | None = None
         anywhere = np.full(space.dimensions, spread)
         self._strategy = self._begun(anywhere if space.start is None else space.start.spread)
@@ -62,7 +62,7 @@ class CMAES:
     def ask(self) -> Array:
         """Return the next population (n, d)."""
         if self._asked is None:
-            asked = self._space.wrap(self._strategy.sample(self._rng, self._population))
+            asked = self._space.wrap(self._strategy.sample(self._rng, self._population_size))
             broken = np.flatnonzero(~self._space.feasible(asked))
             if len(broken) and self._redraws:
                 broken = self._redraw(asked, broken)
@@ -83,15 +83,15 @@ class CMAES:
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Adapt mean, step size and covariance, and restart where the search has come to an end."""
-        if len(proposals) != self._population:
-            raise ValueError(f"tell must get a population of {self._population}, got {len(proposals)}")
+        if len(proposals) != self._population_size:
+            raise ValueError(f"tell must get a population of {self._population_size}, got {len(proposals)}")
         known, mean = bearable(costs), self._strategy.mean
         # the mean goes on past the end of a circle, and so must what it learns from
         round_trip = self._space.periodic.any()
         self._strategy.learn(mean + self._space.towards(mean, proposals) if round_trip else proposals, known)
         self._home, self._asked = proposals[known.argmin()].copy(), None
         if self._strategy.ended():
-            self._population *= self._growth  # AUGER2005 (restart)
+            self._population_size *= self._growth  # AUGER2005 (restart)
             self._strategy = self._begun(np.full(self._space.dimensions, self._spread))
 
     def _begun(self, spread: Array) -> Strategy:
@@ -100,4 +100,4 @@ class CMAES:
         self._home = self._space.draw(self._rng, 1)[0]
         if start is not None and self._space.feasible(start.mean[None])[0]:
             self._home = start.mean.copy()
-        return Strategy(self._home, spread, self._population, lag=self._lag)
+        return Strategy(self._home, spread, self._population_size, lag=self._lag)

@@ -25,23 +25,23 @@ VARIANTS = ("TPESampler", "CmaEsSampler", "GPSampler", "NSGAIISampler", "QMCSamp
 
 
 def optuna(
-    space: Space, rng: np.random.Generator, *, variant: Variant = "NSGAIISampler", particles: int = 10
+    space: Space, rng: np.random.Generator, *, variant: Variant = "NSGAIISampler", population_size: int = 10
 ) -> Bridged:
-    """A study of Optuna with that sampler, asked for so many `particles` at a time; the first come from the start.
+    """A study of Optuna with that sampler, asked for `population_size` proposals at a time, at first from the start.
 
     NSGAIISampler is quick enough for thousands of proposals; TPESampler and GPSampler take milliseconds each, and more
     with every one before.
 
     Settings:
         variant: a sampler of `optuna.samplers`; `optuna:SAMPLER` sets it.
-        particles: proposals asked for at a time, 1 or more.
+        population_size: proposals asked for at a time, 1 or more.
     """
-    at_least("particles", particles, 1)
+    at_least("population_size", population_size, 1)
     one_of("variant", variant, VARIANTS)
-    return Bridged(space, rng, partial(_run, variant, particles))
+    return Bridged(space, rng, partial(_run, variant, population_size))
 
 
-def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+def _run(variant: str, population_size: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
@@ -50,10 +50,10 @@ def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, o
     names = [f"x{k:03}" for k in range(space.dimensions)]
     box: dict[str, optuna.distributions.BaseDistribution]
     box = {name: optuna.distributions.FloatDistribution(-1.0, 1.0) for name in names}
-    for proposal in space.draw(rng, particles).tolist():
+    for proposal in space.draw(rng, population_size).tolist():
         study.enqueue_trial(dict(zip(names, proposal, strict=True)))
     while True:
-        trials = [study.ask(box) for _ in range(particles)]
+        trials = [study.ask(box) for _ in range(population_size)]
         costs = objective(np.array([[trial.params[name] for name in names] for trial in trials]))
         for trial, cost in zip(trials, costs.tolist(), strict=True):
             study.tell(trial, cost)

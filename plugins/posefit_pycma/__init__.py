@@ -19,28 +19,30 @@ from posefit.fitting.check import at_least, positive
 from posefit.hooks import RegisterOptimiser
 
 
-def pycma(space: Space, rng: np.random.Generator, *, population: int = 0, spread: float = 0.5) -> Bridged:
-    """pycma's evolution strategy with its own handling of the box; `population` of 0 is its own choice.
+def pycma(space: Space, rng: np.random.Generator, *, population_size: int = 0, spread: float = 0.5) -> Bridged:
+    """pycma's evolution strategy with its own handling of the box; `population_size` of 0 is its own choice.
 
     It starts around the prediction with its spread, or anywhere with `spread`, and again where it has stopped.
 
     Settings:
-        population (lambda): 5 or more, or 0 for the library's own choice.
+        population_size (lambda): 5 or more, or 0 for the library's own choice.
         spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
     """
-    if population != 0:
-        at_least("population", population, 5)
+    if population_size != 0:
+        at_least("population_size", population_size, 5)
     positive("spread", spread)
-    return Bridged(space, rng, partial(_evolve, population, spread))
+    return Bridged(space, rng, partial(_evolve, population_size, spread))
 
 
-def _evolve(population: int, spread: float, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+def _evolve(population_size: int, spread: float, space: Space, rng: np.random.Generator, objective: Objective) -> None:
     from cma import CMAEvolutionStrategy
 
     spare = np.zeros(1 if space.dimensions == 1 else 0)  # it cannot search a single dimension
     stds = np.full(space.dimensions, spread) if space.start is None else np.maximum(space.start.spread, 1e-6)
     stds = np.append(stds, spare + spread)
-    options = {"bounds": [-1, 1], "CMA_stds": stds, "verbose": -9} | ({"popsize": population} if population else {})
+    options = {"bounds": [-1, 1], "CMA_stds": stds, "verbose": -9} | (
+        {"popsize": population_size} if population_size else {}
+    )
     # without a seed, and with our generator, it leaves numpy's global one alone
     options |= {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
     while True:

@@ -23,19 +23,19 @@ from posefit.hooks import RegisterOptimiser
 Variant = Literal["DE", "PSO", "GA", "ES", "SRES", "ISRES"]
 
 
-def pymoo(space: Space, rng: np.random.Generator, *, variant: Variant = "DE", particles: int = 40) -> Bridged:
-    """An algorithm of pymoo, with so many `particles` drawn from the start.
+def pymoo(space: Space, rng: np.random.Generator, *, variant: Variant = "DE", population_size: int = 40) -> Bridged:
+    """An algorithm of pymoo, whose first population is drawn from the start.
 
     Settings:
         variant: a single-objective algorithm with a population; `pymoo:NAME` sets it.
-        particles: size of its population, 5 or more.
+        population_size: size of its population, 5 or more.
     """
-    at_least("particles", particles, 5)
+    at_least("population_size", population_size, 5)
     one_of("variant", variant, ("DE", "PSO", "GA", "ES", "SRES", "ISRES"))
-    return Bridged(space, rng, partial(_run, variant, particles))
+    return Bridged(space, rng, partial(_run, variant, population_size))
 
 
-def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+def _run(variant: str, population_size: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
     from pymoo.config import Config
     from pymoo.core.problem import Problem
     from pymoo.core.termination import NoTermination
@@ -43,7 +43,7 @@ def _run(variant: str, particles: int, space: Space, rng: np.random.Generator, o
 
     Config.warnings["not_compiled"] = False
     kind = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{variant.lower()}"), variant)
-    algorithm = kind(pop_size=particles, sampling=space.draw(rng, particles))
+    algorithm = kind(pop_size=population_size, sampling=space.draw(rng, population_size))
     problem = Problem(n_var=space.dimensions, n_obj=1, xl=-1.0, xu=1.0)
     algorithm.setup(problem, termination=NoTermination(), seed=int(rng.integers(2**31)))
     while True:

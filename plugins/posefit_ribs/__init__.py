@@ -33,7 +33,7 @@ class Ribs:
     are the proposals of the archive that are better than all their neighbours.
 
     Settings:
-        particles: proposals at a time, those of all strategies together, 4 or more.
+        population_size: proposals at a time, those of all strategies together, 4 or more.
         strategies: that search at a time, 1 or more, with at least 4 proposals each.
         capacity: proposals that the archive holds, 2 or more.
         neighbours: better ones whose distance counts, and neighbours that a mode is better than, 1 or more.
@@ -46,7 +46,7 @@ class Ribs:
         space: Space,
         rng: np.random.Generator,
         *,
-        particles: int = 24,
+        population_size: int = 24,
         strategies: int = 2,
         capacity: int = 100,
         neighbours: int = 1,
@@ -56,13 +56,13 @@ class Ribs:
         from ribs.archives import DNSArchive
         from ribs.emitters import EvolutionStrategyEmitter
 
-        at_least("particles", particles, LEAST)
+        at_least("population_size", population_size, LEAST)
         at_least("strategies", strategies, 1)
         at_least("capacity", capacity, 2)
         at_least("neighbours", neighbours, 1)
         at_least("populations", populations, 1)
         positive("step", step)
-        self._first, self._asked = space.draw(rng, particles), False
+        self._first, self._asked = space.draw(rng, population_size), False
         self._space, self._home, self._neighbours = space, self._first[0], neighbours
         self._archive: Any = DNSArchive(
             solution_dim=space.dimensions,
@@ -73,7 +73,7 @@ class Ribs:
         )
         if space.start is not None:
             step = min(step, max(float(np.mean(space.start.spread)), 1e-6))
-        strategies = min(strategies, particles // LEAST)
+        strategies = min(strategies, population_size // LEAST)
         self._strategies: list[Any] = [
             EvolutionStrategyEmitter(
                 self._archive,
@@ -82,7 +82,7 @@ class Ribs:
                 ranker="obj",
                 selection_rule="mu",
                 restart_rule=populations,
-                batch_size=particles // strategies + (k < particles % strategies),
+                batch_size=population_size // strategies + (k < population_size % strategies),
                 seed=int(rng.integers(2**31)),
             )
             for k in range(strategies)

@@ -24,7 +24,7 @@ Variant = Literal["differential_evolution", "dual_annealing"]
 
 
 def scipy(
-    space: Space, rng: np.random.Generator, *, variant: Variant = "differential_evolution", particles: int = 40
+    space: Space, rng: np.random.Generator, *, variant: Variant = "differential_evolution", population_size: int = 40
 ) -> Bridged:
     """SciPy's differential evolution, or its dual annealing, which proposes one at a time.
 
@@ -32,14 +32,14 @@ def scipy(
 
     Settings:
         variant: "differential_evolution" or "dual_annealing"; `scipy:NAME` sets it.
-        particles: size of differential evolution's population, 5 or more; dual annealing has none.
+        population_size: size of differential evolution's population, 5 or more; dual annealing has none.
     """
-    at_least("particles", particles, 5)
+    at_least("population_size", population_size, 5)
     one_of("variant", variant, ("differential_evolution", "dual_annealing"))
-    return Bridged(space, rng, partial(_evolve, particles) if variant == "differential_evolution" else _anneal)
+    return Bridged(space, rng, partial(_evolve, population_size) if variant == "differential_evolution" else _anneal)
 
 
-def _evolve(particles: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
+def _evolve(population_size: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
     from scipy.optimize import differential_evolution
 
     box: Any = [(-1.0, 1.0)] * space.dimensions
@@ -49,7 +49,7 @@ def _evolve(particles: int, space: Space, rng: np.random.Generator, objective: O
         return objective(proposals.T)
 
     while True:
-        first: Any = space.draw(rng, particles)
+        first: Any = space.draw(rng, population_size)
         differential_evolution(columns, box, init=first, rng=rng, **settings)
 
 

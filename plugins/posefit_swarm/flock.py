@@ -40,7 +40,7 @@ class Flock:
         self,
         space: Space,
         rng: np.random.Generator,
-        particles: int,
+        population_size: int,
         limits: tuple[Array, Array],
         redraws: int,
         rand: Literal["dimension", "scalar"],
@@ -49,13 +49,13 @@ class Flock:
         self._redraws, self._scalar = redraws, rand == "scalar"
         self._apart = 0 if self._scalar else redraws  # of a coordinate by itself
         self._spare, self._used = np.empty(0), 0  # numbers for those
-        self._everyone = np.arange(particles)
-        self.moved = space.draw(rng, particles)
+        self._everyone = np.arange(population_size)
+        self.moved = space.draw(rng, population_size)
         self.velocity = self._first_velocities()
-        self.position, self.cost = self.moved.copy(), np.full(particles, np.inf)
-        self.best, self.best_cost = self.moved.copy(), np.full(particles, np.inf)
+        self.position, self.cost = self.moved.copy(), np.full(population_size, np.inf)
+        self.best, self.best_cost = self.moved.copy(), np.full(population_size, np.inf)
         # room for the next velocities, and for who was stopped at the border
-        self._flown, self._stuck = np.empty_like(self.moved), np.zeros(particles, dtype=bool)
+        self._flown, self._stuck = np.empty_like(self.moved), np.zeros(population_size, dtype=bool)
 
     def settle(
         self, proposals: Array, costs: Array, temperature: float, kept: float = 1.0

@@ -15,7 +15,7 @@ from posefit.fitting.check import at_least, one_of, positive
 from posefit_swarm.flock import Flock, speed_limits
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, inertia
 
-PARTICLES = 40
+POPULATION_SIZE = 40
 ITERATIONS = 60
 PHI = 4.1  # Clerc and Kennedy's usual sum of the two accelerations; chi is then 0.7298
 ALWAYS = math.inf  # a temperature at which every move is accepted
@@ -32,7 +32,7 @@ class PSO:
     Velocities are limited, and a particle that breaks a constraint is redrawn, as in the SAPSO paper.
 
     Settings:
-        particles (N): size of the swarm, 1 or more.
+        population_size (N): size of the swarm, 1 or more.
         iterations (C): over which an "inertia" falls, 1 or more.
         velocity: "constricted" by chi; or with an "inertia" that falls as SAPSO's does; or the "original", all kept.
         phi (phi): sum of both accelerations where velocities are constricted, above 4. Clerc and Kennedy 2002.
@@ -47,7 +47,7 @@ class PSO:
         space: Space,
         rng: np.random.Generator,
         *,
-        particles: int = PARTICLES,
+        population_size: int = POPULATION_SIZE,
         iterations: int = ITERATIONS,
         velocity: Literal["constricted", "inertia", "original"] = "constricted",
         phi: float = PHI,
@@ -56,7 +56,7 @@ class PSO:
         alpha: float = ALPHA,
         redraws: int = REDRAWS,
     ) -> None:
-        at_least("particles", particles, 1)
+        at_least("population_size", population_size, 1)
         at_least("iterations", iterations, 1)
         one_of("velocity", velocity, ("constricted", "inertia", "original"))
         if not phi > 4.0:
@@ -70,7 +70,7 @@ class PSO:
         self._inertia, self._acceleration = inertia, acceleration
         self._iteration, self._iterations = 0, iterations
         limits = speed_limits(space, alpha, "symmetric")
-        self._flock = Flock(space, rng, particles, limits, redraws, "dimension")
+        self._flock = Flock(space, rng, population_size, limits, redraws, "dimension")
 
     def ask(self) -> Array:
         """Return the particles (n, d) after their move."""

@@ -11,18 +11,18 @@ class Random:
     """Draws every population uniformly from the feasible part of the box, whatever was found before.
 
     Settings:
-        particles: size of a population, 1 or more.
+        population_size: size of a population, 1 or more.
     """
 
     baseline = True  # the chance that other optimisers are held against
 
-    def __init__(self, space: Space, rng: np.random.Generator, *, particles: int = 40) -> None:
-        at_least("particles", particles, 1)
-        self._space, self._rng, self._particles = space, rng, particles
+    def __init__(self, space: Space, rng: np.random.Generator, *, population_size: int = 40) -> None:
+        at_least("population_size", population_size, 1)
+        self._space, self._rng, self._population_size = space, rng, population_size
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
-        return self._space.draw(self._rng, self._particles)
+        return self._space.draw(self._rng, self._population_size)
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Learn nothing."""

@@ -10,7 +10,7 @@ from posefit.fitting.check import at_least, between, one_of, positive
 from posefit_swarm.flock import Flock, speed_limits
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, inertia
 
-PARTICLES = 40  # N, section 5.2
+POPULATION_SIZE = 40  # N, section 5.2
 ITERATIONS = 60  # C, section 5.2
 TEMPERATURE = 1.0  # T, section 5.2
 COOLING = 0.95  # gamma, section 5.2
@@ -21,7 +21,7 @@ class SAPSO:
     """Algorithm 1 as an ask/tell optimiser. Velocities and positions are those of the unit box.
 
     Settings:
-        particles (N): size of the swarm, 1 or more. Section 5.2.
+        population_size (N): size of the swarm, 1 or more. Section 5.2.
         iterations (C): moves of the swarm, 1 or more; it is evaluated once more than that (Reading S10). Section 5.2.
         temperature (T): of the annealing at first, above 0, in units of the cost. Section 5.2.
         cooling (gamma): factor on the temperature after each iteration, 0 to 1. Section 5.2.
@@ -41,7 +41,7 @@ class SAPSO:
         space: Space,
         rng: np.random.Generator,
         *,
-        particles: int = PARTICLES,
+        population_size: int = POPULATION_SIZE,
         iterations: int = ITERATIONS,
         temperature: float = TEMPERATURE,
         cooling: float = COOLING,
@@ -55,7 +55,9 @@ class SAPSO:
         velocity_limits: Literal["symmetric", "literal"] = "symmetric",
         rejected_velocity: Literal["kept", "zeroed"] = "kept",
     ) -> None:
-        _check(particles, iterations, temperature, cooling, stop_temperature, inertia, acceleration, alpha, redraws)
+        _check(
+            population_size, iterations, temperature, cooling, stop_temperature, inertia, acceleration, alpha, redraws
+        )
         one_of("cool", cool, ("iteration", "acceptance"))
         one_of("rand", rand, ("dimension", "scalar"))
         one_of("velocity_limits", velocity_limits, ("symmetric", "literal"))
@@ -65,7 +67,7 @@ class SAPSO:
         self._cool_each, self._kept = cool == "acceptance", 1.0 if rejected_velocity == "kept" else 0.0  # Reading S11
         self._iteration, self._dimensions = 0, space.dimensions
         limits = speed_limits(space, alpha, velocity_limits)
-        self._flock = Flock(space, rng, particles, limits, redraws, rand)  # SAPSO A1.1
+        self._flock = Flock(space, rng, population_size, limits, redraws, rand)  # SAPSO A1.1
 
     def ask(self) -> Array:
         """Return the particles (n, d) after their move; none once the iterations or the temperature are used up."""
@@ -89,7 +91,7 @@ class SAPSO:
 
 
 def _check(
-    particles: int,
+    population_size: int,
     iterations: int,
     temperature: float,
     cooling: float,
@@ -99,7 +101,7 @@ def _check(
     alpha: float,
     redraws: int,
 ) -> None:
-    at_least("particles", particles, 1)
+    at_least("population_size", population_size, 1)
     at_least("iterations", iterations, 1)
     positive("temperature", temperature)
     between("cooling", cooling, 0.0, 1.0)

@@ -30,7 +30,7 @@ LEAVING = 0.5  # seconds that it has to end by itself
 
 
 def check_apart(kind: Any, name: str, settings: Sequence[str] = (), only: Sequence[str] = ()) -> Report:
-    """Return what the checks, or `only` those named, say of an installed plugin with settings such as `particles=20`.
+    """Return what the checks, or `only` those named, say of an installed plugin with settings such as `shrink=0.9`.
 
     Raises ValueError where a setting or a check is wrong, or the plugin cannot be loaded.
     """

@@ -65,7 +65,7 @@ class Choice:
             raise ValueError(f"ask_seconds must be above 0, got {self.ask_seconds}")
         if self.evaluations is not None and self.iterations is not None:
             raise ValueError("evaluations and iterations must not both be given: a budget has so many iterations")
-        return self.evaluations or (self.particles or settings.PARTICLES) * ((self.iterations or ITERATIONS) + 1)
+        return self.evaluations or (self.particles or settings.POPULATION_SIZE) * ((self.iterations or ITERATIONS) + 1)
 
 
 @dataclass(frozen=True, eq=False)

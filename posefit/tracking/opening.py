@@ -15,7 +15,7 @@ from posefit.footage.scene import Scene
 from posefit.listening import Listener
 from posefit.motion.motion import Motion
 from posefit.searching.starts import RESTARTS, STRIDE, Follow, begun, best_seen, usable
-from posefit.settings import PARTICLES
+from posefit.settings import POPULATION_SIZE
 from posefit.tracking.method import Method
 
 BODY_FRAMES = 12  # from which a build is found
@@ -139,8 +139,8 @@ def _warm_up(method: Method, task: Task, scene: Scene) -> bool:
 
     Return whether it is a tracker that looks ahead.
     """
-    particles = method.settings.get("optimiser", {}).get("particles", PARTICLES)
-    few = replace(task, evaluations=min(task.evaluations, POPULATIONS * particles))
+    population_size = method.settings.get("optimiser", {}).get("population_size", POPULATION_SIZE)
+    few = replace(task, evaluations=min(task.evaluations, POPULATIONS * population_size))
     first = next(iter(scene.observations))
     tracker = None
     with suppress(ValueError):  # what does not work with so few evaluations is told where it does not with all

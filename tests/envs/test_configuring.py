@@ -28,7 +28,9 @@ def made(**arguments: Any) -> Any:
 
 
 @pytest.mark.filterwarnings("ignore:.*pkg_resources.*:UserWarning", "ignore:.*pkg_resources.*:DeprecationWarning")
-@pytest.mark.parametrize("arguments", [{}, {"translation": "searched", "prior": "full", "particles": 9, "every": 2}])
+@pytest.mark.parametrize(
+    "arguments", [{}, {"translation": "searched", "prior": "full", "population_size": 9, "every": 2}]
+)
 def test_the_checkers_of_gymnasium_and_stable_baselines3_pass_without_a_warning(arguments: dict[str, Any]) -> None:
     check_env(made(**arguments))
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs posefit[rl]")
@@ -95,7 +97,7 @@ def test_shares_are_those_of_the_exponentials() -> None:
 
 @pytest.mark.parametrize("power", [-1.0, -0.1, 0.2, 1.0])
 def test_a_step_has_the_same_evaluations_whatever_part_of_the_population_moves(power: float) -> None:
-    env = made(particles=10, iterations=6, every=3)
+    env = made(population_size=10, iterations=6, every=3)
     env.reset(seed=0)
     action = np.zeros(10)
     action[3], action[6] = power, 0.3
@@ -104,7 +106,7 @@ def test_a_step_has_the_same_evaluations_whatever_part_of_the_population_moves(p
 
 
 def test_of_a_quarter_only_the_best_particles_move_and_more_often() -> None:
-    env = made(particles=40, every=1)
+    env = made(population_size=40, every=1)
     env.reset(seed=0)
     before = env._search.flock.best_cost.copy()
     asked = []
@@ -119,7 +121,7 @@ def test_of_a_quarter_only_the_best_particles_move_and_more_often() -> None:
 
 
 def test_all_begin_anew_and_the_best_of_all_is_kept() -> None:
-    env = made(particles=40, every=1)
+    env = made(population_size=40, every=1)
     env.reset(seed=0)
     for k in range(20):
         best = env.step(sapso_action(k, every=1))[4]["best_cost"]
@@ -129,7 +131,7 @@ def test_all_begin_anew_and_the_best_of_all_is_kept() -> None:
     assert reward == 0.0
     assert not (known[:, None] == env._search.flock.best).all(axis=2).any()
     assert env._search.flock.best_cost.min() > best
-    half = made(particles=40, every=1)
+    half = made(population_size=40, every=1)
     half.reset(seed=0)
     order = half._search.flock.best_cost.argsort()
     still = {k: half._search.flock.best_cost[k] for k in order[:20]}
@@ -141,7 +143,7 @@ def test_a_kick_goes_into_its_layer_alone() -> None:
     # without a stride, and particles that are their own best, the swarm is pulled towards the leader alone: the leader
     # stays where it is but for its kick
     for layer, columns in enumerate((slice(0, 3), slice(3, 6), slice(6, 9))):
-        env = made(particles=40, every=1)
+        env = made(population_size=40, every=1)
         env.reset(seed=0)
         mine = env._search
         leader, row = mine.leader.copy(), int(mine.flock.best_cost.argmin())
@@ -176,7 +178,7 @@ def test_shares_become_whole_numbers_of_particles(
 
     monkeypatch.setattr(herd, "differential", different)
     monkeypatch.setattr(herd, "normal", drawn)
-    env = made(particles=40, every=1)
+    env = made(population_size=40, every=1)
     env.reset(seed=0)
     env._search.follow(Order(shares))
     env._search.ask()
@@ -200,7 +202,7 @@ def test_differences_and_draws_are_those_of_their_formulas() -> None:
 
 
 def test_rewards_add_up_to_what_the_logarithm_of_the_cost_fell_by() -> None:
-    env = made(particles=12)
+    env = made(population_size=12)
     first = env.reset(seed=0)[1]["best_cost"]
     rng, total, ended = np.random.default_rng(0), 0.0, False
     while not ended:
@@ -215,7 +217,7 @@ def test_rewards_add_up_to_what_the_logarithm_of_the_cost_fell_by() -> None:
 
 
 def test_it_can_be_pickled_and_copied_in_the_middle() -> None:
-    env = made(particles=8)
+    env = made(population_size=8)
     env.reset(seed=0)
     action = np.full(10, 0.1)
     env.step(action)
@@ -227,7 +229,7 @@ def test_it_can_be_pickled_and_copied_in_the_middle() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"particles": 3}, "particles must be at least 4, got 3"),
+        ({"population_size": 3}, "population_size must be at least 4, got 3"),
         ({"iterations": 1}, "iterations must be at least 2, got 1"),
         ({"every": 0}, "every must be at least 1, got 0"),
         ({"iterations": 7, "every": 2}, "iterations must be a multiple of every 2, got 7"),

@@ -31,7 +31,7 @@ SPREAD: list[dict[str, Any]] = [
 SHORT: dict[str, dict[str, Any]] = {
     "posefit/Fit-v0": {"max_evaluations": 7},
     "posefit/Track-v0": {"frames": 3, "evaluations_per_frame": 3},
-    "posefit/Configure-v0": {"particles": 5, "iterations": 4},
+    "posefit/Configure-v0": {"population_size": 5, "iterations": 4},
 }
 
 
@@ -343,7 +343,7 @@ def test_the_third_number_of_configure_kicks_every_particle_by_its_deviation() -
     # The third number stands for 0 to 0.3 half-ranges, so -0.8 is a deviation of 0.03.
     moved = []
     for third in (-1.0, -0.8):
-        env: Any = gym.make("posefit/Configure-v0", instance=17, particles=2000, prior="full").unwrapped
+        env: Any = gym.make("posefit/Configure-v0", instance=17, population_size=2000, prior="full").unwrapped
         env.reset(seed=0)
         swarm, leader = env._search.flock, env._search.leader
         env.step(np.array([-1.0, 0.0, third]))

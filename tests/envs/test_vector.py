@@ -39,10 +39,16 @@ TRACK: list[dict[str, Any]] = [
 
 
 CONFIGURE: list[dict[str, Any]] = [
-    {"particles": 5, "iterations": 4},
-    {"particles": 7, "iterations": 6, "translation": "aligned", "view_degrees": [0.0, 70.0], "mismatch_percent": 8.0},
-    {"particles": 4, "iterations": 3, "instance": 3, "prior": "full", "translation": "searched", "errors": False},
-    {"particles": 6, "iterations": 30, "noise": {"shadow": 0.6}, "prior": "loose"},
+    {"population_size": 5, "iterations": 4},
+    {
+        "population_size": 7,
+        "iterations": 6,
+        "translation": "aligned",
+        "view_degrees": [0.0, 70.0],
+        "mismatch_percent": 8.0,
+    },
+    {"population_size": 4, "iterations": 3, "instance": 3, "prior": "full", "translation": "searched", "errors": False},
+    {"population_size": 6, "iterations": 30, "noise": {"shadow": 0.6}, "prior": "loose"},
 ]
 FIT_V1: list[dict[str, Any]] = [
     {},
@@ -50,9 +56,9 @@ FIT_V1: list[dict[str, Any]] = [
     {"max_evaluations": 4, "errors": False, "translation": "searched", "view_degrees": [0.0, 70.0]},
 ]
 CONFIGURE_V1: list[dict[str, Any]] = [
-    {"particles": 8, "iterations": 4, "every": 2},
-    {"particles": 10, "iterations": 9, "every": 3, "translation": "aligned", "mismatch_percent": 8.0},
-    {"particles": 6, "iterations": 3, "every": 1, "prior": "full", "translation": "searched", "errors": False},
+    {"population_size": 8, "iterations": 4, "every": 2},
+    {"population_size": 10, "iterations": 9, "every": 3, "translation": "aligned", "mismatch_percent": 8.0},
+    {"population_size": 6, "iterations": 3, "every": 1, "prior": "full", "translation": "searched", "errors": False},
 ]
 CASES_V1 = {"posefit/Fit-v1": FIT_V1, "posefit/Configure-v1": CONFIGURE_V1}
 CASES = {"posefit/Fit-v0": FIT, "posefit/Track-v0": TRACK, "posefit/Configure-v0": CONFIGURE}
@@ -119,9 +125,9 @@ def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
         ("posefit/Fit-v0", {"max_evaluations": 3}),
         ("posefit/Fit-v0", {"target_cost": 99.0}),
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
-        ("posefit/Configure-v0", {"particles": 3, "iterations": 3}),
+        ("posefit/Configure-v0", {"population_size": 3, "iterations": 3}),
         ("posefit/Fit-v1", {}),
-        ("posefit/Configure-v1", {"particles": 5, "iterations": 5, "every": 1}),
+        ("posefit/Configure-v1", {"population_size": 5, "iterations": 5, "every": 1}),
     ],
 )
 def test_a_time_limit_truncates_a_vector_environment_too(name: str, arguments: dict[str, Any]) -> None:
@@ -170,7 +176,7 @@ def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
 
 def test_some_environments_can_be_reset_alone() -> None:
     for name in CASES:
-        vector = gym.make_vec(name, num_envs=3, **({"particles": 4} if "Configure" in name else {}))
+        vector = gym.make_vec(name, num_envs=3, **({"population_size": 4} if "Configure" in name else {}))
         with pytest.raises(error.ResetNeeded, match="the first reset must be of all"):
             vector.reset(options={"reset_mask": np.array([True, False, False])})
         vector.reset(seed=0)

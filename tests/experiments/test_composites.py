@@ -77,7 +77,7 @@ def run(*words: object) -> Result:
         (("no.mp4", "--seeds", "0"), "seeds must be at least 1, got 0"),
         (("no.mp4", "--extraction", "magic"), "magic"),
         (("no.mp4", "--extraction", ""), "extraction must name a segmenter such as mixture, got ''"),
-        (("no.mp4", "--extraction", "mixture soft"), "must be SETTING=VALUE such as particles=20, got 'soft'"),
+        (("no.mp4", "--extraction", "mixture soft"), "must be SETTING=VALUE such as population_size=20, got 'soft'"),
         (
             ("no.mp4", "--extraction", "mixture softness=1"),
             "a setting of mixture must be one of history, threshold, got 'softness'",

@@ -137,7 +137,7 @@ def test_only_the_best_of_a_small_look_go_on_and_the_others_cost_no_less() -> No
 
 
 def test_a_search_that_looks_coarse_first_reports_what_is_true_at_full_size(problem: PoseProblem) -> None:
-    optimiser = SAPSO(problem.space, np.random.default_rng(0), particles=40, iterations=20)
+    optimiser = SAPSO(problem.space, np.random.default_rng(0), population_size=40, iterations=20)
     best = minimise(problem.evaluate, CoarseFirst(optimiser, problem, factor=4, keep=0.1), 21 * 4)
     assert best.evaluations == 21 * 4
     assert best.cost == problem.evaluate(best.proposal[None])[0]

@@ -179,7 +179,7 @@ def test_the_command_prints_what_it_found(filmed: tuple[Path, list[Any]], tmp_pa
         (["--extraction", "mean", "--background", "90:99"], "frames must choose some of the 60 frames, got 90:99"),
         (["--set", "mixture.colour=3"], "a setting of mixture must be one of history, threshold, got 'colour'"),
         (["--set", "threshold=low"], "mixture.threshold must be float, got 'low'"),
-        (["--set", "threshold"], "--set must be SETTING=VALUE such as particles=20, got 'threshold'"),
+        (["--set", "threshold"], "--set must be SETTING=VALUE such as population_size=20, got 'threshold'"),
         (["--set", "threshold=-1"], "threshold must be above 0, got -1"),
         (["--frames", "90:"], "frames must choose some of the 60 frames, got 90:"),
         (["--roi", "1,2,3"], "expected X,Y,WIDTH,HEIGHT in pixels"),

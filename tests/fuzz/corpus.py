@@ -25,7 +25,7 @@ PLAN = """[defaults]
 frames = 3
 settings = { sapso.cooling = 0.9 }
 [product]
-methods = ["sapso@pca", { method = "random@full", settings = { random.particles = 20 } }]
+methods = ["sapso@pca", { method = "random@full", settings = { random.population_size = 20 } }]
 motions = ["walk", { motion = "walk-a", train = ["walk-b"] }]
 views = [45, [0, 90]]
 corruptions = [{}, { holes = 0.3, dropped = 0.1 }]

@@ -13,7 +13,7 @@ from posefit_evolution.cma import CMAES
 def test_what_leaves_the_box_is_drawn_again_before_it_is_moved_to_its_side(redraws: int, share: float) -> None:
     # a tenth of a standard deviation from the side, 46.02 % of all draws are beyond it
     space = Toy(2, start=Start(np.array([0.99, 0.0]), np.array([0.1, 0.01]), np.zeros(2)))
-    asked = CMAES(space, np.random.default_rng(0), population=4000, redraws=redraws).ask()
+    asked = CMAES(space, np.random.default_rng(0), population_size=4000, redraws=redraws).ask()
     assert space.feasible(asked).all()
     assert (asked[:, 0] == 1.0).mean() == pytest.approx(share, abs=0.02)
 
@@ -35,6 +35,6 @@ def test_a_target_at_the_seam_of_a_circle_is_found(wrapping: int) -> None:
 
 
 def test_settings_out_of_range_are_refused_by_name() -> None:
-    for wrong in ({"population": 4}, {"spread": 0.0}, {"growth": 0}, {"redraws": -1}, {"lag": -0.1}):
+    for wrong in ({"population_size": 4}, {"spread": 0.0}, {"growth": 0}, {"redraws": -1}, {"lag": -0.1}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             CMAES(Toy(2), np.random.default_rng(0), **wrong)

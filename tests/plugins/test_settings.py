@@ -99,8 +99,8 @@ def test_an_annotation_that_is_not_understood_accepts_everything() -> None:
     ("given", "evaluations", "particles", "filled"),
     [
         ({}, 2440, None, {"iterations": 60}),
-        ({}, 2440, 20, {"particles": 20, "iterations": 121}),
-        ({"particles": 61}, 2440, None, {"particles": 61, "iterations": 39}),
+        ({}, 2440, 20, {"population_size": 20, "iterations": 121}),
+        ({"population_size": 61}, 2440, None, {"population_size": 61, "iterations": 39}),
         ({"iterations": 5}, 2440, None, {"iterations": 5}),
         ({}, 50, None, {"iterations": 1}),
     ],

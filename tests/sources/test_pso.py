@@ -52,7 +52,7 @@ class Twin:
 
 def matches_twin(velocity: Any, omega: float, acceleration: float) -> None:
     space = Toy(3)
-    pso = PSO(space, np.random.default_rng(3), particles=8, velocity=velocity, alpha=0.05)
+    pso = PSO(space, np.random.default_rng(3), population_size=8, velocity=velocity, alpha=0.05)
     flock = pso._flock
     twin = Twin(0.2 * flock.position, flock.velocity, omega, acceleration, 0.05)
     flock.position[:], flock.best[:], flock.moved = twin.x, twin.x, twin.x.copy()  # far from the sides of the box
@@ -77,7 +77,7 @@ def test_the_constricted_velocity_is_chi_times_all_three_parts() -> None:  # CLE
 
 
 def test_bests_are_remembered_and_every_move_is_accepted() -> None:  # KENNEDY1995 (pbest, gbest)
-    pso = PSO(Toy(2), np.random.default_rng(0), particles=3, alpha=0.1)
+    pso = PSO(Toy(2), np.random.default_rng(0), population_size=3, alpha=0.1)
     first = pso.ask()
     pso.tell(first, np.array([3.0, 1.0, 2.0]))
     second = pso.ask()
@@ -89,7 +89,7 @@ def test_bests_are_remembered_and_every_move_is_accepted() -> None:  # KENNEDY19
 
 
 def test_inertia_falls_from_0_9_to_0_1() -> None:
-    pso = PSO(Toy(2), np.random.default_rng(0), particles=3, iterations=10, velocity="inertia")
+    pso = PSO(Toy(2), np.random.default_rng(0), population_size=3, iterations=10, velocity="inertia")
     weights = []
     for _ in range(12):
         weights.append(pso._weights())

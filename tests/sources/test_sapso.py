@@ -238,7 +238,7 @@ def test_every_particle_flies_with_draws_of_its_own() -> None:
 def test_c1_and_c2_are_2_and_section_5_sets_the_rest() -> None:
     assert swarm.ACCELERATION == 2.0
     assert swarm.ALPHA == 0.15
-    assert (sapso.PARTICLES, sapso.ITERATIONS, sapso.TEMPERATURE, sapso.COOLING) == (40, 60, 1.0, 0.95)
+    assert (sapso.POPULATION_SIZE, sapso.ITERATIONS, sapso.TEMPERATURE, sapso.COOLING) == (40, 60, 1.0, 0.95)
 
 
 def test_inertia_falls_from_a_to_a_tenth() -> None:
@@ -279,7 +279,7 @@ def test_eq_4_counts_an_empty_denominator_as_1() -> None:  # Reading S2
 
 def test_a1_1_the_first_particles_meet_both_constraints() -> None:
     space = line_space(gap=(-0.8, 0.8))
-    first = SAPSO(space, np.random.default_rng(0), particles=200).ask()
+    first = SAPSO(space, np.random.default_rng(0), population_size=200).ask()
     assert (np.abs(first) <= 1.0).all()
     assert (np.abs(first[:, 3]) >= 0.8).all()
 
@@ -297,7 +297,7 @@ def bowl(proposals: Array) -> Array:
 
 
 def test_a1_2_there_are_c_moves_and_n_times_c_plus_1_evaluations() -> None:  # Reading S10
-    populations = run(SAPSO(line_space(), np.random.default_rng(0), particles=7, iterations=5), bowl)
+    populations = run(SAPSO(line_space(), np.random.default_rng(0), population_size=7, iterations=5), bowl)
     assert sum(map(len, populations)) == 7 * (5 + 1)
 
 
@@ -337,14 +337,14 @@ def test_a1_2d_a_rise_is_accepted_with_chance_exp_minus_de_over_t() -> None:
 def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:
     space = line_space(gap=(-0.5, 0.5))
     for settings in ({}, {"redraws": 0}, {"rand": "scalar"}, {"velocity_limits": "literal"}):
-        for proposals in run(SAPSO(space, np.random.default_rng(1), particles=30, **settings), bowl):
+        for proposals in run(SAPSO(space, np.random.default_rng(1), population_size=30, **settings), bowl):
             assert space.feasible(proposals).all()
 
 
 @pytest.mark.parametrize("rand", ["dimension", "scalar"])
 def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border(rand: Any) -> None:  # Reading S7
     space = line_space()
-    optimiser = SAPSO(space, Fixed(1.0), particles=2, redraws=0, alpha=1.0, rand=rand)
+    optimiser = SAPSO(space, Fixed(1.0), population_size=2, redraws=0, alpha=1.0, rand=rand)
     optimiser._flock.position[:], optimiser._flock.best[:] = 0.9, 0.9
     optimiser._flock.velocity[:] = 0.5
     optimiser._flock.fly(0.9, 2.0, np.full(4, 0.9))
@@ -354,7 +354,7 @@ def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border(rand: Any) ->
 
 @pytest.mark.parametrize(("cool", "expected"), [("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))])
 def test_a1_2e_cools_once_an_iteration_or_once_an_acceptance(cool: Any, expected: float) -> None:  # Reading S6
-    optimiser = SAPSO(line_space(), np.random.default_rng(0), particles=4, iterations=9, cool=cool)
+    optimiser = SAPSO(line_space(), np.random.default_rng(0), population_size=4, iterations=9, cool=cool)
     for _ in range(4):  # a flat cost: every move is accepted
         optimiser.tell(optimiser.ask(), np.zeros(4))
     assert optimiser._temperature == pytest.approx(expected)
@@ -368,7 +368,7 @@ def test_a1_2e_read_literally_the_swarm_freezes_in_3_to_5_iterations() -> None: 
 def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
     space = line_space()
     for kind, alike in (("scalar", True), ("dimension", False)):
-        optimiser = SAPSO(space, np.random.default_rng(0), particles=1, rand=kind, alpha=9.0)  # type: ignore[arg-type]
+        optimiser = SAPSO(space, np.random.default_rng(0), population_size=1, rand=kind, alpha=9.0)  # type: ignore[arg-type]
         optimiser._flock.position[:], optimiser._flock.best[:], optimiser._flock.velocity[:] = 0.0, 0.1, 0.0
         optimiser._flock.fly(0.9, 2.0, np.full(4, 0.1))
         assert (np.ptp(optimiser._flock.moved) < 1e-12) == alike
@@ -376,7 +376,9 @@ def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
 
 @pytest.mark.parametrize("kind", ["kept", "zeroed"])
 def test_s11_a_refused_move_keeps_or_loses_its_velocity(kind: Any) -> None:
-    optimiser = SAPSO(line_space(), Fixed(1.0), particles=1, iterations=2, rejected_velocity=kind, acceleration=0.0)
+    optimiser = SAPSO(
+        line_space(), Fixed(1.0), population_size=1, iterations=2, rejected_velocity=kind, acceleration=0.0
+    )
     optimiser.tell(optimiser.ask(), np.array([0.0]))
     before = optimiser._flock.velocity.copy()
     optimiser._flock.position[:] = 0.0
@@ -392,7 +394,7 @@ def test_eq_7_velocities_of_the_first_population_keep_within_the_limits() -> Non
     # v_pred of 3, -3 and 0.1: drawn from U(0, 3) no more than a twentieth lies below the limit 0.15; the rest is
     # clipped to it. U(0, 0.1) needs no clipping.
     start = Start(np.zeros(4), np.full(4, 0.1), np.array([3.0, -3.0, 0.1, 0.0]))
-    velocity = SAPSO(line_space(start=start), np.random.default_rng(0), particles=400)._flock.velocity
+    velocity = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=400)._flock.velocity
     assert velocity.max(axis=0)[[0, 2]].tolist() == [0.15, pytest.approx(0.1, abs=0.005)]
     assert velocity.min(axis=0)[1] == -0.15
     assert (np.abs(velocity) <= 0.15).all()
@@ -438,7 +440,7 @@ def test_eq_6_the_first_population_is_normal_around_the_last_best() -> None:
 def test_eq_7_first_velocities_are_uniform_from_zero_to_the_predicted_one() -> None:
     velocity = np.array([0.1, -0.1, 0.0, 0.05])  # Reading S12: a negative bound is sorted, not refused
     start = Start(np.zeros(4), np.full(4, 0.01), velocity)
-    optimiser = SAPSO(line_space(start=start), np.random.default_rng(0), particles=4000)
+    optimiser = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=4000)
     drawn = optimiser._flock.velocity
     np.testing.assert_allclose(drawn.min(axis=0), np.minimum(0.0, velocity), atol=2e-3)
     np.testing.assert_allclose(drawn.max(axis=0), np.maximum(0.0, velocity), atol=2e-3)

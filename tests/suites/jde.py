@@ -9,10 +9,14 @@ import numpy as np
 
 
 class JDE:
-    def __init__(self, space, rng, *, particles=20):
-        self.rng, self.shape = rng, (particles, space.dimensions)
+    def __init__(self, space, rng, *, population_size=20):
+        self.rng, self.shape = rng, (population_size, space.dimensions)
         self.population = rng.uniform(-1.0, 1.0, self.shape)
-        self.costs, self.f, self.cr = np.full(particles, np.inf), np.full(particles, 0.5), np.full(particles, 0.9)
+        self.costs, self.f, self.cr = (
+            np.full(population_size, np.inf),
+            np.full(population_size, 0.5),
+            np.full(population_size, 0.9),
+        )
         self.next = self.population, self.f, self.cr
 
     def ask(self):

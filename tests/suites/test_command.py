@@ -23,7 +23,7 @@ from posefit.sweep.single.search import run_search
 
 PLAN = """
 suite = "posefit-2026.1"
-methods = ["random", { method = "pso", settings = { particles = 20 } }]
+methods = ["random", { method = "pso", settings = { population_size = 20 } }]
 functions = [1, 7]
 dimensions = [9, 24]
 instances = [10000, 3]
@@ -145,7 +145,7 @@ def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path, tmp_pa
     found = {(run.method, run.function, run.dimension, run.instance): run for run in search_runs(Ledger(results))}
     assert len(found) == 12
     problem = posefit.suite("posefit-2026.1", 1, 3, 9)
-    expected = run_on(problem, "pso", {"particles": 20}, evaluations=90)
+    expected = run_on(problem, "pso", {"population_size": 20}, evaluations=90)
     mine = found["pso", 1, 9, 3]
     assert np.array_equal(mine.evaluations, expected.evaluations)
     assert np.array_equal(mine.costs, expected.costs)
@@ -172,7 +172,7 @@ def test_the_ledger_is_a_table_and_a_report(results: Path, tmp_path: Path) -> No
     table = Ledger(results).frame()
     assert len(table) == 12
     assert set(table["function"]) == {1, 7}
-    assert set(table["settings"]) == {"", "particles=20"}
+    assert set(table["settings"]) == {"", "population_size=20"}
     done = run("report", results, "--out", tmp_path / "page.html")
     assert done.exit_code == 0, done.stderr
     assert " % of all targets reached " in done.stdout.splitlines()[0]

@@ -58,7 +58,7 @@ def searches(**more: Any) -> Sequence[Keyed]:
         (TRACKS, tracks(), 3_000),
         (SEARCHES, searches(), 2 * 900),
         (SEARCHES, searches(budgets=[10, 1000], dimensions=[9, 24]), 2 * 1010 * 33),
-        (SEARCHES, searches(methods=[{"method": "random", "settings": {"particles": 700}}]), 2 * 900),
+        (SEARCHES, searches(methods=[{"method": "random", "settings": {"population_size": 700}}]), 2 * 900),
     ],
 )  # fmt: skip
 def test_an_estimate_is_the_time_of_all_cells_where_evaluations_take_the_same(
@@ -72,7 +72,7 @@ def test_an_estimate_is_the_time_of_all_cells_where_evaluations_take_the_same(
     assert found.seconds == pytest.approx((len(cells) * SECONDS + evaluations * EACH) / 2)
     assert sum(map(gauge.work, engine.tried)) < 10_000
     for cell in engine.tried:
-        assert cell.evaluations >= cell.settings.get("particles", 1)
+        assert cell.evaluations >= cell.settings.get("population_size", 1)
 
 
 def test_a_kind_that_fails_is_named_once_and_counts_for_nothing() -> None:

@@ -21,12 +21,12 @@ class Sound:
     """Shrinks a cloud around the best point; nothing is wrong with it, and the others each spoil one thing."""
 
     def __init__(
-        self, space: SearchSpace, rng: np.random.Generator, *, particles: int = 40, shrink: float = 0.9
+        self, space: SearchSpace, rng: np.random.Generator, *, population_size: int = 40, shrink: float = 0.9
     ) -> None:
-        if particles < 1:
-            raise ValueError(f"particles must be at least 1, got {particles}")
+        if population_size < 1:
+            raise ValueError(f"population_size must be at least 1, got {population_size}")
         self.space, self.rng, self.shrink = space, rng, shrink
-        self.population = space.draw(rng, particles)
+        self.population = space.draw(rng, population_size)
         self.best, self.cost, self.width = self.population[0].copy(), np.inf, 0.5
 
     def ask(self) -> Array:
@@ -47,8 +47,8 @@ class SwallowsSettings(Sound):
 
 
 class PositionalSettings(Sound):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator, particles: int = 40) -> None:
-        super().__init__(space, rng, particles=particles)
+    def __init__(self, space: SearchSpace, rng: np.random.Generator, population_size: int = 40) -> None:
+        super().__init__(space, rng, population_size=population_size)
 
 
 class AsksOneRow(Sound):
@@ -343,8 +343,10 @@ class Slow(Sound):
 
 
 class HangsOnNonsense(Sound):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator, *, particles: int = 40, tries: int = 5) -> None:
-        super().__init__(space, rng, particles=particles)
+    def __init__(
+        self, space: SearchSpace, rng: np.random.Generator, *, population_size: int = 40, tries: int = 5
+    ) -> None:
+        super().__init__(space, rng, population_size=population_size)
         while tries != 0:
             tries -= 1
             if tries < -10:

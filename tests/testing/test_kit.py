@@ -50,7 +50,7 @@ def test_it_passes_every_shipped_prior(name: str) -> None:
 
 def synthesis(task: Task, *, floor: float = 0.05) -> SynthesisTracker:
 
-    make = partial(SAPSO, particles=20, iterations=task.evaluations // 20 - 1)
+    make = partial(SAPSO, population_size=20, iterations=task.evaluations // 20 - 1)
     return SynthesisTracker(task, PCA().fit(task.angles), make, prediction=Prediction(floor=floor))
 
 
@@ -64,11 +64,11 @@ def test_it_passes_the_papers_tracker() -> None:
 class Chance:
     """Draws uniformly."""
 
-    def __init__(self, space: Any, rng: Any, *, particles: int = 40) -> None:
-        self.space, self.rng, self.particles = space, rng, particles
+    def __init__(self, space: Any, rng: Any, *, population_size: int = 40) -> None:
+        self.space, self.rng, self.population_size = space, rng, population_size
 
     def ask(self) -> Any:
-        return self.space.draw(self.rng, self.particles)
+        return self.space.draw(self.rng, self.population_size)
 
     def tell(self, proposals: Any, costs: Any) -> None: ...
 
@@ -85,7 +85,7 @@ def test_chance_does_not_beat_chance_and_need_not_where_it_says_that_it_is_the_b
         return [(one.outcome, one.detail) for one in found]
 
     assert [outcome for outcome, _ in outcomes(Chance)] == ["failed", "failed"]
-    for factory in (Baseline, partial(Baseline, particles=20), registry().optimiser("random")):
+    for factory in (Baseline, partial(Baseline, population_size=20), registry().optimiser("random")):
         assert outcomes(factory) == [("skipped", "it is the baseline itself")] * 2
 
 

@@ -94,7 +94,7 @@ def test_costs_are_an_array_with_one_for_each_proposal(problem: PoseProblem) -> 
         (lambda proposals: problem.evaluate(proposals).tolist(), "list"),
     ):
         with pytest.raises(TypeError, match=rf"evaluate must return an array of costs of shape \(40,\), got {came}"):
-            minimise(costs, factory(problem.space, np.random.default_rng(0), particles=40), 400)
+            minimise(costs, factory(problem.space, np.random.default_rng(0), population_size=40), 400)
 
 
 @pytest.mark.parametrize("name", ["sapso", "annealed", "particle"])

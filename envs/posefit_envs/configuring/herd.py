@@ -27,32 +27,32 @@ class Herd:
     """
 
     def __init__(
-        self, world: World, number: int, generator: np.random.Generator, particles: int, steps: int, every: int
+        self, world: World, number: int, generator: np.random.Generator, population_size: int, steps: int, every: int
     ) -> None:
-        self.episode = Episode(world, number, particles * (steps * every + 1))
+        self.episode = Episode(world, number, population_size * (steps * every + 1))
         self.rng = np.random.default_rng(int(generator.integers(2**63)))
         self.space = self.episode.space
         self.limits = speed_limits(self.space, ALPHA, "symmetric")
-        self.flock = Flock(self.space, self.rng, particles, self.limits, REDRAWS, "dimension")
-        self.particles, self.steps, self.every = particles, steps, every
+        self.flock = Flock(self.space, self.rng, population_size, self.limits, REDRAWS, "dimension")
+        self.population_size, self.steps, self.every = population_size, steps, every
         self.left, self.used = steps, 0
         root = 6 if world.translation == "searched" else 3
         half = root + (self.space.dimensions - root + 1) // 2
         self.layers = slice(0, root), slice(root, half), slice(half, None)
-        self.order, self.stale, self.open = Order(temperature=FIRST), 0, particles
+        self.order, self.stale, self.open = Order(temperature=FIRST), 0, population_size
         self.best, self.leader = np.inf, self.flock.moved[0]
         self._told: list[tuple[Array, NDArray[np.bool_]]] = []
-        self._rows: Rows = np.arange(particles)
+        self._rows: Rows = np.arange(population_size)
         self._part = self.flock
 
     def follow(self, order: Order) -> None:
         """Begin another step."""
-        self.order, self._told, self.open = order, [], self.particles * self.every
+        self.order, self._told, self.open = order, [], self.population_size * self.every
         self.left -= 1
         self.stale += 1
-        anew = round(order.restart * self.particles)
+        anew = round(order.restart * self.population_size)
         if anew:
-            flock, worst = self.flock, self.flock.best_cost.argsort(kind="stable")[self.particles - anew :]
+            flock, worst = self.flock, self.flock.best_cost.argsort(kind="stable")[self.population_size - anew :]
             flock.moved[worst] = flock.position[worst] = flock.best[worst] = self.space.draw(self.rng, anew)
             flock.velocity[worst], flock.cost[worst], flock.best_cost[worst] = 0.0, np.inf, np.inf
 
@@ -61,9 +61,9 @@ class Herd:
 
         Particles that begin anew come first, and propose where they are.
         """
-        flock, most = self.flock, self.open % self.particles or self.particles
-        count = min(max(LEAST, round(self.order.population * self.particles)), most)
-        if count == self.particles:
+        flock, most = self.flock, self.open % self.population_size or self.population_size
+        count = min(max(LEAST, round(self.order.population * self.population_size)), most)
+        if count == self.population_size:
             self._part = part = flock
         else:
             ranks = np.where(np.isinf(flock.best_cost), -1.0, flock.best_cost)
@@ -110,7 +110,7 @@ class Herd:
 
     def _cooler(self, factor: float) -> float:
         """Return what a number that falls by a factor an iteration has fallen by in this step."""
-        done = self.every - -(-self.open // self.particles)
+        done = self.every - -(-self.open // self.population_size)
         return float(factor**done)
 
     def tell(self, costs: Array) -> None:

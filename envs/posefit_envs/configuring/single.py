@@ -6,7 +6,7 @@ from gymnasium import error
 
 from posefit.fitting.check import whole
 from posefit_envs.base import SearchEnv
-from posefit_envs.configure import ITERATIONS, PARTICLES
+from posefit_envs.configure import ITERATIONS, POPULATION_SIZE
 from posefit_envs.configuring.features import State, instance_features, observed_state, space_of_features
 from posefit_envs.configuring.herd import LEAST, Herd
 from posefit_envs.configuring.orders import order_of, space_of_orders
@@ -47,9 +47,9 @@ class OptimiserEnv(SearchEnv[Herd]):
     first, and in an order that never changes where all of it does. Number 3 has come to its ends at -0.5 and 0.5.
     Numbers 6 to 9 stand for nothing from 0 down.
 
-    A step always has `every * particles` evaluations: so a smaller part moves more often. Stride and temperature fall
-    with each iteration of a step as SAPSO's do. The best pose of all is kept, whatever begins anew. Actions outside
-    are clipped, with one warning.
+    A step always has `every * population_size` evaluations: so a smaller part moves more often. Stride and
+    temperature fall with each iteration of a step as SAPSO's do. The best pose of all is kept, whatever begins
+    anew. Actions outside are clipped, with one warning.
 
     ## Observation Space
     `Box(0, 1, (25,), float32)`
@@ -73,7 +73,7 @@ class OptimiserEnv(SearchEnv[Herd]):
     ln((1 + best cost before) / (1 + best cost after)), so that the sum over an episode is by what factor it came down.
 
     ## Starting State
-    A first population of `particles`, drawn uniformly and evaluated; the instance as in `Fit-v0`.
+    A first population of `population_size`, drawn uniformly and evaluated; the instance as in `Fit-v0`.
 
     ## Episode End
     Terminates after `iterations` iterations, `iterations / every` steps. It is never truncated.
@@ -83,7 +83,7 @@ class OptimiserEnv(SearchEnv[Herd]):
     truth; a reset too.
 
     ## Arguments
-    As in `Fit-v0`, with `particles=40`, 4 or more, `iterations=60` and `every=5`, of which `iterations` must be a
+    As in `Fit-v0`, with `population_size=40`, 4 or more, `iterations=60` and `every=5`, of which `iterations` must be a
     multiple, instead of `target_cost` and `max_evaluations`.
 
     ## Version History
@@ -96,15 +96,15 @@ class OptimiserEnv(SearchEnv[Herd]):
     def __init__(
         self,
         *,
-        particles: int = PARTICLES,
+        population_size: int = POPULATION_SIZE,
         iterations: int = ITERATIONS,
         every: int = EVERY,
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        check_herd(particles, iterations, every)
+        check_herd(population_size, iterations, every)
         super().__init__(select(**arguments), (space_of_orders(), space_of_features()), render_mode)
-        self._sizes = int(particles), int(iterations) // int(every), int(every)
+        self._sizes = int(population_size), int(iterations) // int(every), int(every)
         self._stage = Stage(self.world, 1)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[State, dict[str, Any]]:
@@ -142,9 +142,9 @@ class OptimiserEnv(SearchEnv[Herd]):
         return search.portrait()
 
 
-def check_herd(particles: int, iterations: int, every: int) -> None:
+def check_herd(population_size: int, iterations: int, every: int) -> None:
     """Return nothing. Raises ArgumentError where a number makes no sense."""
-    approved(whole, "particles", particles, LEAST)
+    approved(whole, "population_size", population_size, LEAST)
     approved(whole, "iterations", iterations, 2)
     if iterations % approved(whole, "every", every, 1):
         raise ArgumentError(f"iterations must be a multiple of every {every}, got {iterations}")

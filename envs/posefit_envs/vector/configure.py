@@ -10,7 +10,7 @@ from posefit.fitting.box import MANY, REDRAWS, fold
 from posefit_envs.configure import (
     FIRST,
     ITERATIONS,
-    PARTICLES,
+    POPULATION_SIZE,
     State,
     SteeredSwarm,
     check_swarm,
@@ -35,17 +35,17 @@ class ConfigureVectorEnv(SearchVectorEnv[SteeredSwarm]):
         self,
         num_envs: int = 1,
         *,
-        particles: int = PARTICLES,
+        population_size: int = POPULATION_SIZE,
         iterations: int = ITERATIONS,
         threads: int = 1,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        check_swarm(particles, iterations)
+        check_swarm(population_size, iterations)
         selection = select(**arguments)
         super().__init__(num_envs, selection, spaces_of_swarm(), threads, render_mode, max_episode_steps)
-        self.particles, self._iterations = int(particles), int(iterations)
+        self.population_size, self._iterations = int(population_size), int(iterations)
 
     def step(self, actions: Any) -> tuple[State, Array, Flags, Flags, Infos]:
         """Fly one iteration in each environment; one whose episode has ended resets instead."""
@@ -109,7 +109,7 @@ class ConfigureVectorEnv(SearchVectorEnv[SteeredSwarm]):
         return self._standings(self._reached.best, used, lambda: self._stage.poses(self._reached.leaders))
 
     def _begin(self, i: int, number: int) -> None:
-        swarm = SteeredSwarm(self.world, number, self._generator(i), self.particles, self._iterations)
+        swarm = SteeredSwarm(self.world, number, self._generator(i), self.population_size, self._iterations)
         self._searches[i] = swarm
         self._put(i, swarm.episode)
 

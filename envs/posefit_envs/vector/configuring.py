@@ -5,7 +5,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from posefit.arrays import Array
-from posefit_envs.configure import ITERATIONS, PARTICLES
+from posefit_envs.configure import ITERATIONS, POPULATION_SIZE
 from posefit_envs.configuring.features import State, instance_features, observed_state, space_of_features
 from posefit_envs.configuring.herd import Herd
 from posefit_envs.configuring.orders import order_of, space_of_orders
@@ -28,7 +28,7 @@ class OptimiserVectorEnv(SearchVectorEnv[Herd]):
         self,
         num_envs: int = 1,
         *,
-        particles: int = PARTICLES,
+        population_size: int = POPULATION_SIZE,
         iterations: int = ITERATIONS,
         every: int = EVERY,
         threads: int = 1,
@@ -36,11 +36,11 @@ class OptimiserVectorEnv(SearchVectorEnv[Herd]):
         render_mode: str | None = None,
         **arguments: Unpack[Arguments],
     ) -> None:
-        check_herd(particles, iterations, every)
+        check_herd(population_size, iterations, every)
         selection = select(**arguments)
         spaces = space_of_orders(), space_of_features()
         super().__init__(num_envs, selection, spaces, threads, render_mode, max_episode_steps)
-        self._sizes = int(particles), int(iterations) // int(every), int(every)
+        self._sizes = int(population_size), int(iterations) // int(every), int(every)
         self._features: list[Array] = [np.empty(0)] * num_envs
 
     def step(self, actions: Any) -> tuple[State, Array, Flags, Flags, Infos]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from posefit_envs.configure import ITERATIONS, PARTICLES
+from posefit_envs.configure import ITERATIONS, POPULATION_SIZE
 from posefit_envs.configuring.single import EVERY
 from posefit_envs.fit import MAX_EVALUATIONS
 
@@ -29,7 +29,7 @@ class Contested:
 
 CONFIGURE = Contested(
     "posefit/Configure-v1",
-    PARTICLES * (ITERATIONS + 1),
+    POPULATION_SIZE * (ITERATIONS + 1),
     ITERATIONS // EVERY,
     ("random search", "random actions", "middle", "sapso"),
     ("bandit", "cma over constants", "ppo", "sac"),

@@ -116,7 +116,7 @@ def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -
     there = _on(problem, device)
 
     def search(where: PoseProblem) -> float:
-        optimiser = SAPSO(where.space, np.random.default_rng(0), particles=particles, iterations=iterations)
+        optimiser = SAPSO(where.space, np.random.default_rng(0), population_size=particles, iterations=iterations)
         return minimise(where.evaluate, optimiser, particles * (iterations + 1), told=True).cost
 
     costs = {name: search(where) for name, where in (("device", there), ("cpu", problem))}

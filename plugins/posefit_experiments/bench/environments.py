@@ -37,7 +37,7 @@ def vector_env(threads: int) -> dict[str, dict[str, float]]:
     seconds = fastest(jobs)
     figures = {}
     for name, envs in vectors.items():
-        proposals = ENVIRONMENTS * getattr(envs["native"].unwrapped, "particles", 1)
+        proposals = ENVIRONMENTS * getattr(envs["native"].unwrapped, "population_size", 1)
         native, sync = (1e6 * seconds[f"{name} {kind}"] / proposals for kind in envs)
         kernel_us = 1e6 * seconds["kernel"] / ENVIRONMENTS
         figures[name] = {

@@ -36,7 +36,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
     few = proposals[: POSES // 5]
 
     def frame(seed: int) -> None:
-        optimiser = SAPSO(alone.space, np.random.default_rng(seed), particles=PARTICLES, iterations=ITERATIONS)
+        optimiser = SAPSO(alone.space, np.random.default_rng(seed), population_size=PARTICLES, iterations=ITERATIONS)
         minimise(alone.evaluate, optimiser, PARTICLES * (ITERATIONS + 1), told=True)
 
     jobs: dict[str, Callable[[], object]] = {

@@ -28,9 +28,9 @@ FRAMES = 4  # of the track; all but the first are predicted
 BUDGET = 2440  # evaluations of a frame: the first population and 60 moves
 PARTICLES, ITERATIONS = 40, 60
 METHODS: dict[str, tuple[Callable[..., Optimiser], NextFrame, type[Prior]]] = {
-    "sapso+pca": (partial(SAPSO, particles=PARTICLES, iterations=ITERATIONS), "start", PCA),
-    "sapso+loose": (partial(SAPSO, particles=PARTICLES, iterations=ITERATIONS), "start", Loose),
-    "pso+pca": (partial(PSO, particles=PARTICLES, iterations=ITERATIONS), "start", PCA),
+    "sapso+pca": (partial(SAPSO, population_size=PARTICLES, iterations=ITERATIONS), "start", PCA),
+    "sapso+loose": (partial(SAPSO, population_size=PARTICLES, iterations=ITERATIONS), "start", Loose),
+    "pso+pca": (partial(PSO, population_size=PARTICLES, iterations=ITERATIONS), "start", PCA),
     "annealed+pca": (partial(Annealed, evaluations=BUDGET), "carry", PCA),
 }
 PARTS = ("kernel", "prior", "swarm")

@@ -79,7 +79,7 @@ def _ask_and_tell(space: SearchSpace, offer: Offer) -> float:
     """Return the seconds of a proposal."""
     known = {setting.name for setting in offer.settings}
     populations = POPULATIONS if "layers" not in known else POPULATIONS // 10
-    sizes: dict[str, Any] = {name: PARTICLES for name in ("particles", "population") if name in known}
+    sizes: dict[str, Any] = {"population_size": PARTICLES} if "population_size" in known else {}
     budget = PARTICLES * (10 if "layers" in known else 1 if offer.next_frame == "carry" else POPULATIONS + 1)
     fastest = np.inf
     began = time.perf_counter()

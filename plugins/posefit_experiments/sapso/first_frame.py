@@ -46,8 +46,10 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
     searches: list[_Search] = []
 
     class Watched:
-        def __init__(self, space: SearchSpace, rng: np.random.Generator, *, particles: int, iterations: int) -> None:
-            self._optimiser = SAPSO(space, rng, particles=particles, iterations=iterations)
+        def __init__(
+            self, space: SearchSpace, rng: np.random.Generator, *, population_size: int, iterations: int
+        ) -> None:
+            self._optimiser = SAPSO(space, rng, population_size=population_size, iterations=iterations)
             self._seen = _Search(space)
             searches.append(self._seen)
 
@@ -64,7 +66,7 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
     found = track(
         scene,
         optimiser=Watched,
-        optimiser_settings={"particles": particles},
+        optimiser_settings={"population_size": particles},
         train=motion.training,
         particles=particles,
         iterations=scale.iterations,

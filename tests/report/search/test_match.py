@@ -65,14 +65,14 @@ def test_random_search_that_leads_is_called_so_and_without_it_there_is_no_baseli
 
 
 def test_methods_are_told_apart_by_settings_budget_and_what_becomes_of_the_infeasible(tmp_path: Path) -> None:
-    more: list[dict[str, Any]] = [{}, {"settings": {"particles": 20}}, {"budget": 30}, {"infeasible": "reject"}]
+    more: list[dict[str, Any]] = [{}, {"settings": {"population_size": 20}}, {"budget": 30}, {"infeasible": "reject"}]
     made = [found(cell("pso", instance=10_000 + i, **dict(one)), 5) for one in more for i in range(2)]
     names = searches_of(Ledger(ledger(tmp_path / "r", made))).methods
     assert sorted(names) == [
         "pso, 100 evaluations for each dimension, infeasible: reject",
         "pso, 100 evaluations for each dimension, infeasible: repair",
         "pso, 30 evaluations for each dimension, infeasible: repair",
-        "pso, particles=20, 100 evaluations for each dimension, infeasible: repair",
+        "pso, population_size=20, 100 evaluations for each dimension, infeasible: repair",
     ]
 
 

@@ -16,7 +16,7 @@ from tests.report.search.searched import cell, found, problems, searched
 from tests.report.test_live import data_in, page_of
 from tests.sweep.fake import cells
 
-LOST = (cell("pso", instance=10_001, settings={"particles": 20}, seed=3), ["ValueError: it had to"])
+LOST = (cell("pso", instance=10_001, settings={"population_size": 20}, seed=3), ["ValueError: it had to"])
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def test_json_has_the_answer_the_leaderboard_and_running_times(results: Path, tm
 
 
 def test_the_command_of_a_search_is_a_plan_of_that_one_cell() -> None:
-    one = cell("pso", 7, 24, 3, seed=5, budget=30, infeasible="reject", settings={"particles": 20})
+    one = cell("pso", 7, 24, 3, seed=5, budget=30, infeasible="reject", settings={"population_size": 20})
     plan = search_command(one.spec).partition("<<'END'\n")[2].removesuffix("END")
     assert [other.key for other in search_cells(parsed_toml(plan))] == [one.key]
 
