@@ -1,7 +1,7 @@
 """A niching task: numbered silhouettes that several known poses explain nearly as well, and its scores.
 
     posed = niche_instance(17)
-    proposals = posed.problem.space.draw(np.random.default_rng(0), 20_000)      # or those of any search
+    proposals = draw_population(posed.problem.space, np.random.default_rng(0), 20_000)      # or those of any search
     report = best_apart(posed.problem, proposals, posed.problem.evaluate(proposals))
     print(posed.kind, scored(posed, report).peak_ratio)
 
@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.box import displacement, wrap
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
@@ -287,8 +288,8 @@ def _is_separate_niche(problem: PoseProblem, poses: Array, costs: Array, k: int,
         return False
     proposals = _proposals(problem.space, legs_and_arms(), poses)
     for other in others:
-        way = problem.space.towards(proposals[k], proposals[other])
-        between = problem.evaluate(problem.space.wrap(proposals[k] + STEPS[:, None] * way))
+        way = displacement(problem.space, proposals[k], proposals[other])
+        between = problem.evaluate(wrap(problem.space, proposals[k] + STEPS[:, None] * way))
         if between.max() < max(costs[k], costs[other]) + HILL:
             return False
     return True

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from posefit.fitting.box import displacement, draw_population, wrap
 from posefit.geometry.alike import mirrored_poses
 from posefit.motion import built_in
 from posefit.niching import (
@@ -48,8 +49,8 @@ def test_known_poses_cost_nearly_the_same_are_apart_and_have_hills_between_them(
     assert space.decode(posed.proposals)[0][:, 3:] == pytest.approx(posed.known[:, 3:], abs=1e-9)
     assert posed.problem.evaluate(posed.proposals) == pytest.approx(posed.costs, abs=0.05)
     for i, j in pairs:
-        way = space.towards(posed.proposals[i], posed.proposals[j])
-        between = posed.problem.evaluate(space.wrap(posed.proposals[i] + STEPS[:, None] * way))
+        way = displacement(space, posed.proposals[i], posed.proposals[j])
+        between = posed.problem.evaluate(wrap(space, posed.proposals[i] + STEPS[:, None] * way))
         assert between.max() >= posed.costs[[i, j]].max() + HILL - 0.05
 
 
@@ -118,7 +119,7 @@ def test_weights_are_those_of_boltzmann() -> None:
 
 def test_the_best_come_first_and_are_apart() -> None:
     posed = niche_instance(1)
-    proposals = np.concatenate([posed.problem.space.draw(np.random.default_rng(0), 300), posed.proposals])
+    proposals = np.concatenate([draw_population(posed.problem.space, np.random.default_rng(0), 300), posed.proposals])
     costs = posed.problem.evaluate(proposals)
     report = best_apart(posed.problem, proposals, costs)
     found = posed.problem.cost(report.poses, report.translations)

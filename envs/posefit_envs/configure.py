@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from posefit import PoseProblem
 from posefit.arrays import Array
+from posefit.fitting.box import sample_normal
 from posefit.fitting.check import whole
 from posefit_envs.base import SearchEnv
 from posefit_envs.drawing import Picture, portray
@@ -113,7 +114,7 @@ class ConfigureEnv(SearchEnv["SteeredSwarm"]):
         search.fly(inertia)
         flock, space = search.flock, search.space
         if spread > 0.0:
-            flock.moved = space.scatter(search.rng, flock.moved, np.full(space.dimensions, spread))
+            flock.moved = sample_normal(space, search.rng, flock.moved, np.full(space.dimensions, spread))
         search.settle(search.problem.evaluate(flock.moved), temperature)
         self._show()
         return standings([search]).states[0], before - search.best, search.left == 0, False, self._info(search)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.evolution.constants import usual_population
 from posefit.evolution.strategy import LAG, Strategy
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.bridge import bearable
 from posefit.fitting.check import at_least, positive
 
@@ -62,19 +62,19 @@ class CMAES:
     def ask(self) -> Array:
         """Return the next population (n, d)."""
         if self._asked is None:
-            asked = self._space.wrap(self._strategy.sample(self._rng, self._population_size))
+            asked = wrap(self._space, self._strategy.sample(self._rng, self._population_size))
             broken = np.flatnonzero(~self._space.feasible(asked))
             if len(broken) and self._redraws:
                 broken = self._redraw(asked, broken)
             if len(broken):
-                mean = self._space.repair(self._strategy.mean[None], self._home)[0]
-                asked[broken] = self._space.repair(asked[broken], mean)
+                mean = repair(self._space, self._strategy.mean[None], self._home)[0]
+                asked[broken] = repair(self._space, asked[broken], mean)
             self._asked = asked
         return self._asked.copy()
 
     def _redraw(self, asked: Array, broken: NDArray[np.int64]) -> NDArray[np.int64]:
         """Put new draws that break no constraint in some rows of (n, d); return the rows for which there were none."""
-        again = self._space.wrap(self._strategy.sample(self._rng, len(broken) * self._redraws))
+        again = wrap(self._space, self._strategy.sample(self._rng, len(broken) * self._redraws))
         works = self._space.feasible(again).reshape(-1, self._redraws)
         first, mended = works.argmax(axis=1), works.any(axis=1)
         chosen = again.reshape(*works.shape, -1)[np.arange(len(broken)), first]
@@ -88,7 +88,7 @@ class CMAES:
         known, mean = bearable(costs), self._strategy.mean
         # the mean goes on past the end of a circle, and so must what it learns from
         round_trip = self._space.periodic.any()
-        self._strategy.learn(mean + self._space.towards(mean, proposals) if round_trip else proposals, known)
+        self._strategy.learn(mean + displacement(self._space, mean, proposals) if round_trip else proposals, known)
         self._home, self._asked = proposals[known.argmin()].copy(), None
         if self._strategy.ended():
             self._population_size *= self._growth  # AUGER2005 (restart)
@@ -97,7 +97,7 @@ class CMAES:
     def _begun(self, spread: Array) -> Strategy:
         """Return a strategy around the prediction, or else around a fresh draw."""
         start = self._space.start
-        self._home = self._space.draw(self._rng, 1)[0]
+        self._home = draw_population(self._space, self._rng, 1)[0]
         if start is not None and self._space.feasible(start.mean[None])[0]:
             self._home = start.mean.copy()
         return Strategy(self._home, spread, self._population_size, lag=self._lag)

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting import box
 from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Optimiser, minimise
 from posefit.geometry.rotation import wrapped
@@ -54,27 +53,7 @@ class Surroundings:
         """Return which proposals (n, d) lie in the box (n,)."""
         return np.asarray((np.abs(proposals) <= 1.0).all(axis=1))
 
-    def wrap(self, proposals: Array) -> Array:
-        """Return proposals as they are: nothing here goes round."""
-        return proposals
-
-    def towards(self, origin: Array, target: Array) -> Array:
-        """Return target - origin."""
-        return target - origin
-
-    def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Return a first population (count, d); see `box.draw`."""
-        return box.draw(self, rng, count)
-
-    def scatter(self, rng: np.random.Generator, means: Array, spread: Array) -> Array:
-        """Return a normal draw (n, d) around each of n means; see `box.scatter`."""
-        return box.scatter(self, rng, means, spread)
-
-    def repair(self, proposals: Array, home: Array) -> Array:
-        """Return proposals (n, d) moved into the box; see `box.repair`."""
-        return box.repair(self, proposals, home)
-
-    def moved(self, proposals: Array, origin: Space) -> Array:
+    def moved(self, proposals: Array, origin: "Surroundings") -> Array:
         """Return the proposals (n, d) that mean here what these mean in `origin`."""
         return np.asarray(np.clip((origin.centre + origin.half * proposals) / self.half, -1.0, 1.0))
 

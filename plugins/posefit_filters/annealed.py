@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, converted, displacement, draw_population, sample_normal
 from posefit.fitting.check import at_least, between, positive
 from posefit_filters.kernels import sharpness
 from posefit_filters.resampling import systematic, weigh
@@ -56,7 +56,7 @@ class Annealed:
         self._space, self._rng = space, rng
         self._layers, self._survival, self._crossover = min(layers, evaluations), survival, crossover
         self._diffusion, self._noise = diffusion, noise
-        self._particles = space.draw(rng, evaluations // self._layers)
+        self._particles = draw_population(space, rng, evaluations // self._layers)
         self._costs = np.zeros(len(self._particles))
         self._layer = 0
 
@@ -74,9 +74,9 @@ class Annealed:
     def advance(self, space: Space) -> None:
         """Carry the survivors of the last layer into the next frame."""
         rows = self._survivors()[0]
-        moved = space.moved(self._particles[rows], self._space)
+        moved = converted(space, self._particles[rows], self._space)
         spread = np.full(space.dimensions, self._noise)
-        self._particles = space.scatter(self._rng, moved, spread)  # DEUTSCHER2005 (next frame)
+        self._particles = sample_normal(space, self._rng, moved, spread)  # DEUTSCHER2005 (next frame)
         self._space, self._layer = space, 0
 
     def _survivors(self) -> tuple[NDArray[np.int64], Array]:
@@ -86,14 +86,14 @@ class Annealed:
 
     def _descend(self) -> None:
         rows, weights = self._survivors()
-        around = self._space.towards(self._particles[weights.argmax()], self._particles)
+        around = displacement(self._space, self._particles[weights.argmax()], self._particles)
         mean = weights @ around
         spread = np.sqrt(weights @ (around - mean) ** 2)
         survivors = self._particles[rows]
         if self._crossover:
             survivors = self._traded(survivors)
         noise = self._diffusion * spread  # DEUTSCHER2005 (diffusion)
-        self._particles = self._space.scatter(self._rng, survivors, noise)
+        self._particles = sample_normal(self._space, self._rng, survivors, noise)
 
     def _traded(self, survivors: Array) -> Array:
         """Return survivors that have traded a run of coordinates with a partner, where both remain feasible."""

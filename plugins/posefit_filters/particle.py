@@ -7,7 +7,7 @@ N. Gordon, D. Salmond, A. Smith, Novel approach to nonlinear/non-Gaussian Bayesi
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, converted, draw_population, repair, sample_normal
 from posefit.fitting.check import at_least, positive
 from posefit_filters.resampling import systematic, weigh
 
@@ -46,7 +46,7 @@ class Particle:
         at_least("drift", drift, 0.0)
         self._space, self._rng = space, rng
         self._sharpness, self._noise, self._drift = sharpness, noise, drift
-        self._particles = space.draw(rng, evaluations)
+        self._particles = draw_population(space, rng, evaluations)
         self._weights = np.full(evaluations, 1.0 / evaluations)
         self._due = True
 
@@ -63,10 +63,10 @@ class Particle:
     def advance(self, space: Space) -> None:
         """Let the particles survive by their weights, and move into the next frame."""
         rows = systematic(self._weights, self._rng.random())
-        moved = space.moved(self._particles[rows], self._space)
+        moved = converted(space, self._particles[rows], self._space)
         if self._drift and space.start is not None:
-            drifted = space.repair(moved + self._drift * space.start.velocity, moved[0])
+            drifted = repair(space, moved + self._drift * space.start.velocity, moved[0])
             moved = drifted
         spread = np.full(space.dimensions, self._noise)
-        self._particles = space.scatter(self._rng, moved, spread)  # GORDON1993 (motion)
+        self._particles = sample_normal(space, self._rng, moved, spread)  # GORDON1993 (motion)
         self._space, self._due = space, True

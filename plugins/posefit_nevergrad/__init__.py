@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from posefit import hookimpl
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population
 from posefit.fitting.bridge import Bridged, GlobalRandom, Objective
 from posefit.fitting.check import at_least
 from posefit.hooks import RegisterOptimiser
@@ -52,10 +52,14 @@ def _run(
     borrowed = GlobalRandom(int(rng.integers(2**31)))  # some of its optimisers draw from numpy's global generator
     with borrowed:
         spread = 0.5 if space.start is None else np.clip(space.start.spread, 1e-6, 0.5)
-        box = ng.p.Array(init=space.draw(rng, 1)[0]).set_mutation(sigma=spread).set_bounds(-1.0, 1.0, method="clipping")
+        box = (
+            ng.p.Array(init=draw_population(space, rng, 1)[0])
+            .set_mutation(sigma=spread)
+            .set_bounds(-1.0, 1.0, method="clipping")
+        )
         box.random_state = np.random.RandomState(int(rng.integers(2**31)))
         optimiser = ng.optimizers.registry[variant](box, budget=evaluations, num_workers=population_size)
-        for proposal in space.draw(rng, population_size):
+        for proposal in draw_population(space, rng, population_size):
             optimiser.suggest(proposal)
     while True:
         with borrowed:

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from posefit import hookimpl
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population
 from posefit.fitting.bridge import Bridged, Objective
 from posefit.fitting.check import at_least, one_of
 from posefit.hooks import RegisterOptimiser
@@ -50,7 +50,7 @@ def _run(variant: str, population_size: int, space: Space, rng: np.random.Genera
     names = [f"x{k:03}" for k in range(space.dimensions)]
     box: dict[str, optuna.distributions.BaseDistribution]
     box = {name: optuna.distributions.FloatDistribution(-1.0, 1.0) for name in names}
-    for proposal in space.draw(rng, population_size).tolist():
+    for proposal in draw_population(space, rng, population_size).tolist():
         study.enqueue_trial(dict(zip(names, proposal, strict=True)))
     while True:
         trials = [study.ask(box) for _ in range(population_size)]

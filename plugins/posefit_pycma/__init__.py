@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from posefit import hookimpl
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population
 from posefit.fitting.bridge import Bridged, Objective
 from posefit.fitting.check import at_least, positive
 from posefit.hooks import RegisterOptimiser
@@ -46,7 +46,7 @@ def _evolve(population_size: int, spread: float, space: Space, rng: np.random.Ge
     # without a seed, and with our generator, it leaves numpy's global one alone
     options |= {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
     while True:
-        strategy = CMAEvolutionStrategy(np.append(space.draw(rng, 1)[0], spare), 1.0, options)
+        strategy = CMAEvolutionStrategy(np.append(draw_population(space, rng, 1)[0], spare), 1.0, options)
         while not strategy.stop():
             asked = strategy.ask()
             strategy.tell(asked, objective(np.array(asked)[:, : space.dimensions]).tolist())

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from posefit import hookimpl
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population
 from posefit.fitting.bridge import Bridged, Objective
 from posefit.fitting.check import at_least, one_of
 from posefit.hooks import RegisterOptimiser
@@ -43,7 +43,7 @@ def _run(variant: str, population_size: int, space: Space, rng: np.random.Genera
 
     Config.warnings["not_compiled"] = False
     kind = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{variant.lower()}"), variant)
-    algorithm = kind(pop_size=population_size, sampling=space.draw(rng, population_size))
+    algorithm = kind(pop_size=population_size, sampling=draw_population(space, rng, population_size))
     problem = Problem(n_var=space.dimensions, n_obj=1, xl=-1.0, xu=1.0)
     algorithm.setup(problem, termination=NoTermination(), seed=int(rng.integers(2**31)))
     while True:

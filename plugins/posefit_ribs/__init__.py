@@ -16,7 +16,7 @@ import numpy as np
 
 from posefit import hookimpl
 from posefit.arrays import Array
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population, repair
 from posefit.fitting.bridge import bearable
 from posefit.fitting.check import at_least, positive
 from posefit.hooks import RegisterOptimiser
@@ -62,7 +62,7 @@ class Ribs:
         at_least("neighbours", neighbours, 1)
         at_least("populations", populations, 1)
         positive("step", step)
-        self._first, self._asked = space.draw(rng, population_size), False
+        self._first, self._asked = draw_population(space, rng, population_size), False
         self._space, self._home, self._neighbours = space, self._first[0], neighbours
         self._archive: Any = DNSArchive(
             solution_dim=space.dimensions,
@@ -94,7 +94,7 @@ class Ribs:
             return self._first.copy()
         self._asked = True
         asked = np.concatenate([one.ask() for one in self._strategies])
-        return self._space.repair(asked, self._home)
+        return repair(self._space, asked, self._home)
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Let the archive choose among its proposals and these, and every strategy learn from its own."""

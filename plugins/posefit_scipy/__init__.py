@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from posefit import hookimpl
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population
 from posefit.fitting.bridge import Bridged, Objective
 from posefit.fitting.check import at_least, one_of
 from posefit.hooks import RegisterOptimiser
@@ -49,7 +49,7 @@ def _evolve(population_size: int, space: Space, rng: np.random.Generator, object
         return objective(proposals.T)
 
     while True:
-        first: Any = space.draw(rng, population_size)
+        first: Any = draw_population(space, rng, population_size)
         differential_evolution(columns, box, init=first, rng=rng, **settings)
 
 
@@ -62,7 +62,7 @@ def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> Non
         return float(objective(proposal[None])[0])
 
     while True:
-        first = space.draw(rng, 1)[0]
+        first = draw_population(space, rng, 1)[0]
         dual_annealing(row, box, x0=first, rng=rng, no_local_search=True)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population, extent
 from posefit_swarm.kernels import fly, mend, settle, settle_and_fly
 
 FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
@@ -50,7 +50,7 @@ class Flock:
         self._apart = 0 if self._scalar else redraws  # of a coordinate by itself
         self._spare, self._used = np.empty(0), 0  # numbers for those
         self._everyone = np.arange(population_size)
-        self.moved = space.draw(rng, population_size)
+        self.moved = draw_population(space, rng, population_size)
         self.velocity = self._first_velocities()
         self.position, self.cost = self.moved.copy(), np.full(population_size, np.inf)
         self.best, self.best_cost = self.moved.copy(), np.full(population_size, np.inf)
@@ -179,5 +179,6 @@ def speed_limits(space: Space, alpha: float, kind: Literal["symmetric", "literal
     # SAPSO 2.2 velocity
     if kind == "symmetric":
         return np.full(space.dimensions, -alpha), np.full(space.dimensions, alpha)
-    half = np.where(space.half > 0.0, space.half, 1.0)
-    return alpha * (space.centre - space.half) / half, alpha * (space.centre + space.half) / half
+    centre, reach = extent(space)
+    half = np.where(reach > 0.0, reach, 1.0)
+    return alpha * (centre - reach) / half, alpha * (centre + reach) / half

@@ -3,7 +3,7 @@
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population
 from posefit.fitting.check import at_least
 
 
@@ -22,7 +22,7 @@ class Random:
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
-        return self._space.draw(self._rng, self._population_size)
+        return draw_population(self._space, self._rng, self._population_size)
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Learn nothing."""

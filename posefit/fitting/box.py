@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.uncertainty.landscape import displacement as displacement
+from posefit.uncertainty.landscape import wrap as wrap
 
 REDRAWS = 100  # Reading S7
 MANY = 8  # ours: after the first, so many redraws are made at once
@@ -23,7 +25,7 @@ class Start:
 
 
 class Space(Protocol):
-    """The box [-1, 1]^d, of which some is feasible. `SearchSpace` is one; an optimiser needs no more than this."""
+    """The box [-1, 1]^d, part of which is feasible: all that an optimiser knows of it. `SearchSpace` is one."""
 
     @property
     def dimensions(self) -> int:
@@ -40,46 +42,32 @@ class Space(Protocol):
         """Which coordinates wrap around (d,)."""
         ...
 
-    @property
-    def centre(self) -> Array:
-        """The coordinates (d,), radians, metres or latents, of the box's middle."""
-        ...
-
-    @property
-    def half(self) -> Array:
-        """Half the sides of the box (d,), in the same units."""
-        ...
-
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, d) lie in the box and are allowed (n,)."""
         ...
 
-    def wrap(self, proposals: Array) -> Array:
-        """Return proposals with their periodic coordinates brought into [-1, 1)."""
-        ...
 
-    def towards(self, origin: Array, target: Array) -> Array:
-        """Return target - origin, the short way round where a coordinate is periodic."""
-        ...
+def extent(space: Space) -> tuple[Array, Array]:
+    """Return the middle of the box and half its sides (d,), in radians, metres and latents.
 
-    def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Return a first population (count, d), feasible, from `start` or uniform."""
-        ...
-
-    def scatter(self, rng: np.random.Generator, means: Array, spread: Array) -> Array:
-        """Return a feasible normal draw (n, d) around each of n feasible means, standard deviations `spread`."""
-        ...
-
-    def repair(self, proposals: Array, home: Array) -> Array:
-        """Return proposals (n, d), those that are not feasible moved towards the feasible point `home` (d,)."""
-        ...
-
-    def moved(self, proposals: Array, origin: "Space") -> Array:
-        """Return the proposals (n, d) that mean here what these mean in the space `origin`."""
-        ...
+    They are 0 and 1 for a space that has no such units.
+    """
+    centre, half = getattr(space, "centre", None), getattr(space, "half", None)
+    if centre is None or half is None:
+        return np.zeros(space.dimensions), np.ones(space.dimensions)
+    return centre, half
 
 
-def draw(space: Space, rng: np.random.Generator, count: int) -> Array:
+def converted(space: Space, proposals: Array, origin: Space) -> Array:
+    """Return the proposals (n, d) in `space` that stand for the poses of these in `origin`, the space before.
+
+    A `Filter` needs it in `advance`. A space without a method `moved` is the same box in every frame.
+    """
+    moved = getattr(space, "moved", None)
+    return np.array(proposals) if moved is None else np.asarray(moved(proposals, origin))
+
+
+def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array:
     """Return a first population (count, d) of feasible proposals, from the start or uniform. SAPSO (6).
 
     What breaks a constraint is redrawn at most 100 times (Reading S7). Out of the box that is a coordinate by itself:
@@ -118,7 +106,7 @@ def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: 
     """Return proposals (count, d) from the start or uniform, in the box, whatever the prior finds of them."""
     if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
-    drawn = space.wrap(rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
+    drawn = wrap(space, rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
     for _ in range(REDRAWS):
         outside = np.abs(drawn) > 1.0
         if not outside.any():
@@ -128,7 +116,7 @@ def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: 
     return fold(space, drawn)
 
 
-def scatter(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:
+def sample_normal(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:
     """Return a normal draw (n, d) around each of n feasible means, standard deviations `spread` (d,) or (n, d).
 
     A coordinate that leaves the box is folded back into it, as at a mirror; what the prior finds infeasible is redrawn
@@ -154,7 +142,7 @@ def scatter(space: Space, rng: np.random.Generator, means: Array, spread: Array)
 def fold(space: Space, proposals: Array) -> Array:
     """Return proposals (n, d) folded into the box: mirrored at its sides, periodic coordinates wrapped."""
     folded = np.abs((proposals + 3.0) % 4.0 - 2.0) - 1.0
-    return np.where(space.periodic, space.wrap(proposals), folded) if space.periodic.any() else folded
+    return np.where(space.periodic, wrap(space, proposals), folded) if space.periodic.any() else folded
 
 
 def repair(space: Space, proposals: Array, home: Array) -> Array:
@@ -162,13 +150,13 @@ def repair(space: Space, proposals: Array, home: Array) -> Array:
 
     It becomes the farthest of 32 evenly spaced points on the line between them, so this always ends.
     """
-    mended = np.clip(space.wrap(np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
+    mended = np.clip(wrap(space, np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
     mended = np.where(np.isfinite(mended), mended, home)
     broken = np.flatnonzero(~space.feasible(mended))
     if len(broken):
-        way = space.towards(home, mended[broken])
+        way = displacement(space, home, mended[broken])
         shares = np.arange(STEPS - 1, 0, -1) / STEPS
-        line = np.clip(space.wrap(home + shares[:, None, None] * way), -1.0, 1.0)
+        line = np.clip(wrap(space, home + shares[:, None, None] * way), -1.0, 1.0)
         works = space.feasible(line.reshape(-1, space.dimensions)).reshape(line.shape[:2])
         farthest = line[works.argmax(axis=0), np.arange(len(broken))]
         found: NDArray[np.bool_] = np.asarray(works.any(axis=0))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, draw_population, repair
 
 WORST = 1e15  # the largest cost that other libraries get to see: few bear nan, infinity or the square of 1e300
 PATIENCE = 5.0  # seconds to wait for a library to leave when its search is dropped
@@ -87,13 +87,13 @@ class Bridged:
     def __init__(
         self, space: Space, rng: np.random.Generator, library: Callable[[Space, np.random.Generator, Objective], Any]
     ) -> None:
-        self._space, self._home = space, space.draw(rng, 1)[0]
+        self._space, self._home = space, draw_population(space, rng, 1)[0]
         self._bridge = Bridge(partial(_seeded, library, space, int(rng.integers(2**63))))
 
     def ask(self) -> Array:
         """Return the population (n, d) that the library asks for; none once it has ended."""
         asked = self._bridge.ask()
-        return np.empty((0, self._space.dimensions)) if asked is None else self._space.repair(asked, self._home)
+        return np.empty((0, self._space.dimensions)) if asked is None else repair(self._space, asked, self._home)
 
     def tell(self, proposals: Array, costs: Array) -> None:  # noqa: ARG002, the library knows what it asked
         """Give the library the costs of what it asked for; ValueError where their number is another."""

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.fitting import box
-from posefit.fitting.box import Space, Start
+from posefit.fitting.box import Start
 from posefit.fitting.kernels import unpack_proposals, unpack_tilted, within
 from posefit.fitting.prior import Prior, Tilt
 from posefit.geometry.rotation import wrapped
@@ -118,28 +117,6 @@ class SearchSpace:
         allowed = self.prior.feasible(latents)
         return allowed if everyone else allowed & inside
 
-    def wrap(self, proposals: Array) -> Array:
-        """Return proposals with their periodic coordinates brought into [-1, 1)."""
-        if not self.periodic.any():
-            return proposals
-        return np.where(self.periodic, (proposals + 1.0) % 2.0 - 1.0, proposals)
-
-    def towards(self, origin: Array, target: Array) -> Array:
-        """Return target - origin, the short way round where a coordinate is periodic."""
-        return self.wrap(target - origin)
-
-    def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Return a first population (count, d) of feasible proposals; see `box.draw`. SAPSO (6)."""
-        return box.draw(self, rng, count)
-
-    def scatter(self, rng: np.random.Generator, means: Array, spread: Array) -> Array:
-        """Return a feasible normal draw (n, d) around each of n feasible means; see `box.scatter`."""
-        return box.scatter(self, rng, means, spread)
-
-    def repair(self, proposals: Array, home: Array) -> Array:
-        """Return proposals (n, d), those that are not feasible moved towards `home` (d,); see `box.repair`."""
-        return box.repair(self, proposals, home)
-
-    def moved(self, proposals: Array, origin: Space) -> Array:
+    def moved(self, proposals: Array, origin: "SearchSpace") -> Array:
         """Return the proposals (n, d), the nearest in the box, that mean here what these mean in `origin`."""
         return self.proposals(origin.centre + origin.half * proposals)

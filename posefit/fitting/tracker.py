@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space, Start
+from posefit.fitting.box import Space, Start, displacement
 from posefit.fitting.check import between, one_of, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior, Tilt
@@ -202,7 +202,7 @@ class Follower:
         step = np.zeros(space.dimensions)
         if len(found) > back:
             half = np.where(space.half > 0.0, space.half, 1.0)  # as in proposals: 0 where nothing is searched
-            step = space.towards(found[-back - 1] / half, found[-back] / half)
+            step = displacement(space, found[-back - 1] / half, found[-back] / half)
         mean = space.proposals(found[-1])
         spread = np.maximum(self._how.spread * np.abs(step), self._how.floor)  # Reading S5
         self._space = space.around(found[-1], Start(mean, spread, step), anchor)

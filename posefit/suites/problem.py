@@ -9,7 +9,7 @@ from typing import Literal, final
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space, Start
+from posefit.fitting.box import Space, Start, draw_population
 from posefit.fitting.check import one_of, positive, whole
 from posefit.reading import quoted
 from posefit.suites.functions import SuiteFunction
@@ -150,7 +150,7 @@ class Problem:
         """Return the proposal (d,) to start from at first, and others, drawn, for each restart."""
         if not restart:
             return self.initial_solution
-        drawn: Array = self.space.draw(np.random.default_rng([self.instance, restart]), 1)[0]
+        drawn: Array = draw_population(self.space, np.random.default_rng([self.instance, restart]), 1)[0]
         return drawn
 
     @property

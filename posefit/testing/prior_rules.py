@@ -14,6 +14,7 @@ from typing import Any, Literal, get_origin
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
 from posefit.motion import built_in
@@ -267,7 +268,7 @@ def searchable(case: PriorCase) -> str:
     """A search space on it can be drawn from."""
     prior = case.fitted
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
-    drawn = space.draw(np.random.default_rng(0), ROWS)
+    drawn = draw_population(space, np.random.default_rng(0), ROWS)
     expect(space.feasible(drawn).all(), "a first population must be feasible, got some that are not")
     uniform = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, space.dimensions))
     return f"{100 * space.feasible(uniform).mean():.2g} % of the box is feasible"

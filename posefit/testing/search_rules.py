@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from posefit.fitting.box import Space, Start
+from posefit.fitting.box import Space, Start, draw_population
 from posefit.fitting.optimiser import Filter, Niching, Optimiser
 from posefit.testing.case import Evaluate, OptimiserCase, check_population, checklist
 from posefit.testing.problem import pose_problem
@@ -47,7 +47,7 @@ def next_frame(case: OptimiserCase) -> str:
     proposals = optimiser.ask()
     expect(len(proposals), "after advance, ask must return a population, got an empty one")
     check_population(proposals, space)
-    near, chance = sphere(proposals).mean(), sphere(space.draw(np.random.default_rng(0), 1000)).mean()
+    near, chance = sphere(proposals).mean(), sphere(draw_population(space, np.random.default_rng(0), 1000)).mean()
     expect(
         near < 0.7 * chance, f"particles must be carried, got a mean cost of {near:.3g} where chance has {chance:.3g}"
     )
@@ -110,7 +110,7 @@ def _beats_chance(case: OptimiserCase, space: Space, evaluate: Evaluate) -> str:
 
 
 def _by_chance(space: Space, evaluate: Evaluate, seed: int) -> float:
-    drawn = space.draw(np.random.default_rng(seed), BUDGET)
+    drawn = draw_population(space, np.random.default_rng(seed), BUDGET)
     return float(evaluate(drawn).min())
 
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting import box
-from posefit.fitting.box import Space, Start
+from posefit.fitting.box import Start
 
 Rule = Callable[[Array], NDArray[np.bool_]]
 
@@ -43,40 +42,11 @@ class Toy:
     rule: Rule = anywhere
     start: Start | None = None
     wrapping: int = 0
-    centre: Array = field(init=False, repr=False)
-    half: Array = field(init=False, repr=False)
     periodic: NDArray[np.bool_] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", np.zeros(self.dimensions))
-        object.__setattr__(self, "half", np.ones(self.dimensions))
         object.__setattr__(self, "periodic", np.arange(self.dimensions) < self.wrapping)
 
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, d) lie in the box and are allowed (n,)."""
         return np.asarray((np.abs(proposals) <= 1.0).all(axis=1) & self.rule(proposals))
-
-    def wrap(self, proposals: Array) -> Array:
-        """Return proposals with their periodic coordinates brought into [-1, 1)."""
-        return np.where(self.periodic, (proposals + 1.0) % 2.0 - 1.0, proposals)
-
-    def towards(self, origin: Array, target: Array) -> Array:
-        """Return target - origin, the short way round where a coordinate is periodic."""
-        return self.wrap(target - origin)
-
-    def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Return a first population (count, d) of allowed proposals."""
-        return box.draw(self, rng, count)
-
-    def scatter(self, rng: np.random.Generator, means: Array, spread: Array) -> Array:
-        """Return an allowed normal draw (n, d) around each of n allowed means."""
-        return box.scatter(self, rng, means, spread)
-
-    def repair(self, proposals: Array, home: Array) -> Array:
-        """Return proposals (n, d), those that are not allowed moved towards `home` (d,)."""
-        return box.repair(self, proposals, home)
-
-    def moved(self, proposals: Array, origin: Space) -> Array:
-        """Return the same proposals (n, d): all toys have one box."""
-        assert origin.dimensions == self.dimensions
-        return np.array(proposals)

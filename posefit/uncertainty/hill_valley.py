@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.uncertainty.landscape import Landscape
+from posefit.uncertainty.landscape import Landscape, displacement, wrap
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +41,11 @@ def same_valley(
     So many `probes` (p,) are spaced evenly on the way between two, the short way round where a coordinate is periodic.
     A hill costs more than both by more than `tolerance`, and what is not feasible is one. All are evaluated at once.
     """
-    origins, ways = proposals[pairs[:, 0]], landscape.box.towards(proposals[pairs[:, 0]], proposals[pairs[:, 1]])
+    origins, ways = proposals[pairs[:, 0]], displacement(landscape.box, proposals[pairs[:, 0]], proposals[pairs[:, 1]])
     owner = np.repeat(np.arange(len(pairs)), probes)
     number = np.arange(len(owner)) - np.repeat(probes.cumsum() - probes, probes) + 1
     share = number / (probes[owner] + 1.0)
-    between = landscape.box.wrap(origins[owner] + share[:, None] * ways[owner])
+    between = wrap(landscape.box, origins[owner] + share[:, None] * ways[owner])
     rim = costs[pairs].max(axis=1) + tolerance
     hill = landscape.costs(between) > rim[owner]  # URSEM1999 (hill valley)
     return np.asarray(np.bincount(owner[hill], minlength=len(pairs)) == 0)
@@ -88,7 +88,7 @@ def _pairs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return each proposal with those that are better (p, 2), nearest first, and how often to probe them (p,)."""
     most, ranked = proposals.shape[1] + 1, proposals[order]
-    away = np.linalg.norm(landscape.box.towards(ranked[:, None], ranked), axis=2)
+    away = np.linalg.norm(displacement(landscape.box, ranked[:, None], ranked), axis=2)
     pairs, far = [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
     for place in range(1, len(order)):
         nearest = np.argsort(away[place, :place], kind="stable")[:most]  # MAREE2018 (nearest better)

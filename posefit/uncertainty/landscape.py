@@ -27,13 +27,17 @@ class Box(Protocol):
         """Return which proposals (n, d) lie in the box and are allowed (n,)."""
         ...
 
-    def wrap(self, proposals: Array) -> Array:
-        """Return proposals with their periodic coordinates brought into [-1, 1)."""
-        ...
 
-    def towards(self, origin: Array, target: Array) -> Array:
-        """Return target - origin, the short way round where a coordinate is periodic."""
-        ...
+def wrap(box: Box, proposals: Array) -> Array:
+    """Return proposals (..., d) with their periodic coordinates brought into [-1, 1)."""
+    if not box.periodic.any():
+        return proposals
+    return np.where(box.periodic, (proposals + 1.0) % 2.0 - 1.0, proposals)
+
+
+def displacement(box: Box, origin: Array, target: Array) -> Array:
+    """Return target - origin (..., d), the short way round where a coordinate is periodic."""
+    return wrap(box, target - origin)
 
 
 @dataclass(eq=False)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.uncertainty.kernels import log_parts, log_sums
-from posefit.uncertainty.landscape import Box
+from posefit.uncertainty.landscape import Box, wrap
 
 REDRAWS = 100  # Reading S7
 SPARE = 8  # ours: proposals that are drawn beyond those that are expected to be enough
@@ -84,7 +84,7 @@ class NormalMixture:
             return drawn
         which = rng.integers(0, len(self.centres), len(near))
         means, spreads = self.centres[which], self.spreads[which]
-        mine = box.wrap(means + spreads * rng.standard_normal(means.shape))
+        mine = wrap(box, means + spreads * rng.standard_normal(means.shape))
         rows, columns = np.nonzero(np.abs(mine) > 1.0)
         while len(rows):  # of a mean in the box at least a third stays inside
             again = means[rows, columns] + spreads[rows, columns] * rng.standard_normal(len(rows))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.uncertainty.hill_valley import valleys
-from posefit.uncertainty.landscape import Box, Landscape
+from posefit.uncertainty.landscape import Box, Landscape, displacement
 from posefit.uncertainty.mixture import WIDEST, NormalMixture
 from posefit.uncertainty.smc import reweighed, systematic_rows, tempered
 
@@ -136,7 +136,7 @@ def widths(box: Box, searched: Sequence[Searched], modes: Array, costs: Array, t
     usable = np.flatnonzero(known <= costs.min() + REACH * temperature)
     usable = usable[:: max(len(usable) // LOOKED_AT, 1)]
     proposals, known = proposals[usable], known[usable]
-    away = np.array([box.towards(mode, proposals) ** 2 for mode in modes])  # (k, n, d)
+    away = np.array([displacement(box, mode, proposals) ** 2 for mode in modes])  # (k, n, d)
     owners = away.sum(axis=2).argmin(axis=0)
     away, rises = away[owners, np.arange(len(known))], known - costs[owners]
     if len(modes) == 1:

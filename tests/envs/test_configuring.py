@@ -12,6 +12,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.utils.seeding import np_random
 
 import posefit_envs  # noqa: F401, registers it
+from posefit.fitting.box import draw_population
 from posefit_envs.configuring import herd
 from posefit_envs.configuring.moves import differential, normal
 from posefit_envs.configuring.orders import Order, action_of, order_of
@@ -190,7 +191,7 @@ def test_differences_and_draws_are_those_of_their_formulas() -> None:
     env.reset(seed=0)
     space, rng = env._search.space, np.random.default_rng(0)
     # of bests that are all the same neither has anywhere to go
-    same = np.repeat(space.draw(rng, 1), 20, axis=0)
+    same = np.repeat(draw_population(space, rng, 1), 20, axis=0)
     order = np.arange(20)
     np.testing.assert_allclose(differential(space, rng, same, same, order, 0.7), same)
     np.testing.assert_allclose(normal(space, rng, same, order, 20, 0.6), same)

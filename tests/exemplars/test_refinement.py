@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space
+from posefit.fitting.box import Space, converted, displacement, draw_population, repair, sample_normal, wrap
 from posefit.geometry.skeleton import ANGLES
 from posefit.registry import registry
 from posefit_exemplars.exemplars import Exemplars
@@ -25,18 +25,18 @@ def test_it_is_a_space_and_every_draw_lies_in_it(two: Exemplars) -> None:
     assert 2 < space.dimensions <= COMPONENTS + 1
     for name in ("centre", "half", "periodic"):
         assert getattr(space, name).shape == (space.dimensions,)
-    drawn = space.draw(rng, 300)
+    drawn = draw_population(space, rng, 300)
     assert drawn.shape == (300, space.dimensions)
-    far = space.scatter(rng, drawn, np.full(space.dimensions, 5.0))
-    mended = space.repair(10.0 * drawn, space.start.mean)
+    far = sample_normal(space, rng, drawn, np.full(space.dimensions, 5.0))
+    mended = repair(space, 10.0 * drawn, space.start.mean)
     for proposals in (drawn, far, mended):
         assert space.feasible(proposals).all()
     np.testing.assert_array_equal(
         space.feasible(np.array([[1.1], [0.9], [-1.1]]) * np.ones(space.dimensions)), [0, 1, 0]
     )
-    np.testing.assert_array_equal(space.wrap(drawn), drawn)
-    np.testing.assert_array_equal(space.towards(drawn, far), far - drawn)
-    np.testing.assert_allclose(space.moved(drawn, space), drawn)
+    np.testing.assert_array_equal(wrap(space, drawn), drawn)
+    np.testing.assert_array_equal(displacement(space, drawn, far), far - drawn)
+    np.testing.assert_allclose(converted(space, drawn, space), drawn)
 
 
 def test_its_middle_is_the_path_and_its_axes_are_how_poses_like_it_differ(two: Exemplars) -> None:

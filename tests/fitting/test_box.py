@@ -9,6 +9,7 @@ from scipy.stats import kstest, truncnorm
 from posefit import SearchSpace, Start
 from posefit.arrays import Array
 from posefit.fitting import box
+from posefit.fitting.box import converted, draw_population, repair, sample_normal
 from posefit.motion import built_in
 from posefit.testing.toy import Toy, anywhere, ball, shell
 from posefit_priors.pca import PCA
@@ -37,7 +38,7 @@ def test_folding_leaves_the_inside_and_wraps_what_is_periodic() -> None:
 
 def test_a_scatter_is_normal_around_its_means() -> None:
     means = np.repeat([[0.2, -0.3], [-0.5, 0.4]], 20_000, axis=0)
-    drawn = Toy(2).scatter(np.random.default_rng(0), means, np.array([0.05, 0.1]))
+    drawn = sample_normal(Toy(2), np.random.default_rng(0), means, np.array([0.05, 0.1]))
     for rows in (slice(0, 20_000), slice(20_000, None)):
         np.testing.assert_allclose(drawn[rows].mean(axis=0), means[rows][0], atol=3e-3)
         np.testing.assert_allclose(drawn[rows].std(axis=0), [0.05, 0.1], rtol=0.03)
@@ -45,10 +46,10 @@ def test_a_scatter_is_normal_around_its_means() -> None:
 
 def test_a_scatter_is_feasible_and_redraws_only_what_is_not() -> None:
     space = Toy(3, ball)
-    means = space.draw(np.random.default_rng(0), 500)
-    drawn = space.scatter(np.random.default_rng(1), means, np.full(3, 0.3))
+    means = draw_population(space, np.random.default_rng(0), 500)
+    drawn = sample_normal(space, np.random.default_rng(1), means, np.full(3, 0.3))
     assert space.feasible(drawn).all()
-    free = Toy(3).scatter(np.random.default_rng(1), means, np.full(3, 0.3))
+    free = sample_normal(Toy(3), np.random.default_rng(1), means, np.full(3, 0.3))
     kept = space.feasible(free)
     assert 0.5 < kept.mean() < 1.0
     np.testing.assert_array_equal(drawn[kept], free[kept])
@@ -56,13 +57,13 @@ def test_a_scatter_is_feasible_and_redraws_only_what_is_not() -> None:
 
 def test_a_scatter_that_finds_nothing_stays_at_its_means() -> None:
     means = np.zeros((4, 2))
-    drawn = Toy(2, nowhere).scatter(np.random.default_rng(0), means, np.full(2, 0.1))
+    drawn = sample_normal(Toy(2, nowhere), np.random.default_rng(0), means, np.full(2, 0.1))
     np.testing.assert_array_equal(drawn, means)
 
 
 def test_a_repair_moves_to_the_farthest_feasible_point_of_the_line() -> None:
     space, home = Toy(1, lambda x: np.asarray(np.abs(x[:, 0]) < 0.5)), np.zeros(1)
-    mended = space.repair(np.array([[0.2], [0.9], [-3.0], [np.nan]]), home)
+    mended = repair(space, np.array([[0.2], [0.9], [-3.0], [np.nan]]), home)
     # of 32 points on the way from 0 to 0.9 the 17th is the last below 0.5; from 0 to -1 the 15th
     np.testing.assert_allclose(mended[:, 0], [0.2, 0.9 * 17 / 32, -15 / 32, 0.0])
 
@@ -79,20 +80,20 @@ def test_a_repair_is_always_feasible(rule: box.Space, wrapping: int) -> None:
     }[rule]  # type: ignore[index]
     proposals = np.random.default_rng(0).normal(0.0, 3.0, (300, 2))
     kept = proposals.copy()
-    assert space.feasible(space.repair(proposals, np.array(home))).all()
+    assert space.feasible(repair(space, proposals, np.array(home))).all()
     np.testing.assert_array_equal(proposals, kept)
 
 
 def test_a_draw_from_a_start_on_the_edge_of_many_dimensions_is_no_heap_of_copies() -> None:
     start = Start(np.ones(50), np.full(50, 0.1), np.zeros(50))
-    drawn = Toy(50, start=start).draw(np.random.default_rng(0), 40)
+    drawn = draw_population(Toy(50, start=start), np.random.default_rng(0), 40)
     assert len(np.unique(drawn, axis=0)) == 40
     assert (np.abs(drawn) <= 1.0).all()
 
 
 def test_a_draw_from_a_start_is_normal_within_the_box_and_redrawn_by_coordinates() -> None:
     start = Start(np.array([1.0, 0.9, 0.0]), np.array([0.1, 0.2, 0.1]), np.zeros(3))
-    drawn = Toy(3, start=start).draw(np.random.default_rng(0), 5000)
+    drawn = draw_population(Toy(3, start=start), np.random.default_rng(0), 5000)
     # normal distributions cut off at 1: 0, 0.5 and 10 deviations above their means
     for j, cut in enumerate((0.0, 0.5, 10.0)):
         away = (drawn[:, j] - start.mean[j]) / start.spread[j]
@@ -102,14 +103,14 @@ def test_a_draw_from_a_start_is_normal_within_the_box_and_redrawn_by_coordinates
 
 def test_a_draw_around_a_mean_far_out_of_the_box_is_folded_into_it() -> None:
     start = Start(np.array([5.2, 0.0]), np.array([0.01, 0.1]), np.zeros(2))
-    drawn = Toy(2, start=start).draw(np.random.default_rng(0), 50)
+    drawn = draw_population(Toy(2, start=start), np.random.default_rng(0), 50)
     # a triangle wave of period 4: 5.2 is where 1.2 is, mirrored at 1
     np.testing.assert_allclose(drawn[:, 0], 0.8, atol=0.05)
 
 
 def test_a_draw_where_nothing_is_feasible_says_so() -> None:
     with pytest.raises(ValueError, match="some of its range feasible, got none"):
-        Toy(2, nowhere).draw(np.random.default_rng(0), 3)
+        draw_population(Toy(2, nowhere), np.random.default_rng(0), 3)
 
 
 def test_moving_to_another_box_keeps_the_pose() -> None:
@@ -119,8 +120,8 @@ def test_moving_to_another_box_keeps_the_pose() -> None:
     new = SearchSpace(
         prior, np.array([0.3, 0.0, 0.0]), np.radians([45.0, 15.0, 15.0]), np.array([0.1, 1.0, 0.0]), "searched"
     )
-    proposals = old.draw(np.random.default_rng(0), 200) * np.array([0.1] + [0.5] * 11)
+    proposals = draw_population(old, np.random.default_rng(0), 200) * np.array([0.1] + [0.5] * 11)
     poses, places = old.decode(proposals)
-    moved_poses, moved_places = new.decode(new.moved(proposals, old))
+    moved_poses, moved_places = new.decode(converted(new, proposals, old))
     np.testing.assert_allclose(moved_poses, poses, atol=1e-12)
     np.testing.assert_allclose(moved_places, places, atol=1e-12)

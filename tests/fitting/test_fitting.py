@@ -9,6 +9,7 @@ import pytest
 from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
 from posefit.arrays import Array
 from posefit.fitting.alignment import align
+from posefit.fitting.box import displacement, draw_population
 from posefit.fitting.optimiser import BudgetError, populations
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
@@ -31,7 +32,7 @@ def problem() -> PoseProblem:
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_cost_has_the_same_bits_whatever_stands_beside_it(problem: PoseProblem, threads: int) -> None:
     problem = replace(problem, threads=threads)
-    proposals = problem.space.draw(np.random.default_rng(0), 300)
+    proposals = draw_population(problem.space, np.random.default_rng(0), 300)
     together = problem.evaluate(proposals)
     np.testing.assert_array_equal(problem.evaluate(proposals[:40]), together[:40])
     np.testing.assert_array_equal([problem.evaluate(one[None])[0] for one in proposals[:20]], together[:20])
@@ -47,7 +48,7 @@ def test_a_search_is_told_the_costs_of_the_areas_and_a_view_that_knows_nothing_h
     blind = Silhouette.of(np.zeros_like(seen.mask), np.zeros_like(seen.mask))
     cameras = [problem.cameras[0]] * 3
     several = replace(problem, cameras=cameras, silhouettes=[blind, seen, half], beta=0.3, threads=threads)
-    proposals = several.space.draw(np.random.default_rng(1), 40)
+    proposals = draw_population(several.space, np.random.default_rng(1), 40)
     counts = several.areas(*several.decode(proposals))
     np.testing.assert_array_equal(several.evaluate(proposals), several.combined(counts))
     shares = np.array([100.0 * (0.7 * b / (b + y) + 0.3 * r / (r + y)) for r, b, y in np.concatenate(counts[1:])])
@@ -57,7 +58,7 @@ def test_a_search_is_told_the_costs_of_the_areas_and_a_view_that_knows_nothing_h
 
 
 def test_proposals_and_coordinates_are_inverse(problem: PoseProblem) -> None:
-    proposals = problem.space.draw(np.random.default_rng(0), 30)
+    proposals = draw_population(problem.space, np.random.default_rng(0), 30)
     back = [problem.space.proposals(one) for one in problem.space.coordinates(proposals)]
     np.testing.assert_allclose(back, proposals, atol=1e-12)
 
@@ -76,7 +77,7 @@ def test_several_views_are_averaged(problem: PoseProblem) -> None:
     seen = Silhouette.of(project(problem.body, other, motion.poses[0], motion.translations[0]))
     second = replace(problem, cameras=[other], silhouettes=[seen])
     both = replace(problem, cameras=[problem.cameras[0], other], silhouettes=[problem.silhouettes[0], seen])
-    proposals = problem.space.draw(np.random.default_rng(0), 20)
+    proposals = draw_population(problem.space, np.random.default_rng(0), 20)
     np.testing.assert_allclose(both.evaluate(proposals), (problem.evaluate(proposals) + second.evaluate(proposals)) / 2)
 
 
@@ -86,7 +87,7 @@ def test_unknown_pixels_count_for_nothing(problem: PoseProblem) -> None:
     valid[60:] = False
     spoilt = mask.copy()
     spoilt[60:] = np.random.default_rng(0).random(spoilt[60:].shape) < 0.5
-    proposals = problem.space.draw(np.random.default_rng(0), 20)
+    proposals = draw_population(problem.space, np.random.default_rng(0), 20)
     clean, dirty = (replace(problem, silhouettes=[Silhouette.of(m, valid)]) for m in (mask, spoilt))
     np.testing.assert_array_equal(clean.evaluate(proposals), dirty.evaluate(proposals))
 
@@ -104,7 +105,7 @@ def test_aligning_finds_the_true_translation(problem: PoseProblem) -> None:
 
 
 def test_a_problem_can_be_pickled(problem: PoseProblem) -> None:
-    proposals = problem.space.draw(np.random.default_rng(0), 5)
+    proposals = draw_population(problem.space, np.random.default_rng(0), 5)
     again = pickle.loads(pickle.dumps(problem))
     np.testing.assert_array_equal(again.evaluate(proposals), problem.evaluate(proposals))
 
@@ -181,4 +182,4 @@ def test_sapso_beats_random_search_at_the_same_cost(problem: PoseProblem) -> Non
 def test_a_full_circle_of_yaw_wraps(problem: PoseProblem) -> None:
     space = replace(problem.space, root_range=np.array([np.pi, 0.2, 0.2]))
     assert space.periodic.tolist() == [True] + [False] * 8
-    assert space.towards(np.array([0.9] + [0.0] * 8), np.array([-0.9] + [0.0] * 8))[0] == pytest.approx(0.2)
+    assert displacement(space, np.array([0.9] + [0.0] * 8), np.array([-0.9] + [0.0] * 8))[0] == pytest.approx(0.2)

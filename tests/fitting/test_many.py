@@ -7,6 +7,7 @@ import pytest
 
 from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
 from posefit.arrays import Array
+from posefit.fitting.box import draw_population
 from posefit.fitting.problem import CoarseFirst
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
@@ -29,7 +30,7 @@ def problem() -> PoseProblem:
 @pytest.mark.parametrize("translation", ["known", "searched", "aligned"])
 def test_a_thousand_proposals_cost_what_each_of_them_costs(problem: PoseProblem, translation: str) -> None:
     problem = replace(problem, space=replace(problem.space, translation=translation))
-    proposals = problem.space.draw(np.random.default_rng(0), 1000)
+    proposals = draw_population(problem.space, np.random.default_rng(0), 1000)
     together = problem.evaluate(proposals)
     shared = replace(problem, threads=3)
     np.testing.assert_array_equal(shared.evaluate(proposals), together)
@@ -67,7 +68,7 @@ def test_a_thousand_proposals_are_counted_once_a_view(problem: PoseProblem, thre
 @pytest.mark.parametrize("translation", ["known", "searched", "aligned"])
 def test_a_proposal_means_the_same_pose_at_every_size(problem: PoseProblem, translation: str) -> None:
     problem = replace(problem, space=replace(problem.space, translation=translation))
-    proposals = problem.space.draw(np.random.default_rng(1), 50)
+    proposals = draw_population(problem.space, np.random.default_rng(1), 50)
     half, quarter = problem.coarser(2), problem.coarser(4)
     assert problem.coarser(2) is half
     assert [camera.width for camera in (*half.cameras, *quarter.cameras)] == [80, 80, 40, 40]
@@ -87,7 +88,7 @@ def test_a_pose_that_fits_perfectly_costs_nothing_at_any_size(problem: PoseProbl
 
 
 def test_small_pictures_rank_random_poses_as_the_whole_one_does(problem: PoseProblem) -> None:
-    costs = problem.evaluate_at(problem.space.draw(np.random.default_rng(2), 300))
+    costs = problem.evaluate_at(draw_population(problem.space, np.random.default_rng(2), 300))
     ranks = costs.argsort(axis=1).argsort(axis=1)
     whole, half, quarter = ranks - ranks.mean()
     # Spearman's rank correlations; a quarter of 160 x 120 is a body of about twenty pixels

@@ -7,6 +7,7 @@ import pytest
 
 from posefit import SearchSpace, Task
 from posefit.arrays import Array
+from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Tilt
 from posefit.fitting.tracker import Follower, Observation, Prediction, SynthesisTracker
 from posefit.geometry.body import Body
@@ -134,7 +135,7 @@ def test_a_walker_tilts_a_few_degrees_more_than_others_did_at_most() -> None:
     tilts = np.concatenate([walk.poses[:, 1:3] for walk in walks])
     for prior in (PCA().fit(angles), Loose().fit(angles)):
         space = Follower(task_of(*walks), prior, Prediction()).space(Observation([], np.zeros(3)))
-        poses = space.decode(space.draw(np.random.default_rng(0), 500))[0]
+        poses = space.decode(draw_population(space, np.random.default_rng(0), 500))[0]
         assert (poses[:, 1:3] > tilts.min(axis=0) - np.radians(8.0)).all()
         assert (poses[:, 1:3] < tilts.max(axis=0) + np.radians(8.0)).all()
 
@@ -187,7 +188,7 @@ def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
     walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
     prior = PCA().fit(np.concatenate([walk.poses[:, 3:] for walk in walks]))
     space = Follower(task_of(*walks), prior, Prediction()).space(Observation([], np.zeros(3)))
-    proposals = space.draw(np.random.default_rng(0), 60)
+    proposals = draw_population(space, np.random.default_rng(0), 60)
     poses = space.decode(proposals)[0]
     np.testing.assert_array_equal(poses[7:8], space.decode(proposals[7:8])[0])
     np.testing.assert_array_equal(poses[::-1], space.decode(proposals[::-1])[0])

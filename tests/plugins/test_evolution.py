@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.fitting.box import Start
+from posefit.fitting.box import Start, displacement
 from posefit.testing.toy import Toy
 from posefit_evolution.cma import CMAES
 
@@ -24,7 +24,7 @@ def test_a_target_at_the_seam_of_a_circle_is_found(wrapping: int) -> None:
     target = np.where(space.periodic, 0.98, 0.3)
 
     def away(proposals: Array) -> Array:
-        return np.asarray((space.towards(target, proposals) ** 2).sum(axis=1))
+        return np.asarray((displacement(space, target, proposals) ** 2).sum(axis=1))
 
     optimiser = CMAES(space, np.random.default_rng(0))
     for _ in range(100):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Tilt
 from posefit.fitting.space import Translation
 from posefit.geometry.body import Body
@@ -100,7 +101,7 @@ def test_a_problem_of_several_views_costs_the_same_bits_on_a_device() -> None:
     seen, around = one.silhouettes[0], Camera.around(one.space.anchor, 2.0, 3.5, (33, 20))
     problem = replace(one, cameras=[*one.cameras, around], silhouettes=[seen, Silhouette.of(np.eye(20, 33))])
     on_device = replace(problem, silhouettes=[moved_to(view, "cuda") for view in problem.silhouettes])
-    proposals = problem.space.draw(np.random.default_rng(7), 6)
+    proposals = draw_population(problem.space, np.random.default_rng(7), 6)
     count = PoseCount()
     with count.counting():
         np.testing.assert_array_equal(on_device.evaluate(proposals), problem.evaluate(proposals))

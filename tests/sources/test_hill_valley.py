@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit.fitting.box import displacement, wrap
 from posefit.testing.toy import Toy
 from posefit.uncertainty.hill_valley import edge_length, same_valley, valleys
 from posefit.uncertainty.landscape import Landscape
@@ -33,7 +34,7 @@ def slow(cost: Callable[[Array], Array], space: Toy, proposals: Array, costs: Ar
     order = sorted(range(n), key=lambda i: costs[i])
     clusters: list[set[int]] = []
     for place, i in enumerate(order):
-        away = {j: float(np.linalg.norm(space.towards(proposals[i], proposals[j]))) for j in order[:place]}
+        away = {j: float(np.linalg.norm(displacement(space, proposals[i], proposals[j]))) for j in order[:place]}
         home: set[int] | None = None
         failed: list[set[int]] = []
         for j in sorted(away, key=lambda j: away[j])[: d + 1]:
@@ -41,9 +42,9 @@ def slow(cost: Callable[[Array], Array], space: Toy, proposals: Array, costs: Ar
             if any(mine is one for one in failed):
                 continue
             probes = least + int(away[j] // edge)
-            way, flat = space.towards(proposals[i], proposals[j]), True
+            way, flat = displacement(space, proposals[i], proposals[j]), True
             for k in range(1, probes + 1):
-                x = space.wrap((proposals[i] + k / (probes + 1) * way)[None])
+                x = wrap(space, (proposals[i] + k / (probes + 1) * way)[None])
                 flat = flat and bool(cost(x)[0] <= max(costs[i], costs[j]))
             if flat:
                 home = mine

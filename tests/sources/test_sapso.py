@@ -11,6 +11,7 @@ import pytest
 from posefit import PoseProblem, SearchSpace, Silhouette, Start, minimise
 from posefit.arrays import Array
 from posefit.fitting import metrics
+from posefit.fitting.box import draw_population
 from posefit.fitting.tracker import Observation, Prediction, SynthesisTracker, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -432,7 +433,7 @@ def test_eq_5_the_search_returns_the_least_cost_it_saw(scene: tuple[Body, Camera
 
 def test_eq_6_the_first_population_is_normal_around_the_last_best() -> None:
     start = Start(np.array([0.1, -0.2, 0.0, 0.3]), np.array([0.05, 0.1, 0.02, 0.2]), np.zeros(4))
-    drawn = line_space(start=start).draw(np.random.default_rng(0), 4000)
+    drawn = draw_population(line_space(start=start), np.random.default_rng(0), 4000)
     np.testing.assert_allclose(drawn.mean(axis=0), start.mean, atol=0.02)
     np.testing.assert_allclose(drawn.std(axis=0), start.spread, rtol=0.06)
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit.fitting.box import draw_population
 from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.drawn import PoseCount
 from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, box_without, learned_without
@@ -95,7 +96,7 @@ def test_a_next_frame_starts_near_a_prediction_and_nearer_than_anywhere() -> Non
     near, anywhere = [], []
     for number in range(10_000, 10_008):
         posed, rng = problem(2, number, 16), np.random.default_rng(0)
-        near.append(np.median(posed(posed.space.draw(rng, 60))))
+        near.append(np.median(posed(draw_population(posed.space, rng, 60))))
         anywhere.append(np.median(posed(rng.uniform(-1.0, 1.0, (60, 16)))))
         assert posed.start is not None
         assert np.array_equal(posed.initial_solution, posed.start.mean)

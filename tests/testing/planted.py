@@ -13,6 +13,7 @@ import numpy as np
 
 from posefit import Frame, SearchSpace, Task
 from posefit.arrays import Array
+from posefit.fitting.box import draw_population, sample_normal
 from posefit_filters.annealed import Annealed
 from posefit_priors.pca import PCA
 
@@ -26,7 +27,7 @@ class Sound:
         if population_size < 1:
             raise ValueError(f"population_size must be at least 1, got {population_size}")
         self.space, self.rng, self.shrink = space, rng, shrink
-        self.population = space.draw(rng, population_size)
+        self.population = draw_population(space, rng, population_size)
         self.best, self.cost, self.width = self.population[0].copy(), np.inf, 0.5
 
     def ask(self) -> Array:
@@ -38,7 +39,7 @@ class Sound:
             self.best, self.cost = proposals[costs.argmin()].copy(), float(costs.min())
         self.width *= self.shrink
         spread = np.full(self.space.dimensions, self.width)
-        self.population = self.space.scatter(self.rng, np.tile(self.best, (len(self.population), 1)), spread)
+        self.population = sample_normal(self.space, self.rng, np.tile(self.best, (len(self.population), 1)), spread)
 
 
 class SwallowsSettings(Sound):
@@ -272,7 +273,9 @@ class HashesNames(Sound):
 
     def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
         super().__init__(space, np.random.default_rng(abs(hash("posefit"))))
-        self.population = space.draw(np.random.default_rng([abs(hash("posefit")), int(rng.integers(9**9))]), 40)
+        self.population = draw_population(
+            space, np.random.default_rng([abs(hash("posefit")), int(rng.integers(9**9))]), 40
+        )
 
 
 class SortsInPlace(Sound):
@@ -320,7 +323,7 @@ class IgnoresTheStart(Sound):
 
 class InventsModes(Sound):
     def modes(self) -> Array:
-        return self.space.draw(np.random.default_rng(0), 3)
+        return draw_population(self.space, np.random.default_rng(0), 3)
 
 
 class BackwardModes(Sound):
@@ -358,7 +361,7 @@ class ForgetsParticles(Annealed):
 
     def advance(self, space: Any) -> None:
         super().advance(space)
-        self._particles = space.draw(self._rng, len(self._particles))
+        self._particles = draw_population(space, self._rng, len(self._particles))
 
 
 class ShiftsWithTheCompany(PCA):

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from posefit.fitting.box import draw_population
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
 from posefit.testing import (
@@ -68,7 +69,7 @@ class Chance:
         self.space, self.rng, self.population_size = space, rng, population_size
 
     def ask(self) -> Any:
-        return self.space.draw(self.rng, self.population_size)
+        return draw_population(self.space, self.rng, self.population_size)
 
     def tell(self, proposals: Any, costs: Any) -> None: ...
 

@@ -5,6 +5,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.box import displacement
 from posefit_envs.configure import ALPHA
 from posefit_envs.configuring.herd import Herd
 from posefit_envs.scales import priced
@@ -27,7 +28,7 @@ def instance_features(herd: Herd) -> Array:
     """
     seen = np.array([_shape(one.mask) for one in herd.episode.scenery.observation.silhouettes]).mean(axis=0)
     first, costs = herd.flock.best, herd.flock.best_cost
-    away = np.sqrt((herd.space.towards(first[costs.argmin()], first) ** 2).sum(axis=1))
+    away = np.sqrt((displacement(herd.space, first[costs.argmin()], first) ** 2).sum(axis=1))
     spread = costs.std() * away.std()
     slope = float(((costs - costs.mean()) * (away - away.mean())).mean() / spread) if spread > 0.0 else 0.0
     landscape = [herd.space.dimensions / 66.0, np.median(costs) / 100.0, costs.std() / 100.0, 0.5 + 0.5 * slope]

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.box import REDRAWS
+from posefit.fitting.box import REDRAWS, displacement, draw_population, sample_normal
 from posefit_envs.configure import ACCELERATION, ALPHA, FIRST
 from posefit_envs.configuring.moves import differential, normal
 from posefit_envs.configuring.orders import Order
@@ -53,7 +53,7 @@ class Herd:
         anew = round(order.restart * self.population_size)
         if anew:
             flock, worst = self.flock, self.flock.best_cost.argsort(kind="stable")[self.population_size - anew :]
-            flock.moved[worst] = flock.position[worst] = flock.best[worst] = self.space.draw(self.rng, anew)
+            flock.moved[worst] = flock.position[worst] = flock.best[worst] = draw_population(self.space, self.rng, anew)
             flock.velocity[worst], flock.cost[worst], flock.best_cost[worst] = 0.0, np.inf, np.inf
 
     def ask(self) -> Array:
@@ -101,12 +101,12 @@ class Herd:
             if apart < count:
                 pieces.append(normal(space, self.rng, bests, ranks, count - apart, stride))
             part.moved = np.concatenate(pieces)
-            part.velocity[swarm:] = np.clip(space.towards(part.position, part.moved), *self.limits)[swarm:]
+            part.velocity[swarm:] = np.clip(displacement(space, part.position, part.moved), *self.limits)[swarm:]
         if any(order.diffusion):
             spread = np.empty(space.dimensions)
             for layer, deviation in zip(self.layers, order.diffusion, strict=True):
                 spread[layer] = deviation
-            part.moved = space.scatter(self.rng, part.moved, spread)
+            part.moved = sample_normal(space, self.rng, part.moved, spread)
 
     def _cooler(self, factor: float) -> float:
         """Return what a number that falls by a factor an iteration has fallen by in this step."""

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space, fold
+from posefit.fitting.box import Space, displacement, fold, repair
 
 GREEDY = 0.1  # p: the share of the bests that pull, JADE
 CROSSED = 0.9  # CR: the share of coordinates that move
@@ -24,10 +24,10 @@ def differential(
     k, (n, d) = len(mine), bests.shape
     leading = bests[order[rng.integers(max(1, round(GREEDY * n)), size=k)]]
     one, other = rng.integers(n, size=(2, k))
-    step = space.towards(mine, leading) + space.towards(bests[other], bests[one])
+    step = displacement(space, mine, leading) + displacement(space, bests[other], bests[one])
     crossed = rng.random((k, d)) < CROSSED
     crossed[np.arange(k), rng.integers(d, size=k)] = True
-    return space.repair(fold(space, mine + np.where(crossed, weight * step, 0.0)), bests[order[0]])
+    return repair(space, fold(space, mine + np.where(crossed, weight * step, 0.0)), bests[order[0]])
 
 
 def normal(
@@ -39,7 +39,7 @@ def normal(
     `stride` / 0.6: one generation of an estimation of multivariate normal algorithm.
     """
     elite = bests[order[: max(2, round(ELITE * len(order)))]]
-    ways = space.towards(elite[0], elite)
+    ways = displacement(space, elite[0], elite)
     middle = ways.mean(axis=0)
     steps = rng.standard_normal((count, len(elite))) @ (ways - middle) / np.sqrt(len(elite))
-    return space.repair(fold(space, elite[0] + middle + stride / MIDDLE * steps), bests[order[0]])
+    return repair(space, fold(space, elite[0] + middle + stride / MIDDLE * steps), bests[order[0]])

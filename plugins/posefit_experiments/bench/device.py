@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.box import draw_population
 from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import areas
@@ -91,7 +92,7 @@ def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
 def _proposals(problem: PoseProblem, count: int) -> Array:
     """Return so many proposals (count, d) that are poses, or so near to one that they are seen as it is."""
     rng = np.random.default_rng(0)
-    drawn = problem.space.draw(rng, min(count, DRAWN))
+    drawn = draw_population(problem.space, rng, min(count, DRAWN))
     return np.ascontiguousarray(np.resize(drawn, (count, drawn.shape[1])) + rng.normal(0.0, 1e-3, (count, 1)))
 
 

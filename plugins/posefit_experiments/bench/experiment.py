@@ -7,6 +7,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from posefit.fitting.box import draw_population
 from posefit.fitting.optimiser import minimise
 from posefit.sweep.command import cores
 from posefit_experiments.bench.environments import vector_env
@@ -32,7 +33,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
     many = threads or cores()
     alone, together = bench_problem(), bench_problem(many)
     rng = np.random.default_rng(0)
-    proposals = alone.space.draw(rng, POSES)
+    proposals = draw_population(alone.space, rng, POSES)
     few = proposals[: POSES // 5]
 
     def frame(seed: int) -> None:

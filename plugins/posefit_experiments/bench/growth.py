@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from posefit.fitting.box import draw_population
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace, Translation
 from posefit.geometry.camera import Camera
@@ -100,7 +101,7 @@ def draw_growths(found: Sequence[Growth], folder: Path) -> list[Path]:
 
 
 def _job(problem: PoseProblem, count: int) -> Callable[[], object]:
-    proposals = problem.space.draw(np.random.default_rng(0), count)
+    proposals = draw_population(problem.space, np.random.default_rng(0), count)
     return lambda: problem.evaluate(proposals)
 
 

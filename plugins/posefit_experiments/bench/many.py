@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from posefit.fitting.box import draw_population
 from posefit.fitting.problem import FACTORS, PoseProblem
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS
@@ -41,7 +42,7 @@ def many_figures() -> dict[str, float]:
     """
     problem = bench_problem()
     body, camera, rng = problem.body, problem.cameras[0], np.random.default_rng(0)
-    proposals = problem.space.draw(rng, MANY)
+    proposals = draw_population(problem.space, rng, MANY)
     poses, places = problem.decode(proposals)
     few = proposals[:FEW].copy(), poses[:FEW].copy(), places[:FEW].copy()
     some = poses[:400].copy(), places[:400].copy()
