@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from posefit import SearchSpace, Silhouette
 from posefit.arrays import Array
-from posefit.fitting.problem import over_views
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
+from posefit.silhouette.cost import mean_cost
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import pack
 from posefit.silhouette.sharing import LEAST_SHARE, work_through
@@ -154,7 +154,7 @@ class Stage:
         cuts = [len(rows) * share // shares for share in range(shares + 1)]
         work_through([slice(a, b) for a, b in pairwise(cuts)], self._threads, lambda _: (), draw)
         # every pixel of a scene is known, so that the silhouettes of one speak for all
-        costs = over_views(list(areas.reshape(views, n * k, 3)), self._silhouettes)
+        costs = mean_cost(areas.reshape(views, n * k, 3), self._silhouettes)
         return costs.reshape(n, k), areas
 
     def _read(self) -> Scenes:

@@ -4,12 +4,11 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.alignment import align
-from posefit.fitting.problem import only_camera, over_views
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton
-from posefit.silhouette.cost import Areas, areas
+from posefit.silhouette.cost import Areas, only_camera, pose_costs
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 
@@ -90,10 +89,8 @@ class Look:
 
     def measured(self, pose: Array, place: Array) -> tuple[float, Areas]:
         """Return the cost of one pose, and its areas (views, 3)."""
-        counts = [
-            areas(self._task.body, camera, silhouette, pose[None], place[None]) for camera, silhouette in self._full
-        ]
-        return float(over_views(counts, self._observation.silhouettes)[0]), np.concatenate(counts)
+        costs, counts = pose_costs(self._task.body, *zip(*self._full, strict=True), pose[None], place[None])
+        return float(costs[0]), counts[:, 0]
 
     def twins(self, pose: Array, place: Array) -> Array:
         """Return the costs of a pose's twins (1 + cameras,): mirrored, and reflected along each camera's line of sight.
@@ -107,8 +104,5 @@ class Look:
         return self.full(poses[1:], place + places[1:] - places[0])
 
     def _costs(self, views: Views, poses: Array, places: Array) -> Array:
-        counts = [
-            areas(self._task.body, camera, silhouette, poses, places, self._task.threads)
-            for camera, silhouette in views
-        ]
-        return over_views(counts, [silhouette for _, silhouette in views])
+        cameras, silhouettes = zip(*views, strict=True)
+        return pose_costs(self._task.body, cameras, silhouettes, poses, places, threads=self._task.threads)[0]

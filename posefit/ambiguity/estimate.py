@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.check import finite_number, whole
-from posefit.fitting.problem import over_views
 from posefit.fitting.shape import NAMES, shaped
 from posefit.footage.masks import FPS
 from posefit.footage.scene import Scene
@@ -37,7 +36,7 @@ from posefit.listening import QUIET, Listener
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.reading import parsed_json, read_text
-from posefit.silhouette.cost import areas, project
+from posefit.silhouette.cost import pose_costs, project
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.uncertainty.modes import Posterior, modes_of
@@ -134,9 +133,8 @@ class Moment:
 
     def costs(self, poses: Array, translations: Array) -> Array:
         """Return the cost (n,) of poses (n, 66) at translations (n, 3): the mean over the cameras."""
-        views = zip(self.cameras, self.silhouettes, strict=True)
-        counts = [areas(self.body, *view, poses, translations, self.threads) for view in views]
-        return over_views(counts, self.silhouettes)
+        scene = self.body, self.cameras, self.silhouettes
+        return pose_costs(*scene, poses, translations, threads=self.threads)[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,11 +19,10 @@ from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import BudgetError, Optimiser
 from posefit.fitting.prior import Prior
-from posefit.fitting.problem import over_views
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
 from posefit.geometry.skeleton import Skeleton
 from posefit.limits import timed
-from posefit.silhouette.cost import areas
+from posefit.silhouette.cost import pose_costs
 from posefit.silhouette.drawn import PoseCount, uncounted
 
 LEEWAY = 10  # ours: poses a frame that may be drawn beyond the evaluations, as to draw once more what was found
@@ -251,15 +250,13 @@ class GuardedTracker:
         """Return the frame with the areas and the cost of its pose, and note where it says others."""
         label = f"{self._name}: frame {number}"
         pose, place = np.asarray(frame.pose, np.float64)[None], np.asarray(frame.translation, np.float64)[None]
-        counts = [
-            areas(self._task.body, camera, silhouette, pose, place)
-            for camera, silhouette in zip(self._task.cameras, observation.silhouettes, strict=True)
-        ]
-        true = np.concatenate(counts)
+        scene = self._task.body, self._task.cameras, observation.silhouettes
+        costs, counts = pose_costs(*scene, pose, place, self._beta)
+        true = counts[:, 0]
         if not np.array_equal(true, frame.areas):
             self._audit.note("areas", f"{label} must have its pose's areas, {true.tolist()}, got {_told(frame.areas)}")
             frame = replace(frame, areas=true)
-        cost = float(over_views(counts, observation.silhouettes, self._beta)[0])
+        cost = float(costs[0])
         if not (isinstance(frame.cost, float | int | np.number) and abs(frame.cost - cost) <= NEAR):
             self._audit.note("cost", f"{label} must have its pose's cost, {cost:.6g}, got {_told(frame.cost)}")
             frame = replace(frame, cost=cost, history=np.array([cost]), spent=None)

@@ -272,11 +272,8 @@ class SynthesisTracker:
         if observation.translation is not None:
             places = np.array(observation.translation, dtype=np.float64)[None]
         problem = self.problem(space, observation)
-        counts = problem.areas(poses, places)
-        areas = np.stack([one[0] for one in counts])
-        return Frame(
-            poses[0], places[0], float(problem.combined(counts)[0]), areas, 0, 0.0, np.empty(0), cpu_seconds=0.0
-        )
+        costs, areas = problem.cost_and_areas(poses, places)
+        return Frame(poses[0], places[0], float(costs[0]), areas[:, 0], 0, 0.0, np.empty(0), cpu_seconds=0.0)
 
     def problem(self, space: SearchSpace, observation: Observation) -> PoseProblem:
         """Return the problem that a frame is."""
@@ -294,7 +291,7 @@ class SynthesisTracker:
 
 def _frame(problem: PoseProblem, best: Minimum, seconds: float, cpu_seconds: float) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
-    counts = np.stack([areas[0] for areas in problem.areas(poses, translations)])
+    counts = problem.areas(poses, translations)[:, 0]
     found = problem.space.coordinates(best.proposal)
     effort = (best.evaluations, seconds, best.history)
     return Frame(poses[0], translations[0], best.cost, counts, *effort, found, best.spent, cpu_seconds=cpu_seconds)

@@ -4,7 +4,7 @@
 |---|---|
 | a mask, its unknown pixels, and both as bits | mask.py |
 | areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
-| several silhouettes for one drawing, and drawings put upon one another, compiled | several.py |
+| drawings put upon one another, compiled | several.py |
 | candidates of limbs, each drawn once, and what their combinations cost | limbs.py |
 | half and quarter size: every second pixel of every second row | pyramid.py |
 | thousands of poses in parts, shared by threads; how many were drawn | sharing.py, drawn.py |

@@ -1,7 +1,7 @@
 """The two-way silhouette cost of many poses, over one view or several."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from posefit.arrays import Array, writeable
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
-from posefit.silhouette import drawn, kernels, several
+from posefit.silhouette import drawn, kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
 from posefit.silhouette.rasteriser import View
 from posefit.silhouette.sharing import parts_of, work_through
@@ -18,7 +18,8 @@ from posefit.silhouette.sharing import parts_of, work_through
 SCALE = 100.0  # S
 BETA = 0.5  # beta
 
-Areas = NDArray[np.int64]  # (n, 3): R, B, Y
+Areas = NDArray[np.int64]  # (..., 3): R, B, Y
+T = TypeVar("T")
 
 
 def view_of(camera: Camera) -> View:
@@ -40,10 +41,12 @@ def areas(
     nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`. They are made on
     the silhouette's device.
     """
-    poses, translations = _checked(camera, [silhouette], poses, translations)
+    poses, translations = _checked(camera, silhouette, poses, translations)
     drawn.count_poses(len(poses), silhouette)
     if silhouette.device == "cuda":
-        return _on_device(body, camera, [silhouette], poses, translations)[:, 0]
+        from posefit.silhouette.cuda.counted import areas_on_device
+
+        return areas_on_device(body, camera, silhouette, poses, translations)
     out = np.empty((len(poses), 3), dtype=np.int64)
     drawing = drawing_of(body, camera, silhouette)
     parts = parts_of(len(poses), threads)
@@ -58,52 +61,8 @@ def areas(
     return out
 
 
-def areas_of_all(
-    body: Body,
-    camera: Camera,
-    silhouettes: Sequence[Silhouette],
-    poses: Array,
-    translations: Array,
-    threads: int = 1,
-) -> Areas:
-    """Return R, B, Y (silhouettes, n, 3) of poses (n, 66) against each of several silhouettes of one camera.
-
-    The same counts as `areas` has for each silhouette alone, but each pose is drawn only once. Each comparison is
-    one of the poses that are counted as drawn. Raises ValueError where a shape does not fit.
-    """
-    poses, translations = _checked(camera, silhouettes, poses, translations)
-    for silhouette in silhouettes:
-        drawn.count_poses(len(poses), silhouette)
-    if any(silhouette.device == "cuda" for silhouette in silhouettes):
-        return np.ascontiguousarray(_on_device(body, camera, silhouettes, poses, translations).transpose(1, 0, 2))
-    out = np.empty((len(poses), len(silhouettes), 3), dtype=np.int64)
-    chain, radii, view = body.skeleton.chain, body.radii, view_of(camera)
-    if not silhouettes:
-        return out.transpose(1, 0, 2)
-    observed, valid = (np.stack(bits) for bits in zip(*(silhouette.bits for silhouette in silhouettes), strict=True))
-
-    def count(_part: slice, *rows: NDArray[Any]) -> None:
-        several.count_areas_of_all(chain, radii, view, observed, valid, *rows)
-
-    work_through(
-        parts_of(len(poses), threads), threads, lambda part: (poses[part], translations[part], out[part]), count
-    )
-    return np.ascontiguousarray(out.transpose(1, 0, 2))
-
-
-def _on_device(
-    body: Body, camera: Camera, silhouettes: Sequence[Silhouette], poses: Array, translations: Array
-) -> Areas:
-    """Return R, B, Y (n, silhouettes, 3), counted by a GPU. Only here is what that needs imported."""
-    from posefit.silhouette.cuda.counted import areas_on_device
-
-    return areas_on_device(body, camera, silhouettes, poses, translations)
-
-
-def _checked(
-    camera: Camera, silhouettes: Sequence[Silhouette], poses: Array, translations: Array
-) -> tuple[Array, Array]:
-    """Return poses and translations as the loops want them. Raises ValueError where a shape does not fit."""
+def _checked(camera: Camera, silhouette: Silhouette, poses: Array, translations: Array) -> tuple[Array, Array]:
+    """Return poses and translations as the loops need them. Raises ValueError where a shape does not fit."""
     # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
     poses, translations = writeable(poses), writeable(translations)
     n = len(poses)
@@ -111,10 +70,51 @@ def _checked(
         raise ValueError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
     if translations.shape != (n, 3):
         raise ValueError(f"translations must have shape {(n, 3)}, got {translations.shape}")
-    for silhouette in silhouettes:
-        if silhouette.mask.shape != (camera.height, camera.width):
-            raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
+    if silhouette.mask.shape != (camera.height, camera.width):
+        raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
     return poses, translations
+
+
+def pose_costs(
+    body: Body,
+    cameras: Sequence[Camera],
+    silhouettes: Sequence[Silhouette],
+    poses: Array,
+    translations: Array,
+    beta: float = BETA,
+    threads: int = 1,
+) -> tuple[Array, Areas]:
+    """Return the cost (n,) of poses (n, 66) at translations (n, 3), and their R, B, Y (views, n, 3). SAPSO (3), (4).
+
+    The cost is the mean over the views of which something is known. Each view is counted on its silhouette's device.
+    """
+    views = zip(cameras, silhouettes, strict=True)
+    counts = np.stack([areas(body, *view, poses, translations, threads) for view in views])
+    return mean_cost(counts, silhouettes, beta), counts
+
+
+def mean_cost(counts: Areas | Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:
+    """Return the cost (n,) of areas R, B, Y (n, 3), one array a view; a view of which nothing is known is left out."""
+    return mean_over_views([mismatch(view, beta) for view in known_views(list(counts), silhouettes)])
+
+
+def mean_over_views(costs: Sequence[Array]) -> Array:
+    """Return the mean (n,) of costs (n,), one array a view. The first of them is overwritten."""
+    total = costs[0]
+    for more in costs[1:]:
+        total += more
+    return total if len(costs) == 1 else total / len(costs)
+
+
+def known_views(views: Sequence[T], silhouettes: Sequence[Silhouette]) -> Sequence[T]:
+    """Return those views of which something is known; all of them where nothing is."""
+    return [view for view, silhouette in zip(views, silhouettes, strict=True) if silhouette.known] or views
+
+
+def only_camera(cameras: Sequence[Camera], silhouettes: Sequence[Silhouette]) -> Camera | None:
+    """Return the camera that alone sees the person, and so cannot see how far away they are; None where several do."""
+    seeing = known_views(cameras, silhouettes)
+    return seeing[0] if len(seeing) == 1 else None
 
 
 def costs_in(

@@ -1,4 +1,4 @@
-"""Several silhouettes for one drawing, and several drawings for one picture: numba loops over arrays.
+"""Several drawings for one picture: numba loops over arrays.
 
 Bit images are as `rasteriser` makes them. Shapes are checked by the callers.
 """
@@ -8,45 +8,6 @@ import numpy as np
 from posefit.arrays import jit
 from posefit.silhouette.popcount import popcount
 from posefit.silhouette.rasteriser import NONE, draw_pose, scratch
-
-
-@jit
-def pixels_of(bits):
-    """Return how many pixels of a bit image are set."""
-    pixels = NONE
-    for w in range(bits.shape[0]):
-        column = bits[w]
-        for y in range(column.size):
-            pixels += np.uint64(popcount(column[y]))
-    return pixels
-
-
-@jit
-def count_areas_of_all(chain, radii, view, observed, valid, poses, translations, areas):
-    """Write the areas (n, silhouettes, 3) R, B, Y of poses (n, 66), each drawn once.
-
-    `observed` and `valid` are bit images (silhouettes, strips, words), observed within valid.
-    """
-    work = scratch(view, chain.parents.size, poses.shape[1])
-    silhouettes = np.empty(observed.shape[0], np.uint64)
-    for s in range(silhouettes.size):
-        silhouettes[s] = pixels_of(observed[s])
-    for i in range(poses.shape[0]):
-        image, box = draw_pose(chain, radii, view, poses[i], translations[i], work)
-        for s in range(silhouettes.size):
-            body, overlap = NONE, NONE
-            for w in range(box[2], box[3] + 1):
-                column = image[w][box[0] : box[1]]
-                seen = observed[s, w][box[0] : box[1]]
-                known = valid[s, w][box[0] : box[1]]
-                for y in range(column.size):
-                    body += np.uint64(popcount(column[y] & known[y]))
-                    overlap += np.uint64(popcount(column[y] & seen[y]))
-            areas[i, s, 0] = silhouettes[s] - overlap
-            areas[i, s, 1] = body - overlap
-            areas[i, s, 2] = overlap
-        for w in range(box[2], box[3] + 1):
-            image[w][box[0] : box[1]] = NONE
 
 
 @jit

@@ -6,14 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.problem import only_camera, over_views
 from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.searching.spent import mean_cost
-from posefit.silhouette.cost import areas
+from posefit.silhouette.cost import only_camera, pose_costs
 from posefit.steadying.outlines import outlined
 from posefit.steadying.path import SeenFrames, steadied
 from posefit.uncertainty.modes import Posterior
@@ -48,15 +47,11 @@ def _eye(scene: Scene, observation: Observation) -> Array:
 
 def _told(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:
     pose, place, silhouettes = motion.poses[k], motion.translations[k], scene.observations[k].silhouettes
-    counts = [
-        areas(scene.body, camera, silhouette, pose[None], place[None])
-        for camera, silhouette in zip(scene.cameras, silhouettes, strict=True)
-    ]
-    cost = float(over_views(counts, silhouettes, beta)[0])
+    costs, counts = pose_costs(scene.body, scene.cameras, silhouettes, pose[None], place[None], beta)
     posterior = frame.posterior
     if posterior is not None:
         posterior = _moved(posterior, wrapped(pose - frame.pose), place - frame.translation)
-    told = replace(frame, pose=pose, translation=place, cost=cost, areas=np.concatenate(counts))
+    told = replace(frame, pose=pose, translation=place, cost=float(costs[0]), areas=counts[:, 0])
     return replace(told, coordinates=None, posterior=posterior)
 
 

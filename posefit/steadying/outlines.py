@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.problem import over_views
 from posefit.fitting.shape import REACH, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
-from posefit.silhouette.cost import BETA, areas
+from posefit.silhouette.cost import BETA, pose_costs
 from posefit.steadying import kernels
 from posefit.steadying.borders import Borders
 from posefit.steadying.path import SeenFrames, add_root, add_standing, windows_over
@@ -123,8 +122,7 @@ def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], b
     costs = []
     for row in np.flatnonzero(part.usable).tolist():
         seen, pose, place = observations[row].silhouettes, part.poses[row : row + 1], part.places[row : row + 1]
-        counts = [areas(part.body, *view, pose, place) for view in zip(scene.cameras, seen, strict=True)]
-        costs.append(float(over_views(counts, seen, beta)[0]))
+        costs.append(float(pose_costs(part.body, scene.cameras, seen, pose, place, beta)[0][0]))
     return float(np.mean(costs)) if costs else np.inf
 
 

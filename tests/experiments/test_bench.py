@@ -74,8 +74,8 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     for case in cases.values():
         assert set(case) == {"kernel_us", "us_per_proposal", "overhead_us", "sync_us_per_proposal", "times_sync"}
     assert set(figures["many"]) == {
-        "evaluate_40", "evaluate_4000", "areas_40", "areas_4000", "silhouettes_alone", "silhouettes_together",
-        "limb_combination", "limb_combination_any_order", "all_sizes", "320x240_full", "320x240_half",
+        "evaluate_40", "evaluate_4000", "areas_40", "areas_4000",
+        "limb_combination", "limb_combination_any_order", "320x240_full", "320x240_half",
         "320x240_quarter", "1280x960_full", "1280x960_half", "1280x960_quarter",
     }  # fmt: skip
     assert all(us > 0.0 for us in figures["many"].values())

@@ -50,7 +50,7 @@ def test_a_search_is_told_the_costs_of_the_areas_and_a_view_that_knows_nothing_h
     several = replace(problem, cameras=cameras, silhouettes=[blind, seen, half], beta=0.3, threads=threads)
     proposals = draw_population(several.space, np.random.default_rng(1), 40)
     counts = several.areas(*several.decode(proposals))
-    np.testing.assert_array_equal(several.evaluate(proposals), several.combined(counts))
+    np.testing.assert_array_equal(several.evaluate(proposals), several.cost(*several.decode(proposals)))
     shares = np.array([100.0 * (0.7 * b / (b + y) + 0.3 * r / (r + y)) for r, b, y in np.concatenate(counts[1:])])
     np.testing.assert_allclose(several.evaluate(proposals), shares.reshape(2, -1).mean(axis=0))
     nothing = replace(several, silhouettes=[blind] * 3, blank=True)

@@ -5,15 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
-from posefit.arrays import Array
+from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette
 from posefit.fitting.box import draw_population
-from posefit.fitting.problem import CoarseFirst
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.drawn import PoseCount
 from posefit_priors.pca import PCA
-from posefit_swarm.sapso import SAPSO
 
 
 @pytest.fixture(scope="module")
@@ -74,11 +71,6 @@ def test_a_proposal_means_the_same_pose_at_every_size(problem: PoseProblem, tran
     assert [camera.width for camera in (*half.cameras, *quarter.cameras)] == [80, 80, 40, 40]
     for mine, theirs in zip(problem.decode(proposals), half.decode(proposals), strict=True):
         np.testing.assert_allclose(theirs, mine, atol=1e-9)
-    costs = problem.evaluate_at(proposals)
-    assert costs.shape == (3, 50)
-    np.testing.assert_array_equal(costs[0], problem.evaluate(proposals))
-    np.testing.assert_allclose(costs[1:], [half.evaluate(proposals), quarter.evaluate(proposals)], atol=1e-6)
-    np.testing.assert_array_equal(problem.evaluate_at(proposals, (4, 1)), costs[[2, 0]])
 
 
 def test_a_pose_that_fits_perfectly_costs_nothing_at_any_size(problem: PoseProblem) -> None:
@@ -88,70 +80,10 @@ def test_a_pose_that_fits_perfectly_costs_nothing_at_any_size(problem: PoseProbl
 
 
 def test_small_pictures_rank_random_poses_as_the_whole_one_does(problem: PoseProblem) -> None:
-    costs = problem.evaluate_at(draw_population(problem.space, np.random.default_rng(2), 300))
+    proposals = draw_population(problem.space, np.random.default_rng(2), 300)
+    costs = np.array([problem.coarser(factor).evaluate(proposals) for factor in (1, 2, 4)])
     ranks = costs.argsort(axis=1).argsort(axis=1)
     whole, half, quarter = ranks - ranks.mean()
     # Spearman's rank correlations; a quarter of 160 x 120 is a body of about twenty pixels
     assert (whole @ half) / (whole @ whole) > 0.99
     assert (whole @ quarter) / (whole @ whole) > 0.95
-
-
-class Line:
-    """Proposes eight points for ever, and keeps what they cost."""
-
-    def __init__(self) -> None:
-        self.told: list[tuple[Array, Array]] = []
-        self.population = np.linspace(-0.7, 0.7, 8)[:, None] * np.ones(9)
-
-    def ask(self) -> Array:
-        return self.population
-
-    def tell(self, proposals: Array, costs: Array) -> None:
-        self.told.append((proposals, costs))
-
-
-def test_only_the_best_of_a_small_look_go_on_and_the_others_cost_no_less() -> None:
-    class Small:
-        def __init__(self) -> None:
-            self.factors: list[int] = []
-
-        def coarser(self, factor: int) -> "Small":
-            self.factors.append(factor)
-            return self
-
-        def evaluate(self, proposals: Array) -> Array:
-            return np.array([5.0, 1.0, 7.0, 3.0, 12.0, 2.0, 8.0, 6.0])
-
-    line, small = Line(), Small()
-    first = CoarseFirst(line, small, factor=4, keep=0.25)  # type: ignore[arg-type]
-    asked = first.ask()
-    np.testing.assert_array_equal(asked, line.population[[1, 5]])
-    first.tell(asked, np.array([4.0, 10.0]))
-    (proposals, costs) = line.told[0]
-    assert proposals is line.population
-    # what was seen whole costs what it costs, and nothing else less than the worst of it, 10
-    assert costs.tolist() == [10.0, 4.0, 10.0, 10.0, 12.0, 10.0, 10.0, 10.0]
-    assert small.factors == [4]
-    first.ask()
-    first.tell(asked, np.array([np.nan, 6.0]))
-    assert line.told[1][1][[0, 4, 5]].tolist() == [6.0, 12.0, 6.0]
-
-
-def test_a_search_that_looks_coarse_first_reports_what_is_true_at_full_size(problem: PoseProblem) -> None:
-    optimiser = SAPSO(problem.space, np.random.default_rng(0), population_size=40, iterations=20)
-    best = minimise(problem.evaluate, CoarseFirst(optimiser, problem, factor=4, keep=0.1), 21 * 4)
-    assert best.evaluations == 21 * 4
-    assert best.cost == problem.evaluate(best.proposal[None])[0]
-    assert (np.diff(best.history) <= 0.0).all()
-    assert best.cost < best.history[0]
-
-
-def test_at_least_one_proposal_goes_on_and_an_end_is_an_end(problem: PoseProblem) -> None:
-    line = Line()
-    assert len(CoarseFirst(line, problem, keep=0.01).ask()) == 1
-    assert len(CoarseFirst(line, problem, keep=1.0).ask()) == 8
-    line.population = np.empty((0, 9))
-    assert len(CoarseFirst(line, problem).ask()) == 0
-    for keep in (0.0, -1.0, 1.5, np.nan):
-        with pytest.raises(ValueError, match="keep must be above 0 and at most 1"):
-            CoarseFirst(line, problem, keep=keep)

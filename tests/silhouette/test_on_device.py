@@ -17,7 +17,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
 from posefit.registry import registry
-from posefit.silhouette.cost import areas, areas_of_all, project
+from posefit.silhouette.cost import areas, project
 from posefit.silhouette.cuda.moving import moved_to
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
@@ -74,16 +74,6 @@ def test_a_pose_that_is_no_number_draws_nothing_and_spoils_no_other(body: Body, 
     assert_equals_the_cpu(body, camera, poses, places)
 
 
-def test_several_silhouettes_are_compared_with_one_drawing(body: Body) -> None:
-    rng = np.random.default_rng(5)
-    camera = Camera.around(np.zeros(3), 0.4, 3.0, (40, 30))
-    poses = some_poses(rng, 4)
-    seen = [seen_by(body, camera, pose, rng) for pose in np.tile(poses, (9, 1))]  # more than one launch compares
-    expected = areas_of_all(body, camera, seen, poses, np.zeros((4, 3)))
-    found = areas_of_all(body, camera, [moved_to(one, "cuda") for one in seen], poses, np.zeros((4, 3)))
-    np.testing.assert_array_equal(found, expected)
-
-
 def test_parts_on_their_way_are_put_together_in_order(body: Body, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("posefit.silhouette.cuda.counted.PART", 3)
     rng = np.random.default_rng(6)
@@ -106,7 +96,8 @@ def test_a_problem_of_several_views_costs_the_same_bits_on_a_device() -> None:
     with count.counting():
         np.testing.assert_array_equal(on_device.evaluate(proposals), problem.evaluate(proposals))
     assert count.poses == 2 * (6 + 6 / 16)  # of each view on the device and on the CPU, in one a quarter as large
-    np.testing.assert_array_equal(on_device.evaluate_at(proposals, (2,)), problem.evaluate_at(proposals, (2,)))
+    half = on_device.coarser(2), problem.coarser(2)
+    np.testing.assert_array_equal(*(size.evaluate(proposals) for size in half))
 
 
 @pytest.mark.parametrize("translation", ["known", "searched", "aligned"])

@@ -1,4 +1,4 @@
-"""How long a pose takes among thousands, against several silhouettes, as limbs, and at half and quarter size."""
+"""How long a pose takes among thousands, as limbs, and at half and quarter size."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,20 +7,19 @@ from functools import partial
 import numpy as np
 
 from posefit.fitting.box import draw_population
-from posefit.fitting.problem import FACTORS, PoseProblem
+from posefit.fitting.problem import PoseProblem
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS
-from posefit.silhouette.cost import areas, areas_of_all, project
+from posefit.silhouette.cost import areas, project
 from posefit.silhouette.limbs import LimbMasks, LimbPoses, every_combination
 from posefit.silhouette.mask import Silhouette
 from posefit_experiments.bench.kernel import bench_problem
 from posefit_experiments.bench.timing import fastest
 
 FEW, MANY = 40, 4000  # poses in a call
-FRAMES = 16  # silhouettes of one camera
 CANDIDATES = 6  # of each of five limbs: 7,776 combinations
 LARGE = (1280, 960)  # beside the usual size
-NAMES = dict(zip(FACTORS, ("full", "half", "quarter"), strict=True))
+NAMES = {1: "full", 2: "half", 4: "quarter"}
 
 
 def seen_at(problem: PoseProblem, size: tuple[int, int]) -> PoseProblem:
@@ -35,7 +34,7 @@ def seen_at(problem: PoseProblem, size: tuple[int, int]) -> PoseProblem:
 
 
 def many_figures() -> dict[str, float]:
-    """Return microseconds a pose on one thread: in calls of 40 and 4,000, against silhouettes, as limbs, at every size.
+    """Return microseconds a pose on one thread: in calls of 40 and 4,000, as limbs, at every size.
 
     `limb_combination` are all combinations of six candidates for each of five limbs, drawing them included;
     `limb_combination_any_order` are 1,000 of them at random, drawn before.
@@ -45,9 +44,7 @@ def many_figures() -> dict[str, float]:
     proposals = draw_population(problem.space, rng, MANY)
     poses, places = problem.decode(proposals)
     few = proposals[:FEW].copy(), poses[:FEW].copy(), places[:FEW].copy()
-    some = poses[:400].copy(), places[:400].copy()
     seen = problem.silhouettes[0]
-    frames = [Silhouette.of(project(body, camera, pose, places[0])) for pose in poses[:FRAMES]]
     limbs = LimbPoses(poses[0], [poses[1 + k * CANDIDATES : 1 + (k + 1) * CANDIDATES] for k in range(len(LIMBS))])
     every = every_combination(limbs.counts)
     mixed = rng.permutation(every)[:1000]
@@ -57,14 +54,11 @@ def many_figures() -> dict[str, float]:
         f"evaluate_{MANY}": (lambda: problem.evaluate(proposals), MANY),
         f"areas_{FEW}": (lambda: areas(body, camera, seen, few[1], few[2]), FEW),
         f"areas_{MANY}": (lambda: areas(body, camera, seen, poses, places), MANY),
-        "silhouettes_alone": (lambda: [areas(body, camera, one, *some) for one in frames], FRAMES * 400),
-        "silhouettes_together": (lambda: areas_of_all(body, camera, frames, *some), FRAMES * 400),
         "limb_combination": (
             lambda: LimbMasks.draw(body, camera, limbs, places[0]).areas(seen, every),
             len(every),
         ),
         "limb_combination_any_order": (lambda: masks.areas(seen, mixed), len(mixed)),
-        "all_sizes": (lambda: problem.evaluate_at(proposals[:400]), 400),
     }
     for one in (problem, seen_at(problem, LARGE)):
         size = "x".join(str(side) for side in one.silhouettes[0].size)

@@ -34,7 +34,7 @@ def areas_of_proposals(
         raise ValueError("proposals must be finite, got nan or infinity")
     found = [np.empty((len(proposals), 3), dtype=np.int64) for _ in silhouettes]
     drawings = [
-        drawing_on_device(body, camera, [silhouette]) for camera, silhouette in zip(cameras, silhouettes, strict=True)
+        drawing_on_device(body, camera, silhouette) for camera, silhouette in zip(cameras, silhouettes, strict=True)
     ]
     box = [cuda.to_device(one) for one in box_of(space)]
     for silhouette in silhouettes:
@@ -42,7 +42,7 @@ def areas_of_proposals(
     for first in range(0, len(proposals), PART):
         part = slice(first, first + PART)
         placed = decoded_on_device(space, box, proposals[part])
-        counts = [launched(drawing, *placed, 1) for drawing in drawings]
+        counts = [launched(drawing, *placed) for drawing in drawings]
         for out, areas in zip(found, counts, strict=True):
             out[part] = areas.copy_to_host()[:, 0]
     return found

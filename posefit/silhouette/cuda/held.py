@@ -24,12 +24,9 @@ def held(owner: T, arrays: Callable[[T], Sequence[NDArray[Any]]]) -> Sequence[An
     return found
 
 
-def drawing_on_device(body: Body, camera: Camera, silhouettes: Sequence[Silhouette]) -> tuple[Any, ...]:
-    """Return what `count_on_device` wants to know before the poses, of one silhouette or several of one camera."""
-    if len(silhouettes) == 1:
-        seen = held(silhouettes[0], lambda one: _seen([one]))
-    else:
-        seen = [cuda.to_device(one) for one in _seen(silhouettes)]
+def drawing_on_device(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
+    """Return the arguments of `count_on_device` that come before the poses."""
+    seen = held(silhouette, _silhouette)
     return *held(body, _body), *held(camera, _camera), camera.width, camera.height, *seen
 
 
@@ -42,10 +39,7 @@ def _camera(camera: Camera) -> Sequence[NDArray[Any]]:
     return [np.concatenate([camera.rotation.ravel(), camera.translation, camera.focal, camera.centre])]
 
 
-def _seen(silhouettes: Sequence[Silhouette]) -> Sequence[NDArray[Any]]:
-    """Return the observed and the known pixels (silhouettes, strips, rows) of 32-bit words, and how many are seen."""
-    observed, valid = (
-        np.stack([bits.view(np.uint32) for bits in planes])
-        for planes in zip(*(one.bits for one in silhouettes), strict=True)
-    )
-    return observed, valid, np.array([one.pixels for one in silhouettes], dtype=np.int64)
+def _silhouette(silhouette: Silhouette) -> Sequence[NDArray[Any]]:
+    """Return the observed and the known pixels (1, strips, rows) of 32-bit words, and how many are observed (1,)."""
+    observed, valid = (bits.view(np.uint32)[None] for bits in silhouette.bits)
+    return observed, valid, np.array([silhouette.pixels], dtype=np.int64)
