@@ -1,9 +1,9 @@
-"""Poses that a silhouette hardly tells from a given one: left and right exchanged, turned, reflected.
+"""Poses with nearly the same silhouette as a given one: left and right exchanged, turned, reflected.
 
 A silhouette shows neither which leg is in front nor how deep anything is. A search that has settled on the wrong one of
-two such poses stays there, as each next frame continues the last; so whatever follows a person may want to try the
-other one, too. These are plain functions of poses (n, 66), whose roots stay where they are; each undoes itself. Bones
-of the two sides are seldom equally long, and silhouettes are as much alike as the sides are.
+two such poses stays there, as each frame continues the last; a tracker may want to try the other one, too. These are
+plain functions of poses (n, 66), whose roots stay where they are; each undoes itself. Bones of the two sides are seldom
+equally long; the silhouettes differ as much as the sides do.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ _BONES: dict[Limbs, tuple[str, ...]] = {
 def mirrored_poses(skeleton: Skeleton, poses: Array) -> Array:
     """Return poses (n, 66) whose left and right are exchanged: a stride becomes the one half a cycle later.
 
-    The body is reflected in the upright plane that it faces along, and each side takes the name of the other. Seen
+    The body is reflected in the upright plane that it faces along, and each side takes the name of the other. Viewed
     exactly from its side that leaves the silhouette as it is, as the camera looks across that plane and depth does not
     show; the farther the camera stands from the side, the more it shows.
     """
@@ -51,10 +51,10 @@ def turned_poses(poses: Array) -> Array:
 
 
 def reflected_poses(skeleton: Skeleton, poses: Array, towards: float) -> Array:
-    """Return poses (n, 66) reflected along the line of sight: who comes goes, who faces across stays as he faces.
+    """Return poses (n, 66) reflected along the line of sight: towards the camera becomes away from it.
 
-    `towards` is the yaw in radians of somebody who faces the camera, see `facing`. What is near and what is far trade
-    places, and so left and right do: a turn of 30 degrees out of the picture becomes one into it. Whatever the pose,
+    `towards` is the yaw in radians of a person who faces the camera, see `facing`. Near and far trade places, and
+    so do left and right: a turn of 30 degrees out of the picture becomes one into it. Whatever the pose,
     and from whatever side, a level camera far away sees the same silhouette. From the side it is `mirrored_poses`, and
     from in front it is `turned_poses` with left and right exchanged.
     """
@@ -66,7 +66,7 @@ def reflected_poses(skeleton: Skeleton, poses: Array, towards: float) -> Array:
 def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
     """Return poses (n, 66) whose two `legs`, or two `arms`, have each the other's angles, mirrored.
 
-    The trunk and the other limbs stay. Seen from the side, the near and the far limb of a pair lie on each other or
+    The trunk and the other limbs stay. Viewed from the side, the near and the far limb of a pair lie on each other or
     cross, and the silhouette is nearly the same whichever of them is in front.
     """
     if limbs not in _BONES:
@@ -75,7 +75,7 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
 
 
 def facing(camera: Camera, place: Array) -> float:
-    """Return the yaw in radians of somebody who stands at a place (3,) and faces a camera."""
+    """Return the yaw in radians of a person at a place (3,) who faces a camera."""
     way = camera.position - np.asarray(place)
     return float(np.arctan2(way[0], way[2]))
 
@@ -83,16 +83,16 @@ def facing(camera: Camera, place: Array) -> float:
 def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
     """Return poses (n, 66) in which the joints of some names have the angles of their counterparts, mirrored."""
     poses = np.asarray(poses, dtype=np.float64)
-    found = poses.copy()
+    result = poses.copy()
     for j, frame in _frames(skeleton):
         if JOINTS[j] not in names:
             continue
         mine, theirs = (slice(k, k + 3) for k in (angle_index(j), angle_index(MIRROR[j])))
         if frame is None:
-            found[:, mine] = poses[:, theirs] * [1.0, -1.0, -1.0]
+            result[:, mine] = poses[:, theirs] * [1.0, -1.0, -1.0]
         else:
-            found[:, mine] = joint_angles_from_rotation(frame @ rotation_from_joint_angles(poses[:, theirs]) @ frame.T)
-    return found
+            result[:, mine] = joint_angles_from_rotation(frame @ rotation_from_joint_angles(poses[:, theirs]) @ frame.T)
+    return result
 
 
 @lru_cache(maxsize=16)

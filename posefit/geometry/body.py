@@ -75,7 +75,7 @@ class Body:
 
 
 def varied(body: Body, percent: float, rng: np.random.Generator) -> Body:
-    """Return a body whose bones and radii are off by at most so many percent each, left and right alike."""
+    """Return a body whose bones and radii vary by at most `percent` each, the same left and right."""
     if percent == 0.0:
         return body
     mirror = np.array(MIRROR)

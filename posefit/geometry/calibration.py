@@ -30,7 +30,7 @@ TURNS = {"x": [[0, -1, 0], [1, 0, 0], [0, 0, 1]], "y": np.eye(3), "z": [[1, 0, 0
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What a file says of one camera. Lengths are metres and pixels."""
+    """One camera's entry in a calibration file. Lengths are metres and pixels."""
 
     name: str
     size: tuple[int, int]  # width, height
@@ -83,18 +83,18 @@ class Calibration:
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
 
-    It is +y already where a file says so; else, without `up`, the axis, either way, that the images see pointing up
-    most. Raises ValueError where `up` is none.
+    It is +y where the file states it; otherwise, without `up`, the axis, in either direction, that points up in the
+    images most. Raises ValueError where `up` is none.
     """
     if up is not None and up not in TURNS:
         raise ValueError(f"up must be one of x, y, z, got {up!r}")
     placed = [one.rotation for one in calibrations if one.rotation is not None]
     if not placed or any(one.upright for one in calibrations):
         return np.eye(3)
-    seen = -np.sum([rotation[1] for rotation in placed], axis=0)  # images' up, in the world
-    axis: Up = up or ("x", "y", "z")[int(np.abs(seen).argmax())]
+    image_up = -np.sum([rotation[1] for rotation in placed], axis=0)  # images' up, in the world
+    axis: Up = up or ("x", "y", "z")[int(np.abs(image_up).argmax())]
     turn = np.array(TURNS[axis], dtype=np.float64)
-    return turn if up is not None or (turn @ seen)[1] > 0.0 else np.diag([1.0, -1.0, -1.0]) @ turn
+    return turn if up is not None or (turn @ image_up)[1] > 0.0 else np.diag([1.0, -1.0, -1.0]) @ turn
 
 
 def read_calibrations(path: str | Path) -> list[Calibration]:
@@ -104,16 +104,16 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         raise ValueError(f"{path}: expected a calibration file, got nothing of that name")
     text = read_text(path, LARGEST_FILE)
     try:
-        found = _reader(path, text)(path, text)
-        for one in found:
+        calibrations = _reader(path, text)(path, text)
+        for one in calibrations:
             one.camera(one.size, np.eye(3))
     except (ValueError, TypeError, KeyError, OverflowError, AttributeError, RecursionError, cv2.error) as error:
-        told = " ".join(str(error).split()) or type(error).__name__
-        said = cut(f"no {told}" if isinstance(error, KeyError) else told, MESSAGE)
-        raise ValueError(f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {said}") from None
-    if not found:
+        cause = " ".join(str(error).split()) or type(error).__name__
+        reason = cut(f"no {cause}" if isinstance(error, KeyError) else cause, MESSAGE)
+        raise ValueError(f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {reason}") from None
+    if not calibrations:
         raise ValueError(f"{path}: expected a calibration with a camera, got none")
-    return found
+    return calibrations
 
 
 def _reader(path: Path, text: str) -> Callable[[Path, str], list[Calibration]]:
@@ -138,13 +138,13 @@ def _own(path: Path, _: str) -> list[Calibration]:
 
 
 def _toml(_: Path, text: str) -> list[Calibration]:
-    found: list[Calibration] = []
+    calibrations: list[Calibration] = []
     for name, camera in parsed_toml(text).items():
         if name == "metadata" or not isinstance(camera, dict):
             continue
         rotation = _turned(camera["rotation"]) if "rotation" in camera else None
         translation = _numbers(camera["translation"], (3,)) if "translation" in camera else None
-        found.append(
+        calibrations.append(
             Calibration(
                 str(camera.get("name", name)),
                 _size(*camera["size"]),
@@ -155,12 +155,12 @@ def _toml(_: Path, text: str) -> list[Calibration]:
                 bool(camera.get("fisheye", False)),
             )
         )
-    return found
+    return calibrations
 
 
 def _qualisys(_: Path, text: str) -> list[Calibration]:
     root = xml_of(text)
-    found: list[Calibration] = []
+    calibrations: list[Calibration] = []
     for camera in root.iter("camera"):
         view, lens, place = (_tag(camera, name) for name in ("fov_video", "intrinsic", "transform"))
         left, top, right, bottom = (float(view.get(side, "")) for side in ("left", "top", "right", "bottom"))
@@ -175,9 +175,9 @@ def _qualisys(_: Path, text: str) -> list[Calibration]:
         rotation = np.diag([1.0, -1.0, -1.0]) @ turned  # its camera looks along -z with y up
         position = np.array([float(place.get(axis, "")) for axis in "xyz"]) / 1000.0
         size = _size(right - left + 1, bottom - top + 1)
-        name = camera.get("serial", f"camera {len(found)}")
-        found.append(Calibration(name, size, matrix, distortion, rotation, -rotation @ position))
-    return found
+        name = camera.get("serial", f"camera {len(calibrations)}")
+        calibrations.append(Calibration(name, size, matrix, distortion, rotation, -rotation @ position))
+    return calibrations
 
 
 def _tag(camera: Any, name: str) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from posefit.arrays import Array
 
 LARGEST_SIDE = 16_384  # pixels
-FIELD_OF_VIEW = math.radians(40.0)  # across the larger side; our guess for a camera nobody described
+FIELD_OF_VIEW = math.radians(40.0)  # across the larger side; our guess for an unknown camera
 MARGIN = 0.06  # share of the image left free around what `framing` shows
 _KEYS = ("width", "height", "focal", "centre", "camera_from_world")
 
@@ -91,9 +91,9 @@ class Camera:
 
     def project(self, points: Array) -> tuple[Array, Array]:
         """Return pixels (..., 2) and depths (...) in metres of world points (..., 3)."""
-        seen = np.asarray(points) @ self.rotation.T + self.translation
-        depths = seen[..., 2]
-        return seen[..., :2] / depths[..., None] * self.focal + self.centre, depths
+        in_camera = np.asarray(points) @ self.rotation.T + self.translation
+        depths = in_camera[..., 2]
+        return in_camera[..., :2] / depths[..., None] * self.focal + self.centre, depths
 
     def to_json(self) -> str:
         """Return the text that `from_json` reads: sizes and pixels, and the 4 x 4 matrix camera_from_world."""

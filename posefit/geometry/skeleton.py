@@ -112,7 +112,7 @@ class Skeleton:
     offsets: Array = field(repr=False)  # (26, 3) from a bone's start to its end, at rest, in the world frame
     axes: Array = field(repr=False)  # (26, 3, 3) world_from_bone at rest: the frame of the bone's angles
     channels: Channels = field(repr=False)  # the .amc layout after the root: (bone, its free angles) in file order
-    # (63, 2) radians: lowest and highest of each joint angle, 0 for padding; None where nobody says
+    # (63, 2) radians: lowest and highest of each joint angle, 0 for padding; None where unknown
     limits: Array | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What OpenCV's FileStorage writes, as YAML, JSON or XML, read without OpenCV: its reader trusts what a file says.
+"""What OpenCV's FileStorage writes, as YAML, JSON or XML, read without OpenCV: its reader trusts the file.
 
 A file's values become numbers, texts, lists and `Matrix`, whatever the format. Nothing is expanded, no tag makes an
 object, and a matrix is as large as the numbers that are there.
@@ -32,16 +32,16 @@ class Matrix:
     def array(self) -> Array:
         """Return the array, its channels last where it has several. Raises ValueError where sizes contradict."""
         shape = tuple(_count(side) for side in (self.sides if isinstance(self.sides, list) else [self.sides])[:4])
-        found = _TYPE.fullmatch(str(self.type))
-        if found is None:
+        match = _TYPE.fullmatch(str(self.type))
+        if match is None:
             raise ValueError(f"a matrix of the type {quoted(self.type)}")
-        channels = int(found[1] or 1)
+        channels = int(match[1] or 1)
         numbers = numbers_of(self.numbers)
         shape = shape if channels == 1 else (*shape, channels)
         if numbers.size != math.prod(shape):
             raise ValueError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
-        if found[2] in _ROUNDED:
-            numbers = numbers.astype(_ROUNDED[found[2]]).astype(np.float64)
+        if match[2] in _ROUNDED:
+            numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
         return numbers.reshape(shape)
 
 
@@ -106,8 +106,8 @@ def _yaml(text: str) -> Any:
     try:
         return yaml.load(text, Loader=yaml.BaseLoader)
     except (yaml.YAMLError, RecursionError) as error:
-        said = " ".join(str(error).split()) or "brackets that are nested too deeply"
-        raise ValueError(f"YAML that is broken: {said}") from None
+        reason = " ".join(str(error).split()) or "brackets that are nested too deeply"
+        raise ValueError(f"YAML that is broken: {reason}") from None
 
 
 def _xml(text: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@
 | clinical angles of hip, knee, ankle, shoulder and elbow, in degrees | angles.py |
 | when feet strike and lift off | events.py |
 | cadence, step, stride, speed, stance, and whether it is a walk | gait.py |
-| in which frames somebody walks backwards | heading.py |
+| in which frames the person walks backwards | heading.py |
 | tables, and files for other programs | tables.py, trc.py, c3d.py |
 
     from posefit.measuring.angles import clinical_angles

@@ -61,7 +61,7 @@ def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
     """Return plane of elevation, elevation and internal rotation (..., 3) of the right shoulder, in radians.
 
     The source counts elevation downwards from 0 to -180 degrees; here it is positive. Where the arm hangs straight
-    down or points straight up, all of the turn is told as rotation.
+    down or points straight up, all of the turn is reported as rotation.
     """
     relative = np.swapaxes(thorax, -1, -2) @ upper_arm
     level = np.hypot(relative[..., 1, 0], relative[..., 1, 2])
@@ -91,15 +91,19 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
             name.removeprefix(f"{side}_"): _ACROSS @ one @ _ACROSS if side == "left" else one
             for name, one in segments.items()
         }
-        found = {
+        by_joint = {
             "hip": hip_angles(axes["pelvis"], axes["thigh"]),
             "knee": knee_angles(axes["thigh"], axes["shank"]),
             "ankle": ankle_angles(axes["shank"], axes["foot"]),
             "shoulder": shoulder_angles(axes["thorax"], axes["upper_arm"]),
             "elbow": elbow_angles(axes["upper_arm"], axes["forearm"]),
         }
-        found["shoulder"][np.sin(found["shoulder"][:, 1]) < np.sin(np.radians(NEAR_POLE))] *= [np.nan, 1.0, np.nan]
-        for joint, values in found.items():
+        by_joint["shoulder"][np.sin(by_joint["shoulder"][:, 1]) < np.sin(np.radians(NEAR_POLE))] *= [
+            np.nan,
+            1.0,
+            np.nan,
+        ]
+        for joint, values in by_joint.items():
             for k, angle in enumerate(MEANINGS[joint]):
                 columns[f"{side}_{joint}_{angle}"] = np.degrees(values[:, k])
     return {name: columns[name] for name in COLUMNS}

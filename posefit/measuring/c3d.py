@@ -1,7 +1,7 @@
 """Joint positions and the events of gait as a .c3d file, which programs of motion analysis open.
 
 The format is that of the C3D file format user guide (2008): a header, parameters and 3D points in blocks of 512 bytes,
-here as little-endian real numbers, in millimetres. A point that nobody saw has the residual -1.
+here as little-endian real numbers, in millimetres. An unobserved point has the residual -1.
 """
 
 import struct

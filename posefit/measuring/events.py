@@ -17,7 +17,7 @@ from posefit.measuring.segments import FORWARDS, SIDES
 from posefit.motion.motion import Motion
 
 CUTOFF = 6.0  # hertz: of a walk nothing to speak of is faster. Winter, Biomechanics and motor control, 2009
-SLOWEST = 2.0 * CUTOFF  # frames a second, with fewer of which nothing of that is seen
+SLOWEST = 2.0 * CUTOFF  # frames a second, the fewest that show it
 SWAY = 0.3  # hertz: the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
 LEAST = 0.1  # metres that a foot moves to and fro at least, against the pelvis, for an event
 SHARE = 0.2  # of the whole range of that, which it moves at least
@@ -37,7 +37,7 @@ class GaitEvents:
 def gait_events(motion: Motion) -> GaitEvents:
     """Return when the feet of a motion strike and lift off; no event at all where they do not move to and fro.
 
-    Raises ValueError where there are too few frames a second to tell.
+    Raises ValueError where there are too few frames a second.
     """
     if motion.fps < SLOWEST:
         raise ValueError(f"fps must be at least {SLOWEST:g} to find the events of gait, got {motion.fps:g}")

@@ -1,7 +1,7 @@
 """What a walk is like: cadence, lengths of steps and strides, speed, stance and the width of steps.
 
 A step of a foot lasts from the other foot's strike to its own, a stride from one of its strikes to its next. Only those
-count whose feet strike in turn, in which the person moves on the way that he faces, and of which every frame is known.
+count whose feet strike in turn, in which the person moves the way they face, and of which every frame is known.
 """
 
 from collections.abc import Collection, Iterator
@@ -22,7 +22,7 @@ LEAST_STEPS = 2  # of a walk
 LEAST_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
 WIDEST = 0.35  # metres between the lines that the feet of a walk keep to; who dances or dodges goes wider
 RUNS = 0.5  # the Froude number from which people run rather than walk
-STANDS = 0.57  # share of a stride; a runner's foot stands shorter, as told by toes that are farthest behind
+STANDS = 0.57  # share of a stride; a runner's foot stands shorter, judged by the rearmost toes
 GRAVITY = 9.81  # metres a second squared
 
 
@@ -46,7 +46,7 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
-    """What a motion's gait is like, with every step; None where it is no walk, and `why` says so in a few words.
+    """The gait of a motion, with every step; None where it is no walk, with the reason in `why`.
 
     Strides and stance are None, too, where no stride is whole.
     """
@@ -61,10 +61,10 @@ class Gait:
     stance_share: float | None = None
 
     def as_dict(self) -> dict[str, object]:
-        """Return what summary.json says of it."""
+        """Return the gait as summary.json holds it."""
         counted = len(_values(self.steps, "step_seconds"))
-        told = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("steps", "why")}
-        return {"walk": not self.why, "why": self.why or None, "steps": counted, **told}
+        measures = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("steps", "why")}
+        return {"walk": not self.why, "why": self.why or None, "steps": counted, **measures}
 
 
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
@@ -113,31 +113,31 @@ def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
     """Yield every strike in the order of time, with what is known of its step and its stride."""
     strikes = sorted((time, side) for side in SIDES for time in _known(events.strikes[side], unknown))
     for k, (time, foot) in enumerate(strikes):
-        told: dict[str, float] = {}
+        measures: dict[str, float] = {}
         again = next((one for one, side in strikes[k + 1 :] if side == foot), np.inf)
         offs = [one for one in _known(events.offs[foot], unknown) if time < one < again]
         if offs:
-            told["toe_off_seconds"] = offs[0] / fps
+            measures["toe_off_seconds"] = offs[0] / fps
         if k and strikes[k - 1][1] != foot and _walked(events, fps, strikes[k - 1][0], time, unknown):
             other = next(side for side in SIDES if side != foot)
             apart = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], strikes[k - 1][0])
             x, z = at_frames(events.heading, time)
-            told["step_seconds"] = (time - strikes[k - 1][0]) / fps
-            told["step_length"] = float(apart @ (x, z))  # WHITTLE2007 (step length)
+            measures["step_seconds"] = (time - strikes[k - 1][0]) / fps
+            measures["step_length"] = float(apart @ (x, z))  # WHITTLE2007 (step length)
             # at one moment: between two, whatever is wrong with a person's depth would count
             beside = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], time)
-            told["step_width"] = abs(float(beside @ (z, -x)))
+            measures["step_width"] = abs(float(beside @ (z, -x)))
         following = strikes[k + 1 : k + 3]
         in_turn = [side for _, side in following] == [side for side in SIDES if side != foot] + [foot]
         times = [time, *(one for one, _ in following)]
         if in_turn and all(_walked(events, fps, *pair, unknown) for pair in pairwise(times)):
             end = times[-1]
             moved = at_frames(events.ankles[foot], end) - at_frames(events.ankles[foot], time)
-            told["stride_seconds"] = (end - time) / fps
-            told["stride_length"] = float(np.linalg.norm(moved))
+            measures["stride_seconds"] = (end - time) / fps
+            measures["stride_length"] = float(np.linalg.norm(moved))
             if offs:
-                told["stance_share"] = stance_share(time, offs[0], end)
-        yield Step(foot=foot, strike_seconds=time / fps, **told)
+                measures["stance_share"] = stance_share(time, offs[0], end)
+        yield Step(foot=foot, strike_seconds=time / fps, **measures)
 
 
 def _known(times: Array, unknown: set[int]) -> list[float]:
@@ -146,7 +146,7 @@ def _known(times: Array, unknown: set[int]) -> list[float]:
 
 
 def _walked(events: GaitEvents, fps: float, start: float, end: float, unknown: set[int]) -> bool:
-    """Return whether somebody walked on from one strike to the next, and whether every frame of it is known."""
+    """Return whether the person walked on from one strike to the next, with every frame known."""
     seconds = (end - start) / fps
     if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or unknown & set(range(int(start), int(end) + 2)):
         return False
@@ -163,7 +163,7 @@ def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float
     """Return why a motion of which so many seconds are known is no walk; empty where it is one."""
     strikes = sum(len(events.strikes[side]) for side in SIDES)
     if strikes <= LEAST_STEPS:
-        return f"{strikes or 'no'} strike{'' if strikes == 1 else 's'} of a foot found"
+        return f"{strikes or 'no'} strike{'' if strikes == 1 else 's'} of a foot detected"
     speed = float(((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum(axis=1).mean() * motion.fps)
     if speed < LEAST_SPEED:
         return f"the person moves {'forwards' if speed > -LEAST_SPEED else 'backwards'} at {abs(speed):.2f} m/s"

@@ -1,4 +1,4 @@
-"""In which frames somebody walks backwards: his pelvis faces away from its way."""
+"""In which frames the person walks backwards: the pelvis faces away from the direction of travel."""
 
 from collections.abc import Collection
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from posefit.motion.motion import Motion
 
-SECONDS = 0.5  # ours: over which the way is told
+SECONDS = 0.5  # ours: over which the direction is measured
 SPEED = 0.3  # metres a second, ours: who goes slower goes nowhere
 SHARE = 0.05  # ours: of frames, from which it is worth a warning
 
@@ -15,8 +15,8 @@ SHARE = 0.05  # ours: of frames, from which it is worth a warning
 def backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
     """Return in which frames (T,) the root faces away from its way; `unknown` frames count for nothing.
 
-    The way of a frame is that of the half second about it, over the ground, as far as all of it is known. Whoever goes
-    slower than 0.3 m/s has none. A heading is away from the way where it lies more than 90 degrees from it.
+    The way of a frame is that of the half second about it, over the ground, as far as all of it is known. A person who
+    moves slower than 0.3 m/s has none. A heading is away from the way where it lies more than 90 degrees from it.
     """
     count = len(motion)
     back = np.zeros(count, dtype=bool)
@@ -34,10 +34,10 @@ def backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_
 
 
 def warned(back: NDArray[np.bool_]) -> str:
-    """Return what is to be said of frames in which somebody walks backwards; empty where they are few."""
+    """Return a warning about frames in which the person walks backwards; empty where they are few."""
     if back.mean() < SHARE:
         return ""
     return (
-        f"the person seems to walk backwards in {back.sum()} of {len(back)} frames: expected that he faces where he "
-        "goes; if he does, he is followed the wrong way round there"
+        f"the person seems to walk backwards in {back.sum()} of {len(back)} frames: expected to face the direction "
+        "of travel; if they do, the track faces the wrong way there"
     )

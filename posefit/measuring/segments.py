@@ -1,9 +1,9 @@
 """How the segments of the body are turned: axes as the International Society of Biomechanics lays them.
 
-X points forwards, Y up along the segment and Z to the person's right, so that all segments of somebody who stands in
-the anatomical position (upright, knees and elbows straight, arms hanging, palms forwards) are turned alike. Wu et al.
-2002, 2005. Where the axes lie in a bone is read off the pose of rest, which is that of the CMU database: upright, feet
-and face forwards, arms out with the palms down, legs apart and the soles at right angles to the shanks.
+X points forwards, Y up along the segment and Z to the person's right, so that all segments of a person in the
+anatomical position (upright, knees and elbows straight, arms hanging, palms forwards) have the same orientation. Wu et
+al. 2002, 2005. Where the axes lie in a bone is read off the pose of rest, which is that of the CMU database: upright,
+feet and face forwards, arms out with the palms down, legs apart and the soles at right angles to the shanks.
 """
 
 import numpy as np

@@ -21,8 +21,8 @@ def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) 
         writer = csv.writer(file)
         writer.writerow(["frame", "seconds", *angles])
         for k, row in enumerate(np.column_stack(list(angles.values()))):
-            told = ["" if k in blank or np.isnan(value) else f"{value:.3f}" for value in row]
-            writer.writerow([k, f"{k / motion.fps:.6f}", *told])
+            cells = ["" if k in blank or np.isnan(value) else f"{value:.3f}" for value in row]
+            writer.writerow([k, f"{k / motion.fps:.6f}", *cells])
 
 
 def write_gait(path: str | Path, gait: Gait) -> None:

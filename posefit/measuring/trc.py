@@ -10,7 +10,7 @@ from posefit.motion.motion import Motion
 def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
     """Write the 27 joints of every frame as markers, in metres and y up; of `blank` frames nothing but the time.
 
-    Markers are named by `PLACES`. An empty field is a marker that nobody saw, to programs that read such files.
+    Markers are named by `PLACES`. Programs that read such files take an empty field for an unobserved marker.
     """
     path, joints = Path(path), motion.skeleton.joints(motion.poses, motion.translations)
     count, fps = len(motion), f"{motion.fps:g}"

@@ -76,7 +76,7 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
     """Return all frames (T, values of a frame) in file units, and whether their angles are radians."""
     width = max(stop for _, stop in spans.values())
     data, row = array("d"), [0.0] * width
-    seen: set[bytes] = set()
+    bones_read: set[bytes] = set()
     frame, radians, number = -1, None, 0
     with path.open("rb") as file:
         for number, raw in enumerate(iter(partial(file.readline, LONGEST_LINE + 1), b""), 1):
@@ -88,15 +88,15 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
             word = words[0]
             span = spans.get(word)
             if span is not None and frame >= 0:
-                if word in seen:
+                if word in bones_read:
                     raise mistake(path, number, f"each bone once in frame {frame}", f"{_quoted(word)} again")
-                seen.add(word)
+                bones_read.add(word)
                 row[span[0] : span[1]] = _numbers(path, number, words, span[1] - span[0])
             elif len(words) == 1 and word.isdigit() and len(word) < 10:
                 if radians is None:
                     raise mistake(path, number, ":DEGREES or :RADIANS before the first frame", f"frame {int(word)}")
                 if frame >= 0:
-                    _check_whole(path, number, spans, seen, frame, f"frame {int(word)}")
+                    _check_whole(path, number, spans, bones_read, frame, f"frame {int(word)}")
                     data.extend(row)
                     if len(data) >= min(LONGEST * width, VALUES):
                         most = min(LONGEST, VALUES // width)
@@ -104,7 +104,7 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
                     if int(word) != frame + 1:
                         raise mistake(path, number, f"frame {frame + 1}", f"frame {int(word)}")
                 frame = int(word)
-                seen.clear()
+                bones_read.clear()
             elif frame < 0 and word.startswith(b":"):
                 keyword = word.upper()
                 if keyword not in (b":FULLY-SPECIFIED", b":DEGREES", b":RADIANS"):
@@ -117,7 +117,7 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
                 raise mistake(path, number, f"a bone of skeleton {name!r} or a frame's number", _quoted(raw))
     if frame < 0:
         raise mistake(path, max(number, 1), "at least one frame", "the end of the file")
-    _check_whole(path, number, spans, seen, frame, "the end of the file")
+    _check_whole(path, number, spans, bones_read, frame, "the end of the file")
     data.extend(row)
     return np.array(data).reshape(-1, width), bool(radians)
 
@@ -135,9 +135,9 @@ def _numbers(path: Path, number: int, words: list[bytes], count: int) -> list[fl
     return values
 
 
-def _check_whole(path: Path, number: int, spans: Spans, seen: set[bytes], frame: int, came: str) -> None:
-    if len(seen) < len(spans):
-        missing = next(bone for bone in spans if bone not in seen)
+def _check_whole(path: Path, number: int, spans: Spans, bones_read: set[bytes], frame: int, came: str) -> None:
+    if len(bones_read) < len(spans):
+        missing = next(bone for bone in spans if bone not in bones_read)
         raise mistake(path, number, f"bone {_quoted(missing)} in frame {frame}", came)
 
 

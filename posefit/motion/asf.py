@@ -69,7 +69,7 @@ class _Bone:
 def read_asf(path: str | Path) -> Skeleton:
     """Return the skeleton of an .asf file, named after it, in metres.
 
-    Only the 26 bones of `posefit.geometry.skeleton.BONES` are kept; other bones may be there and keep their place
+    Only the 26 bones of `posefit.geometry.skeleton.BONES` are chosen; other bones may be there and keep their place
     in `channels`. Raises ValueError with file and line where the file is not an Acclaim skeleton of this tree.
     """
     return parse_asf(path)[0]
@@ -84,11 +84,11 @@ def parse_asf(path: str | Path) -> tuple[Skeleton, float]:
     _check_root(sections["root"])
     bones = _bones(sections["bonedata"], np.pi / 180.0 if degrees else 1.0)
     _check_tree(path, sections["hierarchy"], bones)
-    kept = [bones[name] for name in BONES]
+    chosen = [bones[name] for name in BONES]
     skeleton = Skeleton(
         name=path.stem,
-        offsets=np.array([bone.vector for bone in kept]) * metres,
-        axes=rotation_from_joint_angles(np.array([bone.axis for bone in kept])),
+        offsets=np.array([bone.vector for bone in chosen]) * metres,
+        axes=rotation_from_joint_angles(np.array([bone.axis for bone in chosen])),
         channels=tuple((name, bone.free) for name, bone in bones.items() if bone.free),
         limits=_limits(bones),
     )

@@ -2,7 +2,7 @@
 
 Every kind has styles, each from another person: `walk-a`, `walk-b`, ... Kinds are `walk`, `run`, `march` (raising the
 knees on the spot), `jacks` (jumping jacks), `squat`, `jump`, `step` (walking on the spot), and `arms-out` and `wave`
-(walking with both arms held out, or with one waving). Without a letter it is somebody in between: the mean of the
+(walking with both arms held out, or with one waving). Without a letter it is the mean of the
 styles, in step. So `walk` is none of the motions that its prior is trained on, but within their reach; a prior trained
 on other people only, as for `walk-a`, is the harder case.
 They were fitted to CMU clips by `fit_built_in.py`; the arms that are held out or wave are drawn by hand. The data used
@@ -51,7 +51,7 @@ def other_styles(name: str) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def average_skeleton() -> Skeleton:
-    """Return the skeleton of the built-in motions: the mean of nine people, left and right alike."""
+    """Return the skeleton of the built-in motions: the mean of nine people, symmetric."""
     stored = _stored()["skeleton"]
     return Skeleton(
         "average",

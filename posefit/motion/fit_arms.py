@@ -44,9 +44,9 @@ def drawn(skeleton: Skeleton, side: str, upper: Array, fore: Array) -> tuple[lis
         off = [way / np.linalg.norm(way) - wanted / np.linalg.norm(wanted) for way, wanted in ways]
         return np.concatenate([*off, 0.02 * (angles - before)])
 
-    found = np.zeros((len(upper), 4))
+    solutions = np.zeros((len(upper), 4))
     guess = np.radians([0.0, 0.0, 0.0, 40.0])
     for k in range(len(upper)):
         guess = np.asarray(least_squares(residual, guess, args=(upper[k], fore[k], guess)).x)
-        found[k] = guess
-    return places, found
+        solutions[k] = guess
+    return places, solutions

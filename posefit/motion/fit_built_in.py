@@ -67,7 +67,7 @@ CLIPS = {
 # What the arms do where they do not do what the clip's do: each side's directions, by hand.
 ARMS = {"arms-out": {"l": held_out, "r": held_out}, "wave": {"r": waving}}
 ON_THE_SPOT = ("step",)  # walks whose way is taken away
-STANDING = 0.2  # m/s; who is slower does not go anywhere, and faces where he looks on average
+STANDING = 0.2  # m/s; a slower person stays in place and faces their mean heading
 # What is at its highest at phase 0 in each kind of motion: an angle rx, less another one, or less the root's height.
 BEATS = {
     "walk": ("rfemur", "lfemur"),  # rx is negative when the thigh is in front
@@ -115,8 +115,8 @@ def fitted(root: Path, clip: Clip, kind: str) -> dict[str, Any]:
         columns = basis(times / period, HARMONICS)
         # a little damping: a clip barely longer than its period leaves the highest harmonics undetermined
         normal = columns.T @ columns + 1e-3 * np.eye(columns.shape[1])
-        found: Array = np.linalg.solve(normal, columns.T @ used).astype(np.float64)
-        return float(np.abs(used - columns @ found)[:, 3:].sum() / len(used) / 66.0), found
+        coefficients: Array = np.linalg.solve(normal, columns.T @ used).astype(np.float64)
+        return float(np.abs(used - columns @ coefficients)[:, 3:].sum() / len(used) / 66.0), coefficients
 
     periods = np.arange(clip.shortest, clip.longest, 0.0025)
     period = float(periods[np.argmin([residual(p)[0] for p in periods])])

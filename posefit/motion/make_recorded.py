@@ -1,7 +1,7 @@
 """Makes the library of recorded motions: `python -m posefit.motion.make_recorded CMU30_DIR`.
 
 CMU30_DIR holds clips at 30 frames a second: one NN.npz a subject with `poses` (T, 66) in radians, `translations` (T, 3)
-in metres, `names` and `lengths` of the clips, and their skeletons in asf/NN.asf. Of each clip those poses are kept
+in metres, `names` and `lengths` of the clips, and their skeletons in asf/NN.asf. Of each clip those poses are stored
 between which the others can be interpolated, no joint more than a centimetre off. It is run by hand when a person is
 added; its result, recorded.npz, is what the package carries.
 """
@@ -25,7 +25,7 @@ ORIGIN = (
     "The database was created with funding from NSF EIA-0196217."
 )
 TOLERANCE = 0.01  # metres that a joint of a pose left out may be away from where it is interpolated
-LONGEST_GAP = 8  # frames from one kept pose to the next
+LONGEST_GAP = 8  # frames from one stored pose to the next
 
 
 def kept_frames(skeleton: Skeleton, poses: Array, translations: Array) -> NDArray[np.int64]:
@@ -36,19 +36,19 @@ def kept_frames(skeleton: Skeleton, poses: Array, translations: Array) -> NDArra
     values, joints = np.column_stack([poses, translations]), skeleton.joints(poses, translations)
 
     def replaceable(start: int, stop: int) -> bool:
-        """Whether the frames between two that are kept can be interpolated."""
+        """Whether the frames between two that are stored can be interpolated."""
         share = np.linspace(0.0, 1.0, stop - start + 1)[1:-1, None]
         between = (1.0 - share) * values[start] + share * values[stop]
         away = skeleton.joints(between[:, :-3], between[:, -3:]) - joints[start + 1 : stop]
         return bool(np.linalg.norm(away, axis=-1).max() <= TOLERANCE)
 
-    kept = [0]
-    while (start := kept[-1]) < len(poses) - 1:
+    rows = [0]
+    while (start := rows[-1]) < len(poses) - 1:
         stop = start + 1
         while stop + 1 < len(poses) and stop + 1 - start <= LONGEST_GAP and replaceable(start, stop + 1):
             stop += 1
-        kept.append(stop)
-    return np.array(kept)
+        rows.append(stop)
+    return np.array(rows)
 
 
 def main(root: Path) -> None:
@@ -80,15 +80,15 @@ def main(root: Path) -> None:
         for name, length in clips:
             values = everything[start : start + length]
             start += length
-            kept = kept_frames(skeleton, values[:, :-3], values[:, -3:])
-            steps = np.rint(values[kept] / STEP).astype(np.int64)
+            rows = kept_frames(skeleton, values[:, :-3], values[:, -3:])
+            steps = np.rint(values[rows] / STEP).astype(np.int64)
             changes = np.diff(steps, axis=0, prepend=0)
             if np.abs(changes).max() > np.iinfo(np.int16).max:
                 raise ValueError(f"{path}: expected poses that change little by little, got a jump in {name}")
             names.append(name)
             owners.append(len(skeletons) - 1)
-            counts.append(len(kept))
-            gaps.append(np.diff(kept, prepend=0))
+            counts.append(len(rows))
+            gaps.append(np.diff(rows, prepend=0))
             numbers.append(changes)
     target = Path(__file__).with_name("recorded.npz")
     np.savez_compressed(
@@ -99,7 +99,7 @@ def main(root: Path) -> None:
         owners=np.array(owners, dtype=np.uint8),
         counts=np.array(counts, dtype=np.uint16),
         gaps=np.concatenate(gaps).astype(np.uint8),
-        # one angle after the other: numbers that are alike lie side by side, and pack better
+        # one angle after the other: similar numbers side by side compress better
         changes=np.ascontiguousarray(np.concatenate(numbers).T.astype(np.int16)),
     )
     print(f"{target.name}: {len(names)} clips, {sum(counts)} poses, {target.stat().st_size} bytes")

@@ -1,4 +1,4 @@
-"""The library of recorded motions: clips of ten people, so that nobody has to bring motion capture of his own.
+"""The library of recorded motions: clips of ten people, so that no motion capture of your own is needed.
 
 They walk, run, jump, turn, dance, fight, sweep the floor, and play animals. `make_recorded.py` made the file from clips
 of the CMU database: a clip keeps the poses between which the others can be interpolated, no joint more than about a
@@ -38,7 +38,7 @@ _NAME = re.compile(r"\d+_\d+")
 class RecordedClip:
     """Poses of one clip, in order, as many as it takes. Arrays cannot be written to."""
 
-    name: str  # such as 16_15: the subject, and which of his clips
+    name: str  # such as 16_15: the subject and the clip
     subject: str
     skeleton: Skeleton = field(repr=False)
     poses: Array = field(repr=False)  # (K, 66) radians
@@ -77,7 +77,7 @@ class RecordedClip:
 @lru_cache(maxsize=1)
 def _stored() -> dict[str, RecordedClip]:
     with (files("posefit.motion") / "recorded.npz").open("rb") as file, np.load(file) as stored:
-        told = json.loads(str(stored["skeletons"]))
+        skeletons_json = json.loads(str(stored["skeletons"]))
         names, owners = stored["names"].tolist(), stored["owners"].tolist()
         ends = np.cumsum(stored["counts"], dtype=np.int64)
         changes, gaps = stored["changes"].T.astype(np.int64), stored["gaps"].astype(np.int64)
@@ -89,7 +89,7 @@ def _stored() -> dict[str, RecordedClip]:
             tuple((bone, tuple(free)) for bone, free in one["channels"]),
             None if one["limits_degrees"] is None else np.radians(one["limits_degrees"]),
         )
-        for one in told
+        for one in skeletons_json
     ]
     clips = {}
     for name, owner, start, stop in zip(names, owners, [0, *ends[:-1].tolist()], ends.tolist(), strict=True):
@@ -122,7 +122,7 @@ def clip(name: str) -> RecordedClip:
 def clips(only: Iterable[str] = (), without: Iterable[str] = ()) -> Sequence[RecordedClip]:
     """Return the clips of some people, or of all, but not of those `without`.
 
-    Raises ValueError where one of them is not in the library, or where nobody is left.
+    Raises ValueError where one of them is not in the library, or where no one is left.
     """
     only, without = tuple(only), tuple(without)
     for subject in (*only, *without):
@@ -130,7 +130,7 @@ def clips(only: Iterable[str] = (), without: Iterable[str] = ()) -> Sequence[Rec
             raise ValueError(f"a subject of the library must be one of {', '.join(subjects())}, got {quoted(subject)}")
     chosen = [one for one in _stored().values() if one.subject not in without and (not only or one.subject in only)]
     if not chosen:
-        raise ValueError("the library must hold somebody else, got everybody left out")
+        raise ValueError("the library must keep at least one person, got all left out")
     return chosen
 
 
@@ -142,7 +142,7 @@ def is_library(name: object) -> bool:
 def named(name: str) -> Sequence[RecordedClip]:
     """Return the clips of `library`, of some people as in `library:02,16`, or of all but some as in `library:-16`.
 
-    Raises ValueError where one of them is not in the library, or where nobody is left.
+    Raises ValueError where one of them is not in the library, or where no one is left.
     """
     _, colon, listed = name.partition(":")
     people = [one.strip() for one in listed.split(",")] if colon else []

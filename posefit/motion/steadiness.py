@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 
-PACE = 30.0  # a second: how often places are compared, so that what a search jitters counts alike at any rate
+PACE = 30.0  # a second: the rate at which places are compared, so that jitter counts the same at any frame rate
 BALLS = JOINTS.index("lfoot"), JOINTS.index("rfoot")  # of the feet, which stay where they are while a foot rolls off
 LOW = 0.05  # metres above the lowest place of either foot, up to which a foot may stand
 SLOW = 0.2  # metres a second, up to which it may
@@ -20,11 +20,11 @@ def acceleration(joints: Array, fps: float) -> Array:
     It is the second difference of their places in the world, over a thirtieth of a second each.
     """
     step = max(round(fps / PACE), 1)
-    found = np.full(len(joints), np.nan)
+    accelerations = np.full(len(joints), np.nan)
     if len(joints) > 2 * step:
         change = joints[2 * step :] - 2.0 * joints[step:-step] + joints[: -2 * step]
-        found[step:-step] = np.linalg.norm(change, axis=2).mean(axis=1) * (fps / step) ** 2
-    return found
+        accelerations[step:-step] = np.linalg.norm(change, axis=2).mean(axis=1) * (fps / step) ** 2
+    return accelerations
 
 
 def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
@@ -54,12 +54,12 @@ def slides(joints: Array, stands: NDArray[np.bool_]) -> Array:
 
     `stands` (T, 2) is whether the left and the right foot stand: those of `standing`, or of another motion.
     """
-    found = []
+    slides = []
     for side, ball in enumerate(BALLS):
         for start, stop in runs(stands[:, side]):
             places = joints[start:stop, ball][:, [0, 2]]
-            found.append(float(np.linalg.norm(places - places[0], axis=1).max()))
-    return np.array(found)
+            slides.append(float(np.linalg.norm(places - places[0], axis=1).max()))
+    return np.array(slides)
 
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -1,6 +1,6 @@
-"""What weighted poses say: which poses are possible, how likely each is, and how far off each joint may be.
+"""Weighted poses: which are possible, how likely each is, and how far off each joint may be.
 
-A silhouette seldom tells one pose. What it leaves open is a `Posterior`: poses of one frame, each with its weight.
+A silhouette seldom determines one pose. What it leaves open is a `Posterior`: weighted poses of one frame.
 
     from posefit.uncertainty.intervals import joint_intervals
     from posefit.uncertainty.modes import modes_of
@@ -12,11 +12,11 @@ A silhouette seldom tells one pose. What it leaves open is a `Posterior`: poses 
 
 | looking for | field's term | file |
 |---|---|---|
-| weighted poses, put together by what they look like | modes, clustering | modes.py |
+| weighted poses, clustered by their joints | modes, clustering | modes.py |
 | how far joints and angles may be off | credible intervals, of a mixture | intervals.py |
 | whether left and right are known | mirror ambiguity | sides.py |
-| several searches of any optimiser become modes with weights | multimodal optimisation | searches.py |
+| modes with weights from several searches of any optimiser | multimodal optimisation | searches.py |
 | which proposals lie in one valley of the cost | hill-valley clustering, niching | hill_valley.py |
 | how much of the box each valley holds | tempered sequential Monte Carlo, waste-free | smc.py, mixture.py, kernels.py |
-| whether figures mean what they say, and making them so | conformal prediction, coverage, ECE, AUROC | calibration.py |
+| whether probabilities and intervals are calibrated | conformal prediction, coverage, ECE, AUROC | calibration.py |
 """

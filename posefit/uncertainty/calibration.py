@@ -1,8 +1,8 @@
-"""Do probabilities and intervals mean what they say, and what makes them: coverage, conformal factors, ECE, AUROC.
+"""Calibration of probabilities and intervals: coverage, conformal factors, ECE, AUROC.
 
-The conformal factors are written out here, not taken from crepes or MAPIE: those take every error for a draw of its
-own, but frames of a clip err together. What can be exchanged is the clip, there are few of them, and the factor of a
-joint is found from all joints of its group; that is the thirty lines below.
+The conformal factors are written out here, not taken from crepes or MAPIE: those treat every
+error as an independent draw, but frames of a clip err together. The clip is the exchangeable unit, clips are few, and a
+joint's factor comes from all joints of its group.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ BINS = 10  # of probabilities
 
 @dataclass(frozen=True, eq=False)
 class Recalibration:
-    """What poses of a posterior cannot know of their own error, found on clips whose truth is known."""
+    """Corrections of a posterior's intervals and probabilities, learned on clips whose truth is known."""
 
     # standard deviations, each axis: how far off joints (metres) and angles (radians) are from every pose it has
     joint_spreads: Array = field(default_factory=lambda: np.zeros(len(JOINTS)), repr=False)  # (27,)
@@ -65,7 +65,7 @@ def coverage(distances: Array, radii: Array) -> float:
 def conformal_factor(scores: Sequence[Array], level: float) -> float:
     """Return what radii have to be multiplied by, so that they hold a `level` of what a new clip brings. DUNN2023.
 
-    `scores` has an array for each of n clips: distances over radii. Every clip counts alike, however long it is, and
+    `scores` has an array for each of n clips: distances over radii. Every clip counts the same, however long it is, and
     the one that is to come as infinitely far off: the factor is the least at which the mean over n + 1 clips of the
     share within it is at least the level. Raises ValueError where there are too few clips for that.
     """
@@ -90,16 +90,18 @@ def calibration_error(probabilities: Array, right: NDArray[np.bool_], bins: int 
 
     The mean over `bins` of equal width, weighted by how many fall into each.
     """
-    off = sum(count * abs(told - came) for count, told, came in reliability(probabilities, right, bins))
+    off = sum(
+        count * abs(predicted - observed) for count, predicted, observed in reliability(probabilities, right, bins)
+    )
     return float(off / len(right))  # GUO2017 (3)
 
 
 def reliability(probabilities: Array, right: NDArray[np.bool_], bins: int = BINS) -> list[tuple[int, float, float]]:
     """Return how many probabilities (n,) are in each bin that has any, their mean, and how often they are right."""
-    told, came = _paired("right", probabilities, right)
-    bin_of = np.minimum((told * bins).astype(np.int64), bins - 1)
+    predicted, observed = _paired("right", probabilities, right)
+    bin_of = np.minimum((predicted * bins).astype(np.int64), bins - 1)
     return [
-        (int((bin_of == k).sum()), float(told[bin_of == k].mean()), float(came[bin_of == k].mean()))
+        (int((bin_of == k).sum()), float(predicted[bin_of == k].mean()), float(observed[bin_of == k].mean()))
         for k in np.unique(bin_of)
     ]
 

@@ -1,4 +1,4 @@
-"""How far joints and angles may be off what is told: intervals of weighted poses, each blurred by the model's error."""
+"""Intervals of joints and angles from weighted poses, each blurred by the model's error."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -23,7 +23,7 @@ class JointIntervals:
 
     mean: Array = field(repr=False)  # (27, 3)
     covariance: Array = field(repr=False)  # (27, 3, 3)
-    radii: Array = field(repr=False)  # (levels, 27) of the balls about the told joints that hold the true ones
+    radii: Array = field(repr=False)  # (levels, 27) of the balls about the reported joints that hold the true ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class AngleIntervals:
     """What angles are, and how sure that is. Radians."""
 
     mean: Array = field(repr=False)  # (66,) circular
-    halves: Array = field(repr=False)  # (levels, 66): how far to either side of the told angles the true ones are
+    halves: Array = field(repr=False)  # (levels, 66): to either side of the reported angles
 
 
 def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> JointIntervals:
@@ -42,12 +42,12 @@ def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> Jo
     Then it is multiplied by its factor. The posterior's recalibration has spreads and factors.
     """
     model = posterior.recalibration or Recalibration()
-    joints, told = skeleton.joints(posterior.poses), skeleton.joints(pose)
+    joints, centre = skeleton.joints(posterior.poses), skeleton.joints(pose)
     mean = np.einsum("k,kjd->jd", posterior.weights, joints)
     off = joints - mean
     covariance = np.einsum("k,kjd,kje->jde", posterior.weights, off, off)
     covariance += (model.joint_spreads**2)[:, None, None] * np.eye(3)
-    radii = _quantiles(np.linalg.norm(joints - told, axis=2), posterior.weights, model.joint_spreads, 3)
+    radii = _quantiles(np.linalg.norm(joints - centre, axis=2), posterior.weights, model.joint_spreads, 3)
     return JointIntervals(mean, covariance, model.joint_factors * radii)
 
 

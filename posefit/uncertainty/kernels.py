@@ -85,7 +85,7 @@ def longest_step(rises, left, wanted, halvings):
 
 
 @jit
-def walked(proposals, noise, walk, periodic):
+def random_walk(proposals, noise, walk, periodic):
     """Return proposals (n, d) moved by standard normal noise (n, d) times a walk (d, d), wrapped where periodic."""
     n, d = proposals.shape
     tried = np.empty((n, d))
@@ -99,16 +99,16 @@ def walked(proposals, noise, walk, periodic):
 
 
 @jit
-def taken(proposals, costs, begun, tried, new_costs, new_begun, draws, exponent, temperature):
+def accept_moves(proposals, costs, starts, tried, new_costs, new_starts, draws, exponent, temperature):
     """Put what is accepted of moves tried (n, d) in the place of proposals (n, d); return the share that is.
 
-    `costs` and `begun` (n,), the log density of the start, go along; `draws` (n,) in [0, 1) decide.
+    `costs` and `starts` (n,), the log density of the start, go along; `draws` (n,) in [0, 1) decide.
     """
     count = 0
     for i in range(costs.size):
-        rise = exponent * (costs[i] - new_costs[i]) / temperature + (1.0 - exponent) * (new_begun[i] - begun[i])
+        rise = exponent * (costs[i] - new_costs[i]) / temperature + (1.0 - exponent) * (new_starts[i] - starts[i])
         if math.log(1.0 - draws[i]) < rise:
-            proposals[i], costs[i], begun[i] = tried[i], new_costs[i], new_begun[i]
+            proposals[i], costs[i], starts[i] = tried[i], new_costs[i], new_starts[i]
             count += 1
     return count / costs.size
 

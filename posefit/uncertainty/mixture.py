@@ -45,20 +45,20 @@ class NormalMixture:
     def draw(self, box: Box, rng: np.random.Generator, count: int) -> tuple[Array, float]:
         """Return feasible proposals (count, d), and which share of all that were drawn was feasible.
 
-        Where too few are found in 100 attempts, those are repeated. Raises ValueError where none is.
+        Where 100 attempts give too few, those are repeated. Raises ValueError where they give none.
         """
-        found, tried, kept, more = [], 0, 0, count
+        accepted, tried, total, more = [], 0, 0, count
         for _ in range(REDRAWS):
             drawn = self._drawn(box, rng, more)
-            found.append(drawn[box.feasible(drawn)])
-            tried, kept = tried + more, kept + len(found[-1])
-            if kept >= count:
+            accepted.append(drawn[box.feasible(drawn)])
+            tried, total = tried + more, total + len(accepted[-1])
+            if total >= count:
                 break
-            more = min(count, (count - kept) * tried // max(kept, 1) + SPARE)
-        if not kept:
+            more = min(count, (count - total) * tried // max(total, 1) + SPARE)
+        if not total:
             raise ValueError(f"the box must be feasible somewhere, got nothing in {REDRAWS} x {count} draws")
-        drawn = np.concatenate(found)
-        return (drawn if kept >= count else drawn[rng.integers(0, kept, count)])[:count], kept / tried
+        drawn = np.concatenate(accepted)
+        return (drawn if total >= count else drawn[rng.integers(0, total, count)])[:count], total / tried
 
     def log_density(self, box: Box, proposals: Array) -> Array:
         """Return the logarithm (n,) of the density of proposals (n, d), over that of the uniform distribution."""

@@ -47,7 +47,7 @@ class Posterior:
     translations: Array = field(repr=False)  # (K, 3) metres
     weights: Array = field(repr=False)  # (K,) which sum to 1
     coherent: bool = False
-    recalibration: Recalibration | None = field(default=None, repr=False)  # what these poses do not know of their error
+    recalibration: Recalibration | None = field(default=None, repr=False)  # learned corrections of these poses' errors
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.weights))
@@ -85,19 +85,19 @@ class Posterior:
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> list[Mode]:
-    """Return what a frame may show, the likeliest first: poses that are alike are one mode.
+    """Return what a frame may show, the likeliest first: similar poses are one mode.
 
-    Poses are alike where their joints are at most `apart` metres from each other, the mean over joints, both roots at
-    one point. The pose of a mode is that of its medoid, which somebody can really have; a mean might be nobody's.
+    Poses are similar where their joints are at most `apart` metres from each other, the mean over joints, both roots at
+    one point. The pose of a mode is that of its medoid, a pose that is possible; a mean might not be.
     Weights are shares of the poses' weight, raised to the sharpness of the posterior's recalibration; they sum to 1,
-    less how likely that has it that the truth is like none of them.
+    less its probability that the truth is like none of them.
     """
-    found = _clusters(_distances(skeleton.joints(posterior.poses)), posterior.weights, apart)
+    clusters = _clusters(_distances(skeleton.joints(posterior.poses)), posterior.weights, apart)
     if posterior.recalibration is not None:
-        powers = [weight**posterior.recalibration.sharpness for weight, _ in found]  # temperature scaling
+        powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]  # temperature scaling
         share = (1.0 - posterior.recalibration.none) / sum(powers)
-        found = [(share * power, row) for power, (_, row) in zip(powers, found, strict=True)]
-    return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in found]
+        clusters = [(share * power, row) for power, (_, row) in zip(powers, clusters, strict=True)]
+    return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in clusters]
 
 
 def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> Mode | None:
@@ -114,9 +114,9 @@ def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: fl
 
 
 def likeliest_is_right(skeleton: Skeleton, modes: Sequence[Mode], joints: Array, apart: float = APART) -> bool:
-    """Return whether true joints (27, 3) are those of the likeliest mode: nearest to it of all, and alike.
+    """Return whether true joints (27, 3) are those of the likeliest mode: nearest to it of all, and similar.
 
-    They are alike as poses are in `modes_of`: at most `apart` metres from each other, the mean over joints.
+    Similar as in `modes_of`: at most `apart` metres from each other, the mean over joints.
     """
     nearest, off = _nearest(skeleton, modes, joints)
     return nearest == max(range(len(modes)), key=lambda k: modes[k].weight) and off <= apart
@@ -132,7 +132,7 @@ def _nearest(skeleton: Skeleton, modes: Sequence[Mode], joints: Array) -> tuple[
 def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: float = APART) -> list[TrackMode]:
     """Return the tracks that a clip may show, the likeliest first, given what each of its frames may show.
 
-    Tracks are alike as poses are in `modes_of`, by the mean over frames. Raises ValueError where rows are no tracks.
+    Tracks are similar as poses are in `modes_of`, by the mean over frames. Raises ValueError where rows are no tracks.
     """
     if not posteriors or any(not one.coherent or len(one) != len(posteriors[0]) for one in posteriors):
         raise ValueError("posteriors must be coherent, of one length and at least one, to be tracks")
@@ -167,8 +167,9 @@ def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[floa
         centres.append(int(about.argmax()))
         left &= ~near[centres[-1]]
     owners = distances[:, centres].argmin(axis=1)
-    found = [(float(weights[owners == k].sum()), _medoid(distances, weights, owners == k)) for k in range(len(centres))]
-    return sorted(found, key=lambda one: -one[0])
+    members = [owners == k for k in range(len(centres))]
+    clusters = [(float(weights[rows].sum()), _medoid(distances, weights, rows)) for rows in members]
+    return sorted(clusters, key=lambda cluster: -cluster[0])
 
 
 def _medoid(distances: Array, weights: Array, members: NDArray[np.bool_]) -> int:

@@ -1,8 +1,8 @@
 """Several searches of one problem become modes with weights, whatever optimiser they are made by.
 
-Hill-valley clustering tells which valleys were found in what they evaluated, and a tempered sampler that starts there
-tells how much of exp(-cost / temperature) each valley holds: a deep one may be narrow, and weigh less than a shallow
-one that is wide.
+Hill-valley clustering sorts what they evaluated into valleys, and a tempered sampler that starts there estimates how
+much of exp(-cost / temperature) each valley holds: a deep one may be narrow, and weigh less than a shallow one that is
+wide.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ MOST = 16  # ours: valleys that the sampler starts in, the deepest
 REACH = 20.0  # ours: in temperatures above the least cost: what is not as deep weighs nothing worth a start
 BROAD = 0.3  # ours: the share of particles that start anywhere
 NARROWEST = 2.0**-7  # ours: how narrow a valley may be, in half-ranges of the box
-ENOUGH = 3  # ours: proposals a coordinate from which a valley's own width is found
+ENOUGH = 3  # ours: proposals a coordinate from which a valley's own width is estimated
 LOOKED_AT = 300  # ours: of those, about so many, evenly over the searches
 RIDGE = 1e-3  # of how fast costs rise, as a share of what is known of them
 WIDER = np.array([1.0, 3.0])  # ours: particles start as wide, and wider, as coordinates may change together
@@ -62,15 +62,15 @@ def weighed(
     *,
     evaluations: int = EVALUATIONS,
 ) -> Weighed:
-    """Return weighted proposals of the density exp(-cost / temperature), found from what several searches evaluated.
+    """Return weighted proposals of the density exp(-cost / temperature), from what several searches evaluated.
 
-    Hills lower than a `temperature` part no valleys: silhouettes are made of pixels, and have many that mean nothing.
+    Hills lower than a `temperature` part no valleys: pixels cause many meaningless ones.
     It takes about so many `evaluations` more. Raises ValueError where no search has met a finite cost.
     """
     before = landscape.evaluations
     proposals, costs = best_of_each(landscape, searched, _each(evaluations, len(searched)))
-    found = valleys(landscape, proposals, costs, tolerance=temperature, least=PROBES)
-    lowest = found.lowest[costs[found.lowest] <= costs.min() + REACH * temperature][:MOST]
+    clusters = valleys(landscape, proposals, costs, tolerance=temperature, least=PROBES)
+    lowest = clusters.lowest[costs[clusters.lowest] <= costs.min() + REACH * temperature][:MOST]
     modes = proposals[lowest]
     spreads = WIDER[:, None, None] * widths(landscape.box, searched, modes, costs[lowest], temperature)
     centres = np.broadcast_to(modes, spreads.shape)
@@ -118,7 +118,7 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
 
 
 def boltzmann_weights(costs: Array, temperature: float) -> Array:
-    """Return weights (n,) exp(-cost / temperature), which sum to 1; all weigh alike where no cost is finite."""
+    """Return weights (n,) exp(-cost / temperature), which sum to 1; all the same where no cost is finite."""
     rises = np.where(np.isfinite(costs), -costs / temperature, -np.inf)
     if rises.max() == -np.inf:
         return np.full(len(costs), 1.0 / len(costs))
@@ -141,10 +141,10 @@ def widths(box: Box, searched: Sequence[Searched], modes: Array, costs: Array, t
     away, rises = away[owners, np.arange(len(known))], known - costs[owners]
     if len(modes) == 1:
         return _width(away, rises, temperature)[None]
-    found = np.tile(_width(away, rises, temperature), (len(modes), 1))
+    per_mode = np.tile(_width(away, rises, temperature), (len(modes), 1))
     for k in np.flatnonzero(np.bincount(owners, minlength=len(modes)) >= ENOUGH * modes.shape[1]):
-        found[k] = _width(away[owners == k], rises[owners == k], temperature)
-    return found
+        per_mode[k] = _width(away[owners == k], rises[owners == k], temperature)
+    return per_mode
 
 
 def _width(squares: Array, rises: Array, temperature: float) -> Array:

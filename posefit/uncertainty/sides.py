@@ -29,8 +29,8 @@ def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
 
 def second_side(skeleton: Skeleton, posterior: Posterior, pose: Array) -> float:
     """Return how likely a pose (66,) has left and right exchanged: the weight of poses it is nearer to mirrored."""
-    told = np.repeat(skeleton.joints(pose)[None], len(posterior), axis=0)
-    return float(posterior.weights @ nearer_mirrored(skeleton.joints(posterior.poses), told))
+    reported = np.repeat(skeleton.joints(pose)[None], len(posterior), axis=0)
+    return float(posterior.weights @ nearer_mirrored(skeleton.joints(posterior.poses), reported))
 
 
 def unknown_sides(skeleton: Skeleton, posterior: Posterior, pose: Array) -> bool:

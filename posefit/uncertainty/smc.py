@@ -1,7 +1,7 @@
 """Weighted proposals that are distributed as exp(-cost / temperature) over a box: a tempered, waste-free sampler.
 
-H.-D. Dau, N. Chopin, Waste-free sequential Monte Carlo, Journal of the Royal Statistical Society B 84(1), 2022. Where
-we choose ourselves, the constant says so.
+H.-D. Dau, N. Chopin, Waste-free sequential Monte Carlo, Journal of the Royal Statistical Society B 84(1), 2022.
+Constants of our own are marked.
 """
 
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.uncertainty.kernels import covariance_within, effective, longest_step, taken, walked
+from posefit.uncertainty.kernels import accept_moves, covariance_within, effective, longest_step, random_walk
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.mixture import NormalMixture
 
@@ -51,7 +51,7 @@ def tempered(
     long as leaves a share `survival` of them, by effective sample size. Some survive, and each becomes a chain of
     `chain` random-walk moves, all of which are particles. With a budget of so many `evaluations`, steps are as long as
     it takes to arrive within it, and the last particles are weighed by what is left. Raises ValueError where a setting
-    makes no sense, or where nothing feasible is found.
+    makes no sense, or where nothing is feasible.
     """
     if not temperature > 0.0:
         raise ValueError(f"temperature must be above 0, got {temperature}")
@@ -61,12 +61,12 @@ def tempered(
         raise ValueError(f"survival must lie between 0 and 1, got {survival}")
     before, moved = landscape.evaluations, particles // chain * (chain - 1)
     proposals, share = start.draw(landscape.box, rng, particles)
-    costs, begun = landscape.costs(proposals), start.log_density(landscape.box, proposals)
+    costs, starts = landscape.costs(proposals), start.log_density(landscape.box, proposals)
     log_evidence, exponent, factor = float(np.log(share)), 0.0, 1.0
     exponents: list[float] = []
     accepted: list[float] = []
     while True:
-        rises = -costs / temperature - begun
+        rises = -costs / temperature - starts
         rounds = _rounds(evaluations, landscape.evaluations - before, moved)
         step = left = 1.0 - exponent
         if rounds and len(exponents) < STEPS - 1:
@@ -79,7 +79,7 @@ def tempered(
             return Sampled(proposals, weights, costs, log_evidence, np.array(exponents), np.array(accepted))
         rows = systematic_rows(weights, rng.random(), particles // chain)
         walk = factor * _walk(start, landscape, proposals, weights)
-        state = (proposals[rows], costs[rows], begun[rows])
+        state = (proposals[rows], costs[rows], starts[rows])
         states, moves = [state], 0.0
         for _ in range(chain - 1):
             state, share = _moved(landscape, start, state, walk, exponent, temperature, rng)
@@ -87,7 +87,7 @@ def tempered(
             moves += share / (chain - 1)
         accepted.append(moves)
         factor = float(np.clip(factor * np.exp(2.0 * (moves - WANTED)), 0.01, 1.0))
-        proposals, costs, begun = (np.concatenate(part) for part in zip(*states, strict=True))  # DAU2022 (waste-free)
+        proposals, costs, starts = (np.concatenate(part) for part in zip(*states, strict=True))  # DAU2022 (waste-free)
 
 
 def _rounds(evaluations: int | None, used: int, moved: int) -> float:
@@ -155,8 +155,8 @@ def _moved(
     rng: np.random.Generator,
 ) -> tuple[_State, float]:
     """Return a chain's next state, and the share of its moves that was accepted."""
-    tried = walked(state[0], rng.standard_normal(state[0].shape), walk, landscape.box.periodic)
+    tried = random_walk(state[0], rng.standard_normal(state[0].shape), walk, landscape.box.periodic)
     new = (tried, landscape.costs(tried), start.log_density(landscape.box, tried))
-    found = (state[0].copy(), state[1].copy(), state[2].copy())
-    share = taken(*found, *new, rng.random(len(tried)), exponent, temperature)
-    return found, float(share)
+    moved_state = (state[0].copy(), state[1].copy(), state[2].copy())
+    share = accept_moves(*moved_state, *new, rng.random(len(tried)), exponent, temperature)
+    return moved_state, float(share)

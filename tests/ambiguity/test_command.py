@@ -73,7 +73,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("source", "train", "said"),
     [
-        ("16_15", ["--train", "library:16", "--without-subject", "16"], "the library must hold somebody else"),
+        ("16_15", ["--train", "library:16", "--without-subject", "16"], "the library must keep at least one person"),
         ("nothing.npz", [], "nothing.npz: expected a file, got nothing of that name"),
         ("nothing.bvh", [], "nothing.bvh: expected a file, got nothing of that name"),
     ],

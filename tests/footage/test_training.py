@@ -62,7 +62,7 @@ def test_a_plan_may_train_on_people_of_the_library() -> None:
         (["--train", "library:99"], "a subject of the library must be one of 02, 05"),
         (
             ["--train", "library:16", "--without-subject", "16"],
-            "the library must hold somebody else, got everybody left out",
+            "the library must keep at least one person, got all left out",
         ),
     ],
 )

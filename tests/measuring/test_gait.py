@@ -75,8 +75,8 @@ def test_a_rate_of_thirty_says_what_one_of_120_says() -> None:
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("jacks", "no strikes of a foot found"),
-        ("squat", "no strikes of a foot found"),
+        ("jacks", "no strikes of a foot detected"),
+        ("squat", "no strikes of a foot detected"),
         ("step", "the person moves forwards at 0.00 m/s"),
     ],
 )
@@ -102,7 +102,7 @@ def test_who_walks_backwards_is_not_measured_as_if_he_walked_forwards() -> None:
 
 
 def test_a_single_frame_has_no_gait() -> None:
-    assert gait_of(walker().frames(0, 1)).why == "no strikes of a foot found"
+    assert gait_of(walker().frames(0, 1)).why == "no strikes of a foot detected"
 
 
 def test_too_few_frames_a_second_are_told() -> None:

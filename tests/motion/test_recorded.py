@@ -89,7 +89,7 @@ def test_people_are_chosen_by_name() -> None:
     [
         ("library:3", "a subject of the library must be one of 02, .*, got '3'"),
         ("library:-x", "a subject of the library must be one of 02, .*, got 'x'"),
-        ("library:16,-16", "the library must hold somebody else, got everybody left out"),
+        ("library:16,-16", "the library must keep at least one person, got all left out"),
         *[
             (name, f"a library must be library, library:02,16 or library:-16, got '{name}'")
             for name in ("library:", "library:,", "library:02,,16", "library:16,", "library:-", "library:02,-,16")
