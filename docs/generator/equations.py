@@ -32,7 +32,7 @@ SOURCES = {
     "ALEXANDER1989": "Alexander, Optimization and gaits in the locomotion of vertebrates, 1989",
     "CEC2013": "Li, Engelbrecht and Epitropakis, Benchmark functions for CEC'2013 on niching methods, 2013",
 }
-_TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Reading S\d+)?$")
+_TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Interpretation S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")
 _TEST = re.compile(r"^def (?P<name>test_\w+)\([^#\n]*\n?[^#\n]*?(?:  # (?P<tag>.*))?$", re.MULTILINE)
 

@@ -1,9 +1,9 @@
 """The interacting multiple-model filter: several motion models at once, each as probable as its predictions are good.
 
 A state is an array, and an error of a state is a vector that `Manifold` adds to it and takes out of it: for a vector
-these are + and -, for unit quaternions a rotation (Reading V4); a filter of this kind is called an error-state Kalman
-filter. Everything is computed with logarithms of likelihoods, so that a residual of any size leaves probabilities that
-sum to 1 (Reading V13).
+these are + and -, for unit quaternions a rotation (Interpretation V4); a filter of this kind is called an error-state
+Kalman filter. Everything is computed with logarithms of likelihoods, so that a residual of any size leaves
+probabilities that sum to 1 (Interpretation V13).
 """
 
 from collections.abc import Callable, Sequence

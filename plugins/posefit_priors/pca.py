@@ -16,7 +16,7 @@ from posefit_priors.kernels import distance, near, recover
 COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
 DECIMALS = 7  # of what is learned, in radians and shares
-QUANTILE = 0.99  # Reading S5: chi is this quantile of the training distances
+QUANTILE = 0.99  # Interpretation S5: chi is this quantile of the training distances
 _SHAPES = {
     "mean": (63,),
     "components": ("m", 63),
@@ -34,7 +34,7 @@ class PCA:
     Settings:
         components (m): a whole number of them, or a share of the variance below 1 to keep at least. Section 2.1.
         clusters (K): centres that K-means finds among the training poses, 1 or more. Section 2.2.
-        quantile: chi is this quantile of the training distances, above 0 and at most 1. Reading S5.
+        quantile: chi is this quantile of the training distances, above 0 and at most 1. Interpretation S5.
         seed: of the clustering, 0 or more.
     """
 
@@ -163,4 +163,4 @@ def _orthonormal(directions: Array) -> Array:
 
 def reach_of(centres: Array, latents: Array, quantile: float) -> Array:
     """Return chi (): this quantile of the distances D of training latents (n, m) from their nearest centres (K, m)."""
-    return np.array(np.quantile([distance(centres, latent) for latent in latents], quantile))  # Reading S5
+    return np.array(np.quantile([distance(centres, latent) for latent in latents], quantile))  # Interpretation S5

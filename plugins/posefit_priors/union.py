@@ -25,7 +25,7 @@ CLUSTERS = 12
 # How much of the whole's covariance each cluster's gets added, so that a tube has a width. Measured on walk and run: at
 # 0.2 swarms get stuck in the tubes, at 1 half of what lies between the two motions is let in again.
 BREADTH = 0.6
-QUANTILE = 0.99  # as Reading S5
+QUANTILE = 0.99  # as Interpretation S5
 _SHAPES = {
     "mean": (63,),
     "components": ("m", 63),
@@ -46,7 +46,7 @@ class Union:
         components (m): a whole number of them, or a share of the variance below 1 to keep at least. As `pca`.
         clusters (K): that K-means finds among the training poses, 1 or more. Ours.
         breadth: share of the whole covariance that is added to each cluster's own, above 0. Ours.
-        quantile: of the training distances that is still near, above 0 and at most 1. As Reading S5.
+        quantile: of the training distances that is still near, above 0 and at most 1. As Interpretation S5.
         seed: of the clustering, 0 or more.
     """
 

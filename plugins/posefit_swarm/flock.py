@@ -21,8 +21,8 @@ Pull = tuple[float, float, Array]  # omega, the acceleration c1 = c2, and the sw
 class Flock:
     """What swarms share. `moved` (n, d) are the particles after their move, which is not accepted yet.
 
-    `rand` is fresh for every "dimension" or one "scalar" a particle (Reading S8). What breaks a constraint has it drawn
-    again, at most `redraws` times, before the particle is stopped (Reading S7).
+    `rand` is fresh for every "dimension" or one "scalar" a particle (Interpretation S8). What breaks a constraint has
+    it drawn again, at most `redraws` times, before the particle is stopped (Interpretation S7).
 
     Constraint 1: only the coordinate that left the box is drawn again, which has the distribution of drawing the whole
     particle again. Given positions, velocities and bests, a particle's next coordinates X_1 ... X_d are independent,
@@ -69,7 +69,7 @@ class Flock:
         return accepted, settle(self.moved, costs, chances, temperature, kept, self._swarm(), accepted)
 
     def fly(self, omega: float, acceleration: float, swarm_best: Array) -> None:
-        """Move every particle by SAPSO (1) and (2), so that it meets the constraints. Reading S7."""
+        """Move every particle by SAPSO (1) and (2), so that it meets the constraints. Interpretation S7."""
         self._finish(0, self._draws(len(self.moved)), (omega, acceleration, swarm_best))
 
     def settle_and_fly(
@@ -117,7 +117,7 @@ class Flock:
     def _draws(self, particles: int, before: int = 0) -> Array:
         """Return draws of rand() for a move of so many particles, and so many for something else before them."""
         dimensions = self.moved.shape[1]
-        each = 1 if self._scalar else dimensions  # Reading S8
+        each = 1 if self._scalar else dimensions  # Interpretation S8
         drawn: Array = self._rng.random(before + 2 * particles * each)
         return np.concatenate([drawn[:before], np.repeat(drawn[before:], dimensions)]) if self._scalar else drawn
 
@@ -161,7 +161,7 @@ class Flock:
         shape, start = self.moved.shape, self._space.start
         if start is None:
             return self._rng.uniform(*self._limits, shape)
-        # Reading S12: the bounds may be reversed
+        # Interpretation S12: the bounds may be reversed
         low, high = np.minimum(0.0, start.velocity), np.maximum(0.0, start.velocity)
         drawn = self._rng.uniform(low, high, shape)  # SAPSO (7)
         return np.clip(drawn, *self._limits)
@@ -175,7 +175,7 @@ class Flock:
 
 
 def speed_limits(space: Space, alpha: float, kind: Literal["symmetric", "literal"]) -> tuple[Array, Array]:
-    """Return the lowest and highest velocity (d,) of the unit box. SAPSO 2.2 constraint 1, Reading S9."""
+    """Return the lowest and highest velocity (d,) of the unit box. SAPSO 2.2 constraint 1, Interpretation S9."""
     # SAPSO 2.2 velocity
     if kind == "symmetric":
         return np.full(space.dimensions, -alpha), np.full(space.dimensions, alpha)

@@ -14,7 +14,7 @@ POPULATION_SIZE = 40  # N, section 5.2
 ITERATIONS = 60  # C, section 5.2
 TEMPERATURE = 1.0  # T, section 5.2
 COOLING = 0.95  # gamma, section 5.2
-STOP_TEMPERATURE = 0.0  # T0; Reading S5
+STOP_TEMPERATURE = 0.0  # T0; Interpretation S5
 
 
 class SAPSO:
@@ -22,18 +22,18 @@ class SAPSO:
 
     Settings:
         population_size (N): size of the swarm, 1 or more. Section 5.2.
-        iterations (C): moves of the swarm, 1 or more; it is evaluated once more than that (Reading S10). Section 5.2.
+        iterations (C): moves of the swarm, 1 or more; it is evaluated once more (Interpretation S10). Section 5.2.
         temperature (T): of the annealing at first, above 0, in units of the cost. Section 5.2.
         cooling (gamma): factor on the temperature after each iteration, 0 to 1. Section 5.2.
-        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Reading S5.
-        inertia (A): factor on the old velocity at first, above 0.1; it falls to 0.1. Section 3.1, Reading S5.
+        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Interpretation S5.
+        inertia (A): factor on the old velocity at first, above 0.1; it falls to 0.1. Section 3.1, Interpretation S5.
         acceleration (c1, c2): of the pulls towards the personal and the swarm's best, 0 or more. Section 3.1.
         alpha (alpha): velocities stay within it times the half-range of a coordinate, above 0. Section 2.2.
-        redraws: of rand() before a particle that breaks a constraint is stopped, 0 or more. Reading S7.
-        cool: once an "iteration", or once an "acceptance", with one shared temperature. Reading S6.
-        rand: fresh for every "dimension", or one "scalar" a particle. Reading S8.
-        velocity_limits: "symmetric" about 0, or "literal", alpha times the range's own ends. Reading S9.
-        rejected_velocity: of a particle whose move was refused, "kept" or "zeroed". Reading S11.
+        redraws: of rand() before a particle that breaks a constraint is stopped, 0 or more. Interpretation S7.
+        cool: once an "iteration", or once an "acceptance", with one shared temperature. Interpretation S6.
+        rand: fresh for every "dimension", or one "scalar" a particle. Interpretation S8.
+        velocity_limits: "symmetric" about 0, or "literal", alpha times the range's own ends. Interpretation S9.
+        rejected_velocity: of a particle whose move was refused, "kept" or "zeroed". Interpretation S11.
     """
 
     def __init__(
@@ -64,14 +64,15 @@ class SAPSO:
         one_of("rejected_velocity", rejected_velocity, ("kept", "zeroed"))
         self._iterations, self._inertia, self._acceleration = iterations, inertia, acceleration
         self._temperature, self._cooling, self._stop = temperature, cooling, stop_temperature
-        self._cool_each, self._kept = cool == "acceptance", 1.0 if rejected_velocity == "kept" else 0.0  # Reading S11
+        self._cool_each = cool == "acceptance"
+        self._kept = 1.0 if rejected_velocity == "kept" else 0.0  # Interpretation S11
         self._iteration, self._dimensions = 0, space.dimensions
         limits = speed_limits(space, alpha, velocity_limits)
         self._flock = Flock(space, rng, population_size, limits, redraws, rand)  # SAPSO A1.1
 
     def ask(self) -> Array:
         """Return the particles (n, d) after their move; none once the iterations or the temperature are used up."""
-        # Reading S10: the last generation is evaluated too
+        # Interpretation S10: the last generation is evaluated too
         if self._iteration > self._iterations or self._temperature <= self._stop:  # SAPSO A1.2
             return np.empty((0, self._dimensions))
         return self._flock.moved.copy()
@@ -85,7 +86,7 @@ class SAPSO:
         else:
             accepted, _ = flock.settle(proposals, costs, *how)
         if self._iteration > 0:
-            # SAPSO A1.2e, Reading S6
+            # SAPSO A1.2e, Interpretation S6
             self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
         self._iteration += 1
 

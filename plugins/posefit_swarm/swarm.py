@@ -2,7 +2,7 @@
 
 import math
 
-INERTIA = 0.9  # A; Reading S5: the paper gives none, and it must be above 0.1
+INERTIA = 0.9  # A; Interpretation S5: the paper gives none, and it must be above 0.1
 ACCELERATION = 2.0  # c1 = c2, section 3.1
 ALPHA = 0.15  # section 2.2
 

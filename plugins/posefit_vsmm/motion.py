@@ -20,9 +20,9 @@ from posefit_imm.quaternions import product
 from posefit_vsmm import kernels
 from posefit_vsmm.state import ERROR, STATE, Reliance, free_errors
 
-FPS = 30.0  # the rate that the models were fitted at (Reading V6)
+FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
-Shrink = Literal["identity", "zero"]  # what ridge regression draws F towards (Reading V5)
+Shrink = Literal["identity", "zero"]  # what ridge regression draws F towards (Interpretation V5)
 
 
 @dataclass(frozen=True, eq=False)

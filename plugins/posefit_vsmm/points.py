@@ -1,4 +1,4 @@
-"""The 17 points of a body that a silhouette may show, and where they are on a skeleton. VSMM 6.1, Reading V2."""
+"""The 17 points of a body that a silhouette may show, and where they are on a skeleton. VSMM 6.1, Interpretation V2."""
 
 import numpy as np
 

@@ -115,7 +115,7 @@ class Sight:
         )
 
     def measure(self, state: Array, seen: Sequence[Sighting | None], known: Array | None) -> Measurement:
-        """Return what was detected, less what a state (43,) would show; hidden joints have no row (Reading V9)."""
+        """Return the residuals of detected joints for a state (43,). Hidden joints have no row. Interpretation V9."""
         residuals, jacobians, noise = [np.zeros(0)], [np.zeros((0, ERROR))], [np.zeros(0)]
         for camera, one in zip(self.cameras, seen, strict=True):
             if one is None:

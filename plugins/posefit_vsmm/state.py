@@ -1,9 +1,9 @@
 """The state that the motion models move: where the root is, and ten unit quaternions. VSMM step 3.
 
 A state is (43,): the root's translation in metres, then w, x, y, z of the whole body and of nine bones, each turned
-against its parent. Its error is (33,): metres, then a rotation vector a quaternion, applied on its right (Reading V4);
-`posefit_imm.PLACED` moves the one by the other. A joint that the state does not hold, such as the back's, follows those
-that it holds: see `Reliance`.
+against its parent. Its error is (33,): metres, then a rotation vector a quaternion, applied on its right
+(Interpretation V4); `posefit_imm.PLACED` moves the one by the other. A joint that the state does not
+hold, such as the back's, follows those that it holds: see `Reliance`.
 """
 
 from dataclasses import dataclass, field

@@ -32,7 +32,7 @@ Test = Literal["sequential", "patent"]
 
 @dataclass(frozen=True, kw_only=True)
 class Rules:
-    """Step 7. Reading V10: `smoothing` frames a mean, changes below `floor_degrees` a frame, and `dwell` frames.
+    """Step 7. Interpretation V10: `smoothing` frames a mean, changes below `floor_degrees` a frame, and `dwell` frames.
 
     The patent's own form has smoothing 1, floor 0 and dwell 0.
     """
@@ -77,7 +77,7 @@ def limb_angles(points: Array) -> Array:
 
 
 def enlarged(belief: Belief, old: Sequence[str], union: Sequence[str], fused: Array, spread: Array) -> Belief:
-    """Return a belief over more models: the new ones hold nothing, and the transitions give them all. Reading V11."""
+    """Return a belief over more models; new ones start with probability 0. Interpretation V11."""
     places = [old.index(name) if name in old else None for name in union]
     states = np.array([fused if k is None else belief.states[k] for k in places])
     covariances = np.array([spread if k is None else belief.covariances[k] for k in places])
@@ -129,8 +129,8 @@ class SequentialTest:
     """How step 9 decides between an old group of models and a new one.
 
     `sequential` is Wald's sequential probability ratio test on the likelihoods since the new group came, with error
-    rates `false_alarm`, his alpha, and `miss`, his beta; `patent` looks at the latest frame alone (Reading V12). After
-    `longest` frames the more probable group stays.
+    rates `false_alarm`, his alpha, and `miss`, his beta; `patent` looks at the latest frame alone (Interpretation V12).
+    After `longest` frames the more probable group stays.
     """
 
     test: Test = "sequential"

@@ -49,16 +49,16 @@ def vsmm(
 
     Settings:
         structure: "variable", one group at a time and two while it changes; "all" models always, a plain IMM.
-        groups: path of a TOML file of groups and neighbours; "" is the package's own. Step 4, Reading V1.
-        shrink: what ridge regression drew the models' F towards, "identity" or "zero". Reading V5.
-        smoothing: frames over which changes of angles are averaged, 1 or more. Reading V10; 1 in the patent.
-        floor_degrees: a change below it is none, degrees a frame, 0 or more. Reading V10; 0 in the patent.
-        dwell: frames that a group stays at least, 0 or more. Reading V10; 0 in the patent.
-        new: how a new group's models start: "rerun" of the cycle over all, or as the "patent" has it. Reading V11.
-        test: which group has to go: Wald's "sequential" probability ratio test, or the "patent"'s. Reading V12.
-        false_alarm (alpha): share of wrong groups that the sequential test keeps, between 0 and 0.5. Reading V12.
-        miss (beta): share of right groups that the sequential test drops, between 0 and 0.5. Reading V12.
-        longest: frames after which the more probable group stays, 1 or more. Reading V12.
+        groups: path of a TOML file of groups and neighbours; "" is the package's own. Step 4, Interpretation V1.
+        shrink: what ridge regression drew the models' F towards, "identity" or "zero". Interpretation V5.
+        smoothing: frames over which changes of angles are averaged, 1 or more. Interpretation V10; 1 in the patent.
+        floor_degrees: a change below it is none, degrees a frame, 0 or more. Interpretation V10; 0 in the patent.
+        dwell: frames that a group stays at least, 0 or more. Interpretation V10; 0 in the patent.
+        new: how the models of a new group start: "rerun" of the cycle, or the "patent"'s rule. Interpretation V11.
+        test: which group has to go: Wald's "sequential" probability ratio test, or the "patent"'s. Interpretation V12.
+        false_alarm (alpha): share of wrong groups that are kept, between 0 and 0.5. Interpretation V12.
+        miss (beta): share of right groups that the sequential test drops, between 0 and 0.5. Interpretation V12.
+        longest: frames after which the more probable group stays, 1 or more. Interpretation V12.
     """
     carried = library(shrink)
     topology = read_topology(Path(groups) if groups else None, carried.names)

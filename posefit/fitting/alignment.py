@@ -1,4 +1,4 @@
-"""Where must a posed body stand to fill the silhouette's bounding box? Reading S4, `aligned`."""
+"""Where must a posed body stand to fill the silhouette's bounding box? Interpretation S4, `aligned`."""
 
 from collections.abc import Sequence
 

@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.uncertainty.landscape import displacement as displacement
 from posefit.uncertainty.landscape import wrap as wrap
 
-REDRAWS = 100  # Reading S7
+REDRAWS = 100  # Interpretation S7
 MANY = 8  # ours: after the first, so many redraws are made at once
 STEPS = 32  # ours: how finely `repair` looks along its line
 
@@ -70,10 +70,10 @@ def converted(space: Space, proposals: Array, origin: Space) -> Array:
 def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array:
     """Return a first population (count, d) of feasible proposals, from the start or uniform. SAPSO (6).
 
-    What breaks a constraint is redrawn at most 100 times (Reading S7). Out of the box that is a coordinate by itself:
-    the coordinates of (6) are independent and the box is a product, so that this has the distribution of redrawing the
-    whole proposal. One still out of the box is then folded back into it. What the prior finds infeasible is redrawn as
-    a whole, and then becomes the start's mean, or the copy of one that is feasible. Where nothing around the start is
+    What breaks a constraint is redrawn at most 100 times (Interpretation S7). Out of the box that is a coordinate by
+    itself: the coordinates of (6) are independent and the box is a product, so that this has the distribution of
+    redrawing the whole proposal. One still out of the box is then folded back into it. What the prior finds infeasible is
+    redrawn as a whole, and then becomes the start's mean, or the copy of one that is feasible. Where nothing around the start is
     feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is.
     """
     drawn = _drawn(space, space.start, rng, count)

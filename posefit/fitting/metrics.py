@@ -12,7 +12,7 @@ LOST_MM = 150.0  # MPJPE above which a frame counts as lost
 
 
 def pose_error_degrees(truth: Array, estimate: Array, dimensions: NDArray[np.bool_] | None = None) -> Array:
-    """Return the mean absolute difference of the angles (T,) in degrees, wrapped. SAPSO (8), Reading S13.
+    """Return the mean absolute difference of the angles (T,) in degrees, wrapped. SAPSO (8), Interpretation S13.
 
     All 66 angles count, padding too, unless `dimensions` (66,) chooses some.
     """
@@ -82,7 +82,7 @@ def iou(areas: NDArray[np.int64]) -> Array:
 
 
 def swapped(truth: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return whether each frame (T,) comes nearer to the truth when the estimate is mirrored. Reading S15.
+    """Return whether each frame (T,) comes nearer to the truth when the estimate is mirrored. Interpretation S15.
 
     The mirror is the plane through the root that the hips face each other across; left and right trade names. In a
     side view a pose and its mirror image have nearly one silhouette. Only joints that have a counterpart count.
@@ -92,7 +92,7 @@ def swapped(truth: Array, joints: Array) -> NDArray[np.bool_]:
 
 
 def swap_rate(truth: Array, joints: Array) -> float:
-    """Return the share of frames with left and right swapped. Reading S15."""
+    """Return the share of frames with left and right swapped. Interpretation S15."""
     return float(swapped(truth, joints).mean())
 
 

@@ -14,7 +14,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted
 
-Translation = Literal["known", "searched", "aligned"]  # Reading S4
+Translation = Literal["known", "searched", "aligned"]  # Interpretation S4
 TRANSLATIONS: tuple[Translation, ...] = ("known", "searched", "aligned")
 
 ROOT_RANGE_DEGREES = (45.0, 15.0, 15.0)  # ours: how far yaw, pitch and roll are searched to either side

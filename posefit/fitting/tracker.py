@@ -22,11 +22,11 @@ from posefit.silhouette.cost import BETA, Areas
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.modes import Mode, Posterior
 
-SPREAD = 1.0  # k of Reading S5: Sigma's standard deviations, as multiples of the predicted step
+SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiples of the predicted step
 KEPT = 3  # frames: how far back a prediction looks
 TILT_SHARE = 0.99  # ours: of the training poses, whose tilt can be found
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
-FLOOR = 0.05  # Reading S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
+FLOOR = 0.05  # Interpretation S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Task:
     evaluations: int  # the budget of a frame
     yaw: float | None  # radians: about where the person faces in the first frame; None for anywhere
     anchor: Array  # (3,) metres: about where the person's root is in the first frame, unless observations tell
-    translation: Translation = "known"  # Reading S4
+    translation: Translation = "known"  # Interpretation S4
     fps: float = 30.0
     training: Sequence[Motion] = field(default=(), repr=False)  # what may be learned from
     first_pose: Array | None = None  # (63,) joint angles in the first frame, where somebody knows them
@@ -107,11 +107,11 @@ class Prediction:
     """Where the next frame's pose is sought, where the search starts, and what a pose costs. SAPSO (4), (6), (7).
 
     Settings:
-        spread (k): standard deviations of the start, as multiples of the predicted step, 0 or more. Reading S5.
-        floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Reading S5.
-        prediction (v_pred): the "latest" step, or the "literal" one before it. Reading S12.
+        spread (k): standard deviations of the start, as multiples of the predicted step, 0 or more. Interpretation S5.
+        floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Interpretation S5.
+        prediction (v_pred): the "latest" step, or the "literal" one before it. Interpretation S12.
         root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
-        tilt: pitch and roll are "learned" with the latents, or a "box" around upright. Reading S16.
+        tilt: pitch and roll are "learned" with the latents, or a "box" around upright. Interpretation S16.
         tilt_share: of the training poses, above 0 and at most 1, whose tilt can be found. Ours.
         tilt_margin_degrees: what can be found beyond them, to either side, 0 or more. Ours.
         translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
@@ -197,14 +197,14 @@ class Follower:
         if self._task.yaw is None or self._tilt is not None:  # only the first frame looks all around
             space = self._narrowed(space)
         space = space.around(found[-1], anchor=anchor)
-        # Reading S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
+        # Interpretation S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
         back = 1 if self._how.prediction == "latest" else 2
         step = np.zeros(space.dimensions)
         if len(found) > back:
             half = np.where(space.half > 0.0, space.half, 1.0)  # as in proposals: 0 where nothing is searched
             step = displacement(space, found[-back - 1] / half, found[-back] / half)
         mean = space.proposals(found[-1])
-        spread = np.maximum(self._how.spread * np.abs(step), self._how.floor)  # Reading S5
+        spread = np.maximum(self._how.spread * np.abs(step), self._how.floor)  # Interpretation S5
         self._space = space.around(found[-1], Start(mean, spread, step), anchor)
         return self._space
 

@@ -5,7 +5,7 @@
 | 27 joints, 26 bones, 66 angles, and where the joints of a pose are | skeleton.py |
 | which bones, and which angles of a pose, belong to a limb | limbs.py |
 | cones around the bones, and builds | body.py |
-| root and joint angles as rotations. Reading S3 | rotation.py |
+| root and joint angles as rotations. Interpretation S3 | rotation.py |
 | poses with nearly the same silhouette: mirrored, turned, reflected, limbs exchanged | alike.py |
 | a pinhole camera | camera.py |
 | calibration files: OpenCV, Qualisys, Pose2Sim and ours; lens distortion | calibration.py |

@@ -7,7 +7,7 @@ import numpy as np
 
 from posefit.arrays import Array
 
-# Reading S3: yaw about the vertical is outermost, then pitch, then roll. With the paper's x, y, z order
+# Interpretation S3: yaw about the vertical is outermost, then pitch, then roll. With the paper's x, y, z order
 # the middle angle is the yaw, and a side view sits on the singularity.
 ROOT_ORDER = (1, 0, 2)
 # Acclaim files: rx first, so that the matrix is Rz @ Ry @ Rx.
@@ -16,13 +16,13 @@ LOCKED = 1e-7  # radians from the singularity, where the outer and the inner axi
 
 
 def rotation_from_root_angles(angles: Array) -> Array:
-    """Return the rotations (..., 3, 3) of root angles (..., 3): yaw, pitch, roll. Reading S3."""
+    """Return the rotations (..., 3, 3) of root angles (..., 3): yaw, pitch, roll. Interpretation S3."""
     yaw, pitch, roll = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
     return _about(1, yaw) @ _about(0, pitch) @ _about(2, roll)
 
 
 def root_angles_from_rotation(rotations: Array) -> Array:
-    """Return yaw, pitch, roll (..., 3) of rotations (..., 3, 3). Reading S3."""
+    """Return yaw, pitch, roll (..., 3) of rotations (..., 3, 3). Interpretation S3."""
     return angles_about(ROOT_ORDER, rotations)
 
 
@@ -38,7 +38,7 @@ def joint_angles_from_rotation(rotations: Array) -> Array:
 
 
 def wrapped(angles: Array) -> Array:
-    """Return angles brought to [-pi, pi). Reading S13."""
+    """Return angles brought to [-pi, pi). Interpretation S13."""
     angles = np.asarray(angles, dtype=np.float64)
     return np.asarray(angles - 2.0 * np.pi * np.floor(angles / (2.0 * np.pi) + 0.5))  # faster than a remainder
 

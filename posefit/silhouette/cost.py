@@ -131,7 +131,7 @@ def costs_in(
 
 
 def mismatch(areas: Areas, beta: float = BETA) -> Array:
-    """Return the cost (n,) of areas R, B, Y (n, 3), 0 to 100. SAPSO (4), Reading S2."""
+    """Return the cost (n,) of areas R, B, Y (n, 3), 0 to 100. SAPSO (4), Interpretation S2."""
     costs = np.zeros(len(areas))
     kernels.add_mismatch(areas, SCALE, beta, costs)
     return costs

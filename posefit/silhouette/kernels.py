@@ -89,7 +89,7 @@ def add_mismatch(areas, scale, beta, costs):
     """Add the mismatch of areas (n, 3) to costs (n,). SAPSO (4)."""
     for i in range(areas.shape[0]):
         r, b, y = float(areas[i, 0]), float(areas[i, 1]), float(areas[i, 2])
-        # Reading S2: an empty denominator makes its term 1.
+        # Interpretation S2: an empty denominator makes its term 1.
         spilled = b / (b + y) if b + y > 0.0 else 1.0
         missed = r / (r + y) if r + y > 0.0 else 1.0
         costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)

@@ -11,7 +11,7 @@ from posefit.arrays import Array, writeable
 from posefit.uncertainty.kernels import log_parts, log_sums
 from posefit.uncertainty.landscape import Box, wrap
 
-REDRAWS = 100  # Reading S7
+REDRAWS = 100  # Interpretation S7
 SPARE = 8  # ours: proposals that are drawn beyond those that are expected to be enough
 WIDEST = 0.5  # ours: a wrapped normal of this deviation is its three nearest images to nine digits
 

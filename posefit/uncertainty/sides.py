@@ -13,7 +13,7 @@ _PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
 
 
 def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return whether joints (T, 27, 3) come nearer to targets (T, 27, 3) when they are mirrored. Reading S15.
+    """Return whether joints (T, 27, 3) come nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15.
 
     The mirror is the plane through the root that the hips face each other across; left and right trade names. Roots
     are moved to one point, and only joints that have a counterpart count.

@@ -204,7 +204,7 @@ def test_a_run_is_a_track_of_the_same_seed(walk: PaperMotion) -> None:
         optimiser="pso",
         prior="pca",
         iterations=4,
-        tracker_settings={"tilt": "box"},  # Reading S16
+        tracker_settings={"tilt": "box"},  # Interpretation S16
         seed=3,
     )
     np.testing.assert_array_equal(found.poses, again.motion.poses)
@@ -220,7 +220,7 @@ def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
         particles=30,
         iterations=6,
         optimiser="sapso",
-        tracker_settings={"tilt": "box"},  # Reading S16
+        tracker_settings={"tilt": "box"},  # Interpretation S16
         seed=1,
     )
     np.testing.assert_array_equal(seen.history, again.found[0].history)

@@ -54,7 +54,7 @@ def test_a_search_is_told_the_costs_of_the_areas_and_a_view_that_knows_nothing_h
     shares = np.array([100.0 * (0.7 * b / (b + y) + 0.3 * r / (r + y)) for r, b, y in np.concatenate(counts[1:])])
     np.testing.assert_allclose(several.evaluate(proposals), shares.reshape(2, -1).mean(axis=0))
     nothing = replace(several, silhouettes=[blind] * 3, blank=True)
-    np.testing.assert_array_equal(nothing.evaluate(proposals), 100.0)  # Reading S2
+    np.testing.assert_array_equal(nothing.evaluate(proposals), 100.0)  # Interpretation S2
 
 
 def test_proposals_and_coordinates_are_inverse(problem: PoseProblem) -> None:

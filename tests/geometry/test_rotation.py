@@ -1,4 +1,4 @@
-"""Rotations by law and by hand, and why the root's yaw comes first. Reading S3."""
+"""Rotations by law and by hand, and why the root's yaw comes first. Interpretation S3."""
 
 from collections.abc import Callable
 
@@ -53,7 +53,7 @@ def least_singular_value(matrix: Array) -> float:
 
 @pytest.mark.parametrize("yaw", [QUARTER, -QUARTER])
 @pytest.mark.parametrize(("pitch", "roll"), [(0.0, 0.0), (0.2, -0.1), (-0.35, 0.35)])
-def test_a_side_view_is_not_degenerate(yaw: float, pitch: float, roll: float) -> None:  # Reading S3
+def test_a_side_view_is_not_degenerate(yaw: float, pitch: float, roll: float) -> None:  # Interpretation S3
     angles = np.array([yaw, pitch, roll])
     # The axes that pitch and roll turn about stand at right angles; yaw's leans towards roll's by the pitch.
     by_hand = np.sqrt(2.0 * (1.0 - abs(np.sin(pitch))))

@@ -38,7 +38,7 @@ def test_the_mismatch_by_hand() -> None:
     # beta weighs what is missed: 100 (0.75 * 10 / 20 + 0.25 * 30 / 40)
     np.testing.assert_allclose(mismatch(np.array([[30, 10, 10]]), 0.25), 56.25)
     assert mismatch(np.array([[0, 0, 30], [5, 7, 0]])).tolist() == [0.0, 100.0]
-    # Reading S2: no body seen, no silhouette seen, neither; each empty denominator makes its term 1
+    # Interpretation S2: no body seen, no silhouette seen, neither; each empty denominator makes its term 1
     assert mismatch(np.array([[9, 0, 0], [0, 9, 0], [0, 0, 0]])).tolist() == [100.0, 100.0, 100.0]
     assert mismatch(np.zeros((0, 3), dtype=np.int64)).shape == (0,)
 

@@ -1,4 +1,4 @@
-"""SAPSO, algorithm 1, step 2c, as Reading S7 has it: what leaves the box is drawn again, a coordinate at a time."""
+"""SAPSO, algorithm 1, step 2c, as Interpretation S7 has it: what leaves the box is drawn again, a coordinate at a time."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def particle(*coordinates: tuple[float, float, float, float]) -> list[list[float
     return [list(one) for one in zip(*coordinates, strict=True)]
 
 
-def test_a_coordinate_redrawn_by_itself_is_uniform_on_what_the_box_leaves_of_it() -> None:  # Reading S7
+def test_a_coordinate_redrawn_by_itself_is_uniform_on_what_the_box_leaves_of_it() -> None:  # Interpretation S7
     moved, stuck = redrawn(*particle(SELDOM, ALWAYS), 4000)
     # all of 101 draws fail with a probability of 0.9^101 = 2.4e-5: 0.1 of 4,000 particles
     assert stuck.sum() <= 2
@@ -53,7 +53,7 @@ def test_a_coordinate_redrawn_by_itself_is_uniform_on_what_the_box_leaves_of_it(
     assert kstest(moved[:, 1], "uniform", (0.9, 0.08)).pvalue > 0.01
 
 
-def test_redrawing_coordinates_has_the_distribution_of_redrawing_particles() -> None:  # Reading S7
+def test_redrawing_coordinates_has_the_distribution_of_redrawing_particles() -> None:  # Interpretation S7
     # in the box: r1 + r2 <= 0.6, 18 in 100; r1 <= 0.5 r2 + 0.05, 30 in 100; always
     three = particle((0.85, 0.1, 0.9, 0.9), (-0.9, -0.1, -1.0, -0.85), (0.3, 0.1, 0.5, 0.4))
     apart, stuck = redrawn(*three, 3000)
@@ -73,7 +73,9 @@ def test_redrawing_coordinates_has_the_distribution_of_redrawing_particles() -> 
 
 
 @pytest.mark.parametrize(("redraws", "failing"), [(0, 0.9), (1, 0.81), (4, 0.59049), (20, 0.109419)])
-def test_a_coordinate_is_redrawn_as_often_as_asked_and_no_oftener(redraws: int, failing: float) -> None:  # Reading S7
+def test_a_coordinate_is_redrawn_as_often_as_asked_and_no_oftener(
+    redraws: int, failing: float
+) -> None:  # Interpretation S7
     moved, stuck = redrawn(*particle(SELDOM), 4000, redraws)
     # where coordinates are not redrawn by themselves, none is stopped: the particle as a whole may be redrawn
     failed = moved[:, 0] == 1.0 if redraws else moved[:, 0] > 1.0
@@ -82,13 +84,13 @@ def test_a_coordinate_is_redrawn_as_often_as_asked_and_no_oftener(redraws: int, 
     np.testing.assert_array_equal(stuck, failed if redraws else False)
 
 
-def test_a_particle_that_is_out_whatever_is_drawn_is_not_redrawn_at_all() -> None:  # Reading S7
+def test_a_particle_that_is_out_whatever_is_drawn_is_not_redrawn_at_all() -> None:  # Interpretation S7
     moved, stuck = redrawn(*particle(NEVER, SELDOM), 1000)
     assert stuck.all()
     assert (moved[:, 1] == 1.0).mean() == pytest.approx(0.9, abs=0.04)  # clipped; not a single one was brought back
 
 
-def test_a_coordinate_is_out_of_reach_if_no_rand_could_keep_it_in_the_box() -> None:  # Reading S7
+def test_a_coordinate_is_out_of_reach_if_no_rand_could_keep_it_in_the_box() -> None:  # Interpretation S7
     rng, found = np.random.default_rng(2), set()
     for _ in range(600):
         x, best = rng.uniform(-1.0, 1.0, 2)
@@ -101,7 +103,7 @@ def test_a_coordinate_is_out_of_reach_if_no_rand_could_keep_it_in_the_box() -> N
     assert found == {False, True}
 
 
-def test_a_swarm_that_runs_out_of_numbers_draws_more(monkeypatch: pytest.MonkeyPatch) -> None:  # Reading S7
+def test_a_swarm_that_runs_out_of_numbers_draws_more(monkeypatch: pytest.MonkeyPatch) -> None:  # Interpretation S7
     monkeypatch.setattr(flock, "SPARE", 0)  # so that a block serves one particle
     space = Toy(4)
     swarm = Flock(space, np.random.default_rng(0), 50, speed_limits(space, REACH, "symmetric"), 100, "dimension")
@@ -115,7 +117,9 @@ def test_a_swarm_that_runs_out_of_numbers_draws_more(monkeypatch: pytest.MonkeyP
     assert len(np.unique(swarm.moved)) == 200
 
 
-def test_a_particle_whose_redraws_all_fail_is_stopped_in_the_box(monkeypatch: pytest.MonkeyPatch) -> None:  # Reading S7
+def test_a_particle_whose_redraws_all_fail_is_stopped_in_the_box(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # Interpretation S7
     monkeypatch.setattr(flock, "SPARE", 0)
     space = Toy(2)
     swarm = Flock(space, np.random.default_rng(0), 400, speed_limits(space, REACH, "symmetric"), 2, "dimension")

@@ -274,7 +274,7 @@ def test_eq_4_is_zero_for_equal_masks_and_100_for_disjoint_ones() -> None:
     assert mismatch(np.array([[0, 0, 7], [5, 9, 0]])).tolist() == [0.0, 100.0]
 
 
-def test_eq_4_counts_an_empty_denominator_as_1() -> None:  # Reading S2
+def test_eq_4_counts_an_empty_denominator_as_1() -> None:  # Interpretation S2
     assert mismatch(np.array([[8, 0, 0], [0, 8, 0], [0, 0, 0]])).tolist() == [100.0, 100.0, 100.0]
 
 
@@ -297,7 +297,7 @@ def bowl(proposals: Array) -> Array:
     return np.asarray(100.0 * ((proposals - 0.3) ** 2).mean(axis=1))
 
 
-def test_a1_2_there_are_c_moves_and_n_times_c_plus_1_evaluations() -> None:  # Reading S10
+def test_a1_2_there_are_c_moves_and_n_times_c_plus_1_evaluations() -> None:  # Interpretation S10
     populations = run(SAPSO(line_space(), np.random.default_rng(0), population_size=7, iterations=5), bowl)
     assert sum(map(len, populations)) == 7 * (5 + 1)
 
@@ -343,7 +343,7 @@ def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:
 
 
 @pytest.mark.parametrize("rand", ["dimension", "scalar"])
-def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border(rand: Any) -> None:  # Reading S7
+def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border(rand: Any) -> None:  # Interpretation S7
     space = line_space()
     optimiser = SAPSO(space, Fixed(1.0), population_size=2, redraws=0, alpha=1.0, rand=rand)
     optimiser._flock.position[:], optimiser._flock.best[:] = 0.9, 0.9
@@ -354,14 +354,14 @@ def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border(rand: Any) ->
 
 
 @pytest.mark.parametrize(("cool", "expected"), [("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))])
-def test_a1_2e_cools_once_an_iteration_or_once_an_acceptance(cool: Any, expected: float) -> None:  # Reading S6
+def test_a1_2e_cools_once_an_iteration_or_once_an_acceptance(cool: Any, expected: float) -> None:  # Interpretation S6
     optimiser = SAPSO(line_space(), np.random.default_rng(0), population_size=4, iterations=9, cool=cool)
     for _ in range(4):  # a flat cost: every move is accepted
         optimiser.tell(optimiser.ask(), np.zeros(4))
     assert optimiser._temperature == pytest.approx(expected)
 
 
-def test_a1_2e_read_literally_the_swarm_freezes_in_3_to_5_iterations() -> None:  # Reading S6
+def test_a1_2e_read_literally_the_swarm_freezes_in_3_to_5_iterations() -> None:  # Interpretation S6
     optimiser = SAPSO(line_space(), np.random.default_rng(0), cool="acceptance", stop_temperature=0.01)
     assert 3 <= len(run(optimiser, bowl)) - 1 <= 5
 
@@ -439,7 +439,7 @@ def test_eq_6_the_first_population_is_normal_around_the_last_best() -> None:
 
 
 def test_eq_7_first_velocities_are_uniform_from_zero_to_the_predicted_one() -> None:
-    velocity = np.array([0.1, -0.1, 0.0, 0.05])  # Reading S12: a negative bound is sorted, not refused
+    velocity = np.array([0.1, -0.1, 0.0, 0.05])  # Interpretation S12: a negative bound is sorted, not refused
     start = Start(np.zeros(4), np.full(4, 0.01), velocity)
     optimiser = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=4000)
     drawn = optimiser._flock.velocity
@@ -466,7 +466,7 @@ class Scripted:
 @pytest.mark.parametrize(("prediction", "steps"), [("latest", [0.0, 0.2, -0.1]), ("literal", [0.0, 0.0, 0.2])])
 def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
     scene: tuple[Body, Camera, PCA], prediction: Any, steps: list[float]
-) -> None:  # Reading S12
+) -> None:  # Interpretation S12
     body, camera, _ = scene
     latents = [0.1, 0.3, 0.2, 0.2]
     made: list[Scripted] = []
@@ -487,7 +487,7 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
         assert start is not None
         assert start.velocity[3] == pytest.approx(step)
         assert start.mean[3] == pytest.approx(last)
-        assert start.spread[3] == pytest.approx(max(2.0 * abs(step), 0.05))  # Reading S5
+        assert start.spread[3] == pytest.approx(max(2.0 * abs(step), 0.05))  # Interpretation S5
 
 
 # Section 5
@@ -499,7 +499,7 @@ def test_eq_8_is_the_mean_absolute_difference_of_66_angles() -> None:
     assert metrics.pose_error_degrees(truth, estimate)[0] == pytest.approx(1.0)
 
 
-def test_eq_8_wraps_differences() -> None:  # Reading S13
+def test_eq_8_wraps_differences() -> None:  # Interpretation S13
     truth, estimate = np.full((1, 66), np.radians(179.0)), np.full((1, 66), np.radians(-179.0))
     assert metrics.pose_error_degrees(truth, estimate)[0] == pytest.approx(2.0)
 

@@ -174,7 +174,7 @@ def test_fusing_is_the_mean_over_the_models() -> None:  # VSMM 6.5
     assert covariance[0, 0] == pytest.approx(1.0 + 0.75 * 1.0 + 0.25 * 9.0)
 
 
-def test_a_34_dimensional_residual_of_60_pixels_leaves_probabilities() -> None:  # Reading V13
+def test_a_34_dimensional_residual_of_60_pixels_leaves_probabilities() -> None:  # Interpretation V13
     still = Linear(np.eye(34), np.eye(34))
     imm = IMM([still, still, still], np.full((3, 3), 1.0 / 3.0))
     offsets = np.array([60.0, 55.0, 70.0])
@@ -193,7 +193,7 @@ def test_a_34_dimensional_residual_of_60_pixels_leaves_probabilities() -> None: 
     assert np.isfinite(imm.cycle(belief, lambda state: Measurement(-state, np.eye(34), np.eye(34))).states).all()
 
 
-def test_quaternions_are_mixed_on_their_manifold() -> None:  # Reading V4
+def test_quaternions_are_mixed_on_their_manifold() -> None:  # Interpretation V4
     def plus(state: Array, error: Array) -> Array:
         return np.asarray((Rotation.from_quat(state) * Rotation.from_rotvec(error)).as_quat())
 
@@ -210,7 +210,7 @@ def test_quaternions_are_mixed_on_their_manifold() -> None:  # Reading V4
     assert np.degrees(np.sqrt(spread[1, 1])) == pytest.approx(10.0)
 
 
-def test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance() -> None:  # Reading V4
+def test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance() -> None:  # Interpretation V4
     def plus(state: Array, error: Array) -> Array:
         return np.asarray((Rotation.from_quat(state) * Rotation.from_rotvec(error)).as_quat())
 

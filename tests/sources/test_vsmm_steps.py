@@ -251,7 +251,7 @@ def test_the_models_are_no_worse_than_standing_still_where_the_report_says_so() 
     assert report["walk"]["identity_1"] < report["walk"]["still_1"]  # people who walk are alike
     for figures in report.values():
         assert figures["identity_1"] < 1.35 * figures["still_1"]
-        assert figures["zero_1"] > figures["identity_1"]  # Reading V5
+        assert figures["zero_1"] > figures["identity_1"]  # Interpretation V5
 
 
 # ----------------------------------------------------------------------------------------------------- 4, 5: groups

@@ -31,7 +31,7 @@ def test_walking_is_followed_within_1_9_degrees(cmu: Path, view: float) -> None:
 
 
 @pytest.mark.slow
-def test_a_side_view_is_followed_or_its_loss_is_reported(cmu: Path) -> None:  # Reading S15
+def test_a_side_view_is_followed_or_its_loss_is_reported(cmu: Path) -> None:  # Interpretation S15
     for summary in summaries(cmu, 90.0, range(5)):
         good = summary["error_degrees"]["mean"] <= 1.9
         assert good or summary["swap_rate"] + summary["lost_rate"] > 0.0

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from posefit.tracking.method import ITERATIONS
 from posefit_experiments.sapso.numbers import FRAMES
 
-DRIVEN: dict[str, Any] = {"tilt": "box"}  # Reading S16: the paper learns nothing of the root
+DRIVEN: dict[str, Any] = {"tilt": "box"}  # Interpretation S16: the paper learns nothing of the root
 WORKERS = 2  # tracks at once: what a frame takes depends on it
 
 

@@ -1,7 +1,7 @@
 """The detected joints as they are shown: hidden ones are predicted by a Kalman filter of their own. VSMM 2.7.
 
 Each joint has a model of constant velocity with white-noise acceleration. They are for the eye; a hidden joint is no
-measurement (Reading V9).
+measurement (Interpretation V9).
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Measures how far the rules of joint detection are off: `python -m posefit_vsmm.fit.joints`. VSMM step 2, Reading V7.
+"""Measures the errors of joint detection: `python -m posefit_vsmm.fit.joints`. VSMM step 2, Interpretation V7.
 
 The rules look at silhouettes of built-in motions from all sides, whose truth is known, and expect every point about
 where it is. Left and right share their errors, and no point is biased to one side. What is farther off than OUTLIER is
@@ -30,7 +30,7 @@ DISTANCE = 4.4  # metres
 SIZE = (320, 240)
 OFF = 0.05  # legs: how far from the truth a point is expected, as after a good prediction
 OUTLIER = 0.16  # legs
-CIRCULAR = 0.25  # legs: the deviation granted to points that are only carried along with the root (Reading V8)
+CIRCULAR = 0.25  # legs: the deviation granted to points that are only carried along with the root (Interpretation V8)
 
 
 def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:

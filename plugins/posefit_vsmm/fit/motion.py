@@ -1,4 +1,4 @@
-"""Fits the motion models to CMU clips: `python -m posefit_vsmm.fit.motion CMU_DIR`. VSMM step 3, Readings V4 to V6.
+"""Fits the motion models to CMU clips: `python -m posefit_vsmm.fit.motion CMU_DIR`. Interpretations V4 to V6.
 
 Ridge regression of how the quaternions go on to the next frame; what is stored are its coefficients, the covariance of
 what it leaves, and means of similar poses, no recorded frame. Every clip is also used mirrored. Printed, and stored
@@ -102,21 +102,21 @@ def mirrored_states(states: Array) -> Array:
 
 def pairs(clip: Recorded) -> tuple[Array, Array]:
     """Return states (n, 43) and what they are a frame later at 30 a second, in the heading's frame, root at 0."""
-    step = round(clip.fps / FPS)  # Reading V6: all pairs of a recording so far apart
+    step = round(clip.fps / FPS)  # Interpretation V6: all pairs of a recording so far apart
     before, after = [], []
     for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
         back, here = without_heading(first)
         turn = Rotation.from_quat(back, scalar_first=True).inv()
         there = second[3:].reshape(-1, 4).copy()
         there[0] = (turn * Rotation.from_quat(there[0], scalar_first=True)).as_quat(scalar_first=True)
-        there *= np.where(np.einsum("ij,ij->i", here, there)[:, None] < 0.0, -1.0, 1.0)  # Reading V4
+        there *= np.where(np.einsum("ij,ij->i", here, there)[:, None] < 0.0, -1.0, 1.0)  # Interpretation V4
         before.append(np.concatenate([np.zeros(3), here.ravel()]))
         after.append(np.concatenate([turn.apply(second[:3] - first[:3]), there.ravel()]))
     return np.array(before), np.array(after)
 
 
 def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
-    """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Reading V5.
+    """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Interpretation V5.
 
     The penalty is 0.15 a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
     """
@@ -133,7 +133,7 @@ def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
 
 
 def noise(model: MotionModel, before: Array, after: Array) -> Array:
-    """Return the covariance (33, 33) of what the model leaves, shrunk as Ledoit and Wolf propose. Reading V7."""
+    """Return the covariance (33, 33) of what the model leaves, shrunk as Ledoit and Wolf propose. Interpretation V7."""
     left = np.array([minus(b, model.step(a)[0]) for a, b in zip(before, after, strict=True)])
     least = np.repeat(LEAST, [3, ERROR - 3])
     scale = np.maximum(np.sqrt((left**2).mean(axis=0)), least)

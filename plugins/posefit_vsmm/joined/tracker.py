@@ -116,7 +116,7 @@ def joined(
         optimiser: name of any registered one, with its own defaults.
         dimensions: directions that it searches beside the root, 1 or more; those in which the filter is least sure.
         weight: of a prediction's silhouette cost, 0 to 100, in its model's log-likelihood; above 0. Ours.
-        groups: path of a TOML file of groups and neighbours; "" is the package's own. VSMM step 4, Reading V1.
+        groups: path of a TOML file of groups and neighbours; "" is the package's own. VSMM step 4, Interpretation V1.
     """
     if dimensions < 1:
         raise ValueError(f"dimensions must be at least 1, got {dimensions}")
