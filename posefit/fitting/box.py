@@ -72,9 +72,9 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
 
     What breaks a constraint is redrawn at most 100 times (Interpretation S7). Out of the box that is a coordinate by
     itself: the coordinates of (6) are independent and the box is a product, so that this has the distribution of
-    redrawing the whole proposal. One still out of the box is then folded back into it. What the prior finds infeasible is
-    redrawn as a whole, and then becomes the start's mean, or the copy of one that is feasible. Where nothing around the start is
-    feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is.
+    redrawing the whole proposal. One still out of the box is then folded back into it. An infeasible proposal is
+    redrawn as a whole, and then becomes the start's mean, or the copy of a feasible one. Where nothing around the
+    start is feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is.
     """
     drawn = _drawn(space, space.start, rng, count)
     if drawn is None and space.start is not None:
