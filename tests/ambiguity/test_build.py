@@ -13,6 +13,7 @@ from posefit.cli import main
 from posefit.fitting.shape import NAMES
 from posefit.geometry.body import Body
 from posefit.motion import built_in
+from tests.cases import each
 
 BODY = Body.of(built_in.average_skeleton())
 FACTORS = dict.fromkeys(NAMES, 1.0)
@@ -42,7 +43,7 @@ def test_who_is_twice_as_wide_has_twice_the_radii_and_the_same_bones(tmp_path: P
     assert body.stature == pytest.approx(1.8)
 
 
-@pytest.mark.parametrize(
+@each(
     ("summary", "said"),
     [
         ({"body": None}, "expected the build of a person, got none: it was not fitted"),

@@ -17,6 +17,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
+from tests.cases import each
 
 QUICK = ("--train", "walk-a", "--size", "120x90")
 
@@ -70,7 +71,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
         assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
+@each(
     ("source", "train", "said"),
     [
         ("16_15", ["--train", "library:16", "--without-subject", "16"], "the library must keep at least one person"),
@@ -87,7 +88,7 @@ def test_a_library_of_nobody_and_a_source_that_is_not_there_are_mistakes(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
+@each(
     ("frame", "said"),
     [
         (1, "1.png: expected a mask with a person before a background, got an empty one"),

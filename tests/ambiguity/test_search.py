@@ -14,6 +14,7 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
+from tests.cases import each
 
 WALK = built_in.motion("walk")
 BODY = Body.of(WALK.skeleton)
@@ -41,8 +42,8 @@ def found(states: States) -> set[tuple[int, int]]:
     return set(zip(states.rows.tolist(), yaws.tolist(), strict=True))
 
 
-@pytest.mark.parametrize("known", [True, False])
-@pytest.mark.parametrize("azimuths", [(0.7,), (0.0, 1.2)])
+@each("known", [True, False])
+@each("azimuths", [(0.7,), (0.0, 1.2)])
 def test_none_of_those_that_fit_is_missed(known: bool, azimuths: tuple[float, ...]) -> None:
     library = LibraryPoses.of([built_in.motion("march"), built_in.motion("run")], WALK.skeleton)
     seen = moment(WALK.poses[17], known, azimuths, 240)

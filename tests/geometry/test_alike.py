@@ -14,6 +14,7 @@ from posefit.geometry.rotation import rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
+from tests.cases import each
 
 WALK = built_in.motion("walk", frames=30)
 SKELETON = WALK.skeleton  # symmetric
@@ -46,8 +47,8 @@ def lopsided() -> Skeleton:
     return Skeleton("lopsided", SKELETON.offsets, turn @ SKELETON.axes, SKELETON.channels)
 
 
-@pytest.mark.parametrize("name", OPERATORS)
-@pytest.mark.parametrize("skeleton", [SKELETON, lopsided()], ids=["symmetric", "lopsided"])
+@each("name", OPERATORS)
+@each("skeleton", [SKELETON, lopsided()])
 def test_twice_is_as_before(name: str, skeleton: Skeleton) -> None:
     poses = drawn()
     twice = OPERATORS[name](skeleton, OPERATORS[name](skeleton, poses))
@@ -62,7 +63,7 @@ def test_what_is_given_stays_as_it_is() -> None:
         operator(SKELETON, poses)
 
 
-@pytest.mark.parametrize("skeleton", [SKELETON, lopsided()], ids=["symmetric", "lopsided"])
+@each("skeleton", [SKELETON, lopsided()])
 def test_mirrored_joints_are_those_of_the_other_side_across_the_plane_that_is_faced_along(skeleton: Skeleton) -> None:
     poses = drawn()
     across = np.stack([np.cos(poses[:, 0]), np.zeros(len(poses)), -np.sin(poses[:, 0])], axis=1)
@@ -95,7 +96,7 @@ def test_a_left_leg_that_is_forward_becomes_a_right_one_by_hand() -> None:
     np.testing.assert_array_equal(exchanged_limbs(SKELETON, poses, "arms"), poses)
 
 
-@pytest.mark.parametrize("limbs", ["legs", "arms"])
+@each("limbs", ["legs", "arms"])
 def test_exchanged_limbs_leave_everything_else_where_it_is(limbs: str) -> None:
     poses = drawn()
     moved = {name for limb in LIMBS for name in LIMBS[limb] if limb.endswith(limbs[:-1])}

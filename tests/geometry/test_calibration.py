@@ -8,6 +8,7 @@ import pytest
 
 from posefit.geometry.calibration import Calibration, read_calibrations, upright
 from posefit.geometry.camera import Camera
+from tests.cases import each
 from tests.geometry.calibrations import QUALISYS, TOML, opencv
 
 
@@ -22,7 +23,7 @@ def written(tmp_path: Path, name: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["a.toml", "a.yml", "a.json", "a.xml"])
+@each("name", ["a.toml", "a.yml", "a.json", "a.xml"])
 def test_every_format_gives_the_same_camera(tmp_path: Path, name: str) -> None:
     (one,) = read_calibrations(written(tmp_path, name))
     assert one.size == (640, 480)
@@ -71,7 +72,7 @@ def test_up_can_be_named(tmp_path: Path) -> None:
         upright([one], "w")  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", ["a.toml", "a.yml"])
+@each("name", ["a.toml", "a.yml"])
 def test_the_maps_undo_the_lens(tmp_path: Path, name: str) -> None:
     (one,) = read_calibrations(written(tmp_path, name))
     across, down = one.maps((640, 480))
@@ -103,7 +104,7 @@ def test_several_cameras_stand_in_one_file(tmp_path: Path) -> None:
     assert [one.name for one in read_calibrations(path)] == ["left", "right"]
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "text", "message"),
     [
         ("a.toml", "[left", "expected a calibration"),
@@ -156,7 +157,7 @@ camera_matrix: !!opencv-matrix
 HIDDEN = "".join(f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in range(1, 60))
 
 
-@pytest.mark.parametrize(
+@each(
     ("before", "after", "message"),
     [
         ("   cols: 3", "   cols: 3x", "'3x' where a number should be"),  # OpenCV's own reader corrupted memory
@@ -205,7 +206,7 @@ def test_a_lens_has_as_many_numbers_as_opencv_knows(tmp_path: Path) -> None:
         read_calibrations(tmp_path / "a.toml")
 
 
-@pytest.mark.parametrize(
+@each(
     ("made_for", "came", "fits"),
     [
         ((1080, 1920), (1088, 1920), True),

@@ -14,6 +14,7 @@ from posefit.geometry.body import PROPORTIONS, Body
 from posefit.geometry.camera import MARGIN, Camera
 from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.motion.built_in import average_skeleton
+from tests.cases import each
 
 
 def test_a_point_is_projected_by_hand() -> None:
@@ -44,7 +45,7 @@ def test_from_the_front_the_left_hand_is_on_the_images_right() -> None:
     assert pixels[JOINTS.index("lhand"), 0] > 160.0 > pixels[JOINTS.index("rhand"), 0]
 
 
-@pytest.mark.parametrize("azimuth", [0.0, 0.8, 2.5, -1.6])
+@each("azimuth", [0.0, 0.8, 2.5, -1.6])
 def test_framing_shows_every_ball_with_a_margin(azimuth: float) -> None:
     rng = np.random.default_rng(0)
     points, radii = rng.normal(size=(60, 3)), rng.uniform(0.0, 0.3, 60)
@@ -65,7 +66,7 @@ def test_a_camera_survives_its_file(tmp_path: Path) -> None:
         np.testing.assert_array_equal(getattr(again, name), getattr(camera, name))
 
 
-@pytest.mark.parametrize(
+@each(
     "change",
     [
         {"width": 0},
@@ -89,7 +90,7 @@ def test_a_bad_camera_file_is_named_in_one_line(tmp_path: Path, change: dict[str
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{", "{}", "\x00"])
+@each("text", ["", "[]", "{", "{}", "\x00"])
 def test_a_file_that_is_no_camera_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "camera.json").write_text(text)
     with pytest.raises(ValueError, match="expected a JSON object"):
@@ -117,7 +118,7 @@ def test_around_by_hand_from_the_side() -> None:
     np.testing.assert_allclose(depths, [4.0, 4.0, 4.0, 2.0])
 
 
-@pytest.mark.parametrize("size", [(320, 240), (240, 320)])
+@each("size", [(320, 240), (240, 320)])
 def test_the_field_of_view_spans_the_larger_side(size: tuple[int, int]) -> None:
     camera = Camera.around(np.zeros(3), 0.0, 3.0, size, field_of_view=0.7)
     reach = 3.0 * np.tan(0.35)
@@ -147,7 +148,7 @@ def test_a_face_towards_the_camera_has_its_left_on_the_images_right() -> None:
     assert depths[2] < depths[3]  # the chest is nearer than the back
 
 
-@pytest.mark.parametrize("size", [(200, 150), (150, 200), (64, 64)])
+@each("size", [(200, 150), (150, 200), (64, 64)])
 def test_framing_is_the_nearest_camera_that_does(size: tuple[int, int]) -> None:
     rng = np.random.default_rng(1)
     points, radii = rng.normal(size=(40, 3)), rng.uniform(0.0, 0.2, 40)
@@ -173,7 +174,7 @@ def test_a_camera_is_copied_and_cannot_be_written_to() -> None:
         camera.rotation[0, 0] = 2.0
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "message"),
     [
         ({"width": 0}, "width must be a whole number from 1 to 16384, got 0"),

@@ -1,7 +1,6 @@
 """A bone at a time, as plain Python and as compiled, against frames multiplied by hand."""
 
 import numpy as np
-import pytest
 
 from posefit.arrays import jit
 from posefit.geometry.kernels import empty_frames
@@ -9,6 +8,7 @@ from posefit.geometry.lanes import place_bone
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES
 from posefit.motion.built_in import average_skeleton
+from tests.cases import each
 
 
 @jit
@@ -16,8 +16,8 @@ def compiled_bone(chain, b, sines, cosines, frames):  # type: ignore[no-untyped-
     place_bone(chain, b, sines, cosines, frames)
 
 
-@pytest.mark.parametrize("placing", [place_bone, compiled_bone])
-@pytest.mark.parametrize("bone", range(len(BONES)))
+@each("placing", [place_bone, compiled_bone])
+@each("bone", range(len(BONES)))
 def test_a_bone_carries_its_parents_frame_to_its_end(placing, bone: int) -> None:  # type: ignore[no-untyped-def]
     chain = average_skeleton().chain
     rng = np.random.default_rng(bone)

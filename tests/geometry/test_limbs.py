@@ -9,6 +9,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.limbs import LIMBS, check_limbs, rows_of, turns_of
 from posefit.geometry.skeleton import BONES, JOINTS, PARENTS
 from posefit.motion.built_in import average_skeleton
+from tests.cases import each
 
 
 def test_the_limbs_and_the_torso_are_all_bones_once() -> None:
@@ -20,7 +21,7 @@ def test_the_limbs_and_the_torso_are_all_bones_once() -> None:
         assert all(JOINTS[PARENTS[JOINTS.index(b)]] == a for a, b in pairwise(bones))
 
 
-@pytest.mark.parametrize("name", LIMBS)
+@each("name", LIMBS)
 def test_a_limbs_angles_move_all_of_its_bones_and_no_other(name: str) -> None:
     skeleton = Body.of(average_skeleton()).skeleton
     pose = np.zeros(66)

@@ -16,6 +16,7 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
     wrapped,
 )
+from tests.cases import each
 
 QUARTER = np.pi / 2.0
 turns = st.floats(-np.pi, np.pi)
@@ -51,8 +52,8 @@ def least_singular_value(matrix: Array) -> float:
     return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
-@pytest.mark.parametrize("yaw", [QUARTER, -QUARTER])
-@pytest.mark.parametrize(("pitch", "roll"), [(0.0, 0.0), (0.2, -0.1), (-0.35, 0.35)])
+@each("yaw", [QUARTER, -QUARTER])
+@each(("pitch", "roll"), [(0.0, 0.0), (0.2, -0.1), (-0.35, 0.35)])
 def test_a_side_view_is_not_degenerate(yaw: float, pitch: float, roll: float) -> None:  # Interpretation S3
     angles = np.array([yaw, pitch, roll])
     # The axes that pitch and roll turn about stand at right angles; yaw's leans towards roll's by the pitch.
@@ -87,8 +88,8 @@ def test_joint_angles_come_back(x: float, y: float, z: float) -> None:
     np.testing.assert_allclose(difference, 0.0, rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("roll", [0.0, 0.7, -2.0])
-@pytest.mark.parametrize("pitch", [QUARTER, -QUARTER])
+@each("roll", [0.0, 0.7, -2.0])
+@each("pitch", [QUARTER, -QUARTER])
 def test_on_the_singularity_the_rotation_still_comes_back(pitch: float, roll: float) -> None:
     rotation = rotation_from_root_angles(np.array([0.4, pitch, roll]))
     again = rotation_from_root_angles(root_angles_from_rotation(rotation))

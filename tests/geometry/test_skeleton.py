@@ -31,6 +31,7 @@ from posefit.geometry.skeleton import (
     side,
 )
 from posefit.motion.built_in import average_skeleton
+from tests.cases import each
 
 angles = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
 
@@ -185,7 +186,7 @@ def test_the_root_turns_the_whole_body_about_the_root_joint(root: Array, seed: i
     np.testing.assert_allclose(turned, expected, rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["lfemur", "thorax", "rradius", "upperneck"])
+@each("name", ["lfemur", "thorax", "rradius", "upperneck"])
 def test_an_angle_moves_only_what_hangs_on_its_bone(name: str) -> None:
     skeleton, joint = average_skeleton(), JOINTS.index(name)
     pose = np.random.default_rng(3).uniform(-1.0, 1.0, ANGLES)

@@ -12,6 +12,7 @@ from posefit.measuring.centres import CENTRES, PLACES, joint_centres
 from posefit.measuring.segments import bone_rotations, segment_rotations
 from posefit.motion import built_in, recorded
 from posefit.motion.bvh import read_bvh, write_bvh
+from tests.cases import each
 from tests.measuring.walker import angle
 
 SKELETON = built_in.motion("walk", frames=1).skeleton
@@ -58,7 +59,7 @@ def test_legs_are_at_zero_where_they_stand_straight() -> None:
         assert found[name] == pytest.approx(0.0, abs=1e-3), name
 
 
-@pytest.mark.parametrize(("side", "inwards"), [("left", -20.0), ("right", 20.0)])
+@each(("side", "inwards"), [("left", -20.0), ("right", 20.0)])
 def test_a_leg_moves_in_clinical_words(side: str, inwards: float) -> None:
     def leg(**turned: float) -> dict[str, float]:
         found = measured(**{f"{side[0]}{name}": value for name, value in turned.items()})
@@ -75,7 +76,7 @@ def test_a_leg_moves_in_clinical_words(side: str, inwards: float) -> None:
     assert leg(femur_z=1.5 * inwards) == {"hip_adduction": 10.0}
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
+@each("side", ["left", "right"])
 def test_arms_at_rest_are_out_with_the_palms_down(side: str) -> None:
     rest = measured()
     assert rest[f"{side}_shoulder_plane"] == pytest.approx(0.0, abs=1e-6)

@@ -13,6 +13,7 @@ from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit.tracking.table import gait_line
+from tests.cases import each
 from tests.measuring.walker import SPEED, walker
 
 WALKS = ("02_01", "05_01", *(f"16_{k}" for k in (*range(12, 19), *range(20, 33), 47, 58)))
@@ -22,7 +23,7 @@ def figures(gait: Gait) -> list[object]:
     return [gait.cadence, gait.speed, gait.step_length, gait.stride_length, gait.step_width, gait.stance_share]
 
 
-@pytest.mark.parametrize("name", WALKS)
+@each("name", WALKS)
 def test_walks_of_real_people_are_as_published(name: str) -> None:
     # Whittle, Gait analysis, 2007, table of normal ranges, 15 to 64 years, both sexes; some of these people stroll
     gait = gait_of(recorded.clip(name).motion())
@@ -35,7 +36,7 @@ def test_walks_of_real_people_are_as_published(name: str) -> None:
     assert 0.0 < gait.step_width < 0.25  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("clip", ["02_01", "16_15"])
+@each("clip", ["02_01", "16_15"])
 def test_events_are_near_those_of_a_slow_twin(cmu: Path, clip: str) -> None:
     # O'Connor et al. 2007: the middle of the foot falls fastest just before it strikes and rises fastest at toe off
     folder = cmu / clip[:2]
@@ -72,7 +73,7 @@ def test_a_rate_of_thirty_says_what_one_of_120_says() -> None:
     assert figures(coarse) == pytest.approx(figures(fine), rel=0.03)
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "why"),
     [
         ("jacks", "no strikes of a foot detected"),
@@ -87,12 +88,12 @@ def test_what_is_no_walk_is_called_so(name: str, why: str) -> None:
     assert gait.as_dict()["walk"] is False
 
 
-@pytest.mark.parametrize("name", ["09_01", "127_06", "16_35", "49_04"])
+@each("name", ["09_01", "127_06", "16_35", "49_04"])
 def test_a_run_is_no_walk(name: str) -> None:
     assert "runs" in gait_of(recorded.clip(name).motion()).why
 
 
-@pytest.mark.parametrize("name", ["05_16", "05_17", "127_24"])
+@each("name", ["05_16", "05_17", "127_24"])
 def test_steps_aside_are_no_walk(name: str) -> None:
     assert gait_of(recorded.clip(name).motion()).why.endswith("m wide")
 

@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from posefit.measuring.heading import backwards, warned
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from tests.cases import each
 
 WALK = built_in.motion("walk", frames=60)  # at 30 frames a second
 
@@ -16,7 +16,7 @@ def turned(degrees: float) -> Motion:
     return replace(WALK, poses=WALK.poses + np.radians(degrees) * np.eye(66)[0])
 
 
-@pytest.mark.parametrize(("degrees", "back"), [(0.0, False), (60.0, False), (120.0, True), (180.0, True)])
+@each(("degrees", "back"), [(0.0, False), (60.0, False), (120.0, True), (180.0, True)])
 def test_who_faces_away_from_his_way_goes_backwards(degrees: float, back: bool) -> None:
     found = backwards(turned(degrees))
     half = 8  # half of half a second, beyond which nothing is known at both ends
@@ -25,7 +25,7 @@ def test_who_faces_away_from_his_way_goes_backwards(degrees: float, back: bool) 
     assert not found[-half:].any()
 
 
-@pytest.mark.parametrize(("speed", "back"), [(0.29, False), (0.31, True)])
+@each(("speed", "back"), [(0.29, False), (0.31, True)])
 def test_who_goes_slower_than_30_cm_a_second_goes_nowhere(speed: float, back: bool) -> None:
     places = np.array([0.0, 1.0, 0.0]) + np.arange(60)[:, None] / 30.0 * speed * np.array([0.0, 0.0, -1.0])
     found = backwards(replace(WALK, poses=np.zeros((60, 66)), translations=places))

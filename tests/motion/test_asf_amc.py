@@ -15,6 +15,7 @@ from posefit.motion import amc, asf
 from posefit.motion.amc import read_amc, read_clip, write_amc
 from posefit.motion.asf import METRES_PER_UNIT, read_asf, write_asf
 from posefit.motion.motion import Motion
+from tests.cases import each
 
 CHILDREN = """\
 root lhipjoint rhipjoint lowerback
@@ -145,7 +146,7 @@ def slow_joints(skeleton: Path, clip: Path, frame: int) -> Array:
     return np.array([ends[joint] for joint in JOINTS]) / 0.45 * 0.0254
 
 
-@pytest.mark.parametrize("clip", ["02/02_01", "127/127_03", "49/49_02", "16/16_15"])
+@each("clip", ["02/02_01", "127/127_03", "49/49_02", "16/16_15"])
 def test_joints_are_where_acclaim_puts_them(cmu: Path, clip: str) -> None:
     moving = cmu / f"{clip}.amc"
     skeleton = next(moving.parent.glob("*.asf"))
@@ -194,7 +195,7 @@ def test_angles_may_be_radians(skeleton: Skeleton, tmp_path: Path) -> None:
     np.testing.assert_allclose(read_asf(tmp_path / "rad.asf").axes, skeleton.axes, atol=1e-12)
 
 
-@pytest.mark.parametrize(
+@each(
     ("before", "after", "message"),
     [
         ("name lfemur", "name femur", "small.asf: the skeleton needs bone 'lfemur', which this file does not define"),
@@ -304,7 +305,7 @@ def test_a_clip_is_scaled_by_its_own_skeleton(tmp_path: Path) -> None:
     assert motion.fps == 60.0
 
 
-@pytest.mark.parametrize(
+@each(
     ("before", "after", "message"),
     [
         ("ltibia 40\n", "", ":11: expected bone 'ltibia' in frame 1, got frame 2"),
@@ -337,7 +338,7 @@ def test_mistakes_in_a_motion_are_named(
     assert f"{path}{message}" in str(caught.value)
 
 
-@pytest.mark.parametrize(
+@each(
     ("content", "message"),
     [
         (b"", ":1: expected at least one frame, got the end of the file"),

@@ -14,6 +14,7 @@ from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, angle_index
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
+from tests.cases import each
 
 # Clip, and the frames that were fitted: the walk of 05_01 ends in a turn.
 CLIPS = {
@@ -45,9 +46,9 @@ GAITS = ("walk", "run", "arms-out", "wave")
 DRAWN = {"arms-out": "lr", "wave": "r"}  # whose arms are not the clip's
 CYCLE = 240  # frames
 
-each = pytest.mark.parametrize("name", built_in.names())
-each_gait = pytest.mark.parametrize("name", [name for name in built_in.names() if name.startswith(GAITS)])
-each_exercise = pytest.mark.parametrize("name", [name for name in built_in.names() if not name.startswith(GAITS)])
+each_motion = each("name", built_in.names())
+each_gait = each("name", [name for name in built_in.names() if name.startswith(GAITS)])
+each_exercise = each("name", [name for name in built_in.names() if not name.startswith(GAITS)])
 
 
 def stored() -> dict[str, Any]:
@@ -85,7 +86,7 @@ def test_the_other_styles_of_a_motion_never_contain_it() -> None:
         assert {built_in.activity_of(other) for other in others} == {built_in.activity_of(name)}
 
 
-@each
+@each_motion
 def test_a_motion_repeats_itself_one_travel_further(name: str) -> None:
     motion = cycle(name, 2)
     np.testing.assert_allclose(motion.poses[CYCLE:], motion.poses[:CYCLE], atol=1e-9)
@@ -94,7 +95,7 @@ def test_a_motion_repeats_itself_one_travel_further(name: str) -> None:
     np.testing.assert_allclose(moved, np.tile(travel, (CYCLE, 1)), atol=1e-9)
 
 
-@each
+@each_motion
 def test_no_joint_jumps_anywhere_in_the_cycle(name: str) -> None:
     motion = cycle(name, 2)
     steps = np.linalg.norm(np.diff(joints(motion), axis=0), axis=-1) * motion.fps
@@ -155,7 +156,7 @@ def test_at_phase_0_the_left_thigh_is_ahead(name: str) -> None:
     assert abs(swing @ np.sin(turns)) < 1e-3 * (swing @ np.cos(turns))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@each("kind", KINDS)
 def test_styles_of_a_kind_differ_by_some_degrees(kind: str) -> None:
     poses = {name: cycle(name).poses for name in (kind, *built_in.other_styles(kind))}
     for first, second in combinations(poses, 2):
@@ -192,7 +193,7 @@ def test_each_exercise_is_what_it_is_called() -> None:
         assert min(knees) > 0.25
 
 
-@pytest.mark.parametrize("kind", ["squat", "jump"])
+@each("kind", ["squat", "jump"])
 def test_at_phase_0_somebody_who_squats_or_jumps_is_down(kind: str) -> None:
     for name in (kind, *built_in.other_styles(kind)):
         height = cycle(name).translations[:, 1]
@@ -201,20 +202,20 @@ def test_at_phase_0_somebody_who_squats_or_jumps_is_down(kind: str) -> None:
         assert abs(height @ np.sin(turns)) < 1e-3 * abs(height @ np.cos(turns))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@each("kind", KINDS)
 def test_a_kind_without_a_letter_is_the_mean_of_its_styles(kind: str) -> None:
     styles = [cycle(style).poses for style in built_in.other_styles(kind)]
     np.testing.assert_allclose(cycle(kind).poses, np.mean(styles, axis=0), atol=1e-9)
 
 
-@each
+@each_motion
 def test_twice_the_speed_is_every_second_frame(name: str) -> None:
     slow, fast = built_in.motion(name, frames=39), built_in.motion(name, frames=20, speed=2.0)
     np.testing.assert_allclose(fast.poses, slow.poses[::2], atol=1e-12)
     np.testing.assert_allclose(fast.translations, slow.translations[::2], atol=1e-12)
 
 
-@each
+@each_motion
 def test_a_phase_starts_later_in_the_cycle(name: str) -> None:
     plain, shifted = cycle(name, 2), cycle(name, phase=0.25)
     np.testing.assert_allclose(shifted.poses, plain.poses[CYCLE // 4 : CYCLE // 4 + CYCLE], atol=1e-9)
@@ -247,14 +248,14 @@ def test_the_skeleton_has_a_grown_up_s_size_and_only_inner_joints_turn() -> None
     assert len(skeleton.lengths) == len(BONES)
 
 
-@each
+@each_motion
 def test_only_free_angles_move(name: str) -> None:
     motion = cycle(name)
     assert motion.skeleton is built_in.average_skeleton()
     assert not motion.poses[:, ~motion.skeleton.free].any()
 
 
-@pytest.mark.parametrize("name", CLIPS)
+@each("name", CLIPS)
 def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -> None:
     path, start, stop = CLIPS[name]
     folder, clip = path.split("/")
@@ -310,7 +311,7 @@ def test_the_library_is_small_and_states_its_origin() -> None:
     assert "The database was created with funding from NSF EIA-0196217." in origin
 
 
-@pytest.mark.parametrize("ask", [built_in.motion, built_in.other_styles])
+@each("ask", [built_in.motion, built_in.other_styles])
 def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
     with pytest.raises(ValueError, match=r"one of walk, run, march, .* got 'wlak'; did you mean 'walk'\?"):
         ask("wlak")
@@ -318,7 +319,7 @@ def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
         ask("zzz")
 
 
-@pytest.mark.parametrize(
+@each(
     ("settings", "message"),
     [
         ({"frames": 0}, "frames must be a whole number of at least 1, got 0"),

@@ -11,6 +11,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.motion import built_in, bvh
 from posefit.motion.bvh import read_bvh, write_bvh
+from tests.cases import each
 
 pytest.importorskip("pybvh")
 
@@ -139,7 +140,7 @@ def random_values(root: Node, frames: int = 6) -> Array:
     return np.round(rng.uniform(-80.0, 80.0, (frames, 3 + 3 * len(in_order(root)))), 5)
 
 
-@pytest.mark.parametrize("names", ["cgspeed", "acclaim"])
+@each("names", ["cgspeed", "acclaim"])
 def test_joints_are_where_the_file_puts_them(tmp_path: Path, names: str) -> None:
     root, nodes = build(names)
     values = random_values(root)
@@ -172,7 +173,7 @@ def edited(before: str, after: str) -> str:
     return whole.replace(before, after, 1)
 
 
-@pytest.mark.parametrize(
+@each(
     ("before", "after", "message"),
     [
         ("JOINT LeftLeg", "JOINT Knee", r"with all 27 joints, got one without ltibia \(LeftLeg\)"),
@@ -230,9 +231,7 @@ def test_the_hips_must_be_the_root(tmp_path: Path) -> None:
         read_bvh(path)
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"\xff\xfe\x00\x80" * 50, b"HIERARCHY\nROOT", b"MOTION\n", b"ROOT Hips\n{\n}"]
-)
+@each("content", [b"", b"\xff\xfe\x00\x80" * 50, b"HIERARCHY\nROOT", b"MOTION\n", b"ROOT Hips\n{\n}"])
 def test_junk_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.bvh"
     path.write_bytes(content)

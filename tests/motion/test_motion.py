@@ -6,6 +6,7 @@ import pytest
 from posefit.geometry.rotation import geodesic, rotation_from_root_angles
 from posefit.geometry.skeleton import BONES, Skeleton
 from posefit.motion.motion import Motion
+from tests.cases import each
 
 SKELETON = Skeleton("stick", np.ones((26, 3)), np.tile(np.eye(3), (26, 1, 1)), tuple((bone, ()) for bone in BONES))
 
@@ -29,7 +30,7 @@ def test_arrays_are_copies_that_cannot_be_written_to() -> None:
         motion.translations[0, 0] = 1.0
 
 
-@pytest.mark.parametrize(
+@each(
     ("poses", "translations", "fps", "message"),
     [
         (np.zeros((2, 62)), np.zeros((2, 3)), 30.0, r"poses must have shape \(frames, 66\), got \(2, 62\)"),
@@ -54,13 +55,13 @@ def test_frames_cuts_a_clip() -> None:
     assert (part.name, part.fps) == ("clip", 120.0)
 
 
-@pytest.mark.parametrize(("start", "stop"), [(3, 3), (-1, 4), (0, 11), (5, 2)])
+@each(("start", "stop"), [(3, 3), (-1, 4), (0, 11), (5, 2)])
 def test_frames_outside_the_clip_are_refused(start: int, stop: int) -> None:
     with pytest.raises(ValueError, match=rf"start < stop <= 10, got start {start} and stop {stop}"):
         clip(10).frames(start, stop)
 
 
-@pytest.mark.parametrize(("frames", "kept"), [(1, 1), (4, 1), (5, 2), (9, 3), (343, 86)])
+@each(("frames", "kept"), [(1, 1), (4, 1), (5, 2), (9, 3), (343, 86)])
 def test_a_whole_ratio_takes_every_kth_frame_as_it_is(frames: int, kept: int) -> None:
     motion = clip(frames)
     slow = motion.resampled(30.0)
@@ -75,7 +76,7 @@ def test_the_same_rate_changes_nothing() -> None:
     np.testing.assert_array_equal(motion.resampled(120.0).poses, motion.poses)
 
 
-@pytest.mark.parametrize(
+@each(
     ("frames", "fps", "new", "kept"),
     # times k / new up to (frames - 1) / fps: 0.05 s at 50 Hz is k = 0, 1, 2; 0.1 s at 30 Hz is k = 0 ... 3
     [(7, 120.0, 50.0, 3), (11, 100.0, 30.0, 4), (2, 30.0, 120.0, 5), (1, 30.0, 120.0, 1), (2, 30.0, 29.0, 1)],

@@ -13,6 +13,7 @@ from posefit.cli import main
 from posefit.motion import recorded
 from posefit.motion.built_in import average_skeleton
 from posefit.motion.make_recorded import LONGEST_GAP, TOLERANCE, kept_frames
+from tests.cases import each
 
 ROUNDED = 1e-3  # metres: what rounding 66 angles to a thousandth of a radian may move a hand by, and more
 
@@ -25,7 +26,7 @@ def cmu30(cmu: Path) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("subject", ["09", "135"])
+@each("subject", ["09", "135"])
 def test_a_clip_is_the_recorded_one_to_a_centimetre(cmu30: Path, subject: str) -> None:
     with np.load(cmu30 / f"{subject}.npz") as stored:
         start = 0
@@ -84,7 +85,7 @@ def test_people_are_chosen_by_name() -> None:
     assert recorded.leaving_out("library:02,16", ["16"]) == "library:02,16,-16"
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "message"),
     [
         ("library:3", "a subject of the library must be one of 02, .*, got '3'"),

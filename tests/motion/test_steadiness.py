@@ -6,6 +6,7 @@ import pytest
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import recorded
 from posefit.motion.steadiness import acceleration, slides, standing
+from tests.cases import each
 
 LEFT, RIGHT = JOINTS.index("lfoot"), JOINTS.index("rfoot")
 
@@ -17,7 +18,7 @@ def still(frames: int) -> np.ndarray:
     return joints
 
 
-@pytest.mark.parametrize(("fps", "left_out"), [(30.0, 1), (120.0, 4), (25.0, 1)])
+@each(("fps", "left_out"), [(30.0, 1), (120.0, 4), (25.0, 1)])
 def test_what_falls_accelerates_as_it_does_at_any_rate(fps: float, left_out: int) -> None:
     times = np.arange(40) / fps
     joints = still(40)

@@ -12,6 +12,7 @@ from posefit.uncertainty.calibration import (
     kept_errors,
     reliability,
 )
+from tests.cases import each
 
 SCORES = np.array([0.9, 0.8, 0.8, 0.4, 0.1])
 LOST = np.array([True, False, True, False, False])
@@ -46,7 +47,7 @@ def test_bins_hold_their_own() -> None:
     assert found == [(1, 0.05, 0.0), (2, pytest.approx(0.17), 0.5), (1, 1.0, 1.0)]
 
 
-@pytest.mark.parametrize("figure", [auroc, reliability])
+@each("figure", [auroc, reliability])
 def test_what_does_not_go_together_is_told(figure: object) -> None:
     with pytest.raises(ValueError, match=r"as many entries as there are values, 1 or more, got \(2,\) for \(3,\)"):
         figure(np.zeros(3), np.zeros(2, dtype=bool))  # type: ignore[operator]

@@ -9,6 +9,7 @@ from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.mixture import NormalMixture
 from posefit.uncertainty.searches import best_of_each, boltzmann_weights, weighed, widths
 from posefit.uncertainty.smc import tempered
+from tests.cases import each
 
 WEIGHTS = np.array([0.6, 0.3, 0.1])
 SPREADS = np.array([0.04, 0.1, 0.07])
@@ -35,7 +36,7 @@ def searches(dimensions: int, rng: np.random.Generator) -> list[tuple[Array, Arr
     return found
 
 
-@pytest.mark.parametrize(("dimensions", "off"), [(2, 0.05), (5, 0.08), (10, 0.15)])
+@each(("dimensions", "off"), [(2, 0.05), (5, 0.08), (10, 0.15)])
 def test_the_weights_of_modes_are_known(dimensions: int, off: float) -> None:
     wrong = []
     for seed in range(8):

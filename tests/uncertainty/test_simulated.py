@@ -5,7 +5,6 @@ simulation-based calibration, 2018.
 """
 
 import numpy as np
-import pytest
 from scipy.stats import chisquare
 
 from posefit.arrays import Array
@@ -15,6 +14,7 @@ from posefit.searching.modes import gathered
 from posefit.testing.toy import Toy
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.searches import weighed
+from tests.cases import each
 
 NOISE, DRAWS, TRUTHS = 0.2, 9, 400
 
@@ -27,7 +27,7 @@ def shown(proposals: Array) -> Array:
 MIXED = np.array([[1.0, 0.4, 0.0], [0.0, 1.0, 0.4], [0.4, 0.0, 1.0]])
 
 
-@pytest.mark.parametrize("evaluations", [490, 4000])
+@each("evaluations", [490, 4000])
 def test_a_truth_is_one_more_draw(evaluations: int) -> None:
     space, make, rng = Toy(4), registry().optimiser("sapso"), np.random.default_rng(0)
     ranks = []
