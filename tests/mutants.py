@@ -219,7 +219,7 @@ MUTANTS = (
     ),
     Mutant(
         "the OpenCV twin's radii ignore fy",
-        "plugins/posefit_experiments/bench/kernel.py",
+        "plugins/posefit_reproduce/bench/kernel.py",
         (("np.sqrt(camera.focal.prod())", "camera.focal[0]"),),
         "tests/experiments/test_bench.py::test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths",
     ),

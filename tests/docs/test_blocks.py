@@ -75,7 +75,7 @@ def test_a_block_that_does_not_run_says_why_and_is_right(block: Block) -> None:
 @pytest.mark.parametrize(
     "line",
     ["posefit trakc walk", "posefit track --no-such-option 1", "posefit extract video.mp4", "rm -r results",
-     "python -m posefit_experiments.nothing", "python -m pip install -e '.[nothing]'"],
+     "python -m posefit_reproduce.nothing", "python -m pip install -e '.[nothing]'"],
 )  # fmt: skip
 def test_a_command_that_is_none_is_seen(line: str) -> None:
     (words,) = shell.commands(line)

@@ -1,0 +1,111 @@
+"""How well a person's build is found: `posefit reproduce builds`.
+
+Synthetic subjects whose bones and radii are each up to 10 % off the average, and who are up to 10 % taller or smaller.
+A cell follows the person whose build is known, so the runs are jobs.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.space import Translation
+from posefit.footage.scene import Rendered, synthetic
+from posefit.geometry.body import Body, varied
+from posefit.geometry.skeleton import BONES
+from posefit.motion import built_in
+from posefit.tracking.method import Choice, prepare
+from posefit.tracking.opening import BODY_FRAMES, built, following
+from posefit_reproduce.grid import Progress, each
+from posefit_reproduce.known import SIZE, known_task
+
+MOTION = "walk-b"
+PERCENT = 10.0
+SUBJECTS = 8
+
+
+class Setup(NamedTuple):
+    """What is known of a person beside the silhouettes."""
+
+    label: str
+    views_degrees: tuple[float, ...]
+    stature: bool
+    translation: Translation
+
+
+SETUPS = (
+    Setup("1 view, stature given", (90.0,), True, "aligned"),
+    Setup("1 view, root known", (90.0,), False, "known"),
+    Setup("2 views", (0.0, 90.0), False, "aligned"),
+    Setup("4 views", (0.0, 45.0, 90.0, 135.0), False, "aligned"),
+)
+LIMBS = {
+    "thigh": ("lfemur",),
+    "shank": ("ltibia",),
+    "upper arm": ("lhumerus",),
+    "forearm": ("lradius",),
+    "forearm and hand": ("lradius", "lwrist", "lhand"),
+}
+PARTS = ("stature", *LIMBS)
+
+
+def subject(seed: int) -> Body:
+    """Return a person of another build."""
+    rng = np.random.default_rng([7, seed])
+    body = varied(Body.of(built_in.average_skeleton()), PERCENT, rng)
+    scale = rng.uniform(0.9, 1.1)
+    return body.scaled(scale, scale)
+
+
+def builds(motion: str, subjects: int, workers: int | None, progress: Progress | None = None) -> dict[str, Any]:
+    """Return by how many percent stature and limbs are off, before and after the fit, for every setup."""
+    if subjects < 1:
+        raise ValueError(f"subjects must be at least 1, got {subjects}")
+    if motion not in built_in.names():
+        raise ValueError(f"motion must be one of {', '.join(built_in.names())}, got {motion}")
+    keys = list(product(SETUPS, range(subjects)))
+    found = each({(one.label, k): partial(_found, motion, one, k) for one, k in keys}, workers, progress)
+    told: dict[str, Any] = {}
+    for one in SETUPS:
+        pairs = np.array([found[one.label, k] for k in range(subjects)])  # (subjects, 2, parts)
+        told[one.label] = {label: _told(pairs[:, k]) for k, label in enumerate(("fitted", "average"))}
+    return {"motion": motion, "subjects": subjects, "percent_off": told}
+
+
+def _told(off: Array) -> dict[str, dict[str, float]]:
+    return {
+        part: {"mean": float(mean), "most": float(most)}
+        for part, mean, most in zip(PARTS, off.mean(axis=0), off.max(axis=0), strict=True)
+    }
+
+
+def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[float]]:
+    """Return by how many percent a subject's parts are off after the fit, and as they were taken to be before it."""
+    choice, average, true = Choice(prior="loose"), Body.of(built_in.average_skeleton()), subject(seed)
+    walk = replace(built_in.motion(motion), skeleton=true.skeleton)
+    scene = synthetic(walk, setup.views_degrees, SIZE, [], (None, None))
+    scene = replace(scene, body=true, observations=Rendered(walk, true, scene.cameras))
+    height = true.stature if setup.stature else None
+    start = average if height is None else average.scaled(*[height / average.stature] * 2)
+    task = known_task(scene, choice, start, setup.translation)
+    shape = built(task, scene.observations, following(prepare(choice, task)), BODY_FRAMES, height, seed)
+    return _off(shape.body, true), _off(start, true)
+
+
+def _off(body: Body, true: Body) -> list[float]:
+    """Return by how many percent stature and limbs are off."""
+    limbs = [[BONES.index(bone) for bone in bones] for bones in LIMBS.values()]
+    lengths, others = ([one.stature, *(one.skeleton.lengths[limb].sum() for limb in limbs)] for one in (body, true))
+    return [100.0 * abs(length / other - 1.0) for length, other in zip(lengths, others, strict=True)]
+
+
+def builds_lines(told: dict[str, Any]) -> Iterator[str]:
+    """Yield the table as it is printed."""
+    for setup, rows in told["percent_off"].items():
+        for label, parts in rows.items():
+            figures = [f"{part} {one['mean']:.1f} (at most {one['most']:.1f})" for part, one in parts.items()]
+            yield f"{setup:22} {label:8} % off: {', '.join(figures)}"

@@ -1,0 +1,165 @@
+"""How fast is a GPU, and does it count the same? Beside the CPU in the same run: `posefit bench --device cuda`."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.box import draw_population
+from posefit.fitting.optimiser import minimise
+from posefit.fitting.problem import PoseProblem
+from posefit.silhouette.cost import areas
+from posefit.silhouette.cuda.device import check_device
+from posefit.silhouette.cuda.moving import moved_to
+from posefit.sweep.command import cores
+from posefit_reproduce.bench.kernel import bench_problem
+from posefit_reproduce.bench.many import seen_at
+from posefit_reproduce.bench.processor import processor
+from posefit_swarm.sapso import SAPSO
+
+SIZES = ((320, 240), (1280, 720))
+POSES = (40, 4_000, 400_000)
+FRAME = (10_000, 9)  # particles and iterations: 100,000 evaluations with the first population
+DRAWN = 4_000  # to draw proposals that are poses takes long
+ROUNDS = 5  # of all jobs in turn; of each, the fastest run counts
+
+
+def device_figures(
+    device: str, sizes: Sequence[tuple[int, int]] = SIZES, poses: Sequence[int] = POSES, frame: tuple[int, int] = FRAME
+) -> dict[str, Any]:
+    """Return poses a second on a device and on the CPU, whether both count the same, a large frame, and memory.
+
+    Of every size and number of poses: `cpu_per_second` on all threads; on the device `proposals_per_second`, decoded
+    there; `poses_per_second`, which come from the CPU; and `resident_per_second`, which are there already, areas copied
+    back in all of them. `differing` are poses whose areas are not the CPU's, and `off_by` the most pixels of one.
+    """
+    check_device(device)
+    cases = [_case(seen_at(bench_problem(cores()), size), device, count) for size in sizes for count in poses]
+    return {
+        "cases": cases,
+        "frame": _frame(bench_problem(cores()), device, *frame),
+        "megabytes_held": _megabytes(),
+        "gpu": _name(),
+        "cpu": processor(),
+        "threads": cores(),
+    }
+
+
+def device_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what `device_figures` found as lines of text."""
+    yield f"{figures['gpu']} beside {figures['threads']} threads of {figures['cpu']}"
+    names = ("cpu", "proposals", "poses", "resident")
+    yield f"{'size':>10} {'poses':>8} " + " ".join(f"{name + ' /s':>13}" for name in names) + "  areas"
+    for case in figures["cases"]:
+        same = "equal" if not case["differing"] else f"{case['differing']} differ, by {case['off_by']} pixels at most"
+        rates = " ".join(f"{case[f'{name}_per_second']:13,.0f}" for name in names)
+        yield f"{case['size']:>10} {case['poses']:8,} {rates}  {same}"
+    frame = figures["frame"]
+    yield f"a frame of {frame['evaluations']:,} evaluations: {frame['ms']:.1f} ms, {frame['cpu_ms']:.1f} ms on the CPU"
+    yield f"memory of the GPU in use: {figures['megabytes_held']:,.0f} MB"
+
+
+def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
+    proposals = _proposals(problem, count)
+    poses, places = problem.decode(proposals)
+    there = _on(problem, device)
+    body, camera, seen = there.body, there.cameras[0], there.silhouettes[0]
+    resident = _resident(there, poses, places)
+    jobs: dict[str, Callable[[], object]] = {
+        "cpu": lambda: problem.areas(poses, places),
+        "proposals": lambda: there.evaluate(proposals),
+        "poses": lambda: areas(body, camera, seen, poses, places),
+        "resident": resident,
+    }
+    seconds = _fastest(jobs)
+    expected, found = problem.areas(poses, places)[0], areas(body, camera, seen, poses, places)
+    away = np.abs(found - expected).max(axis=1)
+    off = np.abs(there.evaluate(proposals) - problem.evaluate(proposals))
+    return {
+        "size": "x".join(map(str, seen.size)),
+        "poses": count,
+        **{f"{name}_per_second": count / took for name, took in seconds.items()},
+        "equal": not away.any(),
+        "differing": int(np.count_nonzero(away)),
+        "off_by": int(away.max()),
+        "proposals_differing": int(np.count_nonzero(off)),
+    }
+
+
+def _proposals(problem: PoseProblem, count: int) -> Array:
+    """Return so many proposals (count, d) that are poses, or so near to one that they are seen as it is."""
+    rng = np.random.default_rng(0)
+    drawn = draw_population(problem.space, rng, min(count, DRAWN))
+    return np.ascontiguousarray(np.resize(drawn, (count, drawn.shape[1])) + rng.normal(0.0, 1e-3, (count, 1)))
+
+
+def _on(problem: PoseProblem, device: str) -> PoseProblem:
+    return replace(problem, silhouettes=[moved_to(one, device) for one in problem.silhouettes])
+
+
+def _resident(problem: PoseProblem, poses: Any, places: Any) -> Callable[[], object]:
+    """Return what counts poses that lie on the device already, as a library of them does, and copies their areas."""
+    from numba import cuda
+
+    from posefit.silhouette.cuda.counted import launched
+    from posefit.silhouette.cuda.held import drawing_on_device
+
+    drawing = drawing_on_device(problem.body, problem.cameras[0], problem.silhouettes)
+    there, where = cuda.to_device(poses), cuda.to_device(places)
+    return lambda: launched(drawing, there, where, 1).copy_to_host()
+
+
+def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -> dict[str, Any]:
+    """Return the milliseconds of a search of one frame by SAPSO, its own share and the CPU's time of the same."""
+    there = _on(problem, device)
+
+    def search(where: PoseProblem) -> float:
+        optimiser = SAPSO(where.space, np.random.default_rng(0), population_size=particles, iterations=iterations)
+        return minimise(where.evaluate, optimiser, particles * (iterations + 1), told=True).cost
+
+    costs = {name: search(where) for name, where in (("device", there), ("cpu", problem))}
+    seconds = _fastest({"device": lambda: search(there), "cpu": lambda: search(problem)})
+    return {
+        "evaluations": particles * (iterations + 1),
+        "ms": 1e3 * seconds["device"],
+        "cpu_ms": 1e3 * seconds["cpu"],
+        "evaluations_ms": 1e3 * _evaluations(there, particles, iterations + 1),
+        "cost": costs["device"],
+        "cpu_cost": costs["cpu"],
+    }
+
+
+def _evaluations(problem: PoseProblem, particles: int, populations: int) -> float:
+    """Return the seconds of as many populations without an optimiser that makes them."""
+    proposals = _proposals(problem, particles)
+    return populations * _fastest({"evaluate": lambda: problem.evaluate(proposals)})["evaluate"]
+
+
+def _fastest(jobs: Mapping[str, Callable[[], object]]) -> dict[str, float]:
+    """Return the fastest run of each job in seconds. They take turns; the first one compiles, and does not count."""
+    seconds = dict.fromkeys(jobs, np.inf)
+    for job in jobs.values():
+        job()
+    for _ in range(ROUNDS):
+        for name, job in jobs.items():
+            began = time.perf_counter()
+            job()
+            seconds[name] = min(seconds[name], time.perf_counter() - began)
+    return seconds
+
+
+def _megabytes() -> float:
+    from numba import cuda
+
+    free, total = cuda.current_context().get_memory_info()
+    return float(total - free) / 1e6
+
+
+def _name() -> str:
+    from numba import cuda
+
+    name = cuda.get_current_device().name
+    return name.decode() if isinstance(name, bytes) else str(name)

@@ -1,0 +1,171 @@
+"""What the SAPSO paper claims, and whether the repeated experiments bear it out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.statistics.ranks import LEVEL, holm, wilcoxon
+from posefit.tracking.measures import BASELINES
+from posefit_reproduce.sapso.design import METHODS
+from posefit_reproduce.sapso.first_frame import compact_space
+from posefit_reproduce.sapso.motions import LABELS
+from posefit_reproduce.sapso.numbers import CONVERGED, SMALL_DEGREES, TABLE_2, VARIANCE
+from posefit_reproduce.sapso.results import PaperResults
+
+FALLEN = 0.95  # share of the fall of the cost at which a search counts as converged; the paper gives no measure
+SWAPPED = 0.01  # share of frames with left and right swapped that still counts as none
+
+Verdict = Literal["confirmed", "not confirmed", "not contradicted", "the opposite holds", "undecided"]
+
+
+@dataclass(frozen=True)
+class PaperClaim:
+    """A sentence, and what speaks for it or against it."""
+
+    text: str
+    source: str  # where the paper says so; "" where it does not
+    verdict: Verdict
+    evidence: str
+
+
+@dataclass(frozen=True)
+class _Pair:
+    text: str
+    source: str
+    unit: str
+    errors: Array  # (2, views, seeds), of the one that is claimed to be lower, and of the other
+
+
+def paper_claims(results: PaperResults) -> list[PaperClaim]:
+    """Return every claim with its evidence: the paper's first, those that a paired test can judge before the others."""
+    pairs = [pair for motion in TABLE_2 for pair in _paired(results, motion)]
+    return [
+        *_judged([pair for pair in pairs if pair.source]),
+        *_compactness(results),
+        *_convergence(results),
+        *_small(results),
+        *_sides(results),
+        *_judged([pair for pair in pairs if not pair.source]),
+    ]
+
+
+def _judged(pairs: Sequence[_Pair]) -> list[PaperClaim]:
+    """Return the claims of pairs that are adjusted for each other."""
+    tests = [wilcoxon(pair.errors)[0] for pair in pairs]
+    return [
+        PaperClaim(
+            pair.text,
+            pair.source,
+            _judgement(test.difference, p, pair.errors[0].size, len(pairs)),
+            f"median difference {test.difference:+.3g} {pair.unit}, Wilcoxon p = {test.p_value:.2g}, "
+            f"{p:.3g} after Holm for {len(pairs)} tests, {_counted(pair.errors[0].size, len(pairs))}",
+        )
+        for pair, test, p in zip(pairs, tests, holm([test.p_value for test in tests]), strict=True)
+    ]
+
+
+def _judgement(difference: float, p: float, pairs: int, tests: int) -> Verdict:
+    if not _enough(pairs, tests):
+        return "undecided"
+    if p >= LEVEL or not difference:
+        return "not confirmed"
+    return "confirmed" if difference < 0.0 else "the opposite holds"
+
+
+def _enough(pairs: int, tests: int) -> bool:
+    """Return whether so many pairs can confirm anything: all signed ranks of one sign, and Holm's largest factor."""
+    return 2.0 ** (1 - pairs) * tests < LEVEL
+
+
+def _counted(pairs: int, tests: int) -> str:
+    return f"{pairs} pairs" + ("" if _enough(pairs, tests) else ", too few to confirm anything")
+
+
+def _told(good: bool) -> Verdict:
+    return "confirmed" if good else "not confirmed"
+
+
+def _paired(results: PaperResults, motion: str) -> list[_Pair]:
+    where = f"on the {LABELS[motion]}"
+
+    def error(lower: str, other: str, source: str) -> _Pair:
+        blocks = np.array([results.errors(motion, name).mean(axis=2) for name in (lower, other)])
+        return _Pair(f"{_label(lower)} errs less than {_label(other)} {where}", source, "degrees", blocks)
+
+    shape = 2, len(results.scale.views), results.seeds
+    slow, fast = "sapso@full", "sapso@pca"
+    seconds = np.array([[run.seconds for run in results.of(motion, name)] for name in (fast, slow)]).reshape(shape)
+    return [
+        error("sapso@full", "particle@full", "table 2"),
+        error("sapso@pca", "sapso@full", "table 2"),
+        _Pair(f"{_label(fast)} takes less time than {_label(slow)} {where}", "table 2", "ms", 1e3 * seconds),
+        error("sapso@pca", "pso@pca", ""),
+        error("sapso@pca", "particle@pca", ""),
+        *(error("sapso@pca", name, "") for name in BASELINES),
+    ]
+
+
+def _label(name: str) -> str:
+    return METHODS[name].label if name in METHODS else f"the {BASELINES[name]}"
+
+
+def _compactness(results: PaperResults) -> list[PaperClaim]:
+    shares = {motion: float(compact_space(results.motions[motion]).explained.sum()) for motion in TABLE_2}
+    told = ", ".join(f"{100 * share:.1f} % of the {LABELS[motion]}" for motion, share in shares.items())
+    sentence = f"six components keep {100 * VARIANCE:.0f} % of the variance"
+    return [PaperClaim(sentence, "section 2.1", _told(min(shares.values()) >= VARIANCE), told)]
+
+
+def _convergence(results: PaperResults) -> list[PaperClaim]:
+    histories = np.array(list(results.histories.values()))  # (runs, swarms, iterations + 1)
+    at = min(CONVERGED, histories.shape[2] - 1)
+    fall = histories[:, :, 0] - histories[:, :, -1]
+    done = np.median((histories[:, :, 0] - histories[:, :, at]) / np.maximum(fall, np.finfo(float).tiny), axis=0)
+    swarms = results.scale.swarms
+    told = ", ".join(f"{100 * share:.0f} % with N = {count}" for count, share in zip(swarms, done, strict=True))
+    ends = histories[:, [0, -1], -1].T[:, None]  # the least and the most particles
+    test = wilcoxon(ends)[0]
+    middle = np.median(ends[:, 0], axis=1)
+    return [
+        PaperClaim(
+            f"the cost has converged after {at} iterations, {100 * FALLEN:.0f} % of its fall done",
+            "figure 6",
+            _told(bool((done >= FALLEN).all())),
+            f"median share of the fall done: {told}",
+        ),
+        PaperClaim(
+            "the number of particles matters little",
+            "figure 6",
+            "not contradicted" if test.p_value >= LEVEL else "not confirmed",
+            f"median of the last cost {middle[0]:.2f} with N = {swarms[0]}, {middle[1]:.2f} with N = {swarms[-1]}; "
+            f"Wilcoxon p = {test.p_value:.2g}, {ends.shape[2]} pairs",
+        ),
+    ]
+
+
+def _small(results: PaperResults) -> list[PaperClaim]:
+    found = []
+    for motion, one in results.motions.items():
+        free = one.test.skeleton.free
+        ours, mean = (results.angle_errors(motion, name)[free] < SMALL_DEGREES for name in ("sapso@pca", "mean_pose"))
+        found.append(
+            PaperClaim(
+                f"most dimensions err by less than {SMALL_DEGREES:.0f} degrees on the {LABELS[motion]}",
+                "figure 7",
+                _told(ours.mean() > 0.5),
+                f"{ours.sum()} of the {free.sum()} free angles; of the mean training pose {mean.sum()}",
+            )
+        )
+    return found
+
+
+def _sides(results: PaperResults) -> list[PaperClaim]:
+    shares = {motion: np.mean([run.swapped for run in results.of(motion, "sapso@pca")]) for motion in results.motions}
+    told = ", ".join(f"{100 * share:.0f} % of the frames of the {LABELS[motion]}" for motion, share in shares.items())
+    good = bool(max(shares.values()) <= SWAPPED)
+    return [
+        PaperClaim("left and right are never taken for each other", "section 5.3", _told(good), f"swapped in {told}")
+    ]

@@ -1,0 +1,174 @@
+"""The figures of the SAPSO paper, made anew: 3 and 4 the compact space, 5 and 6 one search, 7 and 9 errors."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
+from posefit_reproduce.sapso.design import METHODS, PAPER
+from posefit_reproduce.sapso.first_frame import WatchedSwarm, compact_space, watched_swarm
+from posefit_reproduce.sapso.motions import LABELS
+from posefit_reproduce.sapso.numbers import CONVERGED, SHOWN_ITERATIONS, SHOWN_PARTICLES, SMALL_DEGREES
+from posefit_reproduce.sapso.results import PaperResults
+
+# Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers too
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MOTIONS = ("walk", "run")
+_DIM = "0.55"
+
+
+def paper_figures(results: PaperResults, folder: Path) -> list[str]:
+    """Write the figures to a folder that is there, and return the names of the files."""
+    figures = {
+        "figure-3-latents.png": latent_figure(results),
+        "figure-4-clusters.png": cluster_figure(results),
+        "figure-5-swarm.png": swarm_figure(watched_swarm(results.motions["walk"], results.scale, SHOWN_PARTICLES)),
+        "figure-6-convergence.png": lowest_cost_figure(results),
+        "figure-7-dimensions.png": dimension_figure(results),
+        "figure-9-frames.png": frame_figure(results),
+    }
+    for name, figure in figures.items():
+        figure.savefig(folder / name, dpi=130)
+    return list(figures)
+
+
+def latent_figure(results: PaperResults) -> Figure:
+    """Return the first three latents of the training poses, a colour a clip."""
+    figure = Figure(figsize=(10.0, 4.8), layout="constrained")
+    for k, motion in enumerate(MOTIONS):
+        followed = results.motions[motion]
+        prior, axes = compact_space(followed), _space(figure, k)
+        for clip, colour in zip(followed.training, COLOURS, strict=False):
+            points = prior.transform(clip.poses[:, 3:])
+            axes.plot(*points[:, :3].T, ".-", color=colour, markersize=3, linewidth=0.4, label=clip.name)
+        kept = 100.0 * prior.explained
+        axes.set_title(
+            f"{LABELS[motion]}: {kept[:3].sum():.0f} % of the variance, six keep {kept.sum():.1f} %", fontsize=9
+        )
+        axes.legend(fontsize=7, frameon=False)
+    return figure
+
+
+def cluster_figure(results: PaperResults) -> Figure:
+    """Return the training poses by their nearest centre of K-means, with the centres."""
+    figure = Figure(figsize=(10.0, 4.8), layout="constrained")
+    for k, motion in enumerate(MOTIONS):
+        followed = results.motions[motion]
+        prior, axes = compact_space(followed), _space(figure, k)
+        points = prior.transform(followed.angles)
+        away = np.abs(points[:, None] - prior.centres).mean(axis=2)
+        for one, colour in zip(range(len(prior.centres)), COLOURS, strict=False):
+            axes.plot(*points[away.argmin(axis=1) == one, :3].T, ".", color=colour, markersize=3)
+            axes.plot(*prior.centres[one, :3, None], "*", color=colour, markersize=13, markeredgecolor="black")
+        within = 100.0 * (away.min(axis=1) < prior.reach).mean()
+        axes.set_title(f"{LABELS[motion]}: K = {len(prior.centres)}, {within:.0f} % of the poses valid", fontsize=9)
+    return figure
+
+
+def _space(figure: Figure, k: int) -> Any:
+    axes: Any = figure.add_subplot(1, len(MOTIONS), k + 1, projection="3d")
+    axes.set(xlabel="latent 1", ylabel="latent 2", zlabel="latent 3")
+    axes.tick_params(labelsize=7)
+    axes.set_box_aspect(None, zoom=0.88)  # else the last label is cut
+    return axes
+
+
+def swarm_figure(seen: WatchedSwarm) -> Figure:
+    """Return the silhouette, and on it the bones of all particles after some iterations; the best in colour."""
+    scene, shown = seen.scene, [k for k in SHOWN_ITERATIONS if k < len(seen.poses)]
+    camera, mask = scene.cameras[0], scene.observations[0].silhouettes[0].mask
+    figure = Figure(figsize=(12.5, 3.1), layout="constrained")
+    panels: Any = figure.subplots(1, 1 + len(shown), squeeze=False)[0]
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    side = 0.62 * max(np.ptp(rows), np.ptp(columns))
+    for axes in panels:
+        axes.imshow(
+            np.where(mask, 0.75, 1.0), cmap="gray", vmin=0.0, vmax=1.0, extent=(0, mask.shape[1], mask.shape[0], 0)
+        )
+        axes.set(xlim=columns.mean() + np.array([-side, side]), ylim=rows.mean() + np.array([side, -side]))
+        axes.set(xticks=[], yticks=[])
+    panels[0].set_title("silhouette", fontsize=9)
+    for axes, k in zip(panels[1:], shown, strict=True):
+        bones = _bones(camera.project(scene.body.skeleton.joints(seen.poses[k], seen.translations[k]))[0])
+        axes.add_collection(LineCollection([*bones.reshape(-1, 2, 2)], colors="black", linewidths=0.5, alpha=0.12))
+        axes.add_collection(LineCollection([*bones[seen.best[k]]], colors=COLOURS[1], linewidths=1.4))
+        axes.set_title(f"iteration {k}, N = {len(bones)}\nlowest cost so far {seen.history[k]:.1f}", fontsize=9)
+    return figure
+
+
+def _bones(pixels: Array) -> Array:
+    """Return the ends (n, 26, 2, 2) of bones whose joints are at pixels (n, 27, 2)."""
+    return np.stack([pixels[:, list(PARENTS[1:])], pixels[:, 1:]], axis=2)
+
+
+def lowest_cost_figure(results: PaperResults) -> Figure:
+    """Return the lowest cost against the iteration in the first frame, for each N: medians over runs."""
+    figure = Figure(figsize=(10.0, 3.8), layout="constrained")
+    panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)
+    for axes, motion in zip(panels, MOTIONS, strict=True):
+        found = np.array([history for key, history in results.histories.items() if key[0] == motion])
+        for k, count in enumerate(results.scale.swarms):
+            _band(axes, found[:, k], COLOURS[k], f"N = {count}")
+        axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
+        axes.set(xlabel="iteration", ylim=(0.0, None), title=f"{LABELS[motion]}, first frame, {len(found)} runs")
+        _plain(axes)
+    panels[0].set_ylabel("lowest cost")
+    panels[-1].legend(fontsize=8, frameon=False)
+    return figure
+
+
+def dimension_figure(results: PaperResults) -> Figure:
+    """Return the error of each angle, of PCA + SAPSO and of the mean training pose."""
+    names = ["root", *(JOINTS[joint] for joint in INNER)]
+    figure = Figure(figsize=(12.0, 7.5), layout="constrained")
+    panels: Any = figure.subplots(len(results.motions), 1, sharex=True)
+    for axes, motion in zip(panels, results.motions, strict=True):
+        for name, style in (("sapso@pca", "bars"), ("mean_pose", "marks")):
+            away = results.angle_errors(motion, name)
+            where = np.arange(len(away))
+            if style == "bars":
+                axes.bar(where, away, color=COLOURS[0], label=METHODS[name].label)
+            else:
+                axes.plot(where, away, "_", color=COLOURS[1], markersize=7, label="mean training pose, true root")
+        axes.axhline(SMALL_DEGREES, color=_DIM, linewidth=0.8, linestyle=":")
+        axes.set(ylabel="degrees", xlim=(-1, len(away)), title=LABELS[motion])
+        for k in range(3, len(away), 3):
+            axes.axvline(k - 0.5, color="0.92", linewidth=0.8, zorder=0)
+        _plain(axes)
+    panels[0].legend(fontsize=8, frameon=False)
+    panels[-1].set_xticks(3 * np.arange(len(names)) + 1, names, rotation=60, ha="right", fontsize=8)
+    panels[-1].tick_params(axis="x", length=0)
+    return figure
+
+
+def frame_figure(results: PaperResults) -> Figure:
+    """Return the error of each frame of the paper's three methods: medians over views and seeds, middle halves."""
+    figure = Figure(figsize=(10.0, 6.4), layout="constrained")
+    panels: Any = figure.subplots(len(MOTIONS), 1)
+    for axes, motion in zip(panels, MOTIONS, strict=True):
+        for name, colour in zip(PAPER, COLOURS[1::-1] + COLOURS[2:], strict=False):
+            errors = results.errors(motion, name)
+            _band(axes, errors.reshape(-1, errors.shape[2]), colour, METHODS[name].label)
+        mean = results.errors(motion, "mean_pose")[0, 0]
+        axes.plot(mean, color=_DIM, linewidth=1.0, linestyle="--", label="mean training pose, true root")
+        axes.set(ylabel="error, degrees", ylim=(0.0, None), title=LABELS[motion], xlim=(0, len(mean) - 1))
+        _plain(axes)
+    panels[0].legend(fontsize=8, frameon=False, ncols=4)
+    panels[-1].set_xlabel("frame")
+    return figure
+
+
+def _band(axes: Any, rows: Array, colour: str, label: str) -> None:
+    """Draw the median of rows (n, T), and their middle half."""
+    low, middle, high = np.quantile(rows, [0.25, 0.5, 0.75], axis=0)
+    axes.plot(middle, color=colour, linewidth=1.3, label=label)
+    axes.fill_between(np.arange(len(middle)), low, high, color=colour, alpha=0.15, linewidth=0)
+
+
+def _plain(axes: Any) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.title.set_fontsize(9)

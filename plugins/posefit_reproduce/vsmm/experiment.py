@@ -1,0 +1,125 @@
+"""The experiment of the VSMM patent: model probabilities, joint errors and switches, over seeds.
+
+The film is made for the occasion, by noise and a mean background, and what counts is which models are in force in each
+frame. A cell says and keeps none of it, so the runs are jobs; see `posefit_reproduce.grid`.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from posefit.arrays import Array
+from posefit.fitting import metrics
+from posefit.fitting.tracker import Frame, Task
+from posefit.geometry.skeleton import JOINTS
+from posefit.motion import built_in
+from posefit.tracking.method import Choice, prepare
+from posefit_reproduce.grid import Progress, check_seeds, each
+from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
+from posefit_reproduce.vsmm.switches import switching_figures
+from posefit_reproduce.vsmm.told import told_by
+
+# What is compared, by the name under which the figures are given.
+METHODS: dict[str, Choice] = {
+    "vsmm": Choice(tracker="vsmm"),
+    "imm_all_six": Choice(tracker="vsmm", tracker_settings={"structure": "all"}),
+}
+SEARCHES: dict[str, Choice] = {
+    "sapso_loose": Choice(optimiser="sapso", prior="loose"),
+    "sapso_pca": Choice(optimiser="sapso", prior="pca"),
+    "sapso_vsmm": Choice(tracker="sapso+vsmm"),
+}
+SHOWN = 0  # the seed that is drawn
+WORKERS = 1  # what a frame takes is measured, so nothing runs beside it
+ELBOW, HAND = JOINTS.index("rhumerus"), JOINTS.index("rwrist")  # the joints that end in elbow and hand
+
+
+@dataclass(frozen=True, eq=False)
+class PatentTrack:
+    """One method on the film of one seed."""
+
+    frames: Sequence[Frame] = field(repr=False)
+    figures: dict[str, Any]
+
+
+def follow_film(choice: Choice, seed: int) -> PatentTrack:
+    """Follow the film of a seed with a method and return what it is worth; the first pose is not known."""
+    seen = film_of(seed)
+    task = Task(
+        seen.body,
+        [seen.camera],
+        choice.budget(),
+        float(seen.truth.poses[0, 0]),
+        seen.truth.translations[0],
+        "aligned",
+        seen.truth.fps,
+        [built_in.motion(one) for one in TRAINING],
+    )
+    with threadpool_limits(1):
+        frames = list(prepare(choice, task).tracker(task).track(seen.observations, np.random.default_rng(seed)))
+    return PatentTrack(frames, {**patent_errors(seen, frames), **switching_figures(seen, told_by(frames))})
+
+
+def both_joints(seen: Film, frames: Sequence[Frame]) -> tuple[Array, Array]:
+    """Return the true and the found joints (T, 27, 3) in metres."""
+    skeleton = seen.body.skeleton
+    found = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
+    return skeleton.joints(seen.truth.poses, seen.truth.translations), skeleton.joints(*found)
+
+
+def projected_cm(seen: Film, truth: Array, found: Array) -> Array:
+    """Return how far found joints are from the true ones in the image, in centimetres at the true one's depth."""
+    (pixels, depths), (others, _) = seen.camera.project(truth), seen.camera.project(found)
+    return np.asarray(100.0 * np.linalg.norm((pixels - others) / seen.camera.focal, axis=-1) * depths)
+
+
+def patent_errors(seen: Film, frames: Sequence[Frame]) -> dict[str, float]:
+    """Return the errors of right elbow and hand, in the image and in space, and of the whole pose."""
+    truth, found = both_joints(seen, frames)
+    flat, deep = projected_cm(seen, truth, found), 100.0 * np.linalg.norm(truth - found, axis=-1)
+    poses = np.array([frame.pose for frame in frames])
+    return {
+        "elbow_cm": float(flat[:, ELBOW].mean()),
+        "hand_cm": float(flat[:, HAND].mean()),
+        "elbow_3d_cm": float(deep[:, ELBOW].mean()),
+        "hand_3d_cm": float(deep[:, HAND].mean()),
+        "projected_cm": float(flat.mean()),
+        "joints_3d_cm": float(deep.mean()),
+        "mpjpe_mm": float(metrics.mpjpe_mm(truth, found).mean()),
+        "error_degrees": float(metrics.pose_error_degrees(seen.truth.poses, poses).mean()),
+        "iou": float(np.mean([metrics.iou(frame.areas)[0] for frame in frames])),
+        "frame_ms": 1e3 * float(np.median([frame.seconds for frame in frames])),
+    }
+
+
+def over_seeds(rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the mean of each figure over seeds, and `per_seed` the rows themselves."""
+    found = list(rows)
+    single = [name for name, value in found[0].items() if not isinstance(value, list)]
+    return {**{name: float(np.mean([row[name] for row in found])) for name in single}, "per_seed": found}
+
+
+def repeat_patent(
+    seeds: int, searches: bool, workers: int = WORKERS, progress: Progress | None = None
+) -> tuple[dict[str, Any], PatentTrack]:
+    """Return the figures, those of `vsmm` outermost and each other method's under its name; and what `vsmm` did first.
+
+    Raises ValueError where seeds is no positive number.
+    """
+    check_seeds(seeds)
+    methods = METHODS | (SEARCHES if searches else {})
+    jobs = {(seed, name): partial(_followed, methods[name], seed) for seed in range(seeds) for name in methods}
+    found = each(jobs, workers, progress)
+    figures = {name: over_seeds(found[seed, name].figures for seed in range(seeds)) for name in methods}
+    outer = figures.pop("vsmm")
+    return {"seeds": seeds, **outer, **figures}, found[SHOWN, "vsmm"]
+
+
+def _followed(choice: Choice, seed: int) -> PatentTrack:
+    """Return a track, without its frames where nobody will look at them."""
+    found = follow_film(choice, seed)
+    return found if seed == SHOWN else replace(found, frames=())

@@ -1,0 +1,127 @@
+"""`posefit bench`: what it tells, and what is timed."""
+
+import json
+import platform
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from posefit.arrays import Array
+from posefit.cli import main
+from posefit.fitting.optimiser import minimise
+from posefit.fitting.problem import PoseProblem
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
+from posefit_reproduce.bench import device, experiment, optimisers, timing
+from posefit_reproduce.bench.kernel import bench_problem, opencv_costs
+from posefit_reproduce.bench.optimisers import Stopwatch, wide_space
+from posefit_reproduce.bench.processor import instructions, processor
+
+
+class Line:
+    """Proposes the same three points for ever."""
+
+    def __init__(self) -> None:
+        self.told = 0
+
+    def ask(self) -> Array:
+        return np.zeros((3, 2))
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        self.told += len(costs)
+
+
+def test_a_stopwatch_ends_a_search_after_its_populations() -> None:
+    line = Line()
+    watch = Stopwatch(line, 4)
+    found = minimise(lambda proposals: np.ones(len(proposals)), watch, 10**9, told=True)
+    assert (found.evaluations, watch.proposals, line.told) == (12, 12, 12)
+    assert watch.seconds > 0.0
+
+
+def test_the_wide_space_has_28_dimensions() -> None:
+    assert wide_space(bench_problem().space).dimensions == 28
+
+
+@pytest.mark.slow
+def test_following_is_timed_and_weighed() -> None:
+    found = CliRunner().invoke(main, ["bench", "--follow", "3", "--json"])
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert told["frames"] == 3
+    assert 0.0 < told["ms"] <= told["slowest_ms"]
+    assert 0.0 < told["mb"] <= told["mb_end"]
+
+
+@pytest.mark.parametrize("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])
+def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tuple[float, float]) -> None:
+    usual = bench_problem()
+    camera = replace(usual.cameras[0], focal=usual.cameras[0].focal * stretch)
+    proposals = np.random.default_rng(0).uniform(-0.3, 0.3, (50, usual.space.dimensions))
+    poses, translations = usual.decode(proposals[:1])
+    seen = Silhouette.of(project(usual.body, camera, poses[0], translations[0]))
+    problem = PoseProblem(usual.body, [camera], [seen], usual.space)
+    ours, theirs = problem.evaluate(proposals), opencv_costs(problem, proposals)
+    # OpenCV also sets the pixels that a border merely touches, a ring of half a pixel around limbs 10 pixels wide
+    assert ours[0] == 0.0
+    assert theirs[0] < 4.0
+    assert np.abs(ours - theirs).mean() < 1.0
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names are of x86-64")
+def test_the_instructions_of_a_named_processor_are_told() -> None:
+    # the levels of the x86-64 psABI: v2 has SSE4.2, v3 AVX2, v4 AVX-512
+    levels = {"x86-64": "SSE2", "x86-64-v2": "SSE4", "sandybridge": "AVX", "x86-64-v3": "AVX2", "x86-64-v4": "AVX-512"}
+    assert {name: instructions(name) for name in levels} == levels
+    assert instructions("x86-64-v4", "-avx512f") == "AVX2"
+    assert set(processor()) == {"name", "compiled_for", "features"}
+
+
+@pytest.mark.slow
+def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "ROUNDS", 1)
+    monkeypatch.setattr(timing, "TURN", 1e-6)
+    monkeypatch.setattr(optimisers, "SEARCHES", 1)
+    monkeypatch.setattr(optimisers, "POPULATIONS", 10)
+    monkeypatch.setattr(experiment, "SEEDS", 1)
+    result = CliRunner().invoke(main, ["bench", "--threads", "1", "--json"])
+    assert result.exit_code == 0, result.output
+    figures = json.loads(result.stdout)
+    assert {"sapso", "pso", "random", "cma", "particle", "scipy:dual_annealing"} <= set(figures["optimisers"])
+    for group in ("many", "optimisers", "optimisers_28"):
+        assert all(us > 0.0 for us in figures[group].values()), group
+    assert {"fit_shared", "track_each", "configure_each", "fit_learning"} <= set(figures["vector_env"])
+    # the same silhouettes but for their edges
+    assert figures["mean_cost_difference_to_opencv"] < 1.0
+
+
+def test_mistakes_are_one_line_before_anything_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+    for words in ("--follow 9 --threads 2", "--device cuda --threads 2", "--device cuda --follow 1"):
+        done = CliRunner().invoke(main, ["bench", *words.split()])
+        assert (done.exit_code, done.stdout) == (2, ""), words
+        assert "must have one of --threads, --follow and --device, got" in done.stderr
+    for words in ("--threads 0", "--follow 0", "--device tpu"):
+        assert CliRunner().invoke(main, ["bench", *words.split()]).exit_code == 2, words
+    if platform.machine() in ("x86_64", "AMD64"):
+        for name in ("nonsense", "pentium3"):  # the other is LLVM's, and has 32 bits
+            monkeypatch.setenv("NUMBA_CPU_NAME", name)
+            done = CliRunner().invoke(main, ["bench"])
+            assert done.stderr == f"posefit: NUMBA_CPU_NAME must name a processor of x86_64, got '{name}'\n"
+
+
+@pytest.mark.device
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_the_table_says_that_both_count_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(device, "ROUNDS", 1)
+    monkeypatch.setattr(device, "_name", lambda: "simulated")
+    figures = device.device_figures("cuda", sizes=((24, 18),), poses=(1, 2), frame=(2, 1))
+    assert [(case["poses"], case["equal"], case["proposals_differing"]) for case in figures["cases"]] == [
+        (1, True, 0),
+        (2, True, 0),
+    ]
+    assert figures["frame"]["cost"] == figures["frame"]["cpu_cost"]
+    lines = list(device.device_lines(figures))
+    assert len(lines) == 6
+    assert lines[2].endswith("  equal")

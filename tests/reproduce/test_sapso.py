@@ -1,0 +1,242 @@
+"""The repetition of the SAPSO paper's experiments: motions, baselines, and what `posefit reproduce sapso` prints."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from posefit.cli import main
+from posefit.geometry.rotation import wrapped
+from posefit.motion import built_in
+from posefit.tracking.front import track
+from posefit.tracking.measures import BASELINES
+from posefit_reproduce.sapso.design import COMPARED, METHODS, Scale
+from posefit_reproduce.sapso.experiment import baseline_poses, follow_paper
+from posefit_reproduce.sapso.first_frame import watched_swarm
+from posefit_reproduce.sapso.motions import CLIPS, PaperMotion, paper_motions, paper_scene, turned
+from posefit_reproduce.sapso.numbers import TABLE_1, TABLE_2
+from posefit_reproduce.sapso.results import TrackKey
+
+TINY = Scale(frames=4, views=(45.0,), iterations=3, swarms=(5, 10))
+FIGURES = {
+    "figure-3-latents.png",
+    "figure-4-clusters.png",
+    "figure-5-swarm.png",
+    "figure-6-convergence.png",
+    "figure-7-dimensions.png",
+    "figure-9-frames.png",
+}
+
+
+def run(*words: object) -> Result:
+    return CliRunner(env={"POSEFIT_CMU": ""}).invoke(main, ["reproduce", "sapso", *map(str, words)])
+
+
+def fails(*words: object) -> str:
+    result = run(*words)
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    lines = result.stderr.splitlines()
+    assert len(lines) == 1, result.stderr
+    return lines[0]
+
+
+@pytest.fixture(scope="module")
+def walk() -> PaperMotion:
+    return paper_motions(None, 3)["walk"]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Result]]:
+    out = tmp_path_factory.mktemp("paper") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("posefit_reproduce.sapso.design.QUICK", TINY)
+        yield out, run("--quick", "--seeds", 2, "--out", out)
+
+
+@pytest.fixture
+def told(written: tuple[Path, Result]) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((written[0] / "report.json").read_text())
+    return found
+
+
+def test_mistakes_are_one_line_and_write_nothing(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert fails("--seeds", 0, "--out", out) == "posefit: seeds must be at least 1, got 0"
+    line = fails("--clips", tmp_path / "nowhere", "--out", out)
+    assert line.startswith("posefit: clips must be a folder of CMU clips such as 16/16_15.amc, got")
+    assert "nowhere" in line
+    assert list(tmp_path.iterdir()) == []
+    out.mkdir()
+    assert "expected a new name to write to, got one that exists" in fails("--out", out)
+
+
+def test_a_folder_without_one_clip_names_it(tmp_path: Path) -> None:
+    (tmp_path / "16").mkdir()
+    (tmp_path / "16" / "16_15.amc").write_text("")
+    with pytest.raises(ValueError, match=r"such as 16/16_17\.amc"):
+        paper_motions(tmp_path, 10)
+
+
+def test_figures_need_matplotlib_and_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posefit_reproduce.sapso.report.find_spec", lambda name: None)
+    assert "pip install posefit[figures]" in fails("--out", tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_is_interrupted_leaves_nothing(tmp_path: Path) -> None:
+    from posefit_reproduce.sapso.report import paper_report
+
+    def interrupted(found: Iterator[Any], count: int) -> Iterator[Any]:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        paper_report(None, 1, TINY, tmp_path / "out", 1, interrupted)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_the_folder_holds_report_and_figures(written: tuple[Path, Result], told: dict[str, Any]) -> None:
+    out, result = written
+    assert result.exit_code == 0, result.stderr
+    assert {path.name for path in out.iterdir()} == FIGURES | {"report.json", "report.txt"}
+    assert set(told["figures"]) == FIGURES
+    assert (out / "report.txt").read_text() in result.stdout
+    for name in FIGURES:
+        assert (out / name).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_table_2_has_the_papers_numbers_ours_and_every_baseline(told: dict[str, Any]) -> None:
+    # table 2, columns walk and run
+    walk, run = told["table_2"]["walk"], told["table_2"]["run"]
+    assert list(walk["sapso@pca"]["paper"].values()) == [3.5123, 1.6324, 2.541]
+    assert list(run["particle@full"]["paper"].values()) == [4.4669, 2.0289, 4.965]
+    for motion, methods in COMPARED.items():
+        rows = told["table_2"][motion]
+        assert set(rows) == {*methods, *BASELINES}
+        assert rows["mean_pose"]["skill"] == 0.0
+    # 4 iterations of 40 particles, the first population included
+    assert walk["sapso@full"]["evaluations"] == 160
+    assert walk["particle@full"]["evaluations"] == 160
+
+
+@pytest.mark.slow
+def test_table_1_has_the_papers_mean_error(told: dict[str, Any]) -> None:
+    # by hand, walk: 1.618 + 2.059 + 5.880 + 0.505 + 3.715 + 0.189 + 0.878 + 2.774 + 2.569 + 0.800 + 3.141 + 2.936
+    rows = told["table_1"]["walk"]
+    assert rows["paper"]["error"] == pytest.approx(27.064 / 12.0)
+    assert rows["frame"] == 2
+    for name in ("sapso@pca", *BASELINES):
+        assert np.shape(rows[name]["angles"]) == (4, 3)
+        away = np.abs(np.subtract(rows[name]["angles"], rows["truth"]))
+        assert rows[name]["error"] == pytest.approx(np.minimum(away, 360.0 - away).mean())
+
+
+@pytest.mark.slow
+def test_it_says_what_was_shortened(told: dict[str, Any], written: tuple[Path, Result]) -> None:
+    assert "4 of the walk" in told["shortened"][1]
+    assert "the paper has 100 of each" in told["shortened"][1]
+    for line in told["shortened"]:
+        assert line in written[1].stdout
+
+
+@pytest.mark.slow
+def test_every_claim_of_the_paper_has_a_verdict_on_one_line(told: dict[str, Any], written: tuple[Path, Result]) -> None:
+    lines = written[1].stdout.splitlines()
+    for one in told["claims"]:
+        end = f" ({one['source']})" if one["source"] else ""
+        assert f"  {one['verdict']}: {one['text']}{end}: {one['evidence']}" in lines
+    tested = [one for one in told["claims"] if "Wilcoxon" in one["evidence"] and "after Holm" in one["evidence"]]
+    assert len(tested) == 16
+    assert all(one["verdict"] == "undecided" for one in tested)  # two pairs confirm nothing
+    assert all("too few to confirm anything" in one["evidence"] for one in tested)
+
+
+@pytest.mark.slow
+def test_json_is_one_object_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posefit_reproduce.sapso.design.QUICK", TINY)
+    result = run("--quick", "--seeds", 1, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert set(json.loads(result.stdout)) >= {"table_1", "table_2", "claims", "shortened", "seeds", "version"}
+
+
+def test_no_motion_is_learned_from_that_is_followed() -> None:
+    for motion in paper_motions(None, 2).values():
+        assert motion.test.name not in [one.name for one in motion.training]
+    for test, training in CLIPS.values():
+        assert test not in training
+
+
+def test_built_in_training_is_as_long_as_the_papers() -> None:
+    # 386 of a walk in three styles, 129 each; 198 of a run in two
+    found = paper_motions(None, 2)
+    assert [len(found[name].angles) for name in ("walk", "turn", "run")] == [387, 387, 198]
+
+
+def test_a_turned_motion_keeps_its_steps_and_ends_to_the_left() -> None:
+    straight = built_in.motion("walk", frames=50)
+    bent = turned(straight, 90.0)
+    steps, old = np.diff(bent.translations, axis=0), np.diff(straight.translations, axis=0)
+    np.testing.assert_allclose(np.linalg.norm(steps, axis=1), np.linalg.norm(old, axis=1))
+    # facing +z with y up, left is +x: a quarter turn takes (x, y, z) to (z, y, -x)
+    np.testing.assert_allclose(steps[-1], [old[-1, 2], old[-1, 1], -old[-1, 0]], atol=1e-12)
+    np.testing.assert_allclose(bent.poses[[0, -1], 0] - straight.poses[[0, -1], 0], [0.0, np.pi / 2.0])
+    np.testing.assert_array_equal(bent.poses[:, 1:], straight.poses[:, 1:])
+
+
+def test_baselines_are_what_a_track_reports(walk: PaperMotion) -> None:
+    found = track(paper_scene(walk, 45.0), train=walk.training, particles=5, iterations=1).summary["baselines_degrees"]
+    for name, poses in baseline_poses(walk, 45.0).items():
+        away = np.degrees(np.abs(wrapped(poses - walk.test.poses)))
+        assert away.mean() == pytest.approx(found[name])
+
+
+def test_a_run_is_a_track_of_the_same_seed(walk: PaperMotion) -> None:
+    found = follow_paper(walk, TrackKey("walk", "pso@pca", 45.0, 3), Scale(iterations=4))
+    again = track(
+        paper_scene(walk, 45.0),
+        train=walk.training,
+        optimiser="pso",
+        prior="pca",
+        iterations=4,
+        tracker_settings={"tilt": "box"},  # Interpretation S16
+        seed=3,
+    )
+    np.testing.assert_array_equal(found.poses, again.motion.poses)
+    assert found.evaluations == 40 * 5
+
+
+def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
+    seen = watched_swarm(walk, Scale(iterations=6), 30, seed=1)
+    assert [one.shape for one in seen.poses] == [(30, 66)] * 7
+    again = track(
+        paper_scene(walk, 45.0, (0, 1)),
+        train=walk.training,
+        particles=30,
+        iterations=6,
+        optimiser="sapso",
+        tracker_settings={"tilt": "box"},  # Interpretation S16
+        seed=1,
+    )
+    np.testing.assert_array_equal(seen.history, again.found[0].history)
+    # the best pose of all iterations is what the search found
+    best = [poses[k] for poses, k in zip(seen.poses, seen.best, strict=True)]
+    assert any(np.array_equal(one, again.motion.poses[0]) for one in best)
+
+
+def test_the_papers_tables_are_whole() -> None:
+    assert set(TABLE_1) == set(CLIPS)
+    assert all(np.shape(pair) == (2, 4, 3) for pair in TABLE_1.values())
+    assert all(set(rows) <= set(METHODS) and len(rows) == 3 for rows in TABLE_2.values())
+
+
+def test_clips_are_cut_to_the_frames_that_are_asked_for(cmu: Path) -> None:
+    found = paper_motions(cmu, 100)
+    # 16_35 has 162 frames at 120 Hz, 81 at 60 Hz, the first of which is left out
+    assert [len(found[name].test) for name in ("walk", "turn", "run")] == [100, 100, 80]
+    assert all(one.test.fps == 60.0 for one in found.values())
