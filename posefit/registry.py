@@ -1,16 +1,13 @@
 """What plugins offer, by kind and name: optimisers, priors, trackers and segmenters."""
 
-import hashlib
 import os
 import re
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 from posefit import entries, hooks
@@ -19,6 +16,7 @@ from posefit.fitting.optimiser import NextFrame, OptimiserFactory
 from posefit.fitting.prior import PriorFactory
 from posefit.fitting.tracker import TrackerFactory
 from posefit.settings import Setting, settings_of
+from posefit.version import source_digest
 
 Kind = Literal["optimiser", "prior", "tracker", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -44,9 +42,13 @@ class Offer:
 
     @property
     def origin(self) -> str:
-        """What results of it hang on: the version of its distribution, and a digest of its package's source."""
-        factory = self.factory.func if isinstance(self.factory, partial) else self.factory
-        return f"{self.distribution} {self.version} {source_digest(factory.__module__)}".rstrip()
+        """What its results depend on: its distribution with its version, and a digest of its package's source.
+
+        The packages of posefit's own plugins, which have one version, are told apart by name.
+        """
+        module = (self.factory.func if isinstance(self.factory, partial) else self.factory).__module__
+        name = module.partition(".")[0] if self.distribution == PROJECT else f"{self.distribution} {self.version}"
+        return f"{name} {source_digest(module)}".rstrip()
 
     @property
     def summary(self) -> str:
@@ -62,23 +64,6 @@ class Offer:
     def missing(self) -> str | None:
         """What to install before it can be used, if anything."""
         return None if self.needs is None or find_spec(self.needs[0]) is not None else self.needs[1]
-
-
-@lru_cache
-def source_digest(module: str) -> str:
-    """Return the first 8 digits of the SHA-256 of the Python source of the package that a loaded module is of.
-
-    Nothing where it has no file.
-    """
-    named = getattr(sys.modules[module.partition(".")[0]], "__file__", None)
-    if named is None:
-        return ""
-    path = Path(named)
-    files = sorted(path.parent.rglob("*.py")) if path.name == "__init__.py" else [path]
-    found = hashlib.sha256()
-    for file in files:
-        found.update(f"{file.relative_to(path.parent)}\0".encode() + file.read_bytes() + b"\0")
-    return found.hexdigest()[:8]
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def rows(plan: Plan, workers: int | None, ledger: str | None, say: Say) -> list[
     with nullcontext(ledger) if ledger else TemporaryDirectory() as folder:
         run: Run = run_cell
         with closing(Processes(workers or cores(), Limits(), run)) as engine:
-            tally = swept(plan.cells, folder, engine, say)
+            tally = swept(plan, folder, engine, say)
         if tally.stopped:
             again = f": the same command goes on from {ledger}" if ledger else ""
             say(f"stopped after {tally.done} of {tally.cells} runs{again}")

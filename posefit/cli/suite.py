@@ -109,7 +109,7 @@ def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     from posefit.files import check_new, check_place
     from posefit.suites.tally import score_lines, suite_scores
     from posefit.sweep.ledger import Ledger
-    from posefit.sweep.single.rows import search_runs
+    from posefit.sweep.table import search_runs
 
     if iohprofiler is not None:
         check_new(iohprofiler)

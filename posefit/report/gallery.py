@@ -9,7 +9,7 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.page.bodies import camera_seen_from, in_16_bits
 from posefit.report.runs import Runs
-from posefit.sweep.cell import Cell, cell_scene, digest_of
+from posefit.sweep.cell import TrackCell, cell_scene, digest_of
 from posefit.sweep.ledger import Ledger
 
 LARGEST = 5_500_000  # characters of all pictures together
@@ -70,7 +70,7 @@ def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> 
             if digest_of(path) != digest:
                 raise ValueError(f"{path} is another file now")
         made = cell_scene(
-            Cell(
+            TrackCell(
                 "",
                 place["motion"],
                 (),

@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import COLUMNS, FIGURES, SHOWN
 from posefit.report.repeat import LAST, command_head
-from posefit.sweep.cell import in_full, settings_text
+from posefit.sweep.cell import settings_text
 from posefit.sweep.table import is_search
 from posefit.uncertainty.calibration import BINS
 
@@ -111,7 +111,7 @@ class _Table:
         variant, begun = self.known[kind]
         place = _index(
             self.places,
-            _text({name: value for name, value in in_full(spec).items() if name not in (*_VARIANT, "seed")}),
+            _text({name: value for name, value in spec.items() if name not in (*_VARIANT, "seed")}),
         )
         if row.get("warnings"):
             self.warnings[len(self.keys)] = tuple(row["warnings"])
@@ -190,16 +190,15 @@ def _failure(lost: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _variant(spec: Mapping[str, Any]) -> str:
-    return _text({name: value for name, value in in_full(spec).items() if name in _VARIANT})
+    return _text({name: value for name, value in spec.items() if name in _VARIANT})
 
 
 def _variation(variant: Mapping[str, Any]) -> list[str]:
-    foreign = variant["version"].partition(", ")[2]
     return [
         *settings_text(variant["settings"]),
         f"{variant['evaluations']} evaluations",
         f"{variant['tracks']} {'track' if variant['tracks'] == 1 else 'tracks'}",
-        *([foreign] if foreign else []),
+        *variant["version"].split(", "),
     ]
 
 

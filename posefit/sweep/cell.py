@@ -1,16 +1,17 @@
-"""A cell: one run of a sweep, told completely by names and numbers; and what it measured."""
+"""A cell: one run of a sweep, a track or a search, described completely by names and numbers; and its result."""
 
 import hashlib
 import io
 import json
 import time
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
-from posefit.version import __version__
+from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.arrays import Array
@@ -21,26 +22,88 @@ if TYPE_CHECKING:
     from posefit.tracking.method import Choice
     from posefit.tracking.opening import Opening
 
-POINTS = 64  # of an anytime trace at most
-TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # what two runs of a cell do not have in common
-ALL_AROUND = 180.0  # degrees that a yaw may be off when nothing is told of it
-SALT = 2001  # part of the seed of what is told of a person
-DROPPED = "dropped"  # the corruption that takes whole frames away, a share of them
+MAX_TRACE_POINTS = 64
+TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
+ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
+RNG_STREAM_PERSON = 2001  # of what a method knows of the person
+DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
 UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
+# Of the two tracks, and of the shorter of two searches, from which the time of a cell is estimated
+TRIAL_FRAMES = (1, 4)
+TRIAL_EVALUATIONS = 400  # of a frame, at most
+TRIAL_SEARCH_EVALUATIONS = 200  # where a population is no larger
+TRIAL_SEARCH_FACTOR = 4  # evaluations of the longer search for each of the shorter
 
 
 @dataclass(frozen=True)
-class Cell:
-    """Everything a run depends on. `posefit.sweep.plan` makes cells that are checked.
+class CellResult:
+    """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
+
+    row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
+    joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
+
+
+class Cell(ABC):
+    """Everything that one run depends on. `posefit.sweep.plan` makes cells that are checked.
+
+    `version` is that of posefit and of the method's plugins, with digests of their sources: see `version_of`.
+    """
+
+    method: str
+    settings: Mapping[str, Any]
+    evaluations: int
+    instance: int
+    seed: int
+    version: str
+
+    @cached_property
+    def spec(self) -> dict[str, Any]:
+        """The cell as JSON holds it."""
+        spec: dict[str, Any] = json.loads(json.dumps({one.name: getattr(self, one.name) for one in fields(self)}))  # type: ignore[arg-type]
+        return spec
+
+    @cached_property
+    def key(self) -> str:
+        """The cell's name: the SHA-256 of its spec, version included, as 64 hexadecimal digits."""
+        return hashlib.sha256(json_of(self.spec).encode()).hexdigest()
+
+    @property
+    @abstractmethod
+    def summary(self) -> str:
+        """The cell in one line, with everything that it is likely to differ by from others of its plan."""
+
+    @property
+    @abstractmethod
+    def kind(self) -> tuple[object, ...]:
+        """What the time of one of its evaluations depends on."""
+
+    @property
+    @abstractmethod
+    def total_evaluations(self) -> int:
+        """Its evaluations, of all frames."""
+
+    @abstractmethod
+    def trials(self) -> tuple[Self, Self]:
+        """Return two smaller cells of its kind, the smaller first, from which its time can be estimated."""
+
+    @abstractmethod
+    def measure(self) -> CellResult:
+        """Run the cell and return its result."""
+
+
+@dataclass(frozen=True)
+class TrackCell(Cell):
+    """A motion that is tracked.
 
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
-    numbers what is seen of the motion, see `posefit.footage.instance`. `corruption` gives kinds of
-    `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames that are not seen; what is
-    spoilt follows from the instance, so that every method and seed sees the same. `tracks` is how many times the motion
-    is followed, see `posefit.tracking.tracks`. `files` holds the SHA-256 of every capture file that is read.
+    numbers what the cameras see of the motion, see `posefit.footage.instance`. `corruption` gives kinds of
+    `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames without masks; the damage
+    follows from the instance, so that it is the same for every method and seed. `tracks` is how many times the motion
+    is tracked, see `posefit.tracking.tracks`. `files` holds the SHA-256 of every capture file that is read.
 
-    Of the person a method is told where he faces at first, at most `yaw_off_degrees` off, nothing at 180; and his body,
-    each bone's length and radii at most `body_off_percent` off. Both are drawn from the instance and the motion's name.
+    Of the person a method knows where they face at first, at most `yaw_off_degrees` off, nothing at 180; and their
+    body, each bone's length and radii at most `body_off_percent` off. Both are drawn from the instance and the motion's
+    name.
     """
 
     method: str
@@ -61,97 +124,177 @@ class Cell:
     body_off_percent: float = 0.0
     seed: int = 0
     files: Mapping[str, str] = field(default_factory=dict)
-    version: str = __version__  # of posefit, and of plugins that are not its own
-
-    @cached_property
-    def spec(self) -> dict[str, Any]:
-        """The cell as JSON holds it, without fields of `LATER` that say nothing new."""
-        told = {name: value for name in FIELDS if is_told(name, value := getattr(self, name))}
-        spec: dict[str, Any] = json.loads(json.dumps(told))
-        return spec
-
-    @cached_property
-    def key(self) -> str:
-        """The cell's name: the SHA-256 of its spec, version included, as 64 hexadecimal digits."""
-        return hashlib.sha256(json_of(self.spec).encode()).hexdigest()
+    version: str = field(default_factory=posefit_build)
 
     def __str__(self) -> str:
         return f"{self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
 
+    @property
+    def summary(self) -> str:
+        """The cell in one line."""
+        more = [*settings_text(self.settings), *(f"{kind} {share:g}" for kind, share in self.corruption.items())]
+        views = ", ".join(f"{view:g}" for view in self.view_degrees)
+        return (
+            f"{self.method} on {self.motion}, view {views}, instance {self.instance}, "
+            f"seed {self.seed}{''.join(f', {one}' for one in more)}"
+        )
 
-FIELDS = tuple(one.name for one in fields(Cell))
-NAMES = tuple(sorted(FIELDS))  # in which order a key is of them
-# Fields that came after ledgers had been kept, and what a spec means that does not say them: keys stay as they were.
-LATER = {"tracks": 1, "yaw_off_degrees": 0.0, "body_off_percent": 0.0}
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What the time of a frame depends on."""
+        return self.method, str(self.settings), self.tracks, self.size, len(self.view_degrees), bool(self.corruption)
 
+    @property
+    def total_evaluations(self) -> int:
+        """The evaluations of all frames."""
+        return self.frames * self.evaluations
 
-def is_told(name: str, value: Any) -> bool:
-    """Return whether a field's value stands in the cell's spec, and so in its key."""
-    return name not in LATER or value != LATER[name]
+    def trials(self) -> tuple[Self, Self]:
+        """Return two cells of fewer frames and evaluations."""
+        evaluations = min(self.evaluations, TRIAL_EVALUATIONS)
+        short, long = (replace(self, frames=min(n, self.frames), evaluations=evaluations) for n in TRIAL_FRAMES)
+        return short, long
 
+    def measure(self) -> CellResult:
+        """Track the motion. Raises ValueError where a file has changed since it was planned."""
+        from posefit.footage.training import training_clips, training_motions
+        from posefit.tracking.measures import MEASURES
+        from posefit.tracking.run import follow
 
-def in_full(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a spec with the fields that it does not tell."""
-    return {**LATER, **spec}
+        for path, digest in self.files.items():
+            if (found := digest_of(path)) != digest:
+                raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
+        scene = cell_scene(self)
+        training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
+        options: dict[str, Any] = {"choice": _choice(self), "opening": _opening(self), "tracks": self.tracks}
+        result = follow(scene, training, seed=self.seed, **options)
+        truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
+        errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
+        row = {
+            **{name: measured[name] for name in MEASURES if name not in UNLIKE},
+            "warnings": result.summary["warnings"],
+            "evaluations_used": result.measures.evaluations,
+            "dimensions": result.summary["dimensions"],
+            "joint_errors_mm": [round(float(error), 3) for error in errors],
+            "mode_reliability": _mode_reliability(result.found, truth, result.motion.skeleton),
+            "trace": anytime_trace(result.found),
+        }
+        return CellResult(row, packed_joints(estimate=estimate, truth=truth))
 
 
 @dataclass(frozen=True)
-class CellResult:
-    """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
+class SearchCell(Cell):
+    """An optimiser that searches a problem of a suite once."""
 
-    row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
-    joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres
+    method: str
+    suite: str
+    function: int
+    dimension: int
+    instance: int
+    evaluations: int
+    settings: Mapping[str, Any] = field(default_factory=dict)  # of the optimiser
+    infeasible: str = "repair"
+    seed: int = 0
+    version: str = field(default_factory=posefit_build)
+
+    def __str__(self) -> str:
+        return f"{self.method} on f{self.function} in {self.dimension}D, instance {self.instance}, seed {self.seed}"
+
+    @property
+    def summary(self) -> str:
+        """The cell in one line."""
+        settings = "".join(f", {name}={value}" for name, value in sorted(self.settings.items()))
+        return f"{self}, {self.evaluations} evaluations{settings}"
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What the time of an evaluation depends on."""
+        return self.method, str(self.settings), self.function, self.dimension, self.infeasible
+
+    @property
+    def total_evaluations(self) -> int:
+        """The evaluations."""
+        return self.evaluations
+
+    def trials(self) -> tuple[Self, Self]:
+        """Return two searches of fewer evaluations."""
+        from posefit.registry import registry
+        from posefit.settings import population
+
+        size = population(registry().optimiser(self.method), self.settings, self.evaluations)
+        least = max(TRIAL_SEARCH_EVALUATIONS, size)
+        short, long = (
+            replace(self, evaluations=min(n, self.evaluations)) for n in (least, TRIAL_SEARCH_FACTOR * least)
+        )
+        return short, long
+
+    def measure(self) -> CellResult:
+        """Search the problem."""
+        from posefit.suites.front import suite
+        from posefit.suites.running import run_on
+
+        problem = suite(self.suite, self.function, self.instance, self.dimension, infeasible=self.infeasible)  # type: ignore[arg-type]
+        found = run_on(problem, self.method, self.settings, evaluations=self.evaluations, seed=self.seed)
+        row = {
+            "cost": found.cost,
+            "best_known": found.best_known,
+            "evaluations_used": problem.evaluations,
+            "dimensions": problem.dimension,
+            "trace": {"evaluations": [int(used) for used in found.evaluations], "cost": found.costs.tolist()},
+            "warnings": [],
+        }
+        return CellResult(row, b"")
 
 
 def run_cell(cell: Cell) -> CellResult:
-    """Return what following the cell's motion by its method measures. Raises ValueError where a file has changed.
+    """Return the result of a cell, with its key and spec.
 
-    And where this posefit, on a worker far away perhaps, is not the one whose results were asked for.
+    Raises ValueError where this posefit, on a remote worker perhaps, or one of its plugins is not the planned one.
     """
-    from posefit.footage.training import training_clips, training_motions
-    from posefit.tracking.measures import MEASURES
-    from posefit.tracking.run import follow
-
     began = time.perf_counter()
-    if (planned := cell.version.partition(",")[0]) != __version__:
-        raise ValueError(f"a worker must have posefit {planned}, got {__version__}")
-    for path, digest in cell.files.items():
-        if (found := digest_of(path)) != digest:
-            raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
-    scene = cell_scene(cell)
-    training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
-    result = follow(scene, training, choice=_choice(cell), opening=_opening(cell), seed=cell.seed, tracks=cell.tracks)
-    truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
-    errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
-    row = {
-        "key": cell.key,
-        "spec": cell.spec,
-        "status": "done",
-        **{name: measured[name] for name in MEASURES if name not in UNLIKE},
-        "warnings": result.summary["warnings"],
-        "evaluations_used": result.measures.evaluations,
-        "dimensions": result.summary["dimensions"],
-        "joint_errors_mm": [round(float(error), 3) for error in errors],
-        "mode_reliability": _mode_reliability(result.found, truth, result.motion.skeleton),
-        "trace": anytime_trace(result.found),
-        "seconds": time.perf_counter() - began,
-    }
+    for planned in cell.version.split(", "):
+        if installed := other_version(planned):
+            raise ValueError(f"a worker must have {planned}, got {installed}")
+    result = cell.measure()
+    row = {"key": cell.key, "spec": cell.spec, "status": "done", **result.row, "seconds": time.perf_counter() - began}
     try:
         json.dumps(row, allow_nan=False)
     except ValueError:
         raise ValueError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
-    return CellResult(row, packed_joints(estimate=estimate, truth=truth))
+    return replace(result, row=row)
 
 
-def cell_scene(cell: Cell) -> "Scene":
-    """Return what is seen in a cell; the same for all methods and seeds."""
+def version_of(origins: Iterable[str]) -> str:
+    """Return the version of a cell whose method comes from plugins of these origins: see `Offer.origin`."""
+    return ", ".join([posefit_build(), *sorted(set(origins))])
+
+
+def other_version(origin: str) -> str | None:
+    """Return what is installed instead of one origin of a version; None where it is this one, or is unknown here."""
+    name, installed = origin.partition(" ")[0], _installed()
+    if origin in installed:
+        return None
+    return next((one for one in installed if one.partition(" ")[0] == name), None)
+
+
+@lru_cache(maxsize=1)
+def _installed() -> frozenset[str]:
+    """Return the versions of posefit and of all plugins."""
+    from posefit.registry import registry
+
+    offers = (offer for named in registry().offers.values() for offer in named.values())
+    return frozenset([posefit_build(), *(offer.origin for offer in offers)])
+
+
+def cell_scene(cell: TrackCell) -> "Scene":
+    """Return the observations of a cell; the same for all methods and seeds."""
     from posefit.footage.instance import motion_of_instance, variation
     from posefit.footage.scene import synthetic
     from posefit.footage.spoilt import Spoilt
 
     motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
     scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
-    scene = _as_told(cell, scene)
+    scene = _with_known_person(cell, scene)
     if not cell.corruption:
         return scene
     noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
@@ -159,18 +302,20 @@ def cell_scene(cell: Cell) -> "Scene":
     return replace(scene, observations=spoilt)
 
 
-def _as_told(cell: Cell, scene: "Scene") -> "Scene":
-    """Return the scene with what a method is told of the person: about where he faces at first, and his body."""
+def _with_known_person(cell: TrackCell, scene: "Scene") -> "Scene":
+    """Return the scene with what a method knows of the person: about where they face at first, and their body."""
     import numpy as np
 
     from posefit.geometry.body import varied
 
     if not (cell.yaw_off_degrees or cell.body_off_percent):
         return scene
-    for_yaw, for_body = np.random.default_rng([SALT, cell.instance, *Path(cell.motion).stem.encode()]).spawn(2)
+    for_yaw, for_body = np.random.default_rng(
+        [RNG_STREAM_PERSON, cell.instance, *Path(cell.motion).stem.encode()]
+    ).spawn(2)
     off = np.radians(cell.yaw_off_degrees) * for_yaw.uniform(-1.0, 1.0)
-    told = None if cell.yaw_off_degrees >= ALL_AROUND or scene.yaw is None else scene.yaw + float(off)
-    return replace(scene, yaw=told, body=varied(scene.body, cell.body_off_percent, for_body))
+    yaw = None if cell.yaw_off_degrees >= ALL_AROUND or scene.yaw is None else scene.yaw + float(off)
+    return replace(scene, yaw=yaw, body=varied(scene.body, cell.body_off_percent, for_body))
 
 
 def json_of(value: Any) -> str:
@@ -210,8 +355,8 @@ def anytime_trace(found: "list[Frame]") -> dict[str, list[float]]:
     spent = [_spent(frame) for frame in searched]
     points = np.unique(np.concatenate(spent))
     points = points[points >= max(one[0] for one in spent)]  # from where every frame has a cost
-    if len(points) > POINTS:
-        wanted = np.geomspace(points[0], points[-1], POINTS)
+    if len(points) > MAX_TRACE_POINTS:
+        wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
         points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
     costs = [
         frame.history[np.searchsorted(one, points, side="right") - 1]
@@ -231,7 +376,7 @@ def _spent(frame: "Frame") -> "Array":
     return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
 
 
-def _choice(cell: Cell) -> "Choice":
+def _choice(cell: TrackCell) -> "Choice":
     from posefit.tracking.method import Choice, parse_settings
 
     optimiser, prior, tracker = parts(cell.method)
@@ -240,11 +385,11 @@ def _choice(cell: Cell) -> "Choice":
     return Choice(evaluations=cell.evaluations, **named, **settings)
 
 
-def _opening(cell: Cell) -> "Opening":
+def _opening(cell: TrackCell) -> "Opening":
     from posefit.tracking.opening import Opening
 
-    told: dict[str, Any] = {name: getattr(cell, name) for name in ("translation", "first_pose")}
-    return Opening(**told)
+    opening: dict[str, Any] = {name: getattr(cell, name) for name in ("translation", "first_pose")}
+    return Opening(**opening)
 
 
 def _joints(motion: "Motion | None") -> "Array":
@@ -267,11 +412,11 @@ def _mode_reliability(found: "list[Frame]", truth: "Array", skeleton: "Skeleton"
     from posefit.uncertainty.calibration import reliability
     from posefit.uncertainty.modes import likeliest_is_right
 
-    told = [(frame.modes, joints) for frame, joints in zip(found, truth, strict=True) if frame.modes]
-    if not told:
+    frames = [(frame.modes, joints) for frame, joints in zip(found, truth, strict=True) if frame.modes]
+    if not frames:
         return []
-    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in told])
-    likely = np.array([max(mode.weight for mode in modes) for modes, _ in told])
+    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in frames])
+    likely = np.array([max(mode.weight for mode in modes) for modes, _ in frames])
     return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from posefit.entries import PROJECT
 from posefit.fitting.space import TRANSLATIONS
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
@@ -20,17 +19,16 @@ from posefit.reading import SHOWN, cut, quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.sweep.cell import ALL_AROUND, DROPPED, Cell, digest_of, parts, settings_text
+from posefit.sweep.cell import ALL_AROUND, DROPPED, TrackCell, digest_of, parts, settings_text, version_of
 from posefit.tracking.method import parse_settings
-from posefit.version import __version__
 
-FIELDS = tuple(one.name for one in fields(Cell) if one.name not in ("files", "version"))
-LARGEST = 16_384  # pixels
-MOST_OFF = 50.0  # percent that a body may be off
-BITS = 1_024  # of a whole number: more than anything is counted in, and few enough to be written down
+FIELDS = tuple(one.name for one in fields(TrackCell) if one.name not in ("files", "version"))
+MAX_SIDE = 16_384  # pixels
+MAX_BODY_OFF = 50.0  # percent that a body may be off
+MAX_BITS = 1_024  # of a whole number, so that it can be written down
 
 
-def cell_of(spec: Mapping[str, Any]) -> Cell:
+def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     """Return the cell that a spec describes, complete: settings as their types ask, training motions by name.
 
     Raises ValueError where a name is not known or a value makes no sense, and ImportError where a method needs a
@@ -50,9 +48,8 @@ def cell_of(spec: Mapping[str, Any]) -> Cell:
     if values["motion"] in train:
         raise ValueError(f"train must not contain the motion itself, got {values['motion']}")
     files = {path: digest for one in (values["motion"], *train) for path, digest in _files(one)}
-    foreign = sorted({offer.origin for offer in offers if offer.distribution != PROJECT})
-    version = ", ".join([__version__, *foreign])
-    cell = Cell(**{**values, "settings": dict(settings), "train": train, "files": files, "version": version})
+    version = version_of(offer.origin for offer in offers)
+    cell = TrackCell(**{**values, "settings": dict(settings), "train": train, "files": files, "version": version})
     if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
         raise ValueError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
     if files.get(cell.motion) and cell.frames > (length := _length(cell.motion, cell.fps)):
@@ -174,7 +171,7 @@ def _motions(field: str, value: Any) -> tuple[str, ...]:
 def _learned_from(field: str, value: Any) -> str:
     """Return what a method learns from: a motion, people of the library, or a folder."""
     if recorded.is_library(value):
-        recorded.named(value)  # raises where somebody is not there
+        recorded.named(value)  # raises where a person is unknown
         return str(value)
     return value if isinstance(value, str) and value and Path(value).is_dir() else _motion(field, value)
 
@@ -212,7 +209,7 @@ def _between(low: float, high: float) -> Callable[[str, Any], float]:
 
 def _whole(least: int) -> Callable[[str, Any], int]:
     def check(field: str, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > BITS:
+        if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > MAX_BITS:
             raise ValueError(f"{field} must be a whole number of at least {least}, got {quoted(value)}")
         return value
 
@@ -221,8 +218,8 @@ def _whole(least: int) -> Callable[[str, Any], int]:
 
 def _size(field: str, value: Any) -> tuple[int, int]:
     sides = list(value) if isinstance(value, list | tuple) else []
-    if len(sides) != 2 or not all(type(side) is int and 1 <= side <= LARGEST for side in sides):
-        raise ValueError(f"{field} must be [width, height] in pixels, up to {LARGEST}, got {quoted(value)}")
+    if len(sides) != 2 or not all(type(side) is int and 1 <= side <= MAX_SIDE for side in sides):
+        raise ValueError(f"{field} must be [width, height] in pixels, up to {MAX_SIDE}, got {quoted(value)}")
     return sides[0], sides[1]
 
 
@@ -272,6 +269,6 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "first_pose": _one_of("searched", "given"),
     "tracks": _whole(1),
     "yaw_off_degrees": _between(0.0, ALL_AROUND),
-    "body_off_percent": _between(0.0, MOST_OFF),
+    "body_off_percent": _between(0.0, MAX_BODY_OFF),
     "seed": _whole(0),
 }

@@ -4,20 +4,18 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from posefit.sweep.cell import Cell, run_cell, settings_text
+from posefit.sweep.cell import run_cell
 from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of, progress_of
 from posefit.sweep.driver import Driver
 from posefit.sweep.engines.engine import Engine, Run
 from posefit.sweep.engines.limits import Limits
 from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.plan import Plan
-from posefit.sweep.single.plan import read_plan, search_line
-from posefit.sweep.single.search import SearchCell, run_search
 
 DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 
@@ -37,8 +35,8 @@ class Where:
 
 def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = False, say: Say) -> tuple[Tally, int, str]:
     """Return how the sweep of a plan to a folder ended, the exit status that says so, and what shows what it found."""
-    cells = read_plan(plan)
-    start = engine(where, _what_runs(cells))
+    cells = Plan.read(plan)
+    start = engine(where)
     with closing(start()) as running:  # without an engine there is no folder either
         tally = swept(cells, out, running, say, retry_quarantined)
     status = STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
@@ -54,6 +52,8 @@ def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quaran
             lost = driver.ledger.sentenced()
             again = sum(driver.pardon(key) for key in keys_of(cells) if key in lost)
             say(f"{again} {'cell is' if again == 1 else 'cells are'} out of quarantine, to be tried again")
+        if count := driver.ledger.outdated():
+            say(f"{count} of the {len(driver.ledger)} rows in {out} are of another version, and do not count here")
         with suppress(OSError, ValueError):  # no room: the sweep will say so, if it needs any
             driver.ledger.begin(keys_of(cells))
         bar = tqdm(total=len(cells), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
@@ -71,18 +71,16 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
 
     Or those of one JSON object that says the same. A million cells are never in memory together.
     """
-    from posefit.sweep.estimate import SECONDS, TRACKS, Amounts, Estimate, estimate_of
-    from posefit.sweep.single.estimate import SEARCHES
+    from posefit.sweep.estimate import TRIAL_SECONDS, Estimate, Workload, estimate_of
 
-    cells = read_plan(plan)
-    limits = replace(where.limits, seconds=min(where.limits.seconds, SECONDS))
-    start = engine(replace(where, limits=limits), _what_runs(cells))
+    cells = Plan.read(plan)
+    limits = replace(where.limits, seconds=min(where.limits.seconds, TRIAL_SECONDS))
+    start = engine(replace(where, limits=limits))
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
-    left, count = Amounts(TRACKS if isinstance(cells, Plan) else SEARCHES), 0
+    left, count = Workload(), 0
     if as_json:
         yield '{"cells": ['
-    every: Iterable[Cell | SearchCell] = cells
-    for k, cell in enumerate(every):
+    for k, cell in enumerate(cells):
         done = ledger is not None and cell.key in ledger
         if not done:
             left.add(cell)
@@ -90,7 +88,7 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
             shown = json.dumps({"key": cell.key, "done": done, **cell.spec})
             yield shown if k == len(cells) - 1 else f"{shown},"
         else:
-            yield preview_line(cell, done) if isinstance(cell, Cell) else search_line(cell, done)
+            yield f"{cell.key[:8]}  {cell.summary}{'  done' if done else ''}"
     found = Estimate(0.0, {})
     if len(left):
         with closing(start()) as running:
@@ -103,11 +101,6 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
         yield f"warning: {cell_text}: {reason}; cells of its kind count for no time here, and would be quarantined"
     takes = f": about {duration_text(found.seconds)} on {count} workers" if len(left) else ""
     yield f"{len(cells)} cells, {len(left)} of them to run{takes}"
-
-
-def _what_runs(cells: Plan | list[SearchCell]) -> Run:
-    """Return the function that runs one of these cells."""
-    return run_cell if isinstance(cells, Plan) else run_search
 
 
 def engine(where: Where, run: Run = run_cell) -> Callable[[], Engine]:
@@ -149,16 +142,6 @@ def tally_text(tally: Tally, out: str, shown: str) -> str:
     elif tally.done:
         line += f"\nwhat was found: {shown}"
     return line
-
-
-def preview_line(cell: Cell, done: bool) -> str:
-    """Return the line that shows a cell of a preview."""
-    more = [*settings_text(cell.settings), *(f"{kind} {share:g}" for kind, share in cell.corruption.items())]
-    views = ", ".join(f"{view:g}" for view in cell.view_degrees)
-    return (
-        f"{cell.key[:8]}  {cell.method} on {cell.motion}, view {views}, instance {cell.instance}, "
-        f"seed {cell.seed}{''.join(f', {one}' for one in more)}{'  done' if done else ''}"
-    )
 
 
 def duration_text(seconds: float) -> str:

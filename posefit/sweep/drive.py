@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
+from posefit.sweep.cell import Cell
 from posefit.sweep.driver import Claim, Driver, State
-from posefit.sweep.engines.engine import Engine, Keyed, Outcome
+from posefit.sweep.engines.engine import Engine, Outcome
 from posefit.sweep.plan import Plan
 
 PATIENCE = 0.2  # seconds between two looks at whether somebody wants to stop
@@ -19,7 +20,7 @@ NEAR = 1000  # cells, among which those of different methods are looked for at t
 ELSEWHERE = 0.5  # seconds between two looks at cells that other drivers run
 
 Say = Callable[[str], None]
-Cells = Plan | Sequence[Keyed]
+Cells = Plan | Sequence[Cell]
 
 
 @dataclass
@@ -111,8 +112,8 @@ class _Sweep:
             settled.append(self._count(state))
         self._left = settled.count(False)  # cells that were not met yet
         self._coming = mingled((cell for cell, done in zip(cells, settled, strict=True) if not done), engine.window)
-        self._again: deque[Keyed] = deque()  # cells that failed, or that others ran
-        self._elsewhere: list[Keyed] = []
+        self._again: deque[Cell] = deque()  # cells that failed, or that others ran
+        self._elsewhere: list[Cell] = []
         self._running: dict[str, Claim] = {}
 
     @property
@@ -157,7 +158,7 @@ class _Sweep:
         """How many cells nobody runs, as far as is known."""
         return self._left + len(self._again)
 
-    def _next(self) -> Keyed:
+    def _next(self) -> Cell:
         """Return a cell that waits: one that was not tried yet, while there is any."""
         if not self._left:
             return self._again.popleft()
@@ -204,14 +205,14 @@ class _Sweep:
         return state in (State.DONE, State.QUARANTINED)
 
 
-def mingled(cells: Iterator[Keyed], count: Callable[[], int]) -> Iterator[Keyed]:
+def mingled(cells: Iterator[Cell], count: Callable[[], int]) -> Iterator[Cell]:
     """Yield cells in their order, but for the first `count()`, which are of different methods where there are any near.
 
     Workers that begin at the same time would otherwise need the same compiled functions, and wait for each other.
     """
     wanted = count()
-    first: dict[str, Keyed] = {}
-    passed: list[Keyed] = []
+    first: dict[str, Cell] = {}
+    passed: list[Cell] = []
     for cell in islice(cells, NEAR):
         if first.setdefault(cell.method, cell) is not cell:
             passed.append(cell)

@@ -22,8 +22,7 @@ from typing import Any, Self
 
 from posefit.files import appear, replaced_file
 from posefit.reading import parsed_json
-from posefit.sweep.cell import CellResult
-from posefit.sweep.engines.engine import Keyed
+from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.fold import LEFT, fold_logs
 from posefit.sweep.ledger import CLAIMS, QUARANTINE, ROWS, Ledger, create
 from posefit.sweep.locks import is_locked, on_one_machine
@@ -46,7 +45,7 @@ class State(Enum):
 class Claim:
     """The right to run a cell."""
 
-    cell: Keyed
+    cell: Cell
     attempt: int
 
 
@@ -89,7 +88,7 @@ class Driver:
             return State.DONE
         return State.QUARANTINED if self.ledger.in_quarantine(key) else None
 
-    def claim(self, cell: Keyed) -> Claim | State:
+    def claim(self, cell: Cell) -> Claim | State:
         """Return the right to run a cell, or why there is none."""
         faults: list[str] = []
         losses: list[str] = []

@@ -1,6 +1,6 @@
 """The ledger: a folder in which every finished cell has its row, whatever happens to those who write to it.
 
-ledger.json          the version of posefit whose results these are
+ledger.json          the format of the folder
 rows/NAME.jsonl      finished rows, one log a driver; those of drivers that ended are folded together
 rows/NAME.joints     the joints of the rows' frames
 claims/KEY.n         the nth attempt at a cell: who runs it, or why it failed
@@ -13,8 +13,11 @@ import hashlib
 import io
 import json
 import os
+import re
+import sys
 import time
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -23,9 +26,10 @@ from typing import TYPE_CHECKING, Any
 
 from posefit.files import appear, replaced_file
 from posefit.reading import cut, parsed_json, quoted, read_text
+from posefit.sweep.cell import other_version
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, joints_at, lines
 from posefit.sweep.table import dataframe
-from posefit.version import __version__
+from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +39,8 @@ if TYPE_CHECKING:
 INDEX = "ledger.json"
 ROWS, CLAIMS, QUARANTINE, ASIDE, PLANS = FOLDERS = ("rows", "claims", "quarantine", "aside", "plans")
 FORMAT = 1
-LARGEST_INDEX = 10_000  # bytes
+MAX_INDEX_BYTES = 10_000
+VERSION = re.compile(rb'"version": "([^"]*)"')  # in a row
 PLANNED, SHORT = b'{"cells": ', 8  # how the file of a plan begins; bytes of each key that it holds
 
 
@@ -55,9 +60,10 @@ class Ledger:
     def __init__(self, path: str | Path, say: Callable[[str], None] | None = None) -> None:
         self.path = Path(path)
         self._say = say or _nothing
-        self.version = _version(self.path)
+        _check_format(self.path)
         self._ends: dict[str, int] = {}  # how far each log was read
         self._places: dict[str, tuple[str, int]] = {}  # of every finished row: its log, and where in it
+        self._versions: dict[str, str] = {}  # of every finished row
         self.refresh()
         self.refresh()  # a log may have been folded into another while the folder was listed
 
@@ -68,6 +74,7 @@ class Ledger:
             # folded into another one, which was there before this one went, or cut off: everything is read again
             self._ends.clear()
             self._places.clear()
+            self._versions.clear()
             logs = self._logs()
         for name in sorted(logs):
             if logs[name] == self._ends.get(name, 0):
@@ -81,6 +88,8 @@ class Ledger:
                     # a row may be there twice: of a log that is folded just now, or of a lock that a file system did
                     # not keep. The first one counts
                     self._places[found[0]] = min((name, offset), self._places.get(found[0], (name, offset)))
+                    version = VERSION.search(found[1])
+                    self._versions[found[0]] = sys.intern(version[1].decode()) if version else ""
 
     def __len__(self) -> int:
         return len(self._places)
@@ -96,13 +105,23 @@ class Ledger:
         """Return the log that a cell's row is in, and where; None where it has none."""
         return self._places.get(key)
 
+    @property
+    def version(self) -> str:
+        """The versions of posefit whose results these are, with digests of its source; that of today without rows."""
+        builds = {version.partition(", ")[0] for version in self._versions.values()} or {posefit_build()}
+        return ", ".join(sorted(build.removeprefix("posefit ") for build in builds))
+
+    def outdated(self) -> int:
+        """Return how many rows are of another version of posefit, or of a plugin, than the ones installed."""
+        counts = Counter(self._versions.values())
+        return sum(count for version, count in counts.items() if any(map(other_version, version.split(", "))))
+
     def begin(self, keys: Iterable[str]) -> None:
         """Take note of the cells of a plan that is begun, or gone on with, for whoever wants to know how far it is."""
         settled, lost, short = 0, self.sentenced(), bytearray()
         for key in keys:
             settled += key in self or key in lost
             short += bytes.fromhex(key[: 2 * SHORT])
-        (self.path / PLANS).mkdir(exist_ok=True)  # a ledger of earlier days has none
         head = {"cells": len(short) // SHORT, "begun": time.time(), "settled": settled}
         path = self.path / PLANS / f"{hashlib.sha256(short).hexdigest()[:16]}.cells"
         with replaced_file(path, PLANNED) as building:
@@ -235,7 +254,7 @@ class Ledger:
 
 
 def create(path: Path) -> None:
-    """Make a folder a ledger of this version, if it is none yet. Raises ValueError where it may not be one."""
+    """Make a folder a ledger, if it is none yet. Raises ValueError where it cannot be one."""
     try:
         if path.exists() and not path.is_dir():
             raise ValueError(f"{path}: expected a folder for the ledger, got a file")
@@ -246,32 +265,25 @@ def create(path: Path) -> None:
                 raise ValueError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
             for name in FOLDERS:
                 (path / name).mkdir(parents=True, exist_ok=True)
-            appear(path / INDEX, {"format": FORMAT, "version": __version__})
+            appear(path / INDEX, {"format": FORMAT})
     except OSError as error:
         raise ValueError(f"{path}: expected a folder that can be written to, got {error.strerror}") from None
-    version = _version(path)
-    if version != __version__:
-        raise ValueError(
-            f"{path}: expected a ledger of posefit {__version__}, got one of {version}; its rows are kept "
-            "apart: choose another folder"
-        )
+    _check_format(path)
 
 
-def _version(path: Path) -> str:
-    """Return the version of posefit whose results a ledger holds."""
+def _check_format(path: Path) -> None:
+    """Raise ValueError where a folder is no ledger."""
     if os.path.isfile(path):
         raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got a file")
     try:
-        index = parsed_json(read_text(path / INDEX, LARGEST_INDEX))
-        form, version = index["format"], index["version"]
+        found = parsed_json(read_text(path / INDEX, MAX_INDEX_BYTES))["format"]
     except FileNotFoundError:
         raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None
     except (ValueError, KeyError, TypeError) as error:
-        said = str(error).removeprefix(f"{path / INDEX}: ")
-        raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {cut(said)}") from None
-    if form != FORMAT or not isinstance(version, str):
-        raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")
-    return version
+        reason = str(error).removeprefix(f"{path / INDEX}: ")
+        raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {cut(reason)}") from None
+    if found != FORMAT:
+        raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(found)}")
 
 
 def _nothing(_: str) -> None:

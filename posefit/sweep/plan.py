@@ -17,21 +17,36 @@
     motion = "run"
 
 An entry of a list of the product is the value of a cell's field, or a table of several fields. See
-`posefit.sweep.cell.Cell` for what the fields are.
+`posefit.sweep.cell.TrackCell` for what the fields are.
+
+A plan that names a suite is one of single searches, of every combination of its lists:
+
+    suite = "posefit-2026.1"
+    methods = ["sapso", "cma", { method = "pso", settings = { population_size = 20 } }]
+    functions = [1, 5]                          # numbers; by default each
+    dimensions = [9, 24]                        # by default 9
+    instances = 15                              # the first so many that are held out; or a list
+    budgets = [100]                             # evaluations for each dimension
+    seeds = 1                                   # 0; or a list
 """
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
-from itertools import chain
+from itertools import chain, product
 from math import prod
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from posefit import settings
+from posefit.fitting.check import one_of, whole
 from posefit.reading import SHOWN, parsed_toml, quoted, read_text
-from posefit.sweep.cell import Cell
+from posefit.registry import registry
+from posefit.suites.functions import DIMENSIONS, FUNCTIONS, HELD_OUT, SUITES, checked_address, suite_function
+from posefit.suites.problem import EVALUATIONS, INFEASIBLE
+from posefit.sweep.cell import Cell, SearchCell, TrackCell, version_of
 from posefit.sweep.check import FIELDS, cell_of, flattened, names_of
 from posefit.sweep.product import Entries, Product
 
@@ -44,11 +59,12 @@ LISTS = {
     "seeds": "seed",
 }
 TABLES = ("defaults", "product", "cells")
+SEARCH_FIELDS = ("suite", "methods", "functions", "dimensions", "instances", "budgets", "seeds", "infeasible")
 DEFAULT = "default"  # the name of the plan that posefit brings along
 INPUT = "-"  # the name of a plan that is read from standard input
-MOST = 1_000_000  # cells
-LARGEST_FILE = 1_000_000  # bytes
-DIGEST = 32  # bytes of a key
+MAX_CELLS = 1_000_000  # cells
+MAX_BYTES = 1_000_000  # bytes
+DIGEST_BYTES = 32  # of a key
 
 
 class Plan:
@@ -79,11 +95,13 @@ class Plan:
 
     @classmethod
     def of(cls, tables: Mapping[str, Any]) -> Self:
-        """Return the plan that a mapping with `defaults`, `product` and `cells` describes, as the TOML file does.
+        """Return the plan that a mapping describes, as the TOML file does: of tracks, or of searches of a `suite`.
 
         Raises ValueError where anything in it is wrong, and ImportError where a method needs a library that is not
         installed.
         """
+        if "suite" in tables:
+            return cls(search_cells(tables))
         for name in tables:
             if name not in TABLES:
                 raise ValueError(f"a plan must hold {', '.join(TABLES)}, got {quoted(name)}")
@@ -96,7 +114,7 @@ class Plan:
             raise ValueError(f"cells must be a list of tables, got {quoted(listed)}")
         fitting = _Shared(defaults)
 
-        def make(spec: Mapping[str, Any]) -> Cell:
+        def make(spec: Mapping[str, Any]) -> TrackCell:
             return cell_of({**defaults, **spec, "settings": fitting.settings(spec)})
 
         lists = _lists(tables.get("product"))
@@ -106,30 +124,29 @@ class Plan:
         return plan
 
     def __len__(self) -> int:
-        return len(self._digests) // DIGEST
+        return len(self._digests) // DIGEST_BYTES
 
     def __iter__(self) -> Iterator[Cell]:
         return chain.from_iterable(self._parts)
 
     def keys(self) -> Iterator[str]:
         """Yield the key of each cell, without making it."""
-        return (self._digests[k : k + DIGEST].hex() for k in range(0, len(self._digests), DIGEST))
-
-    @property
-    def cells(self) -> tuple[Cell, ...]:
-        """All cells, where there are few enough."""
-        return tuple(self)
+        return (self._digests[k : k + DIGEST_BYTES].hex() for k in range(0, len(self._digests), DIGEST_BYTES))
 
 
 def plan_text(path: str | Path) -> str:
-    """Return the text of a plan: of a file, posefit's own for `default`, or what standard input has for `-`."""
+    """Return the text of a plan: of a file, posefit's own for `default`, or of standard input for `-`."""
     if str(path) == DEFAULT:
         return (files("posefit.sweep") / "default.toml").read_text(encoding="utf-8")
     if str(path) == INPUT:
-        return _stdin()
+        try:
+            return sys.stdin.read(MAX_BYTES).removeprefix("\ufeff")
+        except UnicodeDecodeError:
+            raise ValueError(f"{INPUT}: expected a plan in UTF-8, got other bytes") from None
     if not Path(path).is_file():
-        raise ValueError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {_what(Path(path))}")
-    return read_text(path, LARGEST_FILE, "a plan in TOML")
+        what = "a folder" if Path(path).is_dir() else "no file of that name"
+        raise ValueError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {what}")
+    return read_text(path, MAX_BYTES, "a plan in TOML")
 
 
 class _Shared:
@@ -150,7 +167,7 @@ class _Shared:
         return fitting | flattened("settings", spec.get("settings", {}))
 
     def check(self) -> None:
-        """Return nothing. Raises ValueError where no cell used one of them."""
+        """Raise ValueError where no cell used one of them."""
         if self._unused:
             raise ValueError(
                 f"defaults.settings must be of the plan's methods, got {next(iter(self._unused))!r}, which none uses"
@@ -169,8 +186,8 @@ def _lists(tables: Any) -> list[Entries] | None:
         if name not in LISTS:
             raise ValueError(f"product must hold {', '.join(LISTS)}, got {quoted(name)}")
     entries = [_entries(name, named[name]) for name in sorted(named, key=lambda name: name == "methods")]
-    if (count := prod(len(one) for one in entries)) > MOST:
-        raise ValueError(f"product must hold at most {MOST:,} cells, got {count:,}")
+    if (count := prod(len(one) for one in entries)) > MAX_CELLS:
+        raise ValueError(f"product must hold at most {MAX_CELLS:,} cells, got {count:,}")
     return entries
 
 
@@ -179,15 +196,15 @@ def _digests(part: Product | Sequence[Cell]) -> Iterator[bytes]:
 
 
 def _repeated(digests: bytes) -> str | None:
-    """Return a key that is there twice; None where all differ."""
-    starts = np.frombuffer(digests, dtype=np.uint64)[:: DIGEST // 8]  # alike where keys are; seldom where they are not
+    """Return a key that occurs twice; None where all differ."""
+    starts = np.frombuffer(digests, dtype=np.uint64)[:: DIGEST_BYTES // 8]  # equal ones have equal starts
     values, counts = np.unique(starts, return_counts=True)
-    seen: set[bytes] = set()
+    earlier: set[bytes] = set()
     for k in np.flatnonzero(np.isin(starts, values[counts > 1])):
-        one = digests[DIGEST * k : DIGEST * (k + 1)]
-        if one in seen:
-            return one.hex()
-        seen.add(one)
+        digest = digests[DIGEST_BYTES * k : DIGEST_BYTES * (k + 1)]
+        if digest in earlier:
+            return digest.hex()
+        earlier.add(digest)
     return None
 
 
@@ -195,8 +212,9 @@ def _entries(name: str, values: Any) -> Entries:
     """Return the fields that each entry of one list of a product stands for."""
     field = LISTS[name]
     if field in ("instance", "seed") and type(values) is int:
-        if values > MOST:
-            raise ValueError(f"product.{name} must be at most {MOST:,}, got {_written(values)}")
+        if values > MAX_CELLS:
+            shown = f"{values:,}" if values < 10**SHOWN else quoted(values)
+            raise ValueError(f"product.{name} must be at most {MAX_CELLS:,}, got {shown}")
         values = range(values)
     if not isinstance(values, list | tuple | range):
         raise ValueError(f"product.{name} must be a list, got {quoted(values)}")
@@ -212,16 +230,71 @@ def _mapping(name: str, value: Any) -> dict[str, Any]:
     return dict(value)
 
 
-def _written(number: int) -> str:
-    return f"{number:,}" if number < 10**SHOWN else quoted(number)
+def search_cells(tables: Mapping[str, Any]) -> list[SearchCell]:
+    """Return the cells of a plan of single searches. A dimension that a function does not have is passed over.
+
+    Raises ValueError where anything is wrong or no cell is left, and ImportError where an optimiser needs a library
+    that is not installed.
+    """
+    for name in tables:
+        if name not in SEARCH_FIELDS:
+            raise ValueError(f"a plan of a suite must hold {', '.join(SEARCH_FIELDS)}, got {quoted(name)}")
+    suite = tables["suite"]
+    one_of("suite", suite, SUITES)
+    infeasible = tables.get("infeasible", INFEASIBLE[0])
+    one_of("infeasible", infeasible, INFEASIBLE)
+    methods = [_method(one) for one in _listed("methods", tables.get("methods"))]
+    functions = [
+        suite_function(one) for one in _listed("functions", tables.get("functions", [f.number for f in FUNCTIONS]))
+    ]
+    dimensions = _listed("dimensions", tables.get("dimensions", [9]))
+    for dimension in dimensions:
+        one_of("dimensions", dimension, DIMENSIONS)
+    instances = _numbers("instances", tables.get("instances", 15), HELD_OUT.start)
+    budgets = [whole("budgets", one, 1) for one in _listed("budgets", tables.get("budgets", [EVALUATIONS]))]
+    seeds = [whole("seeds", one, 0) for one in _numbers("seeds", tables.get("seeds", 1), 0)]
+    lists = (dimensions, functions, instances, seeds, budgets, methods)
+    if (count := prod(map(len, lists))) > MAX_CELLS:
+        raise ValueError(f"a plan must hold at most {MAX_CELLS:,} cells, got {count:,}")
+    cells = []
+    for dimension, function, instance, seed, budget, (method, chosen, version) in product(*lists):
+        if dimension in function.dimensions:
+            number, instance, dimension = checked_address(suite, function.number, instance, dimension)
+            evaluations = budget * dimension
+            if (size := settings.population(registry().optimiser(method), chosen, evaluations)) > evaluations:
+                raise ValueError(f"evaluations must hold one population of {size}, got {evaluations} of {method}")
+            cells.append(
+                SearchCell(method, suite, number, dimension, instance, evaluations, chosen, infeasible, seed, version)
+            )
+    if not cells:
+        raise ValueError(f"a plan must hold at least one cell, got none in {list(dimensions)} dimensions")
+    return cells
 
 
-def _stdin() -> str:
-    try:
-        return sys.stdin.read(LARGEST_FILE).removeprefix("\ufeff")
-    except UnicodeDecodeError:
-        raise ValueError(f"{INPUT}: expected a plan in UTF-8, got other bytes") from None
+def _method(value: Any) -> tuple[str, dict[str, Any], str]:
+    """Return an optimiser's name, its settings, and the versions that its results are of."""
+    table = dict(value) if isinstance(value, Mapping) else {"method": value}
+    for name in table:
+        if name not in ("method", "settings"):
+            raise ValueError(f"an entry of methods must hold method and settings, got {quoted(name)}")
+    method, chosen = table.get("method"), table.get("settings", {})
+    if not isinstance(method, str) or not isinstance(chosen, Mapping):
+        raise ValueError(f"an entry of methods must be a name, or a table of a name and settings, got {quoted(value)}")
+    offer = registry().offer("optimiser", method)
+    settings.check(method, offer.factory, chosen)
+    return method, dict(chosen), version_of([offer.origin])
 
 
-def _what(path: Path) -> str:
-    return "a folder" if path.is_dir() else "no file of that name"
+def _listed(name: str, values: Any) -> list[Any]:
+    if not isinstance(values, list | tuple) or not values:
+        raise ValueError(f"{name} must be a list of at least one, got {quoted(values)}")
+    return list(values)
+
+
+def _numbers(name: str, values: Any, first: int) -> list[Any]:
+    """Return the numbers of a list, or so many from the first on."""
+    if isinstance(values, int) and not isinstance(values, bool):
+        if not 1 <= values <= MAX_CELLS:
+            raise ValueError(f"{name} must be a list, or a whole number from 1 to {MAX_CELLS:,}, got {quoted(values)}")
+        return list(range(first, first + values))
+    return _listed(name, values)

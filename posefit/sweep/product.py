@@ -6,15 +6,17 @@ cell's key is the SHA-256 of its fields as JSON, and so of pieces that many cell
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from itertools import combinations, product
 from math import prod
 from typing import Any, overload
 
-from posefit.sweep.cell import NAMES, Cell, is_told, json_of
+from posefit.sweep.cell import TrackCell, json_of
 from posefit.sweep.check import FIELDS, checked
 
-CROSSED = ("method", "motion", "train", "settings", "frames", "fps", "evaluations")  # which `cell_of` checks together
-KEPT = 4096  # combinations of these that are kept, to be met again
+NAMES = tuple(sorted(one.name for one in fields(TrackCell)))  # in the order of a key
+CROSSED = ("method", "motion", "train", "settings", "frames", "fps", "evaluations")  # checked together by `cell_of`
+CACHED = 4096  # combinations of these that are kept in memory
 
 Entry = Mapping[str, Any]
 
@@ -40,12 +42,12 @@ class Entries(Sequence[Entry]):
         return dict(value) if isinstance(value, Mapping) and not self._whole else {self._field: value}
 
 
-class _Loose:
-    """The entries of a list whose fields are checked by themselves, once each; of very many when they come."""
+class _Separate:
+    """The entries of a list whose fields are checked by themselves: once each, or as they come where there are many."""
 
     def __init__(self, entries: Sequence[Entry]) -> None:
         self._entries = entries
-        self._known = [self._made(k) for k in range(len(entries))] if len(entries) <= KEPT else []
+        self._known = [self._made(k) for k in range(len(entries))] if len(entries) <= CACHED else []
 
     def __getitem__(self, k: int) -> tuple[Entry, list[tuple[int, str]]]:
         """Return the checked fields of an entry; and, as JSON, with their places among all fields."""
@@ -62,46 +64,48 @@ class Product:
     `make` gives the cell of a spec, checked. Raises ValueError where a field stands in two lists.
     """
 
-    def __init__(self, lists: Sequence[Sequence[Entry]], make: Callable[[Entry], Cell]) -> None:
+    def __init__(self, lists: Sequence[Sequence[Entry]], make: Callable[[Entry], TrackCell]) -> None:
         for one, other in combinations(lists, 2):
             if twice := {name for entry in one for name in entry} & {name for entry in other for name in entry}:
                 raise ValueError(f"product must say {min(twice)} in one list, got it in two")
         self._lists, self._make = lists, make
-        loose = set(FIELDS) - set(CROSSED)
-        self._loose = {
-            n: _Loose(entries) for n, entries in enumerate(lists) if all(loose.issuperset(entry) for entry in entries)
+        separate = set(FIELDS) - set(CROSSED)
+        self._separate = {
+            n: _Separate(entries)
+            for n, entries in enumerate(lists)
+            if all(separate.issuperset(entry) for entry in entries)
         }
-        self._known: dict[tuple[int, ...], tuple[Cell, list[str]]] = {}
+        self._known: dict[tuple[int, ...], tuple[TrackCell, list[str]]] = {}
 
     def __len__(self) -> int:
         return prod(len(entries) for entries in self._lists)
 
-    def __iter__(self) -> Iterator[Cell]:
+    def __iter__(self) -> Iterator[TrackCell]:
         for chosen, cell, key in self._combined():
             fields = {name: getattr(cell, name) for name in NAMES}
-            for n, entries in self._loose.items():
+            for n, entries in self._separate.items():
                 fields |= entries[chosen[n]][0]
-            found = Cell(**fields)
-            vars(found)["key"] = key.hex()  # what it would work out
+            found = TrackCell(**fields)
+            vars(found)["key"] = key.hex()  # its cached property
             yield found
 
     def digests(self) -> Iterator[bytes]:
         """Yield the key of each cell, as 32 bytes."""
         return (key for _, _, key in self._combined())
 
-    def _combined(self) -> Iterator[tuple[tuple[int, ...], Cell, bytes]]:
+    def _combined(self) -> Iterator[tuple[tuple[int, ...], TrackCell, bytes]]:
         """Yield for each cell which entries it is of, a cell with the same crossed fields, and its key."""
         for chosen in product(*(range(len(entries)) for entries in self._lists)):
             cell, common = self._common(chosen)
             pieces = common.copy()
-            for n, entries in self._loose.items():
+            for n, entries in self._separate.items():
                 for place, piece in entries[chosen[n]][1]:
                     pieces[place] = piece
-            yield chosen, cell, hashlib.sha256(f"{{{','.join(filter(None, pieces))}}}".encode()).digest()
+            yield chosen, cell, hashlib.sha256(f"{{{','.join(pieces)}}}".encode()).digest()
 
-    def _common(self, chosen: tuple[int, ...]) -> tuple[Cell, list[str]]:
+    def _common(self, chosen: tuple[int, ...]) -> tuple[TrackCell, list[str]]:
         """Return a cell with the crossed fields of some entries, and its fields as JSON."""
-        crossed = tuple([-1 if n in self._loose else k for n, k in enumerate(chosen)])
+        crossed = tuple([-1 if n in self._separate else k for n, k in enumerate(chosen)])
         found = self._known.get(crossed)
         if found is None:
             spec: dict[str, Any] = {}
@@ -109,12 +113,12 @@ class Product:
                 spec |= entries[k]
             cell = self._make(spec)
             found = cell, [_piece(name, getattr(cell, name)) for name in NAMES]
-            if len(self._known) >= KEPT:
+            if len(self._known) >= CACHED:
                 self._known.clear()
             self._known[crossed] = found
         return found
 
 
 def _piece(name: str, value: Any) -> str:
-    """Return a field as JSON holds it in a key; nothing where it is not told."""
-    return f'"{name}":{json_of(value)}' if is_told(name, value) else ""
+    """Return a field as JSON holds it in a key."""
+    return f'"{name}":{json_of(value)}'

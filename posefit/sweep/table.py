@@ -1,4 +1,4 @@
-"""The rows of a ledger as a table of pandas, one row a cell: `Ledger.frame` gives it.
+"""The rows of a ledger as a table of pandas, one row a cell: `Ledger.frame` gives it; or as runs of a suite.
 
 Columns are `key`, `version`, `status` ("done" or "quarantined"), `reason`; the cell's spec, with `settings`,
 `corruption`, `train`, `view_degrees` and `size` as text, so that rows can be grouped by them; every figure, those of a
@@ -8,21 +8,27 @@ are sorted by what the spec says, not by when they were finished.
 """
 
 import importlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from posefit.geometry.skeleton import JOINTS
-from posefit.sweep.cell import in_full, settings_text
+from posefit.suites.problem import TARGETS
+from posefit.suites.running import SuiteRun
+from posefit.sweep.cell import settings_text
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from posefit.sweep.ledger import Ledger
 
 ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings", "seed", "key")
 _TEXTS = ("key", "version", "status", "reason", "method", "motion", "train", "settings", "view_degrees", "corruption")
 
 
 def is_search(spec: Mapping[str, Any]) -> bool:
-    """Return whether a spec is that of a single search, which has no motion: see `posefit.sweep.single`."""
+    """Return whether a spec is that of a single search, which has no motion: see `posefit.sweep.plan`."""
     return "suite" in spec
 
 
@@ -56,12 +62,15 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     spec = row["spec"]
     flat: dict[str, Any] = {"key": row["key"], "version": spec["version"], "status": row["status"]}
     flat["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
-    searched = is_search(spec)
-    full = spec if searched else in_full(spec)
-    flat |= {name: value for name, value in full.items() if name not in ("files", "version")}
+    flat |= {name: value for name, value in spec.items() if name not in ("files", "version")}
     flat["settings"] = ", ".join(settings_text(spec["settings"]))
-    if not searched:
-        flat |= _told_of_track(spec)
+    if not is_search(spec):
+        flat |= {
+            "corruption": ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items())),
+            "train": ", ".join(spec["train"]),
+            "view_degrees": ", ".join(f"{view:g}" for view in spec["view_degrees"]),
+            "size": "x".join(map(str, spec["size"])),
+        }
     for name, value in row.items():
         if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability", "joints"):
             continue
@@ -74,11 +83,32 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def _told_of_track(spec: Mapping[str, Any]) -> dict[str, str]:
-    """Return those columns of a track's spec that are texts."""
-    return {
-        "corruption": ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items())),
-        "train": ", ".join(spec["train"]),
-        "view_degrees": ", ".join(f"{view:g}" for view in spec["view_degrees"]),
-        "size": "x".join(map(str, spec["size"])),
-    }
+def search_runs(ledger: "Ledger") -> Iterator[SuiteRun]:
+    """Yield the runs of a ledger. Raises ValueError where it holds none, or something else."""
+    count = 0
+    for row in ledger.rows():
+        if not is_search(row["spec"]):
+            raise ValueError(f"{ledger.path}: expected a ledger of single searches, got one of tracks: posefit report")
+        count += 1
+        yield search_run(row)
+    if not count:
+        raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+
+
+def search_run(row: Mapping[str, Any]) -> SuiteRun:
+    """Return the run of a row of a single search."""
+    spec, trace = row["spec"], row["trace"]
+    return SuiteRun(
+        spec["method"],
+        spec["settings"],
+        spec["function"],
+        spec["dimension"],
+        spec["instance"],
+        spec["seed"],
+        spec["evaluations"],
+        spec["infeasible"],
+        row["best_known"],
+        row["best_known"] + TARGETS,
+        np.array(trace["evaluations"], dtype=np.float64),
+        np.array(trace["cost"], dtype=np.float64),
+    )

@@ -18,7 +18,7 @@ from posefit.measuring.angles import COLUMNS
 from posefit.measuring.centres import PLACES
 from posefit.registry import KINDS, registry
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.sweep.cell import DROPPED, Cell, run_cell
+from posefit.sweep.cell import DROPPED, TrackCell, run_cell
 from posefit.sweep.check import FIELDS, cell_of
 from posefit.sweep.plan import LISTS
 from posefit.sweep.table import flat
@@ -126,7 +126,7 @@ def test_every_module_with_a_docstring_has_a_page() -> None:
 def test_a_plan_is_told_with_every_field_list_and_corruption() -> None:
     page = (DOCS / "howto" / "plan.md").read_text("utf-8")
     assert set(FIELDS) | set(LISTS) | set(CORRUPTIONS) | {DROPPED} == rows(page)
-    defaults: dict[str, Any] = {one.name: one.default for one in fields(Cell)}
+    defaults: dict[str, Any] = {one.name: one.default for one in fields(TrackCell)}
     for name in ("instance", "frames", "fps", "evaluations", "seed"):
         assert f"| `{name}` | {defaults[name]:g} |" in page
     assert f"| `size` | {list(defaults['size'])} |" in page

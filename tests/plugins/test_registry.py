@@ -16,7 +16,8 @@ import pytest
 
 from posefit import entries, hookimpl
 from posefit.motion import built_in
-from posefit.registry import Offer, registry, registry_of, source_digest
+from posefit.registry import Offer, registry, registry_of
+from posefit.version import source_digest
 from posefit_priors.pca import PCA
 
 

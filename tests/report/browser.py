@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from posefit.files import appear
-from posefit.sweep.cell import Cell, CellResult, packed_joints
+from posefit.sweep.cell import CellResult, TrackCell, packed_joints
 from posefit.sweep.driver import Driver
 from posefit.sweep.ledger import QUARANTINE, ROWS
 from posefit.sweep.log import Writer
@@ -61,13 +61,13 @@ def opened(chromium: Any, path: Path | str, width: int = 1280, **how: Any) -> It
         context.close()
 
 
-def result(cell: Cell, error: float, **more: Any) -> CellResult:
+def result(cell: TrackCell, error: float, **more: Any) -> CellResult:
     """Return a result as large as a real one; of four frames, each joint wrong by the error in centimetres."""
     truth = np.random.default_rng(cell.instance).normal(0.0, 0.3, (4, 27, 3))
     return CellResult(row_of(cell, error, **more), packed_joints(truth=truth, estimate=truth + 0.01 * error))
 
 
-def row_of(cell: Cell, error: float, **more: Any) -> dict[str, Any]:
+def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
     """Return a row as large as a real one, with that error in degrees."""
     skill = dict.fromkeys(("mean_pose", "persistence", "nearest"), 1.0 - error / 4.0)
     return {
@@ -99,7 +99,9 @@ def sure(coverage: float, width: float, modes: list[list[float]], unknown: float
     }
 
 
-def ledger(path: Path, results: Iterable[CellResult], failures: list[tuple[Cell, list[str]]] | None = None) -> Path:
+def ledger(
+    path: Path, results: Iterable[CellResult], failures: list[tuple[TrackCell, list[str]]] | None = None
+) -> Path:
     """Write a ledger of results and of cells in quarantine with their reasons."""
     with Driver(path):
         pass

@@ -98,12 +98,9 @@ def test_a_plan_that_is_gone_on_with_is_one_plan_and_a_later_one_comes_first(beg
     assert progress_so_far(Ledger(begun)) == Progress(2, 0, 0, 2, 0, 0, None)
 
 
-def test_a_ledger_of_earlier_days_has_no_plan_and_a_damaged_one_is_none(begun: Path) -> None:
+def test_a_damaged_plan_is_none(begun: Path) -> None:
     (path,) = (begun / PLANS).iterdir()
     path.write_bytes(path.read_bytes()[:-3])
-    assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, 0, None)
-    path.unlink()
-    (begun / PLANS).rmdir()
     assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, 0, None)
     with Driver(begun) as driver:
         driver.ledger.begin(cell.key for cell in PLAN)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from posefit.report.runs import FIGURES, Runs, runs_of, shown_of
-from posefit.sweep.cell import Cell
+from posefit.sweep.cell import TrackCell
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
 from tests.sweep.fake import cells
@@ -18,7 +18,7 @@ FIRST = cells(1)[0]
 SAPSO, COOLER = replace(FIRST, method="sapso@pca"), replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
 
 
-def read(path: Path, cells: list[tuple[Cell, float]]) -> Runs:
+def read(path: Path, cells: list[tuple[TrackCell, float]]) -> Runs:
     return runs_of(Ledger(ledger(path / "results", [result(cell, error) for cell, error in cells])))
 
 

@@ -15,11 +15,11 @@ import posefit
 from posefit.cli import main
 from posefit.suites.running import run_on
 from posefit.suites.tally import suite_scores
-from posefit.sweep.engines.engine import Keyed, Outcome, Run
+from posefit.sweep.cell import Cell, run_cell
+from posefit.sweep.engines.engine import Outcome, Run
 from posefit.sweep.ledger import Ledger
-from posefit.sweep.single.plan import search_cells
-from posefit.sweep.single.rows import search_runs
-from posefit.sweep.single.search import run_search
+from posefit.sweep.plan import Plan, search_cells
+from posefit.sweep.table import search_runs
 
 PLAN = """
 suite = "posefit-2026.1"
@@ -43,7 +43,7 @@ def swept(folder: Path, *plans: str) -> Path:
         for cell in [cell for plan in plans for cell in search_cells(tomllib.loads(plan))]:
             claim = driver.claim(cell)
             assert isinstance(claim, Claim)
-            driver.finish(claim, run_search(cell))
+            driver.finish(claim, run_cell(cell))
     return folder
 
 
@@ -189,7 +189,7 @@ class Inside:
     def window(self) -> int:
         return 1
 
-    def submit(self, cell: Keyed) -> None:
+    def submit(self, cell: Cell) -> None:
         try:
             self._ended.append(Outcome(cell, self._run(cell)))
         except ValueError as error:
@@ -302,11 +302,11 @@ def test_a_link_that_leads_nowhere_is_refused_before_anything_runs(words: list[A
         ({"instances": 0}, "instances must be a list, or a whole number from 1 to"),
         ({"budgets": [0]}, "budgets must be at least 1, got 0"),
         ({"budgets": [4]}, "evaluations must hold one population of 40, got 36 of sapso"),
-        ({"seeds": [1, 1]}, "the cells of a plan must differ, got one twice"),
+        ({"seeds": [1, 1]}, "the cells of a plan must differ, got sapso on f1"),
         ({"infeasible": "drop"}, "infeasible must be one of repair, reject, penalise, got 'drop'"),
         ({"dimensions": [66]}, r"a plan must hold at least one cell, got none in \[66\] dimensions"),
     ],
 )
 def test_a_mistake_in_a_plan_is_named_before_anything_runs(change: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        search_cells({"suite": "posefit-2026.1", "methods": ["sapso"], "functions": [1], **change})
+        Plan.of({"suite": "posefit-2026.1", "methods": ["sapso"], "functions": [1], **change})

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from posefit.sweep.cell import Cell, CellResult, packed_joints
+from posefit.sweep.cell import CellResult, TrackCell, packed_joints
 from posefit.sweep.engines.limits import Limits
 
 if TYPE_CHECKING:
@@ -28,12 +28,12 @@ LEAVE, KILLED, EXIT, COMPILE = 1008, 1009, 1010, 1011
 LIMITS = Limits(seconds=300.0, gigabytes=1.0)
 
 
-def cells(count: int, frames: int = 60) -> list[Cell]:
+def cells(count: int, frames: int = 60) -> list[TrackCell]:
     """Return so many cells that differ by their seed."""
-    return [Cell("random@pca", "walk", ("walk-a",), seed=seed, frames=frames) for seed in range(count)]
+    return [TrackCell("random@pca", "walk", ("walk-a",), seed=seed, frames=frames) for seed in range(count)]
 
 
-def behave(cell: Cell) -> CellResult:
+def behave(cell: TrackCell) -> CellResult:
     """Return a result that follows from the cell alone, or do harm."""
     if STARTS in os.environ:
         file = os.open(os.environ[STARTS], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -81,7 +81,7 @@ def compiled() -> int:
     return int(threads())
 
 
-def result(cell: Cell) -> CellResult:
+def result(cell: TrackCell) -> CellResult:
     """Return the result of a cell."""
     numbers = np.random.default_rng(cell.seed).random(3)
     row = {
@@ -98,7 +98,7 @@ def result(cell: Cell) -> CellResult:
     return CellResult(row, packed_joints(estimate=joints, truth=joints))
 
 
-def swept(out: Path, chosen: Sequence[Cell], engine: "Engine") -> "Tally":
+def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
     """Return how a sweep ended."""
     from posefit.sweep.drive import drive_cells
     from posefit.sweep.driver import Driver

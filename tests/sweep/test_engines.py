@@ -97,9 +97,9 @@ def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(t
         }
     )
     runs: list[tuple[str, Any, Engine]] = [
-        ("pebble", plan.cells, Processes(2, Limits(), run_cell)),
-        ("again", plan.cells[::-1], Processes(1, Limits(), run_cell)),
-        ("dask", plan.cells[::-1], Cluster(workers=2, patience=PATIENCE)),
+        ("pebble", list(plan), Processes(2, Limits(), run_cell)),
+        ("again", list(plan)[::-1], Processes(1, Limits(), run_cell)),
+        ("dask", list(plan)[::-1], Cluster(workers=2, patience=PATIENCE)),
     ]
     found = []
     for name, chosen, engine in runs:

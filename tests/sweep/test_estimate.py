@@ -1,84 +1,78 @@
 """How long a plan will take is told from a few small cells, whatever its cells are."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
-from posefit.sweep.cell import CellResult
+from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.check import cell_of
-from posefit.sweep.engines.engine import Ended, Keyed, Outcome
-from posefit.sweep.estimate import TRACKS, Amounts, Gauge, estimate_of
-from posefit.sweep.single.estimate import SEARCHES
-from posefit.sweep.single.plan import search_cells
+from posefit.sweep.engines.engine import Ended, Outcome
+from posefit.sweep.estimate import Workload, estimate_of
+from posefit.sweep.plan import search_cells
 
 SECONDS, EACH = 0.25, 0.001  # of a cell, and of an evaluation of it
 
 
-@dataclass
 class Even:
     """An engine whose cells take so long as they have evaluations, and something more, in no time; pso fails."""
 
-    gauge: Gauge[Any]
-    tried: list[Any] = field(default_factory=list)
+    def __init__(self) -> None:
+        self.tried: list[Cell] = []
 
     def window(self) -> int:
         return 2
 
-    def submit(self, cell: Keyed) -> None:
+    def submit(self, cell: Cell) -> None:
         self.tried.append(cell)
 
     def wait(self, seconds: float) -> list[Outcome]:
         cell = self.tried[-1]
         if cell.method == "pso":
             return [Ended(cell, None, "it does not work")]
-        return [Ended(cell, CellResult({"seconds": SECONDS + EACH * self.gauge.work(cell)}, b""))]
-
-    def stop(self) -> list[Outcome]:
-        return []
+        return [Ended(cell, CellResult({"seconds": SECONDS + EACH * cell.total_evaluations}, b""))]
 
     def close(self) -> None:
         pass
 
 
-def tracks() -> Sequence[Keyed]:
+def tracks() -> Sequence[Cell]:
     spec = {"method": "sapso@pca", "motion": "walk", "evaluations": 100}
     return [cell_of({**spec, "frames": frames}) for frames in (10, 20)]
 
 
-def searches(**more: Any) -> Sequence[Keyed]:
+def searches(**more: Any) -> Sequence[Cell]:
     plan = {"suite": "posefit-2026.1", "methods": ["random"], "functions": [1], "instances": 2, **more}
     return search_cells(plan)
 
 
 @pytest.mark.parametrize(
-    ("gauge", "cells", "evaluations"),
+    ("cells", "evaluations"),
     [
-        (TRACKS, tracks(), 3_000),
-        (SEARCHES, searches(), 2 * 900),
-        (SEARCHES, searches(budgets=[10, 1000], dimensions=[9, 24]), 2 * 1010 * 33),
-        (SEARCHES, searches(methods=[{"method": "random", "settings": {"population_size": 700}}]), 2 * 900),
+        (tracks(), 3_000),
+        (searches(), 2 * 900),
+        (searches(budgets=[10, 1000], dimensions=[9, 24]), 2 * 1010 * 33),
+        (searches(methods=[{"method": "random", "settings": {"population_size": 700}}]), 2 * 900),
     ],
 )  # fmt: skip
 def test_an_estimate_is_the_time_of_all_cells_where_evaluations_take_the_same(
-    gauge: Gauge[Any], cells: Sequence[Keyed], evaluations: int
+    cells: Sequence[Cell], evaluations: int
 ) -> None:
-    amounts, engine = Amounts(gauge), Even(gauge)
+    workload, engine = Workload(), Even()
     for cell in cells:
-        amounts.add(cell)
-    found = estimate_of(amounts, engine, 2)
+        workload.add(cell)
+    found = estimate_of(workload, engine, 2)
     assert found.untried == {}
     assert found.seconds == pytest.approx((len(cells) * SECONDS + evaluations * EACH) / 2)
-    assert sum(map(gauge.work, engine.tried)) < 10_000
+    assert sum(cell.total_evaluations for cell in engine.tried) < 10_000
     for cell in engine.tried:
         assert cell.evaluations >= cell.settings.get("population_size", 1)
 
 
 def test_a_kind_that_fails_is_named_once_and_counts_for_nothing() -> None:
-    amounts, engine = Amounts(SEARCHES), Even(SEARCHES)
+    workload, engine = Workload(), Even()
     for cell in searches(methods=["random", "pso"]):
-        amounts.add(cell)
-    found = estimate_of(amounts, engine, 1)
+        workload.add(cell)
+    found = estimate_of(workload, engine, 1)
     assert found.untried == {"pso on f1 in 9D, instance 10000, seed 0": "it does not work"}
     assert found.seconds == pytest.approx(2 * SECONDS + 2 * 900 * EACH)

@@ -1,23 +1,23 @@
 """A ledger keeps every row, whatever becomes of its files and of those who write to it."""
 
 import errno
-import json
 import os
 import threading
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import posefit
 from posefit.sweep import log
-from posefit.sweep.cell import Cell
+from posefit.sweep.cell import TrackCell
 from posefit.sweep.drive import drive_cells
 from posefit.sweep.driver import ATTEMPTS, LOSSES, Claim, Driver, State
 from posefit.sweep.engines.engine import Outcome
 from posefit.sweep.ledger import Ledger
+from posefit.version import posefit_build
 from tests.sweep.fake import cells, result
 
 
@@ -30,7 +30,7 @@ class Here:
     def window(self) -> int:
         return 1
 
-    def submit(self, cell: Cell) -> None:
+    def submit(self, cell: TrackCell) -> None:
         self.ended.append(Outcome(cell, result(cell)))
 
     def wait(self, seconds: float) -> list[Outcome]:
@@ -84,7 +84,7 @@ def test_a_frame_has_a_row_a_cell_whose_order_does_not_follow_from_when_it_was_r
     assert table["seed"].tolist() == [0, 1, 2, 3, 4, 5]
     assert table["status"].tolist() == ["done"] * 5 + ["quarantined"]
     assert table["reason"].iloc[5] == "it had to; it had to; it had to"
-    assert table["version"].unique().tolist() == [posefit.__version__]
+    assert table["version"].unique().tolist() == [posefit_build()]
     assert table["view_degrees"].unique().tolist() == ["45"]
     assert table["evaluations"].unique().tolist() == [2440]
     assert table["error_degrees.mean"].iloc[0] == result(cells(1)[0]).row["error_degrees"]["mean"]
@@ -188,16 +188,16 @@ def test_damaged_joints_are_named(tmp_path: Path) -> None:
         Ledger(folder).joints(cells(1)[0].key)
 
 
-def test_a_ledger_of_another_version_is_read_but_never_written_to(tmp_path: Path) -> None:
-    folder = filled(tmp_path / "ledger")
-    index = json.loads((folder / "ledger.json").read_text())
-    (folder / "ledger.json").write_text(json.dumps({**index, "version": "0.0.9"}))
-    with pytest.raises(
-        ValueError, match=r"expected a ledger of posefit .*, got one of 0\.0\.9; its rows are kept apart"
-    ):
-        Driver(folder)
-    assert Ledger(folder).version == "0.0.9"
-    assert len(Ledger(folder)) == 5
+def test_rows_of_another_version_are_read_and_counted_and_their_cells_are_run_again(tmp_path: Path) -> None:
+    folder, old = tmp_path / "ledger", [replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)]
+    with Driver(folder) as driver:
+        drive_cells(old, driver, Here(), print, lambda _: None)
+        assert driver.ledger.version == "0.0.9 a1"
+        assert driver.ledger.outdated() == 2
+        assert drive_cells(cells(3), driver, Here(), print, lambda _: None).ran == 3
+    ledger = Ledger(folder)
+    assert (len(ledger), ledger.outdated()) == (5, 2)
+    assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_a_ledger_of_another_version_is_read_but_never_written_to(tmp_path: Path
     [
         ("{", "expected the index of a ledger, got"),
         ("[]", "expected the index of a ledger, got"),
-        ('{"format": 1}', "expected the index of a ledger, got 'version'"),
+        ("{}", "expected the index of a ledger, got 'format'"),
         ('{"format": 9, "version": "9"}', "expected a ledger of format 1, got 9"),
     ],
 )
@@ -403,7 +403,7 @@ def test_many_drivers_may_make_the_same_ledger_at_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "content",
-    [b'{"format": 1, "version": "\xff"}', b"[]", b"{}", b"[" * 9000, b'{"format": 1, "version": 3}', b" " * 20_000],
+    [b'{"format": "\xff"}', b"[]", b"{}", b"[" * 9000, b'{"format": 3}', b" " * 20_000],
 )
 def test_an_index_that_is_damaged_is_one_line(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "ledger.json").write_bytes(content)

@@ -4,18 +4,20 @@ from collections.abc import Iterator
 
 import pytest
 
-from posefit.sweep.cell import Cell
+from posefit.sweep.cell import TrackCell
 from posefit.sweep.drive import NEAR, mingled
 
 METHODS = ("sapso@pca", "cma@pca", "vsmm")
 
 
-def cells(methods: str, seeds: int) -> list[Cell]:
+def cells(methods: str, seeds: int) -> list[TrackCell]:
     """Return the cells of a product of methods, a letter each, and seeds."""
-    return [Cell(METHODS["abc".index(one)], "walk", ("walk-a",), seed=seed) for one in methods for seed in range(seeds)]
+    return [
+        TrackCell(METHODS["abc".index(one)], "walk", ("walk-a",), seed=seed) for one in methods for seed in range(seeds)
+    ]
 
 
-def order(given: list[Cell], workers: int) -> list[int]:
+def order(given: list[TrackCell], workers: int) -> list[int]:
     return [given.index(cell) for cell in mingled(iter(given), lambda: workers)]
 
 
@@ -39,7 +41,7 @@ def test_cells_of_one_method_keep_their_order() -> None:
 def test_a_long_plan_is_not_gone_through_before_it_begins() -> None:
     asked: list[int] = []
 
-    def coming() -> Iterator[Cell]:
+    def coming() -> Iterator[TrackCell]:
         for cell in cells("ab", 2 * NEAR):
             asked.append(cell.seed)
             yield cell

@@ -1,10 +1,13 @@
 """A plan is checked as a whole, before anything runs; a mistake in it is one line."""
 
 import json
+import re
+import sys
 import tracemalloc
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,13 +17,13 @@ from posefit.entries import Plugin
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
-from posefit.registry import Offer, Registry, source_digest
+from posefit.registry import Offer, Registry
 from posefit.sweep import check
-from posefit.sweep.cell import LATER, Cell, anytime_trace, cell_scene, digest_of, run_cell
+from posefit.sweep.cell import TrackCell, anytime_trace, cell_scene, digest_of, run_cell
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
-from posefit.sweep.table import flat
 from posefit.tracking import method
+from posefit.version import posefit_build, source_digest
 from tests.effort import effort
 from tests.testing.planted import Holds
 
@@ -52,7 +55,7 @@ def test_a_product_holds_every_combination_and_cells_come_beside_it() -> None:
     assert {cell.frames for cell in plan if cell.motion != "run"} == {7}
     assert {cell.view_degrees for cell in plan} == {(45.0,), (0.0, 90.0)}
     assert {cell.seed for cell in plan} == {0, 1, 2}
-    assert plan.cells[-1].train == built_in.other_styles("jump")
+    assert list(plan)[-1].train == built_in.other_styles("jump")
 
 
 def test_methods_change_soonest_so_that_a_sweep_under_way_compares_them() -> None:
@@ -159,33 +162,38 @@ def test_the_default_plan_holds_the_papers_three_methods_at_one_budget() -> None
 
 
 def test_a_key_follows_from_the_spec_and_the_version_alone() -> None:
-    one, same, other = (Cell("sapso@pca", "walk", ("walk-a",), seed=seed) for seed in (1, 1, 2))
+    one, same, other = (TrackCell("sapso@pca", "walk", ("walk-a",), seed=seed) for seed in (1, 1, 2))
     assert one.key == same.key != other.key
     assert len(one.key) == 64
-    assert Cell("sapso@pca", "walk", ("walk-a",), seed=1, version="0.0.9").key != one.key
+    assert TrackCell("sapso@pca", "walk", ("walk-a",), seed=1, version="posefit 0.0.9 a1").key != one.key
 
 
-def test_a_key_of_a_ledger_from_before_the_later_fields_is_found_again() -> None:
-    # as posefit had it when cells had no `tracks`, `yaw_off_degrees` and `body_off_percent`
-    before = "87d5e3a83911785010d94a043ebed9b38a7414f921f4e7995c5e1807bdb09a2a"
-    assert Cell("sapso@pca", "walk", ("walk-a",), seed=1, version="0.0.9").key == before
+def test_a_cells_version_has_digests_of_posefit_and_of_its_methods_plugins_and_no_others() -> None:
+    sapso, cma = (cell_of({"method": name, "motion": "walk"}).version.split(", ") for name in ("sapso@pca", "cma@full"))
+    assert sapso[0] == cma[0] == posefit_build()
+    assert [part.partition(" ")[0] for part in sapso[1:]] == ["posefit_priors", "posefit_swarm"]
+    assert [part.partition(" ")[0] for part in cma[1:]] == ["posefit_evolution", "posefit_priors"]
+    assert all(re.fullmatch(r"\w+ [0-9a-f]{8}", part) for part in (*sapso[1:], *cma[1:]))
 
 
-@pytest.mark.parametrize(("name", "value"), [("tracks", 2), ("yaw_off_degrees", 25.0), ("body_off_percent", 5.0)])
-def test_a_later_field_is_told_only_where_it_says_something_else(name: str, value: float) -> None:
-    spec = {"method": "random@pca", "motion": "walk"}
-    plain, other = cell_of(spec), cell_of({**spec, name: value})
-    assert cell_of({**spec, name: LATER[name]}).spec == plain.spec
-    assert name not in plain.spec
-    assert other.spec == {**plain.spec, name: value}
-    assert other.key != plain.key
-    for cell, meant in ((plain, LATER[name]), (other, value)):
-        assert flat({"key": cell.key, "spec": cell.spec, "status": "done"})[name] == meant
+def test_a_digest_changes_with_every_source_and_data_file_but_not_with_those_that_results_do_not_depend_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "package"
+    (package / "report").mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    monkeypatch.setitem(sys.modules, "package", SimpleNamespace(__file__=str(package / "__init__.py")))  # type: ignore[arg-type]
 
+    def digest() -> str:
+        source_digest.cache_clear()
+        return source_digest("package", ("report",))
 
-def test_later_fields_are_all_said_with_their_defaults() -> None:
-    defaults = {one.name: one.default for one in fields(Cell)}
-    assert {name: defaults[name] for name in LATER} == LATER
+    found = [digest()]
+    for name, counts in (("search.py", True), ("model.npz", True), ("notes.txt", False), ("report/page.py", False)):
+        (package / name).write_text("1")
+        found.append(digest())
+        assert (found[-1] != found[-2]) == counts, name
+    source_digest.cache_clear()
 
 
 def test_a_cell_follows_so_many_tracks() -> None:
@@ -200,7 +208,7 @@ def test_a_cell_is_restored_from_its_rows_spec() -> None:
     spec = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
     (cell,) = Plan.of({"cells": [{**spec, "corruption": {"holes": 0.5}, "settings": {"pca.components": 4}}]})
     row = run_cell(cell).row
-    again = Cell(**json.loads(json.dumps(row))["spec"])
+    again = TrackCell(**json.loads(json.dumps(row))["spec"])
     assert again.key == cell.key == row["key"]
     assert run_cell(again).row["error_degrees"] == row["error_degrees"]
 
@@ -265,8 +273,10 @@ def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_eval
 
 
 def test_a_worker_of_another_version_does_not_run_a_cell() -> None:
-    with pytest.raises(ValueError, match=rf"a worker must have posefit 0.0.9, got {posefit.__version__}"):
-        run_cell(Cell("random@pca", "walk", ("walk-a",), version="0.0.9"))
+    with pytest.raises(ValueError, match=rf"a worker must have posefit 0.0.9 a1, got posefit {posefit.__version__} "):
+        run_cell(TrackCell("random@pca", "walk", ("walk-a",), version="posefit 0.0.9 a1"))
+    with pytest.raises(ValueError, match="a worker must have posefit_swarm 00000000, got posefit_swarm "):
+        run_cell(TrackCell("random@pca", "walk", ("walk-a",), version=f"{posefit_build()}, posefit_swarm 00000000"))
 
 
 def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_version(
@@ -278,7 +288,7 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
         monkeypatch.setattr(module, "registry", lambda: found)
     spec = {"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]}
     (cell,) = Plan.of({"cells": [spec]})
-    assert cell.version == f"{posefit.__version__}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
+    assert cell.version == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
     row = run_cell(cell).row
     assert row["prior_floor_degrees"] is None
     assert row["trace"]["evaluations"][-1] <= 2440
@@ -299,7 +309,7 @@ def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(t
         with pytest.raises(ValueError, match=message):
             Plan.read(path)
     path.write_text(cells + "view_degrees = 999999999999999999999")  # was a traceback; it is an angle like others
-    assert Plan.read(path).cells[0].view_degrees == (1e21,)
+    assert next(iter(Plan.read(path))).view_degrees == (1e21,)
 
 
 def test_a_product_gives_the_cells_and_keys_that_its_specs_give_one_by_one() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from posefit.sweep.cell import Cell, CellResult
+from posefit.sweep.cell import CellResult, TrackCell
 from posefit.sweep.driver import Claim, Driver
 from posefit.sweep.ledger import ROWS, Ledger
 from posefit.sweep.log import Writer
@@ -32,7 +32,7 @@ print(json.dumps([len(table), traces, opened, taken, 1024 * int(status["VmHWM"].
 """
 
 
-def real(cell: Cell) -> CellResult:
+def real(cell: TrackCell) -> CellResult:
     """Return a result as large as that of a real cell."""
     trace = {"evaluations": list(range(40, 2480, 40)), "cost": [float(f"{20.0 / k:.6g}") for k in range(1, 62)]}
     figures = dict.fromkeys(("mpjpe_mm", "pa_mpjpe_mm", "iou", "cost", "swap_rate", "lost_rate"), cell.seed / 7.0)
@@ -65,7 +65,7 @@ def one_more(folder: Path, frames: int) -> Effort:
             cell = replace(cells(1)[0], seed=seed, frames=frames)
             ended = real(cell)
 
-            def run(cell: Cell = cell, ended: CellResult = ended) -> None:
+            def run(cell: TrackCell = cell, ended: CellResult = ended) -> None:
                 claim = driver.claim(cell)
                 assert isinstance(claim, Claim)
                 driver.finish(claim, ended)

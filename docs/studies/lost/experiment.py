@@ -14,7 +14,7 @@ from lost.tables import lost_tables, sides_table
 from posefit.files import new_file
 from posefit.footage.training import training_clips, training_motions
 from posefit.reading import parsed_json, read_text
-from posefit.sweep.cell import Cell, cell_scene, parts
+from posefit.sweep.cell import TrackCell, cell_scene, parts
 from posefit.sweep.check import cell_of
 from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
@@ -71,7 +71,7 @@ def _followed(
     return [found[track] for track in tracks]
 
 
-def _tracked(cell: Cell, track: Turn) -> dict[str, Any]:
+def _tracked(cell: TrackCell, track: Turn) -> dict[str, Any]:
     """Return a row of a track: its frames' errors, costs, and evidence where the tracker tells it."""
     scene = cell_scene(cell)
     if track.condition == MASKS:

@@ -21,7 +21,7 @@ from posefit.footage.scene import Rendered, Scene, synthetic
 from posefit.footage.training import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Silhouette
-from posefit.sweep.cell import Cell, cell_scene, parts
+from posefit.sweep.cell import TrackCell, cell_scene, parts
 from posefit.sweep.check import cell_of
 from posefit.tracking.method import Choice
 from posefit.tracking.opening import Opening
@@ -72,14 +72,14 @@ def recoveries(
     return [found[key] for key in keys]
 
 
-def _cell(method: str, evaluations: int, clip: Piece, views: Views, kind: str) -> Cell:
+def _cell(method: str, evaluations: int, clip: Piece, views: Views, kind: str) -> TrackCell:
     """Return the cell of the walk as it is, whole or until its end."""
     frames = BEFORE if kind == RETURN else clip.frames
     spec = {"method": method, "motion": clip.name, "train": [clip.library], "view_degrees": views, "frames": frames}
     return cell_of({**spec, "instance": clip.instance, "evaluations": evaluations, **TOLD})
 
 
-def _tried(cell: Cell, clip: Piece, views: Views, kind: str, translation: Translation) -> dict[str, Any]:
+def _tried(cell: TrackCell, clip: Piece, views: Views, kind: str, translation: Translation) -> dict[str, Any]:
     scene = cell_scene(cell)
     scene, gone, back = returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
     optimiser, prior, tracker = parts(cell.method)

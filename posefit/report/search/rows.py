@@ -14,8 +14,7 @@ from posefit.report.runs import distinct
 from posefit.statistics.profiles import hits
 from posefit.suites.running import SuiteRun
 from posefit.sweep.cell import settings_text
-from posefit.sweep.single.rows import search_run
-from posefit.sweep.table import is_search
+from posefit.sweep.table import is_search, search_run
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
@@ -102,12 +101,11 @@ def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
 
 def _told(variant: Mapping[str, Any]) -> list[str]:
     """Return what tells a method from others of its name."""
-    foreign = variant["version"].partition(", ")[2]
     return [
         *settings_text(variant["settings"]),
         f"{variant['budget']:g} evaluations for each dimension",
         f"infeasible: {variant['infeasible']}",
-        *([foreign] if foreign else []),
+        *variant["version"].split(", "),
     ]
 
 

@@ -9,9 +9,9 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from posefit.sweep.cell import run_cell
+from posefit.sweep.cell import Cell, run_cell
 from posefit.sweep.engines.child import called
-from posefit.sweep.engines.engine import EngineError, Keyed, Outcome, Run
+from posefit.sweep.engines.engine import EngineError, Outcome, Run
 from posefit.sweep.engines.limits import Limits, text_of
 
 PATIENCE = 30.0  # seconds to wait for a scheduler, or for workers, that are not there
@@ -25,7 +25,7 @@ LOOK = 1.0  # seconds between two looks at which workers there are
 class _Sent:
     """A cell on its way."""
 
-    cell: Keyed
+    cell: Cell
     worker: str  # the address that it was sent to
     missed: int = 0  # how often this worker was looked for in vain
 
@@ -75,7 +75,7 @@ class Cluster:
             self._look()
         return len(self._idle) + len(self._running)
 
-    def submit(self, cell: Keyed) -> None:
+    def submit(self, cell: Cell) -> None:
         """Send a cell to an idle worker."""
         worker = self._idle.pop()
         arguments = self._run, cell, self._limits

@@ -6,7 +6,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
-from posefit.sweep.cell import CellResult
+from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.engines.limits import FailedError, Limits, text_of
 
 J = TypeVar("J")  # a job: a cell, or whatever else its function takes
@@ -15,25 +15,6 @@ Run = Callable[[Any], CellResult]
 # Signals that nothing in a cell brings about by mistake: somebody or something outside sent them. So does the kernel
 # where memory runs out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
 OUTSIDE = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGPWR")
-
-
-class Keyed(Protocol):
-    """What a sweep runs and its ledger keeps: a cell, which is a track or a single search."""
-
-    @property
-    def method(self) -> str:
-        """Who runs."""
-        ...
-
-    @property
-    def key(self) -> str:
-        """The name of its row: 64 hexadecimal digits."""
-        ...
-
-    @property
-    def spec(self) -> dict[str, Any]:
-        """Everything that it depends on, as JSON holds it."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -49,7 +30,7 @@ class Ended(Generic[J, R]):
     own: bool = True  # its own fault: a limit, an exception, a segfault, an exit; not a kill from outside
 
 
-Outcome = Ended[Keyed, CellResult]
+Outcome = Ended[Cell, CellResult]
 
 
 class Engine(Protocol):
@@ -59,7 +40,7 @@ class Engine(Protocol):
         """Return how many cells may run at the moment. Raises EngineError where the engine is gone for good."""
         ...
 
-    def submit(self, cell: Keyed) -> None:
+    def submit(self, cell: Cell) -> None:
         """Start a cell."""
         ...
 

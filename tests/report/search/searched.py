@@ -4,8 +4,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from posefit.sweep.cell import CellResult
-from posefit.sweep.single.search import SearchCell
+from posefit.sweep.cell import CellResult, SearchCell
 from tests.report.browser import ledger
 
 BUDGET = 100  # evaluations for each dimension
