@@ -1,49 +1,99 @@
-"""What a plugin may offer. A plugin is a module named in the entry-point group `posefit`."""
+"""The hooks of a plugin: a module named in the entry-point group `posefit`, which registers what it offers.
 
-from typing import Any, Protocol
+    from posefit.plugin import hookimpl
+
+    @hookimpl
+    def posefit_register_optimisers(register):
+        register("spiral", Spiral)
+
+Two kinds of modules are imported apart from the others, and an entry point's name says which: every command line
+imports the modules whose entry point ends in `-commands`, even for `posefit --help`, and a report those whose entry
+point ends in `-claims`. All others are imported when a method is needed.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
 
 from pluggy import HookspecMarker
 
-from posefit.entries import PROJECT
-from posefit.fitting.optimiser import NextFrame, OptimiserFactory
-from posefit.fitting.prior import PriorFactory
-from posefit.fitting.tracker import TrackerFactory
-from posefit.silhouette.foreground import SegmenterFactory
+if TYPE_CHECKING:
+    import click
 
+    from posefit.fitting.optimiser import NextFrame, OptimiserFactory
+    from posefit.fitting.prior import PriorFactory
+    from posefit.fitting.tracker import TrackerFactory
+    from posefit.silhouette.foreground import SegmenterFactory
+
+PROJECT = "posefit"
 hookspec = HookspecMarker(PROJECT)
 
 # The module a factory imports when it is called, and what to install where it is absent: ("cma", "posefit[pycma]").
 Needs = tuple[str, str]
 
 
+@dataclass(frozen=True)
+class ClaimedOrder:
+    """What a publication claims of methods: each of them is beaten by the next.
+
+    Raises ValueError for fewer than two methods, or one that is there twice.
+    """
+
+    source: str  # how a report calls the publication: "the SAPSO paper"
+    statement: str  # the claim, as the second half of a sentence
+    methods: tuple[str, ...]  # worst first, by the names that plans have for them
+
+    def __post_init__(self) -> None:
+        if len(set(self.methods)) != len(self.methods) or len(self.methods) < 2:
+            raise ValueError(f"methods must be at least two that differ, got {', '.join(self.methods) or 'none'}")
+
+    @property
+    def name(self) -> str:
+        """How lists and errors name the claim."""
+        return f"{self.source!r} of {', '.join(self.methods)}"
+
+
 class RegisterOptimiser(Protocol):
-    """Offers an optimiser under a name, says what becomes of it in the next frame, and what it needs."""
+    """Registers an optimiser: its name, its factory, what becomes of it in the next frame, and what it needs."""
 
     def __call__(
-        self, name: str, factory: OptimiserFactory, *, next_frame: NextFrame = "start", needs: Needs | None = None
+        self, name: str, factory: "OptimiserFactory", *, next_frame: "NextFrame" = "start", needs: Needs | None = None
     ) -> None:
-        """Take an optimiser's factory."""
+        """Register an optimiser."""
 
 
 class RegisterPrior(Protocol):
-    """Offers a prior under a name, and says what it needs."""
+    """Registers a prior: its name, its factory and what it needs."""
 
-    def __call__(self, name: str, factory: PriorFactory, *, needs: Needs | None = None) -> None:
-        """Take a prior's factory."""
+    def __call__(self, name: str, factory: "PriorFactory", *, needs: Needs | None = None) -> None:
+        """Register a prior."""
 
 
 class RegisterTracker(Protocol):
-    """Offers a tracker under a name, and says what it needs."""
+    """Registers a tracker: its name, its factory and what it needs."""
 
-    def __call__(self, name: str, factory: TrackerFactory, *, needs: Needs | None = None) -> None:
-        """Take a tracker's factory."""
+    def __call__(self, name: str, factory: "TrackerFactory", *, needs: Needs | None = None) -> None:
+        """Register a tracker."""
 
 
 class RegisterSegmenter(Protocol):
-    """Offers a segmenter under a name, and says what it needs."""
+    """Registers a segmenter: its name, its factory and what it needs."""
 
-    def __call__(self, name: str, factory: SegmenterFactory, *, needs: Needs | None = None) -> None:
-        """Take a segmenter's factory."""
+    def __call__(self, name: str, factory: "SegmenterFactory", *, needs: Needs | None = None) -> None:
+        """Register a segmenter."""
+
+
+class RegisterCommand(Protocol):
+    """Registers a command of `posefit`."""
+
+    def __call__(self, command: "click.Command") -> None:
+        """Register a command, which has its name itself."""
+
+
+class RegisterClaim(Protocol):
+    """Registers a claim of a publication."""
+
+    def __call__(self, claim: ClaimedOrder) -> None:
+        """Register a claim."""
 
 
 @hookspec
@@ -64,3 +114,16 @@ def posefit_register_trackers(register: RegisterTracker) -> Any:
 @hookspec
 def posefit_register_segmenters(register: RegisterSegmenter) -> Any:
     """Call `register(name, factory)` for each segmenter; see `posefit.silhouette.foreground`."""
+
+
+@hookspec
+def posefit_register_commands(register: RegisterCommand) -> Any:
+    """Call `register(command)` for each command, a `click.Command` or a group of them.
+
+    A ValueError, an ImportError or a missing file becomes one line for the user, with exit status 2.
+    """
+
+
+@hookspec
+def posefit_register_claims(register: RegisterClaim) -> Any:
+    """Call `register(ClaimedOrder(...))` for each order of methods that a publication claims."""

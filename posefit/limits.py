@@ -1,4 +1,4 @@
-"""How long something may take that others wrote, how much memory there may be, and that nothing ends the program."""
+"""How long a call into a plugin may take, and how much memory there may be."""
 
 import os
 import signal
@@ -10,7 +10,6 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
 
 AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
 SOON = 1e-6  # seconds, for a timer that should have ended meanwhile; 0 would switch it off
@@ -95,27 +94,3 @@ def _machine_bytes() -> int:
         with suppress(OSError, ValueError):  # "max" is no number
             found.append(int(path.read_text()))
     return min(found)
-
-
-@contextmanager
-def exits_told(status: int) -> Iterator[None]:
-    """Have `os._exit` in the body say who called it, and end this process with `status` instead of its own.
-
-    It ends a process at once and past every `except`; a status of 0 would look like a result. Processes that are
-    forked in the body end as they like.
-    """
-    real, owner = os._exit, os.getpid()
-
-    def told(asked: int) -> NoReturn:
-        if os.getpid() != owner:
-            real(asked)
-        caller = sys._getframe(1)
-        where = f"{caller.f_code.co_filename}:{caller.f_lineno}"
-        os.write(2, f"posefit: nothing may end the program, got os._exit({asked}) in {where}\n".encode())
-        real(status)
-
-    os._exit = told  # type: ignore[assignment]
-    try:
-        yield
-    finally:
-        os._exit = real  # type: ignore[assignment]

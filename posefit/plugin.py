@@ -17,7 +17,6 @@ with a space is a function here.
 
 from posefit import hookimpl
 from posefit.arrays import Array
-from posefit.claims import ClaimedOrder
 from posefit.fitting.box import (
     Space,
     Start,
@@ -35,7 +34,15 @@ from posefit.fitting.check import at_least, between, one_of, positive, whole
 from posefit.fitting.optimiser import Filter, Niching, Optimiser
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
-from posefit.hooks import RegisterOptimiser, RegisterPrior, RegisterSegmenter, RegisterTracker
+from posefit.hooks import (
+    ClaimedOrder,
+    RegisterClaim,
+    RegisterCommand,
+    RegisterOptimiser,
+    RegisterPrior,
+    RegisterSegmenter,
+    RegisterTracker,
+)
 from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.foreground import Footage, Segmenter
 
@@ -49,6 +56,8 @@ __all__ = [
     "Observation",
     "Optimiser",
     "Prior",
+    "RegisterClaim",
+    "RegisterCommand",
     "RegisterOptimiser",
     "RegisterPrior",
     "RegisterSegmenter",

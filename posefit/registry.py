@@ -1,25 +1,44 @@
-"""What plugins offer, by kind and name: optimisers, priors, trackers and segmenters."""
+"""What plugins offer, by kind and name, and how plugins are loaded.
+
+A plugin that cannot be imported, misspells a hook, fails inside one or takes a name that is taken is left out with a
+warning that names its distribution; the others work. Environment variables, as in other plugin hosts:
+POSEFIT_LOAD_PLUGINS names the only ones to load beside the built-ins (none where it is empty), POSEFIT_BLOCK_PLUGINS
+those to leave out, each by plugin or distribution and separated by commas; POSEFIT_STRICT_PLUGINS=1 turns the warning
+into an error.
+"""
 
 import os
 import re
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, TypeVar, get_args
 
-from posefit import entries, hooks
-from posefit.entries import PROJECT, Plugin
-from posefit.fitting.optimiser import NextFrame, OptimiserFactory
-from posefit.fitting.prior import PriorFactory
-from posefit.fitting.tracker import TrackerFactory
+import pluggy
+
+from posefit import hooks
+from posefit.hooks import PROJECT, ClaimedOrder
 from posefit.settings import Setting, settings_of
 from posefit.version import source_digest
 
+if TYPE_CHECKING:
+    import click
+
+    from posefit.fitting.optimiser import NextFrame, OptimiserFactory
+    from posefit.fitting.prior import PriorFactory
+    from posefit.fitting.tracker import TrackerFactory
+
+LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
+
+T = TypeVar("T")
+
 Kind = Literal["optimiser", "prior", "tracker", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+APART = ("commands", "claims")  # what is registered by modules of its own, see `posefit.hooks`
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 
 
@@ -32,7 +51,7 @@ class Offer:
     factory: Callable[..., Any] = field(repr=False)
     distribution: str
     version: str
-    next_frame: NextFrame = "start"  # of an optimiser
+    next_frame: "NextFrame" = "start"  # of an optimiser
     needs: hooks.Needs | None = None
 
     @property
@@ -66,9 +85,21 @@ class Offer:
         return None if self.needs is None or find_spec(self.needs[0]) is not None else self.needs[1]
 
 
+class Plugin(NamedTuple, Generic[T]):
+    """One entry point, whether it was loaded, and what it offers."""
+
+    name: str
+    distribution: str
+    version: str
+    state: Literal["loaded", "broken", "left out"]
+    cause: str = ""
+    offers: tuple[T, ...] = ()
+    traceback: str = ""  # of what broke it
+
+
 @dataclass(frozen=True)
 class Registry:
-    """Everything that plugins registered, by kind and name."""
+    """The methods that plugins registered, by kind and name."""
 
     plugins: tuple[Plugin[Offer], ...]
 
@@ -78,17 +109,17 @@ class Registry:
         mine = [offer for plugin in self.plugins for offer in plugin.offers]
         return {kind: {offer.name: offer for offer in mine if offer.kind == kind} for kind in KINDS}
 
-    def optimiser(self, name: str) -> OptimiserFactory:
+    def optimiser(self, name: str) -> "OptimiserFactory":
         """Return the optimiser factory of a name. Raises ValueError listing the known names."""
         factory: OptimiserFactory = self.offer("optimiser", name).factory
         return factory
 
-    def prior(self, name: str) -> PriorFactory:
+    def prior(self, name: str) -> "PriorFactory":
         """Return the prior factory of a name. Raises ValueError listing the known names."""
         factory: PriorFactory = self.offer("prior", name).factory
         return factory
 
-    def tracker(self, name: str) -> TrackerFactory:
+    def tracker(self, name: str) -> "TrackerFactory":
         """Return the tracker factory of a name. Raises ValueError listing the known names."""
         factory: TrackerFactory = self.offer("tracker", name).factory
         return factory
@@ -121,22 +152,152 @@ class Registry:
 
 @lru_cache(maxsize=1)
 def registry() -> Registry:
-    """Return what all installed plugins offer; they are loaded once a process."""
-    return registry_of(entry_points(group=PROJECT))
+    """Return the methods of all installed plugins; they are loaded once a process."""
+    return registry_of(_installed("methods"))
+
+
+@lru_cache(maxsize=1)
+def command_plugins(taken: tuple[str, ...] = ()) -> "tuple[Plugin[click.Command], ...]":
+    """Return all installed plugins with commands; `taken` are the names of posefit's own commands."""
+    return commands_of(_installed("commands"), taken)
+
+
+@lru_cache(maxsize=1)
+def claim_plugins() -> tuple[Plugin[ClaimedOrder], ...]:
+    """Return all installed plugins with claims of publications."""
+    return claims_of(_installed("claims"))
+
+
+def claimed_orders() -> tuple[ClaimedOrder, ...]:
+    """Return the claims of publications that all installed plugins register."""
+    return tuple(claim for plugin in claim_plugins() for claim in plugin.offers)
 
 
 def registry_of(points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ) -> Registry:
-    """Return what the plugins behind these entry points offer; see `posefit.entries.load`."""
-    return Registry(entries.load(points, hooks, _offers, _named, variables))
+    """Return what the plugins behind these entry points offer; see `load`."""
+    return Registry(load(points, _methods, lambda offer: f"{offer.kind} {offer.name!r}", variables))
 
 
-def _named(offer: Offer) -> str:
-    return f"{offer.kind} {offer.name!r}"
+def commands_of(
+    points: Iterable[EntryPoint], taken: Iterable[str] = (), variables: Mapping[str, str] = os.environ
+) -> "tuple[Plugin[click.Command], ...]":
+    """Return the plugins with commands behind these entry points; see `load`."""
+    owners = {f"command {name!r}": PROJECT for name in taken}
+    return load(points, _commands, lambda command: f"command {command.name!r}", variables, owners)
 
 
-def _offers(relay: Any, distribution: str, version: str) -> Iterator[Offer]:
-    """Yield everything that one plugin registers."""
-    mine: list[Offer] = []
+def claims_of(
+    points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ
+) -> tuple[Plugin[ClaimedOrder], ...]:
+    """Return the plugins with claims behind these entry points; see `load`."""
+    return load(points, _claims, lambda claim: f"claim {claim.name}", variables)
+
+
+def load(
+    points: Iterable[EntryPoint],
+    collect: Callable[[Any, str, str], Iterable[T]],
+    label: Callable[[T], str],
+    variables: Mapping[str, str] = os.environ,
+    taken: Mapping[str, str] | None = None,
+) -> tuple[Plugin[T], ...]:
+    """Return the plugins behind entry points, posefit's own first, loaded, broken or left out.
+
+    `collect(hooks, distribution, version)` returns what a plugin offers, and `label` how an error names an offer. No
+    two offers of one name are loaded; `taken` are names that are not free, with their owners. Raises ValueError where
+    a plugin is broken and POSEFIT_STRICT_PLUGINS is set.
+    """
+    owners = dict(taken or {})
+    plugins: list[Plugin[T]] = []
+    for owner, point in sorted(_owned(points), key=lambda owned: (owned[0][0] != PROJECT, owned[1].name)):
+        plugin = _loaded(point, owner, collect, label, variables, owners)
+        plugins.append(plugin)
+        if plugin.state == "broken":
+            message = f"plugin {plugin.name!r} of {plugin.distribution} {plugin.version} is left out: {plugin.cause}"
+            if variables.get(STRICT, "0") not in ("", "0"):
+                raise ValueError(message)
+            warnings.warn(message, stacklevel=2)
+        owners |= {label(offer): plugin.distribution for offer in plugin.offers}
+    return tuple(plugins)
+
+
+def _loaded(
+    point: EntryPoint,
+    owner: tuple[str, str],
+    collect: Callable[[Any, str, str], Iterable[T]],
+    label: Callable[[T], str],
+    variables: Mapping[str, str],
+    owners: Mapping[str, str],
+) -> Plugin[T]:
+    distribution, version = owner
+    reason = _left_out(point.name, distribution, variables)
+    if reason:
+        return Plugin(point.name, distribution, version, "left out", reason)
+    offers: dict[str, T] = {}
+    try:
+        manager = pluggy.PluginManager(PROJECT)
+        manager.add_hookspecs(hooks)
+        module = point.load()
+        manager.register(module, point.name)
+        manager.check_pending()
+        for hook in manager.get_hookcallers(module) or ():
+            what = hook.name.removeprefix("posefit_register_")
+            if what in APART and _registers(point.name) != what:
+                raise ValueError(f"the entry point of {hook.name} must end in -{what}, got {point.name!r}")
+            if what not in APART and _registers(point.name) != "methods":
+                raise ValueError(f"{point.name!r} must register {_registers(point.name)} alone, got {hook.name}")
+        for offer in collect(manager.hook, distribution, version):
+            name = label(offer)
+            if name in owners or name in offers:
+                raise ValueError(f"{name} is already registered by {owners.get(name, distribution)}")
+            offers[name] = offer
+    except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
+        import traceback
+
+        trace = "".join(traceback.format_exception(error))
+        cause = f"{type(error).__name__}: {error}"
+        return Plugin(point.name, distribution, version, "broken", cause, traceback=trace)
+    return Plugin(point.name, distribution, version, "loaded", offers=tuple(offers.values()))
+
+
+def _registers(name: str) -> str:
+    """Return what an entry point of this name registers: "commands", "claims" or "methods"."""
+    return next((what for what in APART if name.endswith(f"-{what}")), "methods")
+
+
+def _installed(what: str) -> list[EntryPoint]:
+    """Return the installed entry points that register `what`."""
+    return [point for point in entry_points(group=PROJECT) if _registers(point.name) == what]
+
+
+def _owned(points: Iterable[EntryPoint]) -> Iterator[tuple[tuple[str, str], EntryPoint]]:
+    """Yield each entry point with the name and the version of its distribution, read once."""
+    known: dict[int, tuple[str, str]] = {}
+    for point in points:
+        dist = point.dist
+        if dist is not None and id(dist) not in known:
+            known[id(dist)] = dist.name, dist.version
+        yield known.get(id(dist), ("unknown", "")), point
+
+
+def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:
+    """Return why the variables leave a plugin out, or nothing."""
+
+    def chosen(variable: str) -> bool:
+        words = {word.strip().lower() for word in variables[variable].split(",")}
+        return bool(words & {name.lower(), distribution.lower()})
+
+    if BLOCK in variables and chosen(BLOCK):
+        return f"{BLOCK} names it"
+    if LOAD in variables and distribution != PROJECT and not chosen(LOAD):
+        return f"{LOAD} does not name it"
+    return ""
+
+
+def _methods(relay: Any, distribution: str, version: str) -> list[Offer]:
+    """Return the methods that one plugin registers."""
+    from posefit.fitting.optimiser import NextFrame
+
+    offers: list[Offer] = []
 
     def register(kind: Kind, name: str, factory: Callable[..., Any], **more: Any) -> None:
         if not isinstance(name, str) or not _NAME.fullmatch(name):
@@ -145,8 +306,36 @@ def _offers(relay: Any, distribution: str, version: str) -> Iterator[Offer]:
             raise TypeError(f"{kind} {name!r} must be a factory that can be called, got {factory!r}")
         if more.get("next_frame", "start") not in get_args(NextFrame):
             raise ValueError(f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}")
-        mine.append(Offer(kind, name, factory, distribution, version, **more))
+        offers.append(Offer(kind, name, factory, distribution, version, **more))
 
     for kind in KINDS:
         getattr(relay, f"posefit_register_{kind}s")(register=partial(register, kind))
-    yield from mine
+    return offers
+
+
+def _commands(relay: Any, _distribution: str, _version: str) -> "list[click.Command]":
+    """Return the commands that one plugin registers."""
+    import click
+
+    commands: list[click.Command] = []
+
+    def register(command: click.Command) -> None:
+        if not isinstance(command, click.Command) or not command.name:
+            raise TypeError(f"a command must be a click.Command with a name, got {command!r}")
+        commands.append(command)
+
+    relay.posefit_register_commands(register=register)
+    return commands
+
+
+def _claims(relay: Any, _distribution: str, _version: str) -> list[ClaimedOrder]:
+    """Return the claims that one plugin registers."""
+    claims: list[ClaimedOrder] = []
+
+    def register(claim: ClaimedOrder) -> None:
+        if not isinstance(claim, ClaimedOrder):
+            raise TypeError(f"a claim must be a ClaimedOrder, got {claim!r}")
+        claims.append(claim)
+
+    relay.posefit_register_claims(register=register)
+    return claims

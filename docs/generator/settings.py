@@ -4,8 +4,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from posefit.entries import PROJECT
 from posefit.fitting.tracker import Prediction
+from posefit.hooks import PROJECT
 from posefit.registry import KINDS, Offer, registry
 from posefit.settings import settings_in, settings_of, without_settings
 from posefit.sweep.cell import setting_text

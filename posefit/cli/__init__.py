@@ -1,11 +1,9 @@
 """The command line. Messages and progress go to stderr, results to stdout; a mistake is one line and exit status 2.
 
 The commands stand in `following`, `doubt`, `sweeping`, `motions`, `suite` and `plugins`; plugins add others, see
-`posefit.commands`. What each does is imported when it runs.
+`posefit.hooks`. What each does is imported when it runs.
 """
 
-from collections.abc import Callable
-from functools import wraps
 from typing import Any
 
 import click
@@ -13,7 +11,6 @@ import click
 from posefit.cli import following, plugins, suite, sweeping
 from posefit.cli.doubt import ambiguity
 from posefit.cli.motions import motions
-from posefit.limits import exits_told
 from posefit.version import __version__
 
 MISTAKE = 2  # the exit status of everything that is told in one line
@@ -56,9 +53,9 @@ class _Commands(click.Group):
 
 def _added() -> dict[str, click.Command]:
     """Return the commands of plugins."""
-    from posefit.commands import installed
+    from posefit.registry import command_plugins
 
-    added = installed(tuple(main.commands))
+    added = command_plugins(tuple(main.commands))
     return {command.name or "": command for plugin in added for command in plugin.offers}
 
 
@@ -68,26 +65,5 @@ def main() -> None:
     """Recover a person's 3D pose from silhouettes, by searching."""
 
 
-def _unended(callback: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a command of posefit's own as one that nothing ends but itself: a plugin that tries is a mistake."""
-
-    @wraps(callback)
-    def run(*arguments: Any, **options: Any) -> Any:
-        try:
-            with exits_told(MISTAKE):
-                return callback(*arguments, **options)
-        except SystemExit as error:
-            import traceback
-
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            raise ValueError(
-                f"nothing may end the program, got SystemExit: {error.code} in {where.filename}:{where.lineno}"
-            ) from error
-
-    return run
-
-
 for _command in BUILT_IN:
-    assert _command.callback is not None
-    _command.callback = _unended(_command.callback)
     main.add_command(_command)

@@ -10,9 +10,8 @@ from typing import Any
 
 import click
 
-from posefit.claims import ClaimedOrder, order_name
-from posefit.entries import BLOCK, LOAD, STRICT, Plugin
-from posefit.registry import KINDS, Offer, Registry
+from posefit.hooks import ClaimedOrder
+from posefit.registry import BLOCK, KINDS, LOAD, STRICT, Offer, Plugin, Registry
 from posefit.settings import Setting, settings_in, without_settings
 
 
@@ -106,7 +105,7 @@ def diagnosis(
         names = ", ".join(f"command {command.name}" for command in more.offers) or "nothing"
         lines += _state(more, f"offers {names}", verbose)
     for one in claiming:
-        names = "; ".join(map(order_name, one.offers)) or "nothing"
+        names = "; ".join(f"claim {claim.name}" for claim in one.offers) or "nothing"
         lines += _state(one, f"offers {names}", verbose)
     groups: tuple[Sequence[Plugin[Any]], ...] = (found.plugins, added, claiming)
     well = all(plugin.state != "broken" for group in groups for plugin in group)

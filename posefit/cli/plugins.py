@@ -48,13 +48,12 @@ def doctor(context: click.Context, verbose: bool) -> None:
     """Say of every plugin whether it works, and what to do where it does not; exit status 1 where one is broken."""
     import warnings
 
-    from posefit import claims, commands
     from posefit.cli.inspection import diagnosis
-    from posefit.registry import registry
+    from posefit.registry import claim_plugins, command_plugins, registry
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the same is said below
-        lines, well = diagnosis(registry(), commands.installed(_own(context)), claims.claiming(), verbose)
+        lines, well = diagnosis(registry(), command_plugins(_own(context)), claim_plugins(), verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 

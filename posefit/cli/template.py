@@ -9,10 +9,9 @@ from pathlib import Path
 from string import Template
 from typing import Literal
 
-from posefit.commands import GROUP, installed
-from posefit.entries import PROJECT
 from posefit.files import new_folder
-from posefit.registry import KINDS, Kind, registry
+from posefit.hooks import PROJECT
+from posefit.registry import KINDS, Kind, command_plugins, registry
 
 COMMAND: Literal["command"] = "command"  # a kind of plugin that registers no method
 TAKEN = {"Frame"}  # names that a template's module has already
@@ -51,7 +50,7 @@ def write_plugin(
         "module": module,
         "dashed": name.replace("_", "-"),
         "class_name": class_name,
-        "group": f'"{GROUP}"' if kind == COMMAND else PROJECT,
+        "point": f"{module}-commands" if kind == COMMAND else module,
         "usage": "\n".join(usage),
     }
     target = Path(folder or f"posefit-{words['dashed']}")
@@ -74,5 +73,5 @@ def _taken(kind: Kind | Literal["command"], own: Sequence[str]) -> dict[str, str
     """Return the names that a new plugin cannot have, each with the distribution that has it."""
     if kind != "command":
         return {offer.name: offer.distribution for offer in registry().offers[kind].values()}
-    theirs = {str(one.name): plugin.distribution for plugin in installed(tuple(own)) for one in plugin.offers}
+    theirs = {str(one.name): plugin.distribution for plugin in command_plugins(tuple(own)) for one in plugin.offers}
     return dict.fromkeys(own, PROJECT) | theirs

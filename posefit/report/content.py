@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.claims import claimed_orders
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
+from posefit.registry import claimed_orders
 from posefit.report import curves
 from posefit.report.answer.claimed import claim_results
 from posefit.report.answer.lead import lead_sentence, not_told_apart, three_tracks

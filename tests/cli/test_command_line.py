@@ -19,7 +19,7 @@ from posefit.motion import built_in
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
 from tests.files import arrays
-from tests.plugins.test_commands import point
+from tests.plugins.test_registry import point
 
 FEW = ["--particles", "10", "--iterations", "4"]
 QUICK = [*FEW, "--size", "120x90"]
@@ -369,15 +369,18 @@ def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.Monkey
 
 
 def test_the_doctor_lists_claims_and_says_in_one_line_why_one_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    from posefit import claims
+    from posefit import registry
 
     said = "offers claim 'the SAPSO paper' of particle@full, sapso@full, sapso@pca"
-    assert re.search(rf"^loaded    swarm \(posefit .*\): {said}$", run("plugins", "doctor").stdout, re.MULTILINE)
-    bad = point("bad", ImportError("no module named 'lost',\n  nor 'found'"))
-    monkeypatch.setattr(claims, "claiming", lambda: claims.claims_of([bad], {}))
+    assert re.search(rf"^loaded    swarm-claims \(posefit .*\): {said}$", run("plugins", "doctor").stdout, re.MULTILINE)
+    bad = point("bad-claims", ImportError("no module named 'lost',\n  nor 'found'"))
+    monkeypatch.setattr(registry, "claim_plugins", lambda: registry.claims_of([bad], {}))
     result = run("plugins", "doctor")
     assert result.exit_code == 1
-    assert "broken    bad (posefit-bad 1.0): ImportError: no module named 'lost', nor 'found'\n" in result.stdout
+    assert (
+        "broken    bad-claims (posefit-bad-claims 1.0): ImportError: no module named 'lost', nor 'found'\n"
+        in result.stdout
+    )
 
 
 def test_check_reports_every_rule_and_how_many_ran() -> None:

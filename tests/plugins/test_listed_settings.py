@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from posefit.entries import PROJECT
 from posefit.fitting.tracker import Prediction
+from posefit.hooks import PROJECT
 from posefit.registry import registry
 from posefit.settings import settings_of
 

@@ -271,3 +271,33 @@ def test_a_damaged_prior_is_one_line(kind: Any, tmp_path: Path) -> None:
         path.write_bytes(damaged)
         with pytest.raises(ValueError, match="a.npz: expected an .npz file with"):
             kind.load(path)
+
+
+def test_a_prior_survives_its_file(tmp_path: Path) -> None:
+    prior = PCA().fit(built_in.motion("walk-a").poses[:, 3:])
+    prior.save(tmp_path / "prior.npz")
+    again = PCA.load(tmp_path / "prior.npz")
+    latents = np.random.default_rng(0).uniform(prior.low, prior.high, (50, 6))
+    np.testing.assert_array_equal(again.inverse_transform(latents), prior.inverse_transform(latents))
+    np.testing.assert_array_equal(again.feasible(latents), prior.feasible(latents))
+
+
+def test_a_file_that_is_no_pca_is_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", mean=np.zeros(3))
+    (tmp_path / "b.npz").write_bytes(b"nothing of the kind")
+    np.savez(tmp_path / "c.npz", mean=np.array([{}], dtype=object))
+    for name in "abc":
+        with pytest.raises(ValueError, match=r"\.npz: expected an \.npz file with mean"):
+            PCA.load(tmp_path / f"{name}.npz")
+
+
+def test_settings_are_checked() -> None:
+    for settings, message in (
+        ({"components": 2.5}, "components must be a whole number or a share"),
+        ({"clusters": 0}, "clusters must be at least 1, got 0"),
+        ({"quantile": 0.0}, "quantile must lie in 0 to 1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            PCA(**settings)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="angles must hold at least 7 frames, got 3"):
+        PCA().fit(np.zeros((3, 63)))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.claims import ClaimedOrder
+from posefit.hooks import ClaimedOrder
 from posefit.report.answer.claimed import claim_results
 from posefit.report.answer.lead import lead_sentence, not_told_apart, others_said, three_tracks
 from posefit.report.answer.selection import features_of, selected, selection_of

@@ -13,11 +13,10 @@ from typing import Any
 import pytest
 
 import posefit
-from posefit.entries import Plugin
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
-from posefit.registry import Offer, Registry
+from posefit.registry import Offer, Plugin, Registry
 from posefit.sweep import check
 from posefit.sweep.cell import TrackCell, anytime_trace, cell_scene, digest_of, run_cell
 from posefit.sweep.check import cell_of

@@ -10,10 +10,9 @@ import pytest
 
 import posefit
 from posefit import registry as registry_package
-from posefit.entries import Plugin
 from posefit.fitting.guard import BrokenRuleError
 from posefit.footage.scene import synthetic
-from posefit.registry import Offer, Registry, registry
+from posefit.registry import Offer, Plugin, Registry, registry
 from posefit.tracking import method, opening
 from tests.testing import planted
 

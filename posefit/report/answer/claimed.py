@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from posefit.claims import ClaimedOrder
+from posefit.hooks import ClaimedOrder
 from posefit.report.contest import Contest, middle
 from posefit.statistics.ranks import LEVEL, wilcoxon
 
@@ -31,7 +31,7 @@ def _result(contest: Contest, order: ClaimedOrder) -> dict[str, Any] | None:
     by_instance = wilcoxon(errors.mean(axis=2, keepdims=True), steps)
     return {
         "source": order.source,
-        "said": order.said,
+        "said": order.statement,
         "methods": [contest.methods[m] for m in chosen],
         "errors": [middle(one.ravel()) for one in errors],
         "steps": [
