@@ -13,7 +13,6 @@ from posefit.fitting.space import TRANSLATIONS
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
 from posefit.footage.training import training_clips
-from posefit.hooks import PROJECT
 from posefit.motion import built_in, recorded
 from posefit.motion.motion import RATES
 from posefit.reading import SHOWN, cut, quoted
