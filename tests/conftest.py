@@ -25,6 +25,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture(scope="session")
+def seed() -> int:
+    """Return what a test adds to a seed that it is free to choose: 0, or what `tests.machines` runs with."""
+    return int(os.environ.get("POSEFIT_TEST_SEED", "0"))
+
+
+@pytest.fixture(scope="session")
 def cmu() -> Path:
     """Return the folder of real CMU clips, or skip the test where there is none."""
     beside = Path(__file__).parents[2] / "shared" / "data" / "cmu"

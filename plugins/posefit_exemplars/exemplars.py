@@ -123,11 +123,13 @@ class Exemplars:
         return np.concatenate([self.members[self.bounds[g] : self.bounds[g + 1]] for g in chosen])
 
 
-_LATEST: dict[bytes, Exemplars] = {}  # one: restarts, builds and cells of a sweep learn from the same motions again
+# the key and the states of the latest motions: restarts, builds and cells of a sweep learn from the same ones
+_latest: tuple[bytes, Exemplars] | None = None
 
 
 def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> Exemplars:
     """Return the states of motions; those of the same motions and skeleton as the last time are not made again."""
+    global _latest
     told = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
     for array in (
         skeleton.offsets,
@@ -139,11 +141,10 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
     for motion in motions:
         told.update(motion.translations.tobytes())
     key = told.digest()
-    if key not in _LATEST:
-        made = Exemplars.of(motions, skeleton, mirrored=mirrored)
-        _LATEST.clear()
-        _LATEST[key] = made
-    return _LATEST[key]
+    latest = _latest  # read once: another thread may replace it at any time
+    if latest is None or latest[0] != key:
+        latest = _latest = key, Exemplars.of(motions, skeleton, mirrored=mirrored)
+    return latest[1]
 
 
 def mirror_image(motion: Motion) -> Motion:

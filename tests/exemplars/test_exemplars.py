@@ -1,5 +1,7 @@
 """Poses of clips, what came after each of them, and groups of poses that are alike."""
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -138,8 +140,8 @@ def test_poses_are_drawn_by_the_root_of_the_size_of_their_group(two: Exemplars) 
     np.testing.assert_allclose(counts[5:], 2_500, rtol=0.08)
 
 
-def test_states_of_the_same_motions_are_made_once_and_of_others_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exemplars, "_LATEST", {})
+def test_states_of_the_same_motions_are_made_once_and_of_others_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exemplars, "_latest", None)
     walk = built_in.motion("walk-a", frames=12)
     made = exemplars_of([walk], SKELETON, False)
     again = Motion(walk.name, walk.skeleton, walk.poses.copy(), walk.translations.copy(), walk.fps)
@@ -156,7 +158,19 @@ def test_states_of_the_same_motions_are_made_once_and_of_others_anew(monkeypatch
         other = exemplars_of(motions, SKELETON, mirrored)
         assert other is not made
         made = other
-        assert len(exemplars._LATEST) == 1
+
+
+def test_threads_that_learn_from_different_motions_each_get_their_own_states(monkeypatch: pytest.MonkeyPatch) -> None:
+    motions = [built_in.motion(name, frames=2) for name in ("walk-a", "run-a")]
+    monkeypatch.setattr(Exemplars, "of", lambda given, skeleton, mirrored: given[0].name)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            made = list(pool.map(lambda k: exemplars_of([motions[k % 2]], SKELETON, False), range(1000)))
+    finally:
+        sys.setswitchinterval(interval)
+    assert made == [motions[k % 2].name for k in range(1000)]
 
 
 def test_a_motion_of_one_frame_or_none_is_refused() -> None:
