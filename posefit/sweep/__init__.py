@@ -13,8 +13,8 @@
 | a million cells of a product, one after the other | product.py |
 | what is wrong with a cell, before it runs | check.py |
 | what a cell is, how it runs and what it measures | cell.py |
-| the loop: claim, run, write the row, until nothing is left | drive.py |
-| a process's right to write to a ledger: claims, attempts, quarantine | driver.py |
+| the loop: lease, run, write the row, until nothing is left | drive.py |
+| a process's right to write to a ledger: leases, attempts, quarantine | driver.py |
 | the folder of finished rows; the log of one driver, and what a damaged line is | ledger.py, log.py |
 | the logs of dead drivers become one; how it is seen that a driver lives | fold.py, locks.py |
 | single searches of a numbered benchmark, instead of tracks | single/ |

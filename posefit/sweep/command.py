@@ -49,8 +49,8 @@ def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quaran
 
     with Driver(out, say) as driver:
         if retry_quarantined:
-            lost = driver.ledger.sentenced()
-            again = sum(driver.pardon(key) for key in keys_of(cells) if key in lost)
+            lost = driver.ledger.quarantined_keys()
+            again = sum(driver.release_quarantined(key) for key in keys_of(cells) if key in lost)
             say(f"{again} {'cell is' if again == 1 else 'cells are'} out of quarantine, to be tried again")
         if count := driver.ledger.outdated():
             say(f"{count} of the {len(driver.ledger)} rows in {out} are of another version, and do not count here")

@@ -1,4 +1,4 @@
-"""The loop of a sweep: claim cells, have an engine run them, write their rows."""
+"""The loop of a sweep: lease cells, have an engine run them, write their rows."""
 
 import signal
 import threading
@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any
 
 from posefit.sweep.cell import Cell
-from posefit.sweep.driver import Claim, Driver, State
+from posefit.sweep.driver import Driver, Lease, State
 from posefit.sweep.engines.engine import Engine, Outcome
 from posefit.sweep.plan import Plan
 
@@ -106,15 +106,15 @@ class _Sweep:
         self._driver, self._engine, self._stop, self._say, self._watch = driver, engine, stop, say, watch
         self.tally = Tally(len(cells))
         # of each cell whether it needs no work: a plan of a million cells is gone through, not held
-        settled, lost = bytearray(), driver.ledger.sentenced()
+        settled, lost = bytearray(), driver.ledger.quarantined_keys()
         for key in keys_of(cells):
             state = State.DONE if key in driver.ledger else State.QUARANTINED if key in lost else None
             settled.append(self._count(state))
         self._left = settled.count(False)  # cells that were not met yet
-        self._coming = mingled((cell for cell, done in zip(cells, settled, strict=True) if not done), engine.window)
+        self._coming = interleaved((cell for cell, done in zip(cells, settled, strict=True) if not done), engine.window)
         self._again: deque[Cell] = deque()  # cells that failed, or that others ran
         self._elsewhere: list[Cell] = []
-        self._running: dict[str, Claim] = {}
+        self._running: dict[str, Lease] = {}
 
     @property
     def safe(self) -> str:
@@ -149,8 +149,8 @@ class _Sweep:
     def leave(self) -> None:
         """Stop what runs, and let others have it."""
         self._engine.close()
-        for claim in self._running.values():
-            self._driver.release(claim)
+        for lease in self._running.values():
+            self._driver.release(lease)
         self._running.clear()
 
     @property
@@ -172,27 +172,27 @@ class _Sweep:
         """Start as many cells as the engine takes."""
         while self._waiting and len(self._running) < self._engine.window():
             cell = self._next()
-            claim = self._driver.claim(cell)
-            if isinstance(claim, Claim):
-                self._running[cell.key] = claim
+            lease = self._driver.lease(cell)
+            if isinstance(lease, Lease):
+                self._running[cell.key] = lease
                 self._engine.submit(cell)
-            elif claim is State.ELSEWHERE:
+            elif lease is State.ELSEWHERE:
                 self._elsewhere.append(cell)
             else:
-                self._count(claim)
+                self._count(lease)
                 self._watch(self.tally)
 
     def _take(self, outcome: Outcome) -> None:
-        claim = self._running[outcome.cell.key]
+        lease = self._running[outcome.cell.key]
         if outcome.result is not None:
-            self._driver.finish(claim, outcome.result)
+            self._driver.finish(lease, outcome.result)
             self.tally.ran += 1
             self._count(State.DONE)
         else:
             if outcome.reason is None:
-                self._driver.release(claim)
+                self._driver.release(lease)
             else:
-                self._driver.fail(claim, outcome.reason, outcome.own)
+                self._driver.fail(lease, outcome.reason, outcome.own)
                 self.tally.failed += 1
             self._again.append(outcome.cell)
         del self._running[outcome.cell.key]
@@ -205,7 +205,7 @@ class _Sweep:
         return state in (State.DONE, State.QUARANTINED)
 
 
-def mingled(cells: Iterator[Cell], count: Callable[[], int]) -> Iterator[Cell]:
+def interleaved(cells: Iterator[Cell], count: Callable[[], int]) -> Iterator[Cell]:
     """Yield cells in their order, but for the first `count()`, which are of different methods where there are any near.
 
     Workers that begin at the same time would otherwise need the same compiled functions, and wait for each other.

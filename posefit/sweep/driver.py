@@ -1,8 +1,8 @@
 """A driver: one process that works on a ledger, beside any number of others.
 
-Nobody runs a cell without a claim on it, a file that only one driver can create. A driver's claims hold as long as it
-lives, which its locked log shows; what a dead one had claimed is tried again by others, as the next attempt. After
-creating a claim a driver looks whether the row has come meanwhile: it was written before the claim on it was given up.
+Nobody runs a cell without a lease on it, a file that only one driver can create. A driver's leases hold as long as it
+lives, which its locked log shows; what a dead one had leased is tried again by others, as the next attempt. After
+creating a lease a driver looks whether the row has come meanwhile: it was written before the lease on it was given up.
 
 An attempt that failed says whether that was the cell's own fault. `ATTEMPTS` of these put it into quarantine. One that
 something outside ended, a driver that died among them, is no fault of the cell: it is tried again without limit as long
@@ -24,7 +24,7 @@ from posefit.files import appear, replaced_file
 from posefit.reading import parsed_json
 from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.fold import LEFT, fold_logs
-from posefit.sweep.ledger import CLAIMS, QUARANTINE, ROWS, Ledger, create
+from posefit.sweep.ledger import LEASES, QUARANTINE, ROWS, Ledger, create
 from posefit.sweep.locks import is_locked, on_one_machine
 from posefit.sweep.log import SUFFIX, Writer
 
@@ -34,7 +34,7 @@ SYNC = 1.0  # seconds between two times that rows are brought to the disk
 
 
 class State(Enum):
-    """Why a cell cannot be claimed."""
+    """Why a cell cannot be leased."""
 
     DONE = "done"
     QUARANTINED = "quarantined"
@@ -42,7 +42,7 @@ class State(Enum):
 
 
 @dataclass(frozen=True)
-class Claim:
+class Lease:
     """The right to run a cell."""
 
     cell: Cell
@@ -58,7 +58,7 @@ class Driver:
     def __init__(self, path: str | Path, say: Callable[[str], None] | None = None) -> None:
         create(Path(path))
         self.ledger = Ledger(path, say)
-        self._claims = self.ledger.path / CLAIMS
+        self._leases = self.ledger.path / LEASES
         self._dead: set[str] = set()
 
     def __enter__(self) -> Self:
@@ -88,7 +88,7 @@ class Driver:
             return State.DONE
         return State.QUARANTINED if self.ledger.in_quarantine(key) else None
 
-    def claim(self, cell: Cell) -> Claim | State:
+    def lease(self, cell: Cell) -> Lease | State:
         """Return the right to run a cell, or why there is none."""
         faults: list[str] = []
         losses: list[str] = []
@@ -101,8 +101,8 @@ class Driver:
                 if state := self.state(cell.key):
                     self._clear(cell.key, attempt)
                     return state
-                return Claim(cell, attempt)
-            held = held_by(path)
+                return Lease(cell, attempt)
+            held = read_lease(path)
             if held is None:  # it was finished or released just now
                 self.ledger.refresh()
                 return self.state(cell.key) or State.ELSEWHERE
@@ -117,7 +117,7 @@ class Driver:
         if state := self.state(cell.key):
             return state
         if len(self.ledger) != rows:  # others have got somewhere, after all
-            return self.claim(cell)
+            return self.lease(cell)
         reasons = faults if len(faults) == ATTEMPTS else [
             f"something outside ended it {LOSSES} times while no other cell got done", *losses[-ATTEMPTS:]
         ]  # fmt: skip
@@ -126,25 +126,25 @@ class Driver:
             self._clear(cell.key)
         return State.QUARANTINED
 
-    def finish(self, claim: Claim, result: CellResult) -> None:
-        """Write the row of a claimed cell. Raises OSError where there is no room."""
-        if not self._mine(claim):  # somebody has removed the claim, and another driver may have been quicker
+    def finish(self, lease: Lease, result: CellResult) -> None:
+        """Write the row of a leased cell. Raises OSError where there is no room."""
+        if not self._mine(lease):  # somebody has removed the lease, and another driver may have been quicker
             self.ledger.refresh()
-        if claim.cell.key not in self.ledger:
-            self._log.append(claim.cell.key, result.row, result.joints)
+        if lease.cell.key not in self.ledger:
+            self._log.append(lease.cell.key, result.row, result.joints)
             self.ledger.refresh()
-        self._clear(claim.cell.key)
+        self._clear(lease.cell.key)
 
-    def fail(self, claim: Claim, reason: str, own: bool = True) -> None:
+    def fail(self, lease: Lease, reason: str, own: bool = True) -> None:
         """Note why an attempt failed, and whether that was the cell's own fault."""
-        if not self._mine(claim):  # somebody has removed the claim: it is as if it had been released
+        if not self._mine(lease):  # somebody has removed the lease: it is as if it had been released
             return
-        path = self._path(claim.cell.key, claim.attempt)
+        path = self._path(lease.cell.key, lease.attempt)
         with replaced_file(path, self._mark) as building:
             told = {**self._me, "rows": len(self.ledger), "failed": reason, "own": own}
             building.write_text(json.dumps(told), encoding="utf-8")
 
-    def pardon(self, key: str) -> bool:
+    def release_quarantined(self, key: str) -> bool:
         """Let a cell out of quarantine, and return whether it was there."""
         if not self.ledger.in_quarantine(key):
             return False
@@ -152,10 +152,10 @@ class Driver:
         (self.ledger.path / QUARANTINE / f"{key}.json").unlink(missing_ok=True)
         return True
 
-    def release(self, claim: Claim) -> None:
-        """Give a claim up as if it had never been."""
-        if self._mine(claim):
-            self._path(claim.cell.key, claim.attempt).unlink(missing_ok=True)
+    def release(self, lease: Lease) -> None:
+        """Give a lease up as if it had never been."""
+        if self._mine(lease):
+            self._path(lease.cell.key, lease.attempt).unlink(missing_ok=True)
 
     def sync(self) -> None:
         """Bring rows to the disk, once a second."""
@@ -166,11 +166,11 @@ class Driver:
         return {"driver": self._log.name, "process": os.getpid(), "host": socket.gethostname()}
 
     def _path(self, key: str, attempt: int) -> Path:
-        return self._claims / f"{key}.{attempt}"
+        return self._leases / f"{key}.{attempt}"
 
     @property
     def _mark(self) -> bytes:
-        """How a claim of this driver begins, and goes on beginning."""
+        """How a lease of this driver begins, and goes on beginning."""
         return json.dumps(self._me).removesuffix("}").encode()
 
     def _taken(self, path: Path) -> bool:
@@ -179,9 +179,9 @@ class Driver:
         except FileNotFoundError:  # another driver, whose clock is ahead, took what was being written for left behind
             return appear(path, {**self._me, "rows": len(self.ledger)})
 
-    def _mine(self, claim: Claim) -> bool:
+    def _mine(self, lease: Lease) -> bool:
         try:
-            return self._path(claim.cell.key, claim.attempt).read_bytes().startswith(self._mark)
+            return self._path(lease.cell.key, lease.attempt).read_bytes().startswith(self._mark)
         except FileNotFoundError:
             return False
 
@@ -194,8 +194,8 @@ class Driver:
                     return
 
     def _tidy(self) -> None:
-        """Remove what drivers left behind that died between what they wrote and giving up their claim on it."""
-        for entry in os.scandir(self._claims):
+        """Remove what drivers left behind that died between what they wrote and giving up their lease on it."""
+        for entry in os.scandir(self._leases):
             if entry.name.startswith("."):
                 with suppress(FileNotFoundError):  # it got its name just now
                     if self._log.began - entry.stat().st_mtime > LEFT:
@@ -212,7 +212,7 @@ class Driver:
         if held["host"] != socket.gethostname() and (local := on_one_machine(self.ledger.path)):
             raise ValueError(
                 f"{self.ledger.path}: expected a disk whose locks other machines see, got {local}, and {held['host']} "
-                "has begun cells: mount it with locks; or let one machine work on it, and remove from claims/ what "
+                "has begun cells: mount it with locks; or let one machine work on it, and remove from leases/ what "
                 "another one left there"
             )
         if not is_locked(self.ledger.path / ROWS / f"{name}{SUFFIX}"):
@@ -220,8 +220,8 @@ class Driver:
         return name not in self._dead
 
 
-def held_by(path: Path) -> dict[str, Any] | None:
-    """Return what a claim says: its `driver`, `process` and `host`, or why it `failed`; None where there is none.
+def read_lease(path: Path) -> dict[str, Any] | None:
+    """Return what a lease says: its `driver`, `process` and `host`, or why it `failed`; None where there is none.
 
     A damaged one has failed, and holds nothing.
     """
@@ -233,4 +233,4 @@ def held_by(path: Path) -> dict[str, Any] | None:
         return None
     except (ValueError, KeyError, TypeError):
         pass
-    return {"failed": "its claim was damaged"}
+    return {"failed": "its lease was damaged"}

@@ -3,7 +3,7 @@
 ledger.json          the format of the folder
 rows/NAME.jsonl      finished rows, one log a driver; those of drivers that ended are folded together
 rows/NAME.joints     the joints of the rows' frames
-claims/KEY.n         the nth attempt at a cell: who runs it, or why it failed
+leases/KEY.n         the nth attempt at a cell: who runs it, or why it failed
 quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
 plans/NAME.cells     which cells a plan has that was begun here, when, and how many were done then
 aside/               damaged lines and files that were found; their cells are run again
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from posefit.arrays import Array
 
 INDEX = "ledger.json"
-ROWS, CLAIMS, QUARANTINE, ASIDE, PLANS = FOLDERS = ("rows", "claims", "quarantine", "aside", "plans")
+ROWS, LEASES, QUARANTINE, ASIDE, PLANS = FOLDERS = ("rows", "leases", "quarantine", "aside", "plans")
 FORMAT = 1
 MAX_INDEX_BYTES = 10_000
 VERSION = re.compile(rb'"version": "([^"]*)"')  # in a row
@@ -118,7 +118,7 @@ class Ledger:
 
     def begin(self, keys: Iterable[str]) -> None:
         """Take note of the cells of a plan that is begun, or gone on with, for whoever wants to know how far it is."""
-        settled, lost, short = 0, self.sentenced(), bytearray()
+        settled, lost, short = 0, self.quarantined_keys(), bytearray()
         for key in keys:
             settled += key in self or key in lost
             short += bytes.fromhex(key[: 2 * SHORT])
@@ -144,7 +144,7 @@ class Ledger:
         """Return whether a cell is in quarantine."""
         return (self.path / QUARANTINE / f"{key}.json").exists()
 
-    def sentenced(self) -> set[str]:
+    def quarantined_keys(self) -> set[str]:
         """Return the keys of all cells in quarantine that have no row."""
         names = (entry.name.removesuffix(".json") for entry in os.scandir(self.path / QUARANTINE))
         return {name for name in names if name not in self}

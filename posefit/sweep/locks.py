@@ -2,7 +2,7 @@
 
 On a disk that machines share such a lock is worth something only where every machine sees it. Linux passes locks on NFS
 to the server, unless the disk is mounted with `nolock` or `local_lock`; then they hold on one machine alone, and the
-claims of another one say nothing.
+leases of another one say nothing.
 """
 
 import fcntl

@@ -23,7 +23,7 @@ import pytest
 
 from posefit.report.live.progress import Progress, progress_so_far
 from posefit.report.live.server import LOOPBACK, Handler, Showing, address_of, serving
-from posefit.sweep.driver import Claim, Driver
+from posefit.sweep.driver import Driver, Lease
 from posefit.sweep.ledger import PLANS, Ledger
 from tests.cli.test_command_line import fails, run
 from tests.report.browser import browser, ledger, opened, result
@@ -71,7 +71,7 @@ def test_progress_is_of_the_plan_that_was_begun_last(begun: Path) -> None:
     found = progress_so_far(Ledger(begun), now=plan.begun + 30.0)
     assert found == Progress(6, 3, 1, 2, 0, 0, None)  # nobody works on it
     with Driver(begun) as driver:
-        assert isinstance(driver.claim(PLAN[4]), Claim)
+        assert isinstance(driver.lease(PLAN[4]), Lease)
         # three cells were settled in half a minute, so the two that are left take twenty seconds
         assert progress_so_far(Ledger(begun), now=plan.begun + 30.0) == Progress(6, 3, 1, 2, 1, 0, 20.0)
 
@@ -79,12 +79,12 @@ def test_progress_is_of_the_plan_that_was_begun_last(begun: Path) -> None:
 def test_attempts_that_failed_are_counted_until_their_cell_is_settled(begun: Path) -> None:
     with Driver(begun) as driver:
         for _ in range(2):
-            claim = driver.claim(PLAN[4])
-            assert isinstance(claim, Claim)
-            driver.fail(claim, "ValueError: it had to")
+            lease = driver.lease(PLAN[4])
+            assert isinstance(lease, Lease)
+            driver.fail(lease, "ValueError: it had to")
         assert progress_so_far(Ledger(begun)).failed == 2
-        again = driver.claim(PLAN[4])
-        assert isinstance(again, Claim)
+        again = driver.lease(PLAN[4])
+        assert isinstance(again, Lease)
         driver.finish(again, result(PLAN[4], 1.0))
         assert progress_so_far(Ledger(begun)).failed == 0
 
@@ -263,14 +263,14 @@ def shown(path: Path) -> Iterator[str]:
 
 def test_a_browser_shows_how_far_it_is_and_loads_the_page_anew(begun: Path) -> None:
     with browser() as chromium, shown(begun) as address, Driver(begun) as driver:
-        driver.claim(PLAN[4])
+        driver.lease(PLAN[4])
         with opened(chromium, address, offline=False) as seen:
             said = seen.page.locator("#live-said")
             assert said.inner_text().startswith("4 of 6 cells: 3 done, 1 quarantined; 1 running, about ")
             assert "ValueError: it had to" in seen.page.inner_text("#trouble")
-            claim = driver.claim(PLAN[5])
-            assert isinstance(claim, Claim)
-            driver.finish(claim, result(PLAN[5], 3.0))
+            lease = driver.lease(PLAN[5])
+            assert isinstance(lease, Lease)
+            driver.finish(lease, result(PLAN[5], 3.0))
             seen.page.get_by_text("5 of 6 cells").wait_for(timeout=60_000)
             seen.page.locator("#live-stop").check()
             assert seen.complaints == []

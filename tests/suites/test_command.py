@@ -37,13 +37,13 @@ def run(*words: object) -> Result:
 
 def swept(folder: Path, *plans: str) -> Path:
     """Return a folder, once the cells of plans have run into its ledger."""
-    from posefit.sweep.driver import Claim, Driver
+    from posefit.sweep.driver import Driver, Lease
 
     with Driver(folder) as driver:
         for cell in [cell for plan in plans for cell in search_cells(tomllib.loads(plan))]:
-            claim = driver.claim(cell)
-            assert isinstance(claim, Claim)
-            driver.finish(claim, run_cell(cell))
+            lease = driver.lease(cell)
+            assert isinstance(lease, Lease)
+            driver.finish(lease, run_cell(cell))
     return folder
 
 

@@ -2,7 +2,7 @@
 
 Cells take half a second. While they run, events come at random moments: a process that runs a cell is killed, or a
 Dask worker, the driver, or the driver with its whole group; one is stopped and goes on; a log is cut off as power
-failure may, a byte of it is flipped; a claim is deleted. Whenever the driver has ended, it is started again, by the
+failure may, a byte of it is flipped; a lease is deleted. Whenever the driver has ended, it is started again, by the
 same command. At the end every cell must have one row, none may be in quarantine, and every row that the last driver
 counted must be whole. Prints one JSON object of what happened; its exit status is 1 where something was lost.
 """
@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[2]
 DASK = "kill a Dask worker"
 EVENTS = (
     "kill a worker", DASK, "kill the driver", "kill the group", "stop and go on", "cut a log off",
-    "flip a byte", "delete a claim",
+    "flip a byte", "delete a lease",
 )  # fmt: skip
 STOPPED = 1.0  # seconds that a process is stopped
 PAUSE = 0.1, 0.8  # seconds between two events, at least and at most
@@ -79,7 +79,7 @@ class Chaos:
             "lost": len(wanted - keys.keys()),
             "doubled": sum(number > 1 for number in keys.values()) + len(keys.keys() - wanted),
             "quarantined": len(ledger.quarantined()),
-            "claims left": len(list((self._ledger / "claims").iterdir())),
+            "leases left": len(list((self._ledger / "leases").iterdir())),
             "files of rows": len(list((self._ledger / "rows").iterdir())),
             "seconds": round(time.monotonic() - began, 1),
         }
@@ -121,8 +121,8 @@ class Chaos:
                 done = True
             elif event == "stop and go on":
                 done = self._signalled([driver, *self._running()], signal.SIGSTOP)
-            elif event == "delete a claim":
-                done = self._harmed("claims/*", lambda path: path.unlink())
+            elif event == "delete a lease":
+                done = self._harmed("leases/*", lambda path: path.unlink())
             elif event == "cut a log off":
                 done = self._harmed("rows/*", lambda path: os.truncate(path, self._place(path)))
             else:

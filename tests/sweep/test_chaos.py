@@ -51,8 +51,8 @@ def living(process: int) -> bool:
         return False
 
 
-def claimed(folder: Path) -> set[str]:
-    return {path.name.partition(".")[0] for path in (folder / "ledger" / "claims").glob("[!.]*")}
+def leased(folder: Path) -> set[str]:
+    return {path.name.partition(".")[0] for path in (folder / "ledger" / "leases").glob("[!.]*")}
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for left-over processes in /proc")
@@ -74,7 +74,7 @@ def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: s
                 if event == "driver":
                     process.kill()
                     process.wait()
-                    killed |= claimed(tmp_path)
+                    killed |= leased(tmp_path)
                     break
                 alive = [one for one in {worker for _, worker in starts(noted)[-4:]} if living(one)]
                 victim = choice.choice(sorted(alive))
@@ -88,7 +88,7 @@ def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: s
     keys = [row["key"] for row in ledger.rows()]
     assert len(keys) == CELLS
     assert set(keys) == {cell.key for cell in cells(CELLS)}
-    assert not claimed(tmp_path)
+    assert not leased(tmp_path)
     assert not ledger.quarantined()
     runs = Counter(key for key, _ in starts(noted))
     assert {key for key, count in runs.items() if count > 1} <= killed
@@ -117,7 +117,7 @@ def test_two_drivers_at_once_run_no_cell_twice(tmp_path: Path) -> None:
     runs = starts(tmp_path / "starts")
     assert len(runs) == len({key for key, _ in runs}) == 40
     assert len({worker for _, worker in runs}) > 2  # both took part
-    assert not claimed(tmp_path)
+    assert not leased(tmp_path)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -132,7 +132,7 @@ def test_ctrl_c_finishes_the_running_cells_and_the_next_sweep_goes_on(engine: st
     rows = {row["key"] for row in Ledger(tmp_path / "ledger").rows()}
     assert rows == {key for key, _ in starts(noted)}  # whatever was begun was finished
     assert len(rows) < 40
-    assert not claimed(tmp_path)
+    assert not leased(tmp_path)
 
 
 def test_ctrl_c_twice_stops_at_once_and_loses_no_row(tmp_path: Path) -> None:
@@ -146,5 +146,5 @@ def test_ctrl_c_twice_stops_at_once_and_loses_no_row(tmp_path: Path) -> None:
     rows = {row["key"] for row in Ledger(tmp_path / "ledger").rows()}
     begun = [key for key, _ in starts(noted)]
     assert set(begun[:-2]) <= rows <= set(begun)  # two cells ran
-    assert not claimed(tmp_path)
+    assert not leased(tmp_path)
     assert LIMITS.seconds > 1.0  # it was not the limit that stopped them

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from posefit.cli import main
 from posefit.sweep.command import duration_text
-from posefit.sweep.driver import Claim, Driver, State
+from posefit.sweep.driver import Driver, Lease, State
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from tests.cli.test_command_line import fails, run
@@ -112,10 +112,10 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
     (cell,) = Plan.read(plan)
     with Driver(tmp_path / "out") as driver:
         for _ in range(3):
-            claim = driver.claim(cell)
-            assert isinstance(claim, Claim)
-            driver.fail(claim, "the disk of its files was away")
-        assert driver.claim(cell) is State.QUARANTINED
+            lease = driver.lease(cell)
+            assert isinstance(lease, Lease)
+            driver.fail(lease, "the disk of its files was away")
+        assert driver.lease(cell) is State.QUARANTINED
     assert run("sweep", plan, "--out", tmp_path / "out", "--workers", 1).exit_code == 1
     again = run("sweep", plan, "--out", tmp_path / "out", "--workers", 1, "--retry-quarantined")
     assert again.exit_code == 0, again.stderr

@@ -56,7 +56,7 @@ def test_poisoned_cells_are_quarantined_with_their_reasons_and_all_others_finish
     assert quarantined[fake.RAISE] == ["ZeroDivisionError: one by none"] * 3
     assert set(quarantined[fake.SEGFAULT]) <= {"its process died of SIGSEGV", "its process died", "its worker died"}
     assert len(quarantined[fake.SEGFAULT]) == 3
-    assert not list((tmp_path / "ledger" / "claims").iterdir())
+    assert not list((tmp_path / "ledger" / "leases").iterdir())
 
 
 @pytest.mark.slow
@@ -378,7 +378,7 @@ def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp
     ):
         drive_cells(cells(20), driver, engine, print, watch)
     assert 3 <= len(Ledger(tmp_path / "ledger")) < 20
-    assert not list((tmp_path / "ledger" / "claims").iterdir())
+    assert not list((tmp_path / "ledger" / "leases").iterdir())
     assert swept(tmp_path / "ledger", cells(20), Processes(2, LIMITS, behave)).done == 20
 
 

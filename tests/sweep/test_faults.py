@@ -15,7 +15,7 @@ import pytest
 from posefit.report.live.progress import progress_so_far
 from posefit.sweep import fold, locks
 from posefit.sweep.drive import drive_cells
-from posefit.sweep.driver import Claim, Driver
+from posefit.sweep.driver import Driver, Lease
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.locks import on_one_machine
 from tests.sweep.fake import cells, result
@@ -100,9 +100,9 @@ def test_a_log_that_is_folded_while_somebody_reads_gives_every_row_once(tmp_path
     folder = tmp_path / "ledger"
     with Driver(folder) as one, Driver(folder) as other:  # so many logs that nobody could fold before
         for driver, cell in zip((one, other, one, other), cells(4), strict=True):
-            claim = driver.claim(cell)
-            assert isinstance(claim, Claim)
-            driver.finish(claim, result(cell))
+            lease = driver.lease(cell)
+            assert isinstance(lease, Lease)
+            driver.finish(lease, result(cell))
     reading = Ledger(folder).rows()
     keys = [next(reading)["key"]]
     filled(folder, 5)
@@ -113,9 +113,9 @@ def test_a_log_that_is_folded_while_somebody_reads_gives_every_row_once(tmp_path
 def test_a_log_that_lives_and_one_that_is_large_are_not_folded(tmp_path: Path, monkeypatch: Any) -> None:
     folder = tmp_path / "ledger"
     with Driver(folder) as living:
-        claim = living.claim(cells(1)[0])
-        assert isinstance(claim, Claim)
-        living.finish(claim, result(cells(1)[0]))
+        lease = living.lease(cells(1)[0])
+        assert isinstance(lease, Lease)
+        living.finish(lease, result(cells(1)[0]))
         filled(folder, 3)
         assert len(list((folder / "rows").glob("*.jsonl"))) == 2
     monkeypatch.setattr(fold, "LARGE", 1)
@@ -128,9 +128,9 @@ def test_a_log_that_is_cut_off_behind_its_driver_takes_no_later_row_with_it(tmp_
     said: list[str] = []
     with Driver(folder, said.append) as driver:
         for k, cell in enumerate(chosen):
-            claim = driver.claim(cell)
-            assert isinstance(claim, Claim)
-            driver.finish(claim, result(cell))
+            lease = driver.lease(cell)
+            assert isinstance(lease, Lease)
+            driver.finish(lease, result(cell))
             if k == 1:
                 (log,) = (folder / "rows").glob("*.jsonl")
                 os.truncate(log, log.stat().st_size - 40)
@@ -163,12 +163,12 @@ def test_a_damaged_file_of_the_quarantine_is_put_aside_and_its_cell_is_tried_aga
 
 
 @pytest.mark.parametrize("content", [b'{"driver"', DEEP, b"\xff", b"{}"])
-def test_a_damaged_claim_holds_nothing(content: bytes, tmp_path: Path) -> None:
+def test_a_damaged_lease_holds_nothing(content: bytes, tmp_path: Path) -> None:
     folder, cell = tmp_path / "ledger", cells(1)[0]
     with Driver(folder) as driver:
-        (folder / "claims" / f"{cell.key}.1").write_bytes(content)
-        found = driver.claim(cell)
-    assert isinstance(found, Claim)
+        (folder / "leases" / f"{cell.key}.1").write_bytes(content)
+        found = driver.lease(cell)
+    assert isinstance(found, Lease)
     assert found.attempt == 2
     assert progress_so_far(Ledger(folder)).running == 0
 
@@ -184,14 +184,14 @@ def test_a_damaged_note_of_a_plan_is_passed_over(tmp_path: Path) -> None:
 def test_a_clock_that_is_set_back_or_ahead_changes_nothing(step: float, tmp_path: Path, monkeypatch: Any) -> None:
     folder, clock = tmp_path / "ledger", time.time
     with Driver(folder) as one:
-        claim = one.claim(cells(1)[0])
-        assert isinstance(claim, Claim)
-        (folder / "claims" / ".half").write_text("")  # what another one is writing just now
+        lease = one.lease(cells(1)[0])
+        assert isinstance(lease, Lease)
+        (folder / "leases" / ".half").write_text("")  # what another one is writing just now
         monkeypatch.setattr(time, "time", lambda: clock() + step)
         monkeypatch.setattr(time, "gmtime", lambda: time.localtime(clock() + step))
         filled(folder, 3, start=1)
-        assert (folder / "claims" / ".half").exists()
-        one.finish(claim, result(cells(1)[0]))
+        assert (folder / "leases" / ".half").exists()
+        one.finish(lease, result(cells(1)[0]))
     filled(folder, 4)
     assert len(list(Ledger(folder).rows())) == 4
 
@@ -240,7 +240,7 @@ def test_where_locks_stay_on_one_machine_another_ones_cells_are_not_judged(tmp_p
     folder = tmp_path / "ledger"
     with Driver(folder) as there:
         monkeypatch.setattr("socket.gethostname", lambda: "there")
-        assert isinstance(there.claim(cells(1)[0]), Claim)
+        assert isinstance(there.lease(cells(1)[0]), Lease)
         monkeypatch.setattr("socket.gethostname", lambda: "here")
         monkeypatch.setattr("posefit.sweep.driver.on_one_machine", lambda _: "nfs nolock")
         with (
@@ -249,7 +249,7 @@ def test_where_locks_stay_on_one_machine_another_ones_cells_are_not_judged(tmp_p
                 ValueError, match="expected a disk whose locks other machines see, got nfs nolock, and there"
             ),
         ):
-            here.claim(cells(1)[0])
+            here.lease(cells(1)[0])
     monkeypatch.setattr("posefit.sweep.driver.on_one_machine", lambda _: None)
     assert locks.MOUNTS.name == "mountinfo"
     filled(folder, 1)
@@ -275,7 +275,7 @@ try:
 except ValueError as error:
     said = str(error)
 damaged = []
-print(json.dumps([said, len(Ledger(folder, damaged.append)), damaged, len(list((folder / "claims").iterdir()))]))
+print(json.dumps([said, len(Ledger(folder, damaged.append)), damaged, len(list((folder / "leases").iterdir()))]))
 END
 """
 
@@ -290,12 +290,12 @@ def test_a_disk_that_is_really_full_ends_the_sweep_in_one_line_and_keeps_what_wa
     script = SMALL.format(folder=str(tmp_path), root=ROOT, python=sys.executable)
     done = subprocess.run(["unshare", "-rm", "bash", "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    said, rows, damaged, claims = json.loads(done.stdout)
+    said, rows, damaged, leases = json.loads(done.stdout)
     assert "expected room to write to, got No space left on device" in said
     assert f"; {rows} of 200 cells are done and safe" in said
     assert 0 < rows < 200
     assert not damaged
-    assert claims == 0
+    assert leases == 0
 
 
 def test_a_log_has_its_name_only_when_it_is_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -311,9 +311,9 @@ def test_a_log_has_its_name_only_when_it_is_locked(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr(fcntl, "flock", late)
     with Driver(folder) as driver:
-        claim = driver.claim(cells(3)[2])
-        assert isinstance(claim, Claim)
-        driver.finish(claim, result(claim.cell))
+        lease = driver.lease(cells(3)[2])
+        assert isinstance(lease, Lease)
+        driver.finish(lease, result(lease.cell))
     assert met
     assert len(list(Ledger(folder).rows())) == 3
     assert not list((folder / "rows").glob("*.new"))

@@ -14,7 +14,7 @@ import pytest
 from posefit.sweep import log
 from posefit.sweep.cell import TrackCell
 from posefit.sweep.drive import drive_cells
-from posefit.sweep.driver import ATTEMPTS, LOSSES, Claim, Driver, State
+from posefit.sweep.driver import ATTEMPTS, LOSSES, Driver, Lease, State
 from posefit.sweep.engines.engine import Outcome
 from posefit.sweep.ledger import Ledger
 from posefit.version import posefit_build
@@ -76,10 +76,10 @@ def test_a_frame_has_a_row_a_cell_whose_order_does_not_follow_from_when_it_was_r
     bad = cells(6)[5]
     with Driver(folder) as driver:
         for _ in range(3):
-            claim = driver.claim(bad)
-            assert isinstance(claim, Claim)
-            driver.fail(claim, "it had to")
-        assert driver.claim(bad) is State.QUARANTINED
+            lease = driver.lease(bad)
+            assert isinstance(lease, Lease)
+            driver.fail(lease, "it had to")
+        assert driver.lease(bad) is State.QUARANTINED
     table = Ledger(folder).frame()
     assert table["seed"].tolist() == [0, 1, 2, 3, 4, 5]
     assert table["status"].tolist() == ["done"] * 5 + ["quarantined"]
@@ -272,25 +272,25 @@ def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
     said: list[str] = []
     assert 3 <= len(Ledger(folder, said.append)) < 9
     assert not said
-    assert not list((folder / "claims").iterdir())
+    assert not list((folder / "leases").iterdir())
     filled(folder, 9)
 
 
-def test_nobody_runs_what_a_living_driver_has_claimed_and_a_dead_ones_cells_are_tried_again(tmp_path: Path) -> None:
+def test_nobody_runs_what_a_living_driver_has_leaseed_and_a_dead_ones_cells_are_tried_again(tmp_path: Path) -> None:
     cell = cells(1)[0]
     with Driver(tmp_path / "ledger") as one, Driver(tmp_path / "ledger") as other:
-        claim = one.claim(cell)
-        assert claim == Claim(cell, 1)
-        assert other.claim(cell) is State.ELSEWHERE
-        assert one.claim(cell) is State.ELSEWHERE
-        one.release(claim)
-        assert other.claim(cell) == Claim(cell, 1)
-        other.finish(Claim(cell, 1), result(cell))
-        assert one.claim(cell) is State.DONE
+        lease = one.lease(cell)
+        assert lease == Lease(cell, 1)
+        assert other.lease(cell) is State.ELSEWHERE
+        assert one.lease(cell) is State.ELSEWHERE
+        one.release(lease)
+        assert other.lease(cell) == Lease(cell, 1)
+        other.finish(Lease(cell, 1), result(cell))
+        assert one.lease(cell) is State.DONE
     with Driver(tmp_path / "ledger") as dead:
-        assert dead.claim(cells(2)[1]) == Claim(cells(2)[1], 1)
+        assert dead.lease(cells(2)[1]) == Lease(cells(2)[1], 1)
     with Driver(tmp_path / "ledger") as last:
-        assert last.claim(cells(2)[1]) == Claim(cells(2)[1], 2)
+        assert last.lease(cells(2)[1]) == Lease(cells(2)[1], 2)
 
 
 def test_the_death_of_drivers_is_no_fault_of_a_cell_until_fifty_of_them_got_nothing_else_done(tmp_path: Path) -> None:
@@ -298,19 +298,19 @@ def test_the_death_of_drivers_is_no_fault_of_a_cell_until_fifty_of_them_got_noth
 
     def die() -> int:
         with Driver(folder) as dead:
-            claim = dead.claim(cell)
-            assert isinstance(claim, Claim)
-        return claim.attempt
+            lease = dead.lease(cell)
+            assert isinstance(lease, Lease)
+        return lease.attempt
 
     assert [die() for _ in range(LOSSES - 1)] == list(range(1, LOSSES))
     filled(folder, 1, start=1)  # another cell gets done, and all that was before counts no more
     assert [die() for _ in range(LOSSES)][-1] == 2 * LOSSES - 1
     with Driver(folder) as last:
-        assert last.claim(cell) is State.QUARANTINED
+        assert last.lease(cell) is State.QUARANTINED
     (lost,) = Ledger(folder).quarantined()
     assert lost["reasons"][0] == "something outside ended it 50 times while no other cell got done"
     assert all("its driver, process" in reason and reason.endswith("died") for reason in lost["reasons"][1:])
-    assert not list((folder / "claims").iterdir())
+    assert not list((folder / "leases").iterdir())
     assert other.key in Ledger(folder)
 
 
@@ -318,45 +318,45 @@ def test_only_a_cells_own_faults_count_towards_its_three_attempts(tmp_path: Path
     folder, (cell,) = tmp_path / "ledger", cells(1)
     with Driver(folder) as driver:
         for own in (False, True, False, False, True, False, True):
-            claim = driver.claim(cell)
-            assert isinstance(claim, Claim)
-            driver.fail(claim, "its own" if own else "from outside", own)
-        assert driver.claim(cell) is State.QUARANTINED
+            lease = driver.lease(cell)
+            assert isinstance(lease, Lease)
+            driver.fail(lease, "its own" if own else "from outside", own)
+        assert driver.lease(cell) is State.QUARANTINED
     assert Ledger(folder).quarantined()[0]["reasons"] == ["its own"] * ATTEMPTS
 
 
-def test_a_claim_that_is_damaged_or_removed_costs_no_row_and_stops_nobody(tmp_path: Path) -> None:
+def test_a_lease_that_is_damaged_or_removed_costs_no_row_and_stops_nobody(tmp_path: Path) -> None:
     folder, (cell, other) = tmp_path / "ledger", cells(2)
     with Driver(folder) as one, Driver(folder) as two:
-        first = one.claim(cell)
-        assert isinstance(first, Claim)
-        (folder / "claims" / f"{cell.key}.1").unlink()
-        second = two.claim(cell)
-        assert isinstance(second, Claim)
-        one.fail(first, "too late")  # the claim is another one's by now
+        first = one.lease(cell)
+        assert isinstance(first, Lease)
+        (folder / "leases" / f"{cell.key}.1").unlink()
+        second = two.lease(cell)
+        assert isinstance(second, Lease)
+        one.fail(first, "too late")  # the lease is another one's by now
         one.release(first)
-        assert two.claim(cell) is State.ELSEWHERE
+        assert two.lease(cell) is State.ELSEWHERE
         two.finish(second, result(cell))
         one.finish(first, result(cell))
-        (folder / "claims" / f"{other.key}.1").write_bytes(b"\xff{")
-        assert one.claim(other) == Claim(other, 2)
-        one.finish(Claim(other, 2), result(other))
+        (folder / "leases" / f"{other.key}.1").write_bytes(b"\xff{")
+        assert one.lease(other) == Lease(other, 2)
+        one.finish(Lease(other, 2), result(other))
     lines = [line for path in (folder / "rows").glob("*.jsonl") for line in path.read_bytes().splitlines()]
     assert len(lines) == 2
-    assert not list((folder / "claims").iterdir())
+    assert not list((folder / "leases").iterdir())
 
 
-def test_of_many_drivers_that_claim_the_same_cells_one_gets_each(tmp_path: Path) -> None:
+def test_of_many_drivers_that_lease_the_same_cells_one_gets_each(tmp_path: Path) -> None:
     chosen = cells(60)
     got: list[str] = []
 
     def work() -> None:
         with Driver(tmp_path / "ledger") as driver:
             for cell in chosen:
-                claim = driver.claim(cell)
-                if isinstance(claim, Claim):
+                lease = driver.lease(cell)
+                if isinstance(lease, Lease):
                     got.append(cell.key)
-                    driver.finish(claim, result(cell))
+                    driver.finish(lease, result(cell))
 
     threads = [threading.Thread(target=work) for _ in range(6)]
     for thread in threads:
@@ -365,19 +365,19 @@ def test_of_many_drivers_that_claim_the_same_cells_one_gets_each(tmp_path: Path)
         thread.join()
     assert sorted(got) == sorted(cell.key for cell in chosen)
     assert len(list(Ledger(tmp_path / "ledger").rows())) == 60
-    assert not list((tmp_path / "ledger" / "claims").iterdir())
+    assert not list((tmp_path / "ledger" / "leases").iterdir())
 
 
 def test_what_a_dead_driver_left_behind_goes_away(tmp_path: Path) -> None:
     folder = filled(tmp_path / "ledger", 1)
-    claims = folder / "claims"
-    (claims / f"{cells(1)[0].key}.1").write_text("{}")  # its row was written, its claim not yet given up
-    (claims / f"{'0' * 64}.2").write_text("{}")
-    (folder / "quarantine" / f"{'0' * 64}.json").write_text("{}")  # quarantined, its claims not yet given up
-    (claims / ".unnamed").write_text("")
-    os.utime(claims / ".unnamed", (0, 0))
+    leases = folder / "leases"
+    (leases / f"{cells(1)[0].key}.1").write_text("{}")  # its row was written, its lease not yet given up
+    (leases / f"{'0' * 64}.2").write_text("{}")
+    (folder / "quarantine" / f"{'0' * 64}.json").write_text("{}")  # quarantined, its leases not yet given up
+    (leases / ".unnamed").write_text("")
+    os.utime(leases / ".unnamed", (0, 0))
     filled(folder, 1)
-    assert not list(claims.iterdir())
+    assert not list(leases.iterdir())
     assert len(list((folder / "rows").iterdir())) == 2  # a driver that wrote nothing leaves nothing
 
 

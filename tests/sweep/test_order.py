@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from posefit.sweep.cell import TrackCell
-from posefit.sweep.drive import NEAR, mingled
+from posefit.sweep.drive import NEAR, interleaved
 
 METHODS = ("sapso@pca", "cma@pca", "vsmm")
 
@@ -18,7 +18,7 @@ def cells(methods: str, seeds: int) -> list[TrackCell]:
 
 
 def order(given: list[TrackCell], workers: int) -> list[int]:
-    return [given.index(cell) for cell in mingled(iter(given), lambda: workers)]
+    return [given.index(cell) for cell in interleaved(iter(given), lambda: workers)]
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_a_long_plan_is_not_gone_through_before_it_begins() -> None:
             asked.append(cell.seed)
             yield cell
 
-    begun = next(mingled(coming(), lambda: 2))
+    begun = next(interleaved(coming(), lambda: 2))
     assert begun == cells("a", 1)[0]
     assert len(asked) == NEAR
 

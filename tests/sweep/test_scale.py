@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from posefit.sweep.cell import CellResult, TrackCell
-from posefit.sweep.driver import Claim, Driver
+from posefit.sweep.driver import Driver, Lease
 from posefit.sweep.ledger import ROWS, Ledger
 from posefit.sweep.log import Writer
 from tests.effort import Effort, effort
@@ -58,7 +58,7 @@ def filled(folder: Path, count: int) -> Path:
 
 
 def one_more(folder: Path, frames: int) -> Effort:
-    """Return the least that claiming and finishing a cell takes, of some."""
+    """Return the least that leasing and finishing a cell takes, of some."""
     least = []
     with Driver(folder) as driver:
         for seed in range(5):
@@ -66,9 +66,9 @@ def one_more(folder: Path, frames: int) -> Effort:
             ended = real(cell)
 
             def run(cell: TrackCell = cell, ended: CellResult = ended) -> None:
-                claim = driver.claim(cell)
-                assert isinstance(claim, Claim)
-                driver.finish(claim, ended)
+                lease = driver.lease(cell)
+                assert isinstance(lease, Lease)
+                driver.finish(lease, ended)
 
             least.append(effort(run))
     return Effort(min(one.calls for one in least), min(one.read for one in least))

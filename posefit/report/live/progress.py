@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import time
 
-from posefit.sweep.driver import held_by
-from posefit.sweep.ledger import CLAIMS, ROWS, SHORT, Ledger
+from posefit.sweep.driver import read_lease
+from posefit.sweep.ledger import LEASES, ROWS, SHORT, Ledger
 from posefit.sweep.locks import is_locked
 from posefit.sweep.log import SUFFIX
 
@@ -20,7 +20,7 @@ class Progress:
     done: int
     quarantined: int
     left: int | None  # neither done nor in quarantine, those that run among them
-    running: int  # claimed by drivers that live
+    running: int  # leased by drivers that live
     failed: int  # attempts at cells that are neither done nor in quarantine, so that they are tried again
     seconds: float | None  # that what is left will take about, at the pace since the plan was begun or gone on with
 
@@ -28,7 +28,7 @@ class Progress:
 def progress_so_far(ledger: Ledger, now: float | None = None) -> Progress:
     """Return how far the plan of a ledger is that was begun last; `now` is the time in seconds since 1970."""
     ledger.refresh()
-    (running, failed), lost = _attempts(ledger), ledger.sentenced()
+    (running, failed), lost = _attempts(ledger), ledger.quarantined_keys()
     plans = ledger.plans()
     if not plans:
         return Progress(None, len(ledger), len(lost), None, running, failed, None)
@@ -43,14 +43,14 @@ def progress_so_far(ledger: Ledger, now: float | None = None) -> Progress:
 
 
 def _attempts(ledger: Ledger) -> tuple[int, int]:
-    """Return how many cells living drivers have claimed, and how many attempts have failed at cells not settled."""
+    """Return how many cells living drivers have leased, and how many attempts have failed at cells not settled."""
     lives: dict[str, bool] = {}
     running = failed = 0
-    for entry in os.scandir(ledger.path / CLAIMS):
+    for entry in os.scandir(ledger.path / LEASES):
         if entry.name.startswith("."):
             continue
         with suppress(OSError):  # a disk that does not say
-            held = held_by(Path(entry))
+            held = read_lease(Path(entry))
             if held is None:
                 continue
             if "failed" in held:

@@ -58,7 +58,7 @@ class Showing:
     def _page(self, began: float) -> str:
         """Return the page as it is now."""
         progress = progress_so_far(self._ledger)
-        state = len(self._ledger), len(self._ledger.sentenced())
+        state = len(self._ledger), len(self._ledger.quarantined_keys())
         if state != self._state:
             self._data, self._document = self._report()
             self._state = state
