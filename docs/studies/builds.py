@@ -1,4 +1,4 @@
-"""How well a person's build is found: `posefit reproduce builds`.
+"""How well a person's build is found.
 
 Synthetic subjects whose bones and radii are each up to 10 % off the average, and who are up to 10 % taller or smaller.
 A cell follows the person whose build is known, so the runs are jobs.
@@ -10,6 +10,7 @@ from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
+import click
 import numpy as np
 
 from posefit.arrays import Array
@@ -22,6 +23,7 @@ from posefit.tracking.method import Choice, prepare
 from posefit.tracking.opening import BODY_FRAMES, built, following
 from posefit_reproduce.grid import Progress, each
 from posefit_reproduce.known import SIZE, known_task
+from table import WORKERS, bar
 
 MOTION = "walk-b"
 PERCENT = 10.0
@@ -109,3 +111,15 @@ def builds_lines(told: dict[str, Any]) -> Iterator[str]:
         for label, parts in rows.items():
             figures = [f"{part} {one['mean']:.1f} (at most {one['most']:.1f})" for part, one in parts.items()]
             yield f"{setup:22} {label:8} % off: {', '.join(figures)}"
+
+
+@click.command(help=__doc__)
+@click.option("--subjects", type=click.IntRange(1), default=8, show_default=True, help="People, each of another build.")
+@WORKERS
+def main(subjects: int, workers: int | None) -> None:
+    for line in builds_lines(builds(MOTION, subjects, workers, bar)):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,4 @@
-"""Who finds all poses of nearly one silhouette: `posefit reproduce modes`.
+"""Who finds all poses of nearly one silhouette.
 
 Methods search the instances of `posefit.niching`, all with the same budget, and report poses with weights. An optimiser
 with `modes` says itself which poses it found; a filter reports the particles of its last population; of any other, the
@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
+import click
 import numpy as np
 
 from posefit.arrays import Array
@@ -34,6 +35,7 @@ from posefit.settings import planned
 from posefit.uncertainty.modes import Posterior, modes_of
 from posefit.uncertainty.searches import boltzmann_weights
 from posefit_reproduce.grid import Progress, each
+from table import WORKERS, bar
 
 KNOWN, LIBRARY = "known", "library"  # what is known itself, as a ceiling; the nearest poses of the library
 METHODS = (KNOWN, "random", LIBRARY, "sapso", "sapso*8", "pso*8", "cma", "cma*16", "annealed", "ribs")
@@ -43,7 +45,7 @@ SALT = 41
 _SEVERAL = re.compile(r"(?P<name>[^*]+)(?:\*(?P<count>[1-9]\d*))?")
 
 
-def niches(
+def modes(
     instances: int, methods: Sequence[str], evaluations: int, workers: int | None, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Return what every method reaches on so many instances, with so many evaluations on each.
@@ -165,7 +167,7 @@ def _told(method: str, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def niches_lines(told: dict[str, Any]) -> Iterator[str]:
+def modes_lines(told: dict[str, Any]) -> Iterator[str]:
     """Yield the table as it is printed."""
     levels = [f"peak ratio at {level:g} mm" for level in told["levels_mm"]]
     kinds = list(told["methods"][0]["by_kind"])
@@ -182,3 +184,17 @@ def niches_lines(told: dict[str, Any]) -> Iterator[str]:
             f"{one['reported']:.1f}",
         ]
         yield f"| {' | '.join(cells)} |"
+
+
+@click.command(help=__doc__)
+@click.option("--instances", type=int, default=30, show_default=True, help="Of the niching task, held out ones.")
+@click.option("--method", "methods", multiple=True, help="An optimiser; cma*16 is 16 searches. Again for more.")
+@click.option("--evaluations", type=click.IntRange(1), default=19520, show_default=True, help="Of every method.")
+@WORKERS
+def main(instances: int, methods: tuple[str, ...], evaluations: int, workers: int | None) -> None:
+    for line in modes_lines(modes(instances, methods, evaluations, workers, bar)):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()

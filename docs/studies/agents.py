@@ -1,0 +1,485 @@
+"""Baseline agents of the environments on held-out instances.
+
+Chance, constants, schedules, a bandit, CMA-ES over settings, and PPO and SAC of Stable-Baselines3 as they come.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
+from typing import Any, NamedTuple
+
+import click
+import gymnasium as gym
+import numpy as np
+
+from posefit import minimise
+from posefit.arrays import Array
+from posefit.evolution.constants import usual_population
+from posefit.evolution.strategy import Strategy
+from posefit.registry import registry
+from posefit.settings import planned
+from posefit_envs.configure import ITERATIONS, POPULATION_SIZE
+from posefit_envs.configuring.orders import NUMBERS, Order, action_of
+from posefit_envs.configuring.single import EVERY
+from posefit_envs.fit import MAX_EVALUATIONS
+from posefit_envs.instance import instance, select
+from posefit_envs.policies import (
+    Policy,
+    constant_policy,
+    gaussian_policy,
+    played,
+    random_search_policy,
+    sapso_policy,
+    uniform_policy,
+)
+from posefit_reproduce.grid import Progress, each, earlier, kept
+from table import WORKERS, bar, markdown
+
+HELD_OUT = 10_000  # the first instance of the test split
+INSTANCES, SEEDS, STEPS = 40, 5, 20_000
+QUICK_INSTANCES, QUICK_STEPS = 4, 300
+CURVE = 5  # looks at an agent while it learns
+CURVE_INSTANCES = 16  # that each look takes, the first of those held out
+STRONGEST, BEST_KNOWN_EVALUATIONS = "cma", 24_400  # the method, and its budget, for what is best known
+UNTRAINED = 0  # steps of training of a reference
+
+
+@dataclass(frozen=True)
+class Contested:
+    """An environment, the budget of its episodes in evaluations and in steps, and who plays it."""
+
+    name: str
+    evaluations: int
+    length: int  # steps of an episode
+    references: tuple[str, ...]  # not trained
+    learners: tuple[str, ...]
+
+
+CONFIGURE = Contested(
+    "posefit/Configure-v1",
+    POPULATION_SIZE * (ITERATIONS + 1),
+    ITERATIONS // EVERY,
+    ("random search", "random actions", "middle", "sapso"),
+    ("bandit", "cma over constants", "ppo", "sac"),
+)
+FIT = Contested(
+    "posefit/Fit-v1",
+    MAX_EVALUATIONS,
+    MAX_EVALUATIONS - 1,
+    ("random search", "random actions", "gaussian", "sapso", "cma"),
+    ("bandit", "cma over constants", "ppo", "sac"),
+)
+TASKS = {"configure": CONFIGURE, "fit": FIT}
+
+
+class Training(NamedTuple):
+    """One row: an agent in an environment, a seed of its training and evaluation, and the steps it is asked to take."""
+
+    task: str
+    agent: str
+    seed: int
+    steps: int
+    instances: int
+
+
+def agent_turns(
+    tasks: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int
+) -> list[Training]:
+    """Return the rows that are asked for, of each agent that a task has."""
+    turns = []
+    for name in tasks:
+        task = TASKS[name]
+        for seed in range(seeds):
+            for agent in (*task.references, *task.learners):
+                if not agents or agent in agents or agent == "random search":
+                    trained = steps if agent in task.learners else UNTRAINED
+                    turns.append(Training(name, agent, seed, trained, instances))
+    return turns
+
+
+WIDE = 0.5  # the first step size of CMA-ES, of a box from -1 to 1
+EPISODES = 4  # that a setting of CMA-ES is tried in, the same instances for a whole generation
+SIZES = {"configure": NUMBERS, "fit": 2}  # numbers of a setting
+CURIOSITY = 0.5  # of the bandit: how many deviations of rewards an arm that was never tried is worth
+
+Look = Callable[[int, Policy], None]
+
+
+def arms(task: str) -> list[Array]:
+    """Return the settings that the bandit may choose from."""
+    if task == "fit":
+        return [np.full(2, power) for power in np.linspace(-1.0, 1.0, 9)]
+    kinds = [tuple(float(k == kind) for k in range(3)) for kind in range(3)]
+    return [
+        action_of(Order((one, two, three), population, stride, 0.01))
+        for one, two, three in kinds
+        for population in (1.0, 0.5)
+        for stride in (0.3, 0.6, 0.9)
+    ]
+
+
+def setting_policy(task: str, setting: Array, rng: np.random.Generator, dimensions: int, length: int) -> Policy:
+    """Return what a setting does in episodes of so many steps."""
+    if task == "configure":
+        return constant_policy(setting)
+
+    def propose(_: Any, step: int) -> Array:
+        power = setting[0] + (setting[1] - setting[0]) * step / length
+        return np.append(rng.uniform(-1.0, 1.0, dimensions - 1), power)
+
+    return propose
+
+
+def bandit(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
+    """Return the best arm by UCB1 over the whole episodes that `steps` steps of a training environment are.
+
+    `length` is how many an episode has; `look` is called with the steps so far and the policy of then.
+    """
+    rng, choices = np.random.default_rng(seed), arms(task)
+    d = env.action_space.shape[0]
+    policies = [setting_policy(task, arm, rng, d, length) for arm in choices]
+    shown = [setting_policy(task, arm, _apart(seed), d, length) for arm in choices]
+    sums, squares, counts = np.zeros(len(choices)), np.zeros(len(choices)), np.zeros(len(choices))
+    for episode in range(steps // length):
+        tried = np.maximum(counts, 1.0)
+        deviation = np.sqrt(max(squares.sum() / max(episode, 1) - (sums.sum() / max(episode, 1)) ** 2, 0.0))
+        bonus = CURIOSITY * deviation * np.sqrt(2.0 * np.log(episode + 1.0) / tried)
+        arm = int(np.where(counts > 0, sums / tried + bonus, np.inf).argmax())
+        gain = played(env, policies[arm], int(rng.integers(HELD_OUT)), int(rng.integers(2**31)))["gain"]
+        sums[arm], squares[arm], counts[arm] = sums[arm] + gain, squares[arm] + gain**2, counts[arm] + 1
+        look((episode + 1) * length, shown[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
+    return shown[int(np.where(counts > 0, sums / np.maximum(counts, 1.0), -np.inf).argmax())]
+
+
+def _apart(seed: int) -> np.random.Generator:
+    """Return a generator for looks at what was learned, so that looking changes nothing of the training."""
+    return np.random.default_rng([seed, 2])
+
+
+def generation(task: str, length: int) -> int:
+    """Return how many steps a generation of CMA-ES over settings takes, where an episode has `length`."""
+    return usual_population(SIZES[task]) * EPISODES * length
+
+
+def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
+    """Return the setting at the mean of CMA-ES after the whole generations that `steps` steps of an environment are.
+
+    Without one it is the middle.
+    """
+    rng, other = np.random.default_rng(seed), _apart(seed)
+    d, size, whole = env.action_space.shape[0], SIZES[task], generation(task, length)
+    population = usual_population(size)
+    strategy = Strategy(np.zeros(size), np.full(size, WIDE), population)
+    for number in range(1, steps // whole + 1):
+        settings = np.clip(strategy.sample(rng, population), -1.0, 1.0)
+        numbers, seeds = rng.integers(HELD_OUT, size=EPISODES), rng.integers(2**31, size=EPISODES)
+        costs = [
+            -np.mean(
+                [
+                    played(env, setting_policy(task, setting, rng, d, length), int(number), int(one))["gain"]
+                    for number, one in zip(numbers, seeds, strict=True)
+                ]
+            )
+            for setting in settings
+        ]
+        strategy.learn(settings, np.array(costs))
+        look(number * whole, setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length))
+    return setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length)
+
+
+DISCOUNT = 0.99  # their default, stated
+ROLLOUT = 2048  # steps that PPO takes before it learns of them; its default, stated
+
+
+def check_learners(agents: set[str]) -> None:
+    """Return nothing. Raises ImportError where agents need Stable-Baselines3 and it is not there."""
+    if agents & {"ppo", "sac"} and find_spec("stable_baselines3") is None:
+        raise ImportError("ppo and sac need Stable-Baselines3: pip install posefit[rl]")
+
+
+def trained(
+    agent: str, env: Any, steps: int, seed: int, deterministic: bool, look: Callable[[int, Policy], None]
+) -> Policy:
+    """Return the policy of "ppo" or "sac" after so many steps in an environment, of "ppo" in whole rollouts.
+
+    `deterministic` takes the middle of its distribution in place of a draw. `look` is called with the steps so far and
+    the policy of then.
+    """
+    import torch
+    from stable_baselines3 import PPO, SAC
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    torch.set_num_threads(1)
+    common: dict[str, Any] = {"policy": "MlpPolicy", "env": env, "seed": seed, "device": "cpu", "gamma": DISCOUNT}
+    model = PPO(**common, n_steps=ROLLOUT) if agent == "ppo" else SAC(**common)
+
+    def act(observation: Any, _: int) -> Array:
+        chosen: Array = model.predict(observation, deterministic=deterministic)[0]
+        return chosen
+
+    class Looking(BaseCallback):  # type: ignore[misc]
+        def _on_step(self) -> bool:
+            with torch.random.fork_rng(devices=()):  # looking changes nothing of the training
+                look(self.num_timesteps, act)
+            return True
+
+    model.learn(steps, callback=Looking())
+    return act
+
+
+BEST = "best known"
+FIGURES = ("costs", "curve", "minutes")  # of a row, beside what was asked for
+SAMPLED = ("fit",)  # tasks in which a learner's actions are drawn, as its noise is what searches
+
+
+def agents(
+    environments: tuple[str, ...],
+    names: tuple[str, ...],
+    seeds: int,
+    steps: int,
+    instances: int,
+    quick: bool,
+    rows: str | None,
+    workers: int | None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Return the table of agents: normalised scores on held-out instances, with intervals, and learning curves.
+
+    `rows` is a file for a row a line as they come; what it holds already is not measured again. Raises ValueError where
+    something asked for is not there.
+    """
+    asked = tuple(dict.fromkeys(environments)) or tuple(TASKS)
+    if quick:
+        seeds, steps, instances = min(seeds, 2), QUICK_STEPS, QUICK_INSTANCES
+    turns = agent_turns(asked, names, seeds, steps, instances)
+    check_learners({turn.agent for turn in turns})
+    turns += [Training(name, BEST, 0, 0, instances) for name in asked]
+    done = earlier(rows, (*Training._fields, *FIGURES), turn_of)
+    jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
+    done |= each(jobs, workers, partial(kept, rows, progress)) if jobs else {}
+    found = [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
+    return {"seeds": seeds, "steps": steps, "instances": instances, "rows": found} | agent_tables(found)
+
+
+def agent_row(turn: Training) -> dict[str, Any]:
+    """Return a row: the best costs that an agent reached on held-out instances, and what it learned on the way."""
+    began = time.perf_counter()
+    numbers = range(HELD_OUT, HELD_OUT + turn.instances)
+    row: dict[str, Any] = turn._asdict() | {"curve": []}
+    evaluations = TASKS[turn.task].evaluations
+    if turn.agent == BEST:
+        row["costs"] = _searched(STRONGEST, BEST_KNOWN_EVALUATIONS, numbers, turn.seed)
+    elif turn.agent in ("random search", "sapso", "cma") and not _is_policy(turn):
+        row["costs"] = _searched(turn.agent.split()[0], evaluations, numbers, turn.seed)
+    else:
+        row["costs"] = _costs(turn, _policy(turn, row["curve"]), numbers)
+        if row["curve"]:
+            last = [steps_taken(turn), row["costs"][:CURVE_INSTANCES]]
+            row["curve"] = [look for look in row["curve"] if look[0] < last[0]] + [last]
+    return row | {"minutes": round((time.perf_counter() - began) / 60.0, 2)}
+
+
+def _is_policy(turn: Training) -> bool:
+    return (turn.task, turn.agent) in {("fit", "random search"), ("configure", "sapso")}
+
+
+def _policy(turn: Training, curve: list[Any]) -> Policy:
+    env, rng = _made(turn.task), np.random.default_rng([turn.seed, 1])
+    plain: dict[str, Callable[[], Policy]] = {
+        "random search": lambda: random_search_policy(env, rng),
+        "random actions": lambda: uniform_policy(env, rng),
+        "middle": lambda: constant_policy(np.zeros(env.action_space.shape or ())),
+        "sapso": sapso_policy,
+        "gaussian": lambda: gaussian_policy(env, rng),
+    }
+    if turn.agent in plain:
+        return plain[turn.agent]()
+    numbers = range(HELD_OUT, HELD_OUT + min(turn.instances, CURVE_INSTANCES))
+
+    def look(steps: int, policy: Policy) -> None:
+        due = turn.steps * len(curve) // CURVE
+        if steps >= due and len(curve) < CURVE:
+            curve.append([steps, _costs(turn, policy, numbers)])
+
+    if turn.agent in ("bandit", "cma over constants"):
+        learn = bandit if turn.agent == "bandit" else evolved
+        return learn(turn.task, env, TASKS[turn.task].length, steps_taken(turn), turn.seed, look)
+    return trained(turn.agent, env, turn.steps, turn.seed, turn.task not in SAMPLED, look)
+
+
+def steps_taken(turn: Training) -> int:
+    """Return how many steps of training an agent takes of those asked for: whole episodes, generations or rollouts."""
+    length = TASKS[turn.task].length
+    if turn.agent == "bandit":
+        return max(1, turn.steps // length) * length
+    if turn.agent == "cma over constants":
+        whole = generation(turn.task, length)
+        return turn.steps // whole * whole
+    if turn.agent == "ppo":
+        return -(-turn.steps // ROLLOUT) * ROLLOUT
+    return turn.steps
+
+
+def _made(task: str) -> gym.Env[Any, Any]:
+    more: dict[str, Any] = {"max_evaluations": TASKS[task].evaluations} if task == "fit" else {}
+    return gym.make(TASKS[task].name, errors=False, **more)
+
+
+def _costs(turn: Training, policy: Policy, numbers: range) -> list[float]:
+    env = _made(turn.task)
+    return [played(env, policy, number, 1000 * turn.seed + number)["best_cost"] for number in numbers]
+
+
+def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> list[float]:
+    """Return the costs that an optimiser of the library reaches on the same instances, by itself."""
+    world, factory = select().world, registry().optimiser(optimiser)
+    found = []
+    for number in numbers:
+        made = instance(world, number, 1, evaluations)
+        space = made.space(world.learned)
+        searching = factory(space, np.random.default_rng([seed, number]), **planned(factory, {}, evaluations))
+        problem = made.scenery(0).problem(space)
+        found.append(minimise(problem.evaluate, searching, evaluations, told=True).cost)
+    return found
+
+
+def turn_of(row: Mapping[str, Any]) -> Training:
+    """Return whose row it is."""
+    return Training(*(row[name] for name in Training._fields))
+
+
+Row = Mapping[str, Any]
+
+RESAMPLES, LEVEL, SALT = 2000, 0.95, 67
+LEAST_GAP = 0.1  # of a cost, between random search and what is best known: an instance without one says nothing
+
+
+def agent_tables(rows: Sequence[Row]) -> dict[str, Any]:
+    """Return for each environment its agents' scores: 0 is random search on the instance, 1 what is best known.
+
+    What is best known is the lowest cost in any row. A score is the mean over seeds and instances; its interval is a
+    bootstrap of seeds and instances, each drawn anew. `steps` are those of training that were taken, `taken` of a row.
+    """
+    return {"tables": {task: _table([row for row in rows if row["task"] == task]) for task in _tasks(rows)}}
+
+
+def _tasks(rows: Sequence[Row]) -> list[str]:
+    return [task for task in TASKS if any(row["task"] == task for row in rows)]
+
+
+def _table(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    costs = {name: np.array([row["costs"] for row in rows if row["agent"] == name]) for name in _agents(rows)}
+    chance = costs["random search"].mean(axis=0)
+    best = np.concatenate(list(costs.values())).min(axis=0)
+    told = []
+    for name, found in costs.items():
+        scores = normalised(found, chance, best)
+        low, high = score_interval(scores)
+        mine = [row for row in rows if row["agent"] == name]
+        told.append(
+            {
+                "agent": name,
+                "steps": mine[0]["taken"],
+                "seeds": len(found),
+                "cost": float(found.mean()),
+                "median_cost": float(np.median(found)),
+                "score": float(scores.mean()),
+                "low": low,
+                "high": high,
+                "minutes": float(np.mean([row["minutes"] for row in mine])),
+                "curve": _curve([row["curve"] for row in mine], chance, best),
+            }
+        )
+    return sorted(told, key=lambda one: one["score"])
+
+
+def _agents(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(row["agent"] for row in rows))
+
+
+def normalised(costs: Array, chance: Array, best: Array) -> Array:
+    """Return scores (seeds, instances) of costs: 0 is `chance` (instances,), 1 is `best`.
+
+    Instances where both are nearly equal are left out. Raises ValueError where all are.
+    """
+    apart = chance - best >= LEAST_GAP
+    if not apart.any():
+        raise ValueError(f"best known must lie below random search, got none of {len(best)} instances that do")
+    return ((chance - costs) / np.where(apart, chance - best, 1.0))[:, apart]
+
+
+def score_interval(scores: Array) -> tuple[float, float]:
+    """Return the ends of the 95 % interval of the mean of scores (seeds, instances), by a bootstrap of both."""
+    rng = np.random.default_rng(SALT)
+    seeds, instances = scores.shape
+    one = rng.integers(seeds, size=(RESAMPLES, seeds))
+    other = rng.integers(instances, size=(RESAMPLES, instances))
+    means = [scores[np.ix_(rows, columns)].mean() for rows, columns in zip(one, other, strict=True)]
+    low, high = np.quantile(means, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
+    return float(low), float(high)
+
+
+def _curve(curves: Sequence[Any], chance: Array, best: Array) -> list[dict[str, float]]:
+    """Return the score at each look of all seeds, with its interval."""
+    told = []
+    for looks in zip(*curves, strict=False):
+        costs = np.array([costs for _, costs in looks])
+        few = costs.shape[1]
+        scores = normalised(costs, chance[:few], best[:few])
+        low, high = score_interval(scores)
+        steps = float(np.mean([steps for steps, _ in looks]))
+        told.append({"steps": steps, "score": float(scores.mean()), "low": low, "high": high})
+    return told
+
+
+def agents_lines(told: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the tables as they are printed."""
+    for task, table in told["tables"].items():
+        yield f"{TASKS[task].name}, {TASKS[task].evaluations} evaluations, {told['instances']} held-out instances"
+        yield ""
+        lines = []
+        for one in table:
+            interval = f"{one['low']:.3f} to {one['high']:.3f}"
+            cells = [one["agent"], str(one["steps"]), str(one["seeds"]), f"{one['score']:.3f}", interval]
+            cells += [f"{one['cost']:.2f}", f"{one['median_cost']:.2f}", f"{one['minutes']:.1f}"]
+            lines.append(cells)
+        heads = ["agent", "trained steps", "seeds", "score", "95 % interval", "mean cost", "median cost", "minutes"]
+        yield from markdown(heads, lines)
+        yield ""
+        for one in table:
+            if one["curve"]:
+                looks = ", ".join(
+                    f"{look['steps']:.0f}: {look['score']:.2f} ({look['low']:.2f} to {look['high']:.2f})"
+                    for look in one["curve"]
+                )
+                yield f"{one['agent']} learns: {looks}"
+        yield ""
+
+
+@click.command(help=__doc__)
+@click.option("--environment", "environments", multiple=True, type=click.Choice([*TASKS]), help="By default all.")
+@click.option("--agent", "names", multiple=True, help="One alone, such as ppo, beside random search. Again for more.")
+@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each agent.")
+@click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
+@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
+@click.option("--quick", is_flag=True, help="Two trainings of 300 steps, four instances: a look, not a measurement.")
+@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
+@WORKERS
+def main(
+    environments: tuple[str, ...],
+    names: tuple[str, ...],
+    seeds: int,
+    steps: int,
+    instances: int,
+    quick: bool,
+    rows: str | None,
+    workers: int | None,
+) -> None:
+    for line in agents_lines(agents(environments, names, seeds, steps, instances, quick, rows, workers, bar)):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""Run a sweep plan and print its rows as a table; the other studies print with it, too.
+
+    python docs/studies/table.py docs/studies/accuracy.toml --by method --by motion --by view_degrees
+
+A line is a group of cells that have the fields of `--by` in common: medians over its cells, or means of shares. What is
+in `--ledger` is not run again.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.cli.output import progress, say
+from posefit.sweep.plan import Plan
+from posefit.tracking.measures import BASELINES, MEASURES
+from posefit_reproduce.columns import head_of, number
+from posefit_reproduce.grid import rows
+
+Row = Mapping[str, Any]
+RESAMPLES, LEVEL = 2000, 0.95
+SHARES = ("lost_rate", "swap_rate")
+TRIVIAL = ("nearest", "mean_pose")  # baselines, which know the true root
+WORKERS = click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes; one a core by default.")
+LEDGER = click.option("--ledger", metavar="DIR", help="Folder of finished rows: the same command continues there.")
+bar = partial(progress, unit="run")
+
+
+def markdown(heads: Sequence[str], cells: Sequence[Sequence[str]], words: int = 1) -> Iterator[str]:
+    """Yield the lines of a table whose first columns are words and whose others are numbers."""
+    yield f"| {' | '.join(heads)} |"
+    yield "|" + "---|" * words + "---:|" * (len(heads) - words)
+    yield from (f"| {' | '.join(row)} |" for row in cells)
+
+
+def percent(value: float | None, digits: int = 1) -> str:
+    """Return a share in percent, or a dash."""
+    return "-" if value is None else f"{100.0 * value:.{digits}f}"
+
+
+def interval(values: Array, clusters: Sequence[object]) -> tuple[float, float]:
+    """Return the 95 % interval of the median of values (n,), by a bootstrap over the clusters that they are of."""
+    rng = np.random.default_rng(0)
+    groups = [values[[k for k, name in enumerate(clusters) if name == one]] for one in dict.fromkeys(clusters)]
+    drawn = rng.integers(len(groups), size=(RESAMPLES, len(groups)))
+    medians = [np.median(np.concatenate([groups[k] for k in rows])) for rows in drawn]
+    low, high = np.quantile(medians, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
+    return float(low), float(high)
+
+
+def grouped(found: Sequence[Row], labels: Callable[[Row], Sequence[str]], names: Sequence[str]) -> Iterator[str]:
+    """Yield the table of rows: a line for each of `labels`, in the order of the rows; `names` are the labels' heads."""
+    groups: dict[tuple[str, ...], list[Row]] = {}
+    for row in found:
+        groups.setdefault(tuple(labels(row)), []).append(row)
+    heads = [*names, "tracks", head_of("error_degrees", "median"), "least to most", head_of("mpjpe_mm", "median")]
+    heads += ["95 % interval, mm", *(head_of(name) for name in SHARES)]
+    heads += [f"{BASELINES[name]}, degrees" for name in TRIVIAL] + ["ms a frame"]
+    yield from markdown(heads, [[*key, *_cells(mine)] for key, mine in groups.items()], len(names))
+
+
+def _cells(mine: Sequence[Row]) -> list[str]:
+    errors = np.array([row["error_degrees"]["mean"] for row in mine])
+    distances = np.array([row["mpjpe_mm"] for row in mine])
+    low, high = interval(distances, [row["spec"]["motion"] for row in mine])
+    return [
+        str(len(mine)),
+        number("error_degrees", float(np.median(errors))),
+        f"{errors.min():.1f} to {errors.max():.1f}",
+        number("mpjpe_mm", float(np.median(distances))),
+        f"{number('mpjpe_mm', low)} to {number('mpjpe_mm', high)}",
+        *(percent(float(np.mean([row[name] for row in mine]))) for name in SHARES),
+        *(f"{np.median([row['baselines_degrees'][name] for row in mine]):.1f}" for name in TRIVIAL),
+        MEASURES["seconds_per_frame"].number(float(np.median([row["seconds_per_frame"] for row in mine]))),
+    ]
+
+
+def field_text(row: Row, field: str) -> str:
+    """Return a field of a row's cell as a label; what a cell leaves at its default is a dash."""
+    value = row["spec"].get(field)
+    if isinstance(value, Mapping):
+        return ", ".join(
+            f"{name} {one:g}" if isinstance(one, float) else f"{name} {one}" for name, one in value.items()
+        )
+    if isinstance(value, list | tuple):
+        return ", ".join(Path(one).stem if isinstance(one, str) else f"{one:g}" for one in value)
+    return "-" if value in (None, "") else Path(value).stem if isinstance(value, str) else f"{value:g}"
+
+
+@click.command(help=__doc__)
+@click.argument("plan", type=click.Path(exists=True, dir_okay=False))
+@click.option("--by", multiple=True, metavar="FIELD", help="A field of cells to group by. Again for more.")
+@click.option("--clips", envvar="POSEFIT_CMU", metavar="DIR", help="Folder of CMU clips that the plan's paths are in.")
+@LEDGER
+@WORKERS
+def main(plan: str, by: tuple[str, ...], clips: str | None, ledger: str | None, workers: int | None) -> None:
+    path, kept = Path(plan).resolve(), ledger and str(Path(ledger).resolve())
+    if clips:
+        os.chdir(clips)
+    names = by or ("method", "motion")
+    found = rows(Plan.read(path), workers, kept, say)
+    for line in grouped(found, lambda row: [field_text(row, name) for name in names], names):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()
