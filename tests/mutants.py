@@ -147,13 +147,13 @@ MUTANTS = (
     ),
     Mutant(
         "the mean of several turns is sought in one step instead of ten",
-        "plugins/posefit_imm/filter.py",
+        "plugins/posefit_vsmm.imm/filter.py",
         (("\nTURNS = 10 ", "\nTURNS = 1 "),),
         "tests/sources/test_vsmm.py::test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance",
     ),
     Mutant(
         "the joint tracker's yaw and pitch ranges are permuted",
-        "plugins/posefit_vsmm/joined/tracker.py",
+        "plugins/posefit_vsmm/joined.py",
         (("[[*YAW_PITCH_ROLL]]", "[[*YAW_PITCH_ROLL]][[1, 0, 2]]"),),
         "tests/plugins/test_vsmm.py::test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it",
     ),

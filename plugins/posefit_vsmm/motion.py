@@ -16,8 +16,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
-from posefit_imm.quaternions import product
 from posefit_vsmm import kernels
+from posefit_vsmm.imm import product
 from posefit_vsmm.state import ERROR, STATE, Reliance, free_errors
 
 FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
@@ -27,7 +27,7 @@ Shrink = Literal["identity", "zero"]  # what ridge regression draws F towards (I
 
 @dataclass(frozen=True, eq=False)
 class MotionModel:
-    """One model, for a body and a frame rate; a `posefit_imm.Model`."""
+    """One model, for a body and a frame rate; a `posefit_vsmm.imm.Model`."""
 
     name: str
     matrix: Array = field(repr=False)  # (43, 40) F less the identity, of the quaternions

@@ -15,13 +15,12 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import empty_frames, place_joints
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
-from posefit_imm import Measurement
-from posefit_vsmm.detection.joints import OWN, Errors, detected
-from posefit_vsmm.detection.preprocess import Lines
+from posefit_vsmm.imm import Measurement
+from posefit_vsmm.joints import OWN, Errors, detected
 from posefit_vsmm.kernels import bend, points_and_jacobian
 from posefit_vsmm.motion import leg_of
-from posefit_vsmm.points import POINTS
-from posefit_vsmm.state import ERROR, FIRST_BONE, Reliance
+from posefit_vsmm.preprocess import Lines
+from posefit_vsmm.state import ERROR, FIRST_BONE, POINTS, Reliance
 
 NEAREST = 0.05  # metres: what is nearer to the camera than that is taken to be so far away
 NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected

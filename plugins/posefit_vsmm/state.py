@@ -1,9 +1,9 @@
-"""The state that the motion models move: where the root is, and ten unit quaternions. VSMM step 3.
+"""The state that the motion models move, and the points of a body that a silhouette may show. VSMM 3 and 6.1.
 
 A state is (43,): the root's translation in metres, then w, x, y, z of the whole body and of nine bones, each turned
 against its parent. Its error is (33,): metres, then a rotation vector a quaternion, applied on its right
-(Interpretation V4); `posefit_imm.PLACED` moves the one by the other. A joint that the state does not
-hold, such as the back's, follows those that it holds: see `Reliance`.
+(Interpretation V4); `imm.PLACED` moves the one by the other. A joint that the state does not hold, such as the back's,
+follows those that it holds: see `Reliance`. The 17 points are Interpretation V2.
 """
 
 from dataclasses import dataclass, field
@@ -89,3 +89,33 @@ def decode(states: Array, reliance: Reliance) -> tuple[Array, Array]:
     poses[:, HELD_ANGLES] = joint_angles_from_rotation(rotations[:, 1:]).reshape(n, -1)
     poses[:, OTHER_ANGLES] = vectors @ reliance.matrix.T + reliance.offset
     return poses, states[:, :3].copy()
+
+
+# Each point is the middle of two joints, or one joint twice.
+_BETWEEN = {
+    "head": ("upperneck", "head"),
+    "root": ("root", "root"),
+    "torso": ("upperback", "upperback"),
+    "left clavicle": ("thorax", "lclavicle"),
+    "right clavicle": ("thorax", "rclavicle"),
+    "left shoulder": ("lclavicle", "lclavicle"),
+    "right shoulder": ("rclavicle", "rclavicle"),
+    "left elbow": ("lhumerus", "lhumerus"),
+    "right elbow": ("rhumerus", "rhumerus"),
+    "left hand": ("lwrist", "lwrist"),
+    "right hand": ("rwrist", "rwrist"),
+    "left hip": ("lhipjoint", "lhipjoint"),
+    "right hip": ("rhipjoint", "rhipjoint"),
+    "left knee": ("lfemur", "lfemur"),
+    "right knee": ("rfemur", "rfemur"),
+    "left foot": ("lfoot", "lfoot"),
+    "right foot": ("rfoot", "rfoot"),
+}
+POINTS = tuple(_BETWEEN)
+AT = {name: k for k, name in enumerate(POINTS)}
+ENDS = np.array([[JOINTS.index(joint) for joint in pair] for pair in _BETWEEN.values()])  # (17, 2) two joints a point
+
+
+def points_of(joints: Array) -> Array:
+    """Return the points (..., 17, 3) of joints (..., 27, 3)."""
+    return np.asarray(0.5 * (joints[..., ENDS[:, 0], :] + joints[..., ENDS[:, 1], :]))

@@ -1,17 +1,301 @@
-"""The variable-structure multiple-model tracker, by name: its settings, checked, and a frame for each observation."""
+"""The variable-structure multiple-model tracker: its settings, a first pose from one frame, and each frame."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, Protocol, final
 
 import numpy as np
 
+from posefit.arrays import Array
+from posefit.fitting import metrics
+from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit_vsmm.course import Course
+from posefit.silhouette.cost import areas, mismatch
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.motion import Shrink, library
-from posefit_vsmm.structure import Structure, Switching
-from posefit_vsmm.switching import New, Rules, SequentialTest, Test
+from posefit_vsmm.imm import Belief, Measurement, product, start
+from posefit_vsmm.joints import Shown, rule_errors
+from posefit_vsmm.kernels import minus, plus
+from posefit_vsmm.motion import STIFF, MotionModel, Shrink, library
+from posefit_vsmm.preprocess import Lines, lines_of
+from posefit_vsmm.sight import Figure, Sight, Sighting
+from posefit_vsmm.state import AT, ERROR, Reliance, bone_errors, decode, encode, free_errors
+from posefit_vsmm.switching import Measure, Models, New, Rules, SequentialTest, Structure, Switching, Test
+
+NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # yaws that are tried where one is about known
+ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)
+SHARE = 0.6  # of the budget: what the typical poses may have
+ROUND = 40  # draws around the best so far
+USUAL = np.radians(15.0)  # as far from a typical pose, a quaternion costs 1 of 100, as much as 1 % of the silhouette
+SPREADS = np.radians([20.0, 12.0, 7.0, 4.0])  # of the draws, one a round, the last one for the rest
+
+
+class Matcher:
+    """Compares states with one observation."""
+
+    def __init__(self, task: Task, observation: Observation, reliance: Reliance) -> None:
+        self._task, self._observation, self._reliance = task, observation, reliance
+        self.free = free_errors(task.body.skeleton)
+        self.evaluations = 0
+
+    def costs(self, states: Array) -> tuple[Array, Array]:
+        """Return the costs (n,) of states (n, 43), and the states, moved to where their silhouettes fit."""
+        task, seen = self._task, self._observation
+        poses, places = decode(states, self._reliance)
+        if seen.translation is not None:
+            places[:] = seen.translation
+        else:
+            places = align(task.body, task.cameras, seen.silhouettes, poses, places)
+        costs = np.mean(
+            [
+                mismatch(areas(task.body, camera, silhouette, poses, places, task.threads))
+                for camera, silhouette in zip(task.cameras, seen.silhouettes, strict=True)
+            ],
+            axis=0,
+        )
+        self.evaluations += len(states)
+        return costs, np.column_stack([places, states[:, 3:]])
+
+
+def estimated(
+    matcher: Matcher,
+    models: Sequence[MotionModel],
+    yaw: float | None,
+    anchor: Array,
+    given: Array | None,
+    budget: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Return the state (43,) that fits an observation best, for at most so many evaluations.
+
+    `yaw` is about where the person faces, None for anywhere; `given` a pose (66,) that somebody knows, if anybody.
+    """
+    yaws = ALL_AROUND if yaw is None else yaw + NEAR
+    typical = np.concatenate([model.poses for model in models])
+    states = np.array([_placed(pose, float(one), anchor) for one in yaws for pose in typical])
+    room = max(1, min(len(states), int(SHARE * budget)) - (given is not None))
+    states = states[np.linspace(0, len(states) - 1, room).astype(np.int64)]
+    if given is not None:
+        states = np.concatenate([encode(given[None], anchor[None]), states])
+    costs, states = matcher.costs(states)
+    best, least = states[costs.argmin()], float(costs.min())
+    home = best
+    left, turn = budget - len(states), 0
+    while left >= ROUND:
+        errors = rng.normal(0.0, SPREADS[min(turn, len(SPREADS) - 1)], (ROUND, ERROR))
+        errors[:, :3] = 0.0
+        errors *= matcher.free
+        costs, states = matcher.costs(np.array([plus(best, error) for error in errors]))
+        costs = costs + np.array([_doubt(state, home) for state in states])
+        if costs.min() < least:
+            best, least = states[costs.argmin()], float(costs.min())
+        left, turn = left - ROUND, turn + 1
+    return np.asarray(best)
+
+
+def _doubt(state: Array, home: Array) -> float:
+    """Return what a state costs beside its silhouette for being another pose than the typical one."""
+    return float(((minus(state, home)[3:] / USUAL) ** 2).sum())
+
+
+def _placed(pose: Array, yaw: float, anchor: Array) -> Array:
+    """Return the state of a typical pose (40,) that faces a way and stands somewhere."""
+    turned = pose.copy()
+    turned[:4] = product(np.array([np.cos(0.5 * yaw), 0.0, np.sin(0.5 * yaw), 0.0]), pose[:4])
+    return np.concatenate([anchor, turned])
+
+
+COAST = 15  # frames that the models go on alone when nothing is seen; then the track is lost
+LOST = 0.35  # IoU: below it, for so many frames, the track is lost
+LOST_FRAMES = 8
+UNSURE = np.repeat([0.05, np.radians(15.0)], [3, ERROR - 3])  # metres and radians: deviations of a fresh estimation
+ASTRAY = 2  # frames: a limb that is not where it is sought, while an end point is nobody's, is sought all around
+ASTRAY_SPREAD = np.radians(15.0)  # deviation that each of its joints then gains a frame
+# the bones whose turns a limb's end depends on
+_LIMBS = {
+    "left hand": ("lhumerus", "lradius"),
+    "right hand": ("rhumerus", "rradius"),
+    "left foot": ("lfemur", "ltibia"),
+    "right foot": ("rfemur", "rtibia"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search found in one frame."""
+
+    pose: Array  # (66,)
+    evaluations: int
+    measure: Measure  # what it tells the filter
+
+
+class Searcher(Protocol):
+    """Looks around what the filter holds."""
+
+    def likelihood(self, state: Array, observation: Observation) -> float:
+        """Return the log-likelihood of a predicted state (43,), for one evaluation."""
+        ...
+
+    def find(
+        self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator
+    ) -> Found | None:
+        """Return what is found around a state (43,) with covariance (33, 33), for at most so many evaluations."""
+        ...
+
+
+@final
+class Course:
+    """One track, as far as it has come; with a `searcher`, every frame ends in a search."""
+
+    def __init__(
+        self, task: Task, switching: Switching, rng: np.random.Generator, searcher: Searcher | None = None
+    ) -> None:
+        self._task, self._reliance, self._rng, self._searcher = task, switching.library.reliance, rng, searcher
+        self._models = Models(switching, task.body.skeleton, task.fps)
+        self._sight = Sight(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), rule_errors())
+        self._free = np.maximum(free_errors(task.body.skeleton), STIFF)
+        self._latest: Frame | None = task.before[-1] if task.before else None
+        self._shown: list[Shown] = []
+        self._belief: Belief | None = None
+        self._unseen = self._bad = 0
+        self._astray = dict.fromkeys(_LIMBS, 0)
+
+    def frame(self, observation: Observation) -> Frame:
+        """Return what is found in the next frame."""
+        began, models = time.perf_counter(), self._models
+        self._begun = time.process_time()
+        blind = not observation.usable
+        lines = [None if blind else lines_of(silhouette.mask) for silhouette in observation.silhouettes]
+        blind = all(one is None for one in lines)
+        self._unseen = self._unseen + 1 if blind else 0
+        if self._bad >= LOST_FRAMES or self._unseen > COAST:
+            self._belief = None
+        if self._belief is None and blind:
+            return self._held(observation, began)
+        spent = self._begin(observation) if self._belief is None else 0
+        belief = self._belief
+        assert belief is not None
+        state, spread = models.imm.fused(belief)
+        likely = models.known[models.active[int(belief.probabilities.argmax())]]
+        expected, spread = likely.predict(state, spread)
+        seen = self._look(lines, expected, spread)
+        if (extra := self._astray_spread(seen)).any():
+            belief = replace(belief, covariances=belief.covariances + np.diag(extra))
+            seen = self._look(lines, expected, spread + np.diag(extra))
+        details = {"detection_seconds": time.perf_counter() - began}
+
+        filtering, used = time.perf_counter(), spent
+
+        def measure(one: Array) -> Measurement:
+            nonlocal used
+            found = self._sight.measure(one, seen, observation.translation)
+            if self._searcher is None or blind:
+                return found
+            used += 1
+            return replace(found, log_likelihood=self._searcher.likelihood(one, observation))
+
+        surprise = float(np.mean([one.surprise for one in seen if one is not None] or [0.0]))
+        self._belief = models.cycle(belief, measure, surprise)
+        state, spread = models.imm.fused(self._belief)
+        details["filter_seconds"] = time.perf_counter() - filtering
+        poses, places = decode(state[None], self._reliance)
+        pose, place = poses[0], places[0]
+        if self._searcher is not None and not blind:
+            found = self._searcher.find(state, spread, observation, self._task.evaluations - used - 1, self._rng)
+            if found is not None:
+                pose, used = found.pose, used + found.evaluations
+                self._belief = models.imm.updated(self._belief, found.measure)
+                place = models.imm.fused(self._belief)[0][:3]  # one frame alone says little of the depth
+        models.drawn(self._sight.figure.seen(self._task.cameras[0], models.imm.fused(self._belief)[0])[0])
+        told = {**details, **self._joints(seen, expected), "surprise": surprise, **self._told()}
+        return self._frame(pose, place, observation, used + 1, began, told)
+
+    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[Sighting | None]:
+        return [
+            None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)
+        ]
+
+    def _begin(self, observation: Observation) -> int:
+        """Estimate a pose from this frame alone, all models alike; return how many evaluations that took."""
+        task, latest = self._task, self._latest
+        matcher = Matcher(task, observation, self._reliance)
+        yaw, anchor, given = task.yaw, task.anchor, None
+        if latest is not None:
+            yaw, anchor, given = float(latest.pose[0]), latest.translation, latest.pose
+        elif task.first_pose is not None:
+            given = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
+        budget = task.evaluations - 1 if self._searcher is None else task.evaluations // 2
+        models = list(self._models.known.values())
+        state = estimated(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
+        self._models.restart()
+        self._belief = start(state, np.diag((UNSURE * self._free) ** 2), len(models))
+        self._bad = 0
+        self._astray = dict.fromkeys(_LIMBS, 0)
+        return matcher.evaluations
+
+    def _astray_spread(self, seen: Sequence[Sighting | None]) -> Array:
+        """Return the variances (33,) to add for limbs whose ends are not found though an end point is nobody's."""
+        extra = np.zeros(ERROR)
+        spare = any(one.spare for one in seen if one is not None)
+        for limb, bones in _LIMBS.items():
+            found = any(one.confidence[AT[limb]] > 0.0 for one in seen if one is not None)
+            self._astray[limb] = self._astray[limb] + 1 if spare and not found else 0
+            if self._astray[limb] >= ASTRAY:
+                for bone in bones:
+                    extra[bone_errors(bone)] = ASTRAY_SPREAD**2
+        return np.asarray(extra * self._free**2)
+
+    def _joints(self, seen: Sequence[Sighting | None], expected: Array) -> dict[str, Any]:
+        """Return the 17 joints (views, 17, 2) as they are shown, and how sure the rules were of them (views, 17)."""
+        points, confidence = [], []
+        for view, (camera, one) in enumerate(zip(self._task.cameras, seen, strict=True)):
+            if one is None:
+                pixels, _ = self._sight.figure.seen(camera, expected)
+                one = Sighting(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
+            if len(self._shown) == view:
+                self._shown.append(Shown(one.points))
+            points.append(self._shown[view].follow(one.points, one.confidence, one.variances))
+            confidence.append(one.confidence)
+        return {"joints": np.array(points), "confidence": np.array(confidence)}
+
+    def _told(self) -> dict[str, Any]:
+        """Return what is told of the models beside the pose."""
+        belief, models = self._belief, self._models
+        told: dict[str, Any] = {"lost": belief is None, "models": models.active}
+        told |= {"group": models.group, "newcomer": models.newcomer, "groups": models.groups}
+        if belief is not None:
+            told |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
+        return told
+
+    def _held(self, observation: Observation, began: float) -> Frame:
+        """Return the latest pose once more, or an upright one, while nothing is seen."""
+        pose, place = np.zeros(66), np.array(self._task.anchor, dtype=np.float64)
+        pose[0] = self._task.yaw or 0.0
+        if self._latest is not None:
+            pose, place = self._latest.pose, self._latest.translation
+        return self._frame(pose, place, observation, 0, began, self._told())
+
+    def _frame(
+        self, pose: Array, place: Array, observation: Observation, used: int, began: float, details: dict[str, Any]
+    ) -> Frame:
+        task = self._task
+        if observation.translation is not None:
+            place = np.array(observation.translation, dtype=np.float64)
+        views = zip(task.cameras, observation.silhouettes, strict=True)
+        pose = np.where(task.body.skeleton.free, pose, 0.0)
+        counts = np.concatenate([areas(task.body, camera, one, pose[None], place[None]) for camera, one in views])
+        known = [one.known for one in observation.silhouettes]
+        heard = counts[known] if any(known) else counts
+        cost = float(mismatch(heard).mean())
+        if not self._unseen:
+            self._bad = self._bad + 1 if float(metrics.iou(heard).mean()) < LOST else 0
+        seconds = time.perf_counter() - began
+        spent = time.process_time() - self._begun
+        self._latest = Frame(
+            pose, place, cost, counts, used, seconds, np.array([cost]), details=details, cpu_seconds=spent
+        )
+        return self._latest
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ PACKAGES = (
     "posefit_background",
     "posefit_evolution",
     "posefit_filters",
-    "posefit_imm",
+    "posefit_vsmm.imm",
     "posefit_mediapipe",
     "posefit_nevergrad",
     "posefit_optuna",

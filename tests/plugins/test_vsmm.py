@@ -20,13 +20,12 @@ from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
-from posefit_imm import PLACED
-from posefit_vsmm.course import COAST
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.joined.tracker import Search, joined
+from posefit_vsmm.imm import PLACED
+from posefit_vsmm.joined import Search, joined
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.state import decode, encode
-from posefit_vsmm.tracker import vsmm
+from posefit_vsmm.tracker import COAST, vsmm
 
 SIZE = (200, 240)
 NAMES = ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")

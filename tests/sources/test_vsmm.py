@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
-from posefit_imm import IMM, Belief, Manifold, Measurement, positive_definite, start, update
+from posefit_vsmm.imm import IMM, Belief, Manifold, Measurement, positive_definite, start, update
 
 STEP, SIGMA = 1.0, 20.0  # seconds between measurements, metres of noise in each
 TRANSITION = np.array([[0.95, 0.05], [0.10, 0.90]])

@@ -11,22 +11,22 @@ from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit_imm import Belief, Measurement, start
-from posefit_imm.kernels import minus, plus
-from posefit_vsmm.detection.joints import detected
-from posefit_vsmm.detection.preprocess import Lines, lines_of
-from posefit_vsmm.detection.shown import Shown
 from posefit_vsmm.fit.motion import LAMBDA, ridge
 from posefit_vsmm.groups import read_topology
+from posefit_vsmm.imm import Belief, Measurement, start
+from posefit_vsmm.joints import Shown, detected
+from posefit_vsmm.kernels import minus, plus
 from posefit_vsmm.motion import library
-from posefit_vsmm.points import AT, POINTS, points_of
+from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.sight import Figure
-from posefit_vsmm.state import ERROR, HELD_ANGLES, decode, encode
-from posefit_vsmm.structure import FIRST, Models, Switching
+from posefit_vsmm.state import AT, ERROR, HELD_ANGLES, POINTS, decode, encode, points_of
 from posefit_vsmm.switching import (
+    FIRST,
+    Models,
     Rivalry,
     Rules,
     SequentialTest,
+    Switching,
     enlarged,
     enlarged_literally,
     limb_angles,

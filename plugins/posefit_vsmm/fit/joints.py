@@ -17,12 +17,12 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
-from posefit_vsmm.detection import joints
-from posefit_vsmm.detection.joints import BODY, detected
-from posefit_vsmm.detection.preprocess import lines_of
+from posefit_vsmm import joints
+from posefit_vsmm.joints import BODY, detected
 from posefit_vsmm.motion import leg_of
-from posefit_vsmm.points import POINTS, points_of
+from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.sight import NARROWEST, head_radius
+from posefit_vsmm.state import POINTS, points_of
 
 MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a")
 AZIMUTHS = np.radians([0.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0])

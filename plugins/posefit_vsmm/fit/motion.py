@@ -23,8 +23,8 @@ from posefit.motion import built_in
 from posefit.motion.amc import FPS as AMC_FPS
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
-from posefit_imm.kernels import minus
 from posefit_vsmm import motion as models
+from posefit_vsmm.kernels import minus
 from posefit_vsmm.motion import FPS, MotionModel, leg_of, without_heading
 from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode
 

@@ -1,9 +1,37 @@
-"""The interacting multiple-model filter: several motion models at once, each as probable as its predictions are good.
+"""The interacting multiple-model filter (IMM): several models, each as probable as it predicts well. VSMM 6.
 
-A state is an array, and an error of a state is a vector that `Manifold` adds to it and takes out of it: for a vector
-these are + and -, for unit quaternions a rotation (Interpretation V4); a filter of this kind is called an error-state
-Kalman filter. Everything is computed with logarithms of likelihoods, so that a residual of any size leaves
-probabilities that sum to 1 (Interpretation V13).
+In every cycle each model starts from a mixture of all their states, predicts, and is updated by the measurement. The
+equations are those of H. Blom, Y. Bar-Shalom, The interacting multiple model algorithm for systems with Markovian
+switching coefficients, IEEE Trans. Automatic Control 33(8), 1988, as CN101894278 uses them in its step 6. The filter
+works for any models of any states:
+
+- `IMM` is the filter: `cycle` goes on by one measurement, `fused` returns the one state that stands for all models.
+- `Model` is what it asks of a model: `predict(state, covariance)`.
+- `Measurement` is what was measured against what one state expects; any function of a state may return it.
+- `Belief` is all that the filter holds; `start` makes the first one. It can be stored, copied or changed.
+- `Manifold` defines how an error, a vector, moves a state: + and - for vectors; a rotation for unit quaternions in
+  `PLACED` (Interpretation V4), which makes the filter an error-state Kalman filter.
+
+Likelihoods are logarithms, so that a residual of any size leaves probabilities that sum to 1 (Interpretation V13).
+
+A thing on a line either stands or moves by 1 a frame. Its place is measured, and it moves:
+
+>>> import numpy as np
+>>> from posefit_vsmm.imm import IMM, Measurement, start
+>>> class Drift:
+...     def __init__(self, step):
+...         self.step = step
+...     def predict(self, state, covariance):
+...         return state + self.step, covariance + 0.01
+>>> imm = IMM([Drift(0.0), Drift(1.0)], np.array([[0.9, 0.1], [0.1, 0.9]]))
+>>> belief = start(np.zeros(1), np.eye(1), models=2)
+>>> for place in (1.0, 2.0, 3.0):
+...     belief = imm.cycle(belief, lambda state: Measurement(place - state, np.eye(1), np.array([[0.01]])))
+>>> [round(float(one), 3) for one in belief.probabilities]
+[0.0, 1.0]
+>>> state, covariance = imm.fused(belief)
+>>> round(float(state[0]), 2)
+3.0
 """
 
 from collections.abc import Callable, Sequence
@@ -13,6 +41,7 @@ from typing import Protocol
 import numpy as np
 
 from posefit.arrays import Array
+from posefit_vsmm.kernels import minus, plus
 
 SMALLEST = 1e-12  # what an eigenvalue of a covariance is raised to where rounding made it less
 TURNS = 10  # at most, to find the mean of several states; two or three are enough
@@ -187,3 +216,22 @@ def positive_definite(covariance: Array) -> tuple[Array, int]:
         values, vectors = np.linalg.eigh(symmetric)
     raised = np.maximum(values, max(SMALLEST, SMALLEST * float(values[-1])))
     return np.asarray((vectors * raised) @ vectors.T), 1
+
+
+# States (3 + 4 n,): a place, then n unit quaternions w, x, y, z. Errors (3 + 3 n,): a step, then n rotation vectors,
+# each applied on its quaternion's right. Such a plus and minus are also written boxplus and boxminus.
+PLACED = Manifold(plus, minus)
+
+
+def product(first: Array, second: Array) -> Array:
+    """Return the product (4,) of two quaternions (4,)."""
+    a, b, c, d = first.tolist()
+    e, f, g, h = second.tolist()
+    return np.array(
+        [
+            a * e - b * f - c * g - d * h,
+            a * f + b * e + c * h - d * g,
+            a * g - b * h + c * e + d * f,
+            a * h + b * g - c * f + d * e,
+        ]
+    )

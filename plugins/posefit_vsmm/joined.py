@@ -1,15 +1,12 @@
-"""Motion models and a swarm joined: the models say where the search starts, and learn what it finds.
-
-Every model's own prediction is drawn, and its silhouette cost enters the model's likelihood. The filter's mean and
-covariance replace SAPSO (6) and (7): the search looks around the mean, along the directions in which the covariance is
-largest, as far as it is large; and a proposal costs what its silhouette costs and how far it is from the mean.
-"""
+"""`sapso+vsmm`: the motion models of `vsmm` predict where a swarm starts, and learn from what it finds."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit import settings as of_plugins
 from posefit.arrays import Array
@@ -18,16 +15,65 @@ from posefit.fitting.optimiser import OptimiserFactory, minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import Skeleton
 from posefit.registry import registry
-from posefit_imm import PLACED, Measurement
-from posefit_vsmm.course import Course, Found
-from posefit_vsmm.fresh import Matcher
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.joined.directions import Directions
+from posefit_vsmm.imm import PLACED, Measurement
 from posefit_vsmm.motion import library
 from posefit_vsmm.state import ERROR, FIRST_BONE, YAW_PITCH_ROLL, Reliance, decode, encode, free_errors
-from posefit_vsmm.structure import Switching
-from posefit_vsmm.switching import Rules, SequentialTest
+from posefit_vsmm.switching import Rules, SequentialTest, Switching
+from posefit_vsmm.tracker import Course, Found, Matcher
+
+STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
+
+
+@dataclass(eq=False)
+class Directions:
+    """Joint angles are `middle` + latents @ `ways`; a `posefit.fitting.prior.Prior` that needs no fit."""
+
+    middle: Array = field(repr=False)  # (63,)
+    ways: Array = field(repr=False)  # (m, 63)
+    low: Array  # (m,)
+    high: Array  # (m,)
+
+    @classmethod
+    def of(cls, state: Array, covariance: Array, reliance: Reliance, count: int, reach: float) -> "Directions":
+        """Return the `count` directions of a state (43,) in which its covariance (33, 33) is largest.
+
+        They are principal axes of the bones' part of the covariance, carried over to joint angles.
+        Their range is `reach` standard deviations to either side.
+        """
+        values, vectors = np.linalg.eigh(covariance[FIRST_BONE:, FIRST_BONE:])
+        chosen = np.argsort(values)[::-1][:count]
+        errors = np.zeros((2 * len(chosen), len(covariance)))
+        errors[:, FIRST_BONE:] = np.concatenate([vectors[:, chosen].T, -vectors[:, chosen].T]) * STEP
+        poses, _ = decode(np.array([state, *(PLACED.plus(state, error) for error in errors)]), reliance)
+        middle, ahead, back = np.split(poses[:, 3:], [1, 1 + len(chosen)])
+        ways = wrapped(ahead - back) / (2.0 * STEP)  # central differences
+        far = reach * np.sqrt(values[chosen])
+        return cls(middle[0], ways, -far, far)
+
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
+        """Return itself: everything is known already."""
+        return self
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) that come nearest to joint angles (n, 63)."""
+        return np.asarray(wrapped(angles - self.middle) @ np.linalg.pinv(self.ways))
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        return np.asarray(self.middle + (latents[:, :, None] * self.ways).sum(axis=1))
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return that all latents (n, m) are poses."""
+        return np.ones(len(latents), dtype=bool)
+
+    def save(self, path: str | Path) -> None:
+        """Write everything to an .npz file."""
+        np.savez(path, middle=self.middle, ways=self.ways, low=self.low, high=self.high)
+
 
 LEAST = np.repeat([0.02, np.radians(4.0)], [3, ERROR - 3])  # metres and radians: deviations added to the filter's
 LEAST_BUDGET = 80  # evaluations; with fewer, the filter's own pose is as good

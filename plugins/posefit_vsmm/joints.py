@@ -12,8 +12,8 @@ from importlib.resources import files
 import numpy as np
 
 from posefit.arrays import Array
-from posefit_vsmm.detection.preprocess import Lines
-from posefit_vsmm.points import AT, POINTS
+from posefit_vsmm.preprocess import Lines
+from posefit_vsmm.state import AT, POINTS
 
 BODY = ("torso", "left clavicle", "right clavicle", "left shoulder", "right shoulder", "left hip", "right hip")
 _TORSO = np.array([AT[name] for name in BODY])
@@ -42,7 +42,7 @@ class Errors:
 @lru_cache(maxsize=1)
 def rule_errors() -> Errors:
     """Return the errors that the package carries."""
-    stored = json.loads((files("posefit_vsmm.detection") / "joints.json").read_text(encoding="utf-8"))
+    stored = json.loads((files("posefit_vsmm") / "joints.json").read_text(encoding="utf-8"))
     bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
     return Errors(bias, deviation)
 
@@ -147,3 +147,28 @@ def _knees(lines: Lines, points: Array, confidence: Array, expected: Array, gate
     if len(found) == 2 and np.linalg.norm(found["left"] - found["right"]) < 2.0:
         return {}  # one crossing is not two knees
     return found
+
+
+PUSH = 2.0  # pixels a frame squared: the deviation of a joint's acceleration
+_STEP = np.kron([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
+_NOISE = PUSH**2 * np.kron([[0.25, 0.5], [0.5, 1.0]], np.eye(2))
+
+
+class Shown:
+    """Place and velocity of the 17 points in one image."""
+
+    def __init__(self, points: Array) -> None:
+        self._states = np.column_stack([points, np.zeros_like(points)])
+        self._covariances = np.tile(np.diag([25.0, 25.0, 9.0, 9.0]), (len(points), 1, 1))
+
+    def follow(self, points: Array, confidence: Array, variances: Array) -> Array:
+        """Return the points (17, 2) one frame later, `variances` (17, 2) being those of what was detected."""
+        states, covariances = self._states @ _STEP.T, _STEP @ self._covariances @ _STEP.T + _NOISE  # VSMM 2.7
+        seen = np.flatnonzero(confidence > 0.0)
+        across = covariances[seen][:, :, :2]
+        innovation = across[:, :2] + variances[seen][:, :, None] * np.eye(2)
+        gain = across @ np.linalg.inv(innovation)
+        states[seen] += np.einsum("pij,pj->pi", gain, points[seen] - states[seen, :2])
+        covariances[seen] -= gain @ across.transpose(0, 2, 1)
+        self._states, self._covariances = states, covariances
+        return np.array(states[:, :2])

@@ -1,1 +1,0 @@
-"""`sapso+vsmm`: the motion models of `vsmm` say where a swarm starts, and learn what it finds."""
