@@ -13,8 +13,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.cli.options import box, frame_range
 from posefit.footage.masks import Range, existing
-from posefit.footage.segmentation import WIDTH, Extraction
-from posefit.footage.segmenting.film import Box
+from posefit.footage.segmentation import WIDTH, Box, Extraction
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera

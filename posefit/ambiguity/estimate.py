@@ -10,7 +10,6 @@ worse than the best that the next step cannot make up for it; `MARGIN` and `BLUR
 compare the result with all combinations at full size.
 """
 
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -407,13 +406,12 @@ def ambiguity_of(
     viewing = viewing or Viewing()
     clips = training_clips(train, viewing.asf, followed=sources[0])  # before the work, as a name may be wrong
     listener = Listener(say or QUIET.say, QUIET.progress)
-    with tempfile.TemporaryDirectory(prefix="posefit-") as work:
-        if not motion:
-            viewing = replace(viewing, frames=(frame, frame + 1))
-        scene = scene_of(sources, viewing, Path(work), listener)
-        if build is not None:
-            scene = replace(scene, body=body_of(build, scene.body))
-        moment = _moment(scene, frame if motion else 0, frame, translation, threads)
+    if not motion:
+        viewing = replace(viewing, frames=(frame, frame + 1))
+    scene = scene_of(sources, viewing, listener)
+    if build is not None:
+        scene = replace(scene, body=body_of(build, scene.body))
+    moment = _moment(scene, frame if motion else 0, frame, translation, threads)
     for warning in scene.warnings:
         listener.say(f"warning: {warning}")
     began = time.perf_counter()

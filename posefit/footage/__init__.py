@@ -1,24 +1,24 @@
-"""What cameras saw, or would have seen of a known motion, becomes a `Scene`: all that a tracker needs to know.
+"""Motions, masks and videos become a `Scene`: the person, the cameras and what they observed.
 
-    from pathlib import Path
     from posefit.footage.source import Viewing, scene_of
 
-    scene = scene_of(["walk"], Viewing(view_degrees=[0.0, 90.0]), work=Path())     # two cameras see a built-in motion
+    scene = scene_of(["walk"], Viewing(view_degrees=[0.0, 90.0]))     # two cameras see a built-in motion
     print(scene.count, scene.observations[0].silhouettes[1].mask.shape)
 
 | looking for | file |
 |---|---|
-| what a user names becomes a scene: motions, masks, videos; how it is looked at | source.py |
+| a scene from the name of a motion, masks or a video | source.py |
 | what a method learns from: motions, folders of them, people of the library | training.py |
-| what a scene is; a known motion rendered; masks whose truth nobody knows | scene.py |
-| observations that are spoilt on purpose | spoilt.py |
-| several cameras: calibrations, lens distortion, which camera saw what | cameras.py |
-| masks read when their turn comes; those of an .npz file; pictures of strangers | masks.py, stacks.py, images.py |
-| what the values of masks mean; one person of them, whole | given/ |
+| the scene itself; observations of a known motion, on a GPU, or corrupted on purpose | scene.py |
+| numbered variations of a motion, as in other benchmarks | instance.py |
+| several cameras: calibrations, lens distortion, one frame rate | cameras.py |
+| masks in memory, a bit a pixel | masks.py |
+| masks of a folder or an .npz file: which values are the person's; images of any kind | readers.py, images.py |
+| inverted masks, holes, one of several people | cleaning.py |
 | video, read and written frame by frame | video.py |
-| the person taken out of a video; the files of `posefit extract` | segmentation.py, extract.py |
-| whether what was taken out can be a person | segmenting/ |
+| the person in a video; the files of `posefit extract` | segmentation.py, extract.py |
+| whether masks can be a person's; which way the person faces | quality.py, facing.py |
 
-A source is read once. From a mask to its cost it goes through `masks.py`, `silhouette/mask.py`, `fitting/tracker.py`,
-`fitting/problem.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
+Every image and video frame is decoded once, into `masks.PackedMasks`. From a mask to its cost it goes through
+`silhouette/mask.py`, `fitting/tracker.py`, `fitting/problem.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
 """

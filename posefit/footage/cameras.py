@@ -1,4 +1,4 @@
-"""What real cameras saw: masks or videos, with their calibrations, as one scene."""
+"""The scene of real cameras: their masks or videos, with their calibrations."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.footage.extract import store
-from posefit.footage.given.settled import settled
-from posefit.footage.masks import FPS, FolderMasks, Masks, Range, Straight, Views
+from posefit.footage.cleaning import cleaned
+from posefit.footage.extract import segmented
+from posefit.footage.facing import yaws_of
+from posefit.footage.masks import FPS, PackedMasks, Range, Views, undistorted
+from posefit.footage.readers import read_masks
 from posefit.footage.scene import Placing, Scene, observed
 from posefit.footage.segmentation import Segmentation
-from posefit.footage.segmenting.facing import yaws_of
-from posefit.footage.stacks import StackMasks
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
@@ -31,77 +31,91 @@ SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may 
 class CameraView:
     """The masks of one camera."""
 
-    masks: Masks
-    size: tuple[int, int]  # of the masks
-    filmed: tuple[int, int] | None  # of the video, where the masks were taken from one
-    fps: float
+    masks: PackedMasks
+    name: str  # of the source
+    filmed: tuple[int, int] | None = None  # size of the video, where the masks were taken from one
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
     warnings: Sequence[str] = ()
-    facings: Array | Sequence[float] = ()  # of each frame, as `Segmenter.facing`; nan where nobody knows
+    facings: Array | Sequence[float] = ()  # of each frame, as `Segmenter.facing`; NaN where unknown
 
 
-def masks_of(path: Path, fps: float | None, frames: Range, label: int | None, holes: float | None) -> CameraView:
-    """Return what a folder or an .npz of masks shows of one person, at `fps`, or else at the file's own rate, or 30.
+def masks_of(path: Path, frames: Range, label: int | None, holes: float | None) -> CameraView:
+    """Return what a folder or an .npz of masks shows of one person.
 
-    `label` is the value that he has, and `holes` the largest that is filled. Raises ValueError where nobody is seen.
+    `label` is the person's value, and `holes` the largest that is filled. Raises ValueError where no frame shows one.
     """
-    masks = FolderMasks.of(path, frames, label) if path.is_dir() else StackMasks.of(path, frames, label)
-    one = settled(masks, path, holes)
-    return CameraView(one, Views([one]).sizes[0], None, fps or masks.fps or FPS, warnings=one.warnings)
+    masks, warnings = cleaned(read_masks(path, frames, label), path, holes)
+    return CameraView(masks, str(path), warnings=warnings)
 
 
-def video_of(video: Video, found: Segmentation, folder: Path, listener: Listener) -> CameraView:
-    """Return what a video shows; its masks are written to a new folder, so that none has to stay in memory.
+def video_of(video: Video, segmentation: Segmentation, listener: Listener) -> CameraView:
+    """Return what a video shows. Raises ValueError where its masks cannot be those of a person."""
+    masks = segmented(segmentation, listener.progress)
+    if segmentation.verdict and segmentation.verdict.refused:
+        raise ValueError(segmentation.verdict.text)
+    pictures = partial(video.frames, segmentation.start, segmentation.stop, segmentation.size)
+    return CameraView(masks, str(video.path), video.size, pictures, segmentation.warnings, segmentation.facings)
 
-    Raises ValueError where they cannot be those of a person.
+
+def _rate(views: Sequence[CameraView], fps: float | None) -> float:
+    """Return the frame rate of views: `fps`, or else what their files state, or 30.
+
+    Raises ValueError where views of masks differ in their rates, or in how many frames they have.
     """
-    folder.mkdir()
-    masks = store(folder, found, listener.progress)
-    if found.verdict and found.verdict.refused:
-        raise ValueError(found.verdict.text)
-    pictures = partial(video.frames, found.start, found.stop, found.size)
-    return CameraView(masks, found.size, video.size, video.fps, pictures, found.warnings, found.facings)
+    first = views[0]
+    for view in views[1:]:
+        if view.filmed is None and len(view.masks) != len(first.masks):
+            came = f"{len(first.masks)} of {first.name} and {len(view.masks)} of {view.name}"
+            raise ValueError(f"views must have the same frames, got {came}")
+    if fps is not None:
+        return fps
+    stated = [view for view in views if view.masks.fps is not None]
+    for view in stated[1:]:
+        if view.filmed is None and view.masks.fps != stated[0].masks.fps:
+            came = " and ".join(f"{one.masks.fps:g} of {one.name}" for one in (stated[0], view))
+            raise ValueError(f"views must have one frame rate, frames a second, got {came}")
+    return (stated[0].masks.fps if stated else None) or FPS
 
 
 def combined(
-    seen: Sequence[CameraView],
+    views: Sequence[CameraView],
     name: str,
     body: Body,
     cameras: Sequence[Camera | str | Path],
     view_degrees: float | None,
     up: Up | None,
+    fps: float | None = None,
 ) -> Scene:
     """Return the scene of what cameras saw at the same times.
 
     A file with several cameras serves for several views, in its order. One view without a camera gets a guess: level,
     40 degrees across. Raises ValueError where cameras and views do not fit each other.
     """
-    known = calibrated(cameras, [one.filmed for one in seen]) or [Camera.around(np.zeros(3), 0.0, 0.0, seen[0].size)]
-    world = upright([one for one in known if isinstance(one, Calibration)], up)
-    masks: list[Masks] = []
+    rate, size = _rate(views, fps), views[0].masks.size
+    known = calibrated(cameras, [view.filmed for view in views]) or [Camera.around(np.zeros(3), 0.0, 0.0, size)]
+    world = upright([camera for camera in known if isinstance(camera, Calibration)], up)
+    masks: list[PackedMasks] = []
     placed: list[Camera] = []
-    maps: list[tuple[Any, Any] | None] = []
-    for one, calibration in zip(seen, known, strict=True):
+    pictures = views[0].pictures
+    for k, (view, calibration) in enumerate(zip(views, known, strict=True)):
         if isinstance(calibration, Camera):
-            masks.append(one.masks)
+            masks.append(view.masks)
             placed.append(calibration)
-            maps.append(None)
             continue
-        if one.filmed is None:
-            calibration = calibration.padded(one.size) or calibration
-            _check_shape(calibration, one.size)
-        placed.append(calibration.camera(one.size, world))
-        bent = calibration.maps(one.size) if calibration.distorted else None
-        maps.append(bent)
-        masks.append(one.masks if bent is None else Straight(one.masks, bent))
-    pictures = seen[0].pictures
-    if pictures is not None and (first := maps[0]) is not None:
-        pictures = partial(_straightened, pictures, first)
+        size = view.masks.size
+        if view.filmed is None:
+            calibration = calibration.padded(size) or calibration
+            _check_shape(calibration, size)
+        placed.append(calibration.camera(size, world))
+        maps = calibration.maps(size) if calibration.distorted else None
+        masks.append(view.masks if maps is None else undistorted(view.masks, maps))
+        if k == 0 and pictures is not None and maps is not None:
+            pictures = partial(_straightened, pictures, maps)
     placing: Placing = "given" if cameras else "guessed"
-    warnings = [warning for one in seen for warning in one.warnings]
-    # several cameras tell front from back themselves
-    yaws = yaws_of(seen[0].facings if len(seen) == 1 else (), placed[0], seen[0].fps)
-    return observed(Views(masks, yaws), body, placed, name, seen[0].fps, view_degrees, pictures, placing, warnings)
+    warnings = [warning for view in views for warning in view.warnings]
+    # several cameras distinguish front and back themselves
+    yaws = yaws_of(views[0].facings if len(views) == 1 else (), placed[0], rate)
+    return observed(Views(masks, yaws), body, placed, name, rate, view_degrees, pictures, placing, warnings)
 
 
 def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]) -> Iterator[Image]:

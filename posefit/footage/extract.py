@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from posefit.files import new_folder
-from posefit.footage.masks import KINDS, PackedMasks, Range, packed
+from posefit.footage.masks import PackedMasks, Range, empty_planes
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video, VideoWriter
 from posefit.silhouette.foreground import Image, Person
@@ -23,80 +23,72 @@ Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 def extract(
     source: str | Path,
     out: str | Path,
-    how: Extraction = Extraction(),  # noqa: B008, it is frozen
+    how: Extraction | None = None,
     *,
     frames: Range = (None, None),
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Return what was found in a video, and write its masks, a preview and a report to a new folder.
+    """Return a summary of a video's masks, and write them, a preview and a report to a new folder.
 
     masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,) and `fps`. The folder appears whole or not at
-    all. Raises ValueError for every mistake in the arguments or files, where nobody is seen, and on a full disk.
+    all. Raises ValueError for every mistake in arguments or files, where no frame shows a person, and on a full disk.
     """
     target = Path(out)
     if os.path.lexists(target):
         raise ValueError(f"{target}: expected a new folder, got one that exists")
-    video = Video.of(source)
-    found = Segmentation(video, how, frames)
-    with suppress(OSError):  # told where the folder is made
+    video, how = Video.of(source), how or Extraction()
+    segmentation = Segmentation(video, how, frames)
+    with suppress(OSError):  # reported where the folder is made
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
-        with VideoWriter(building / "preview.mp4", video.fps, found.size) as preview:
-            masks = store(building, found, progress, lambda *seen: preview.write(_painted(*seen)))
-        _write_npz(building, masks, video.fps, found.size)
+        with VideoWriter(building / "preview.mp4", video.fps, segmentation.size) as preview:
+            masks = segmented(segmentation, progress, lambda *frame: preview.write(_painted(*frame)))
+        _write_npz(building / "masks.npz", masks)
         with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(found.rows[0]))
+            writer = csv.DictWriter(file, list(segmentation.rows[0]))
             writer.writeheader()
-            writer.writerows(found.rows)
-    return {"video": str(source), "method": how.method, **found.summary}
+            writer.writerows(segmentation.rows)
+    return {"video": str(source), "method": how.method, **segmentation.summary}
 
 
-def store(
-    folder: Path,
-    found: Segmentation,
+def segmented(
+    segmentation: Segmentation,
     progress: Progress | None = None,
-    look: Callable[[Image, Person, bool], None] | None = None,
+    on_frame: Callable[[Image, Person, bool], None] | None = None,
 ) -> PackedMasks:
-    """Return the masks of a video, written to a folder while it goes by.
+    """Return the masks of a video, which is decoded once.
 
-    `look` gets each frame, the person in it, and whether it is usable.
+    `on_frame` gets each frame, the person in it, and whether it is usable.
     """
-    files = [(folder / f"{kind}.bits").open("wb") for kind in KINDS]
-    try:
-        frames = iter(found)
-        for image, person in progress(frames, len(found)) if progress else frames:
-            for file, plane in zip(files, (person.mask, person.valid), strict=True):
-                file.write(packed(plane))
-            if look is not None:
-                look(image, person, bool(found.rows[-1]["usable"]))
-    finally:
-        for file in files:
-            file.close()
-    usable = np.array([row["usable"] for row in found.rows], dtype=bool)
-    return PackedMasks(folder, found.size, usable, str(found.name), found.start)
+    masks, valid = (empty_planes(len(segmentation), segmentation.size) for _ in range(2))
+    frames, count = iter(segmentation), 0
+    for image, person in progress(frames, len(segmentation)) if progress else frames:
+        masks[count], valid[count] = np.packbits(person.mask), np.packbits(person.valid)
+        count += 1
+        if on_frame is not None:
+            on_frame(image, person, bool(segmentation.rows[-1]["usable"]))
+    usable = np.array([row["usable"] for row in segmentation.rows], dtype=bool)
+    names = [f"{segmentation.name}, frame {segmentation.start + k}" for k in range(count)]
+    return PackedMasks(names, segmentation.size, masks[:count], valid[:count], usable, segmentation.fps)
 
 
-def _write_npz(folder: Path, masks: PackedMasks, fps: float, size: tuple[int, int]) -> None:
-    """Write masks.npz frame by frame, as there may be more than memory holds, and remove the files of bits."""
-    count = len(masks)
-    header = {"descr": "|u1", "fortran_order": False, "shape": (count, size[1], size[0])}
-    with zipfile.ZipFile(folder / "masks.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        for kind, name in zip(KINDS, ("mask", "valid"), strict=True):
+def _write_npz(path: Path, masks: PackedMasks) -> None:
+    """Write masks.npz frame by frame, as there may be more than memory holds unpacked."""
+    header = {"descr": "|u1", "fortran_order": False, "shape": (len(masks), masks.size[1], masks.size[0])}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for kind, attribute in (("masks", "mask"), ("valid", "valid")):
             with archive.open(f"{kind}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_1_0(member, header)
-                for k in range(count):
-                    member.write(getattr(masks.silhouette(k), name).astype(np.uint8).tobytes())
-        usable = np.array([masks.is_usable(k) for k in range(count)])
-        for name, value in (("usable", usable), ("fps", np.array(fps))):
+                for k in range(len(masks)):
+                    member.write(getattr(masks.silhouette(k), attribute).astype(np.uint8).tobytes())
+        for name, value in (("usable", masks.usable), ("fps", np.array(masks.fps))):
             with archive.open(f"{name}.npy", "w") as member:
                 np.lib.format.write_array(member, value)
-    for kind in KINDS:
-        (folder / f"{kind}.bits").unlink()
 
 
-def _painted(image: Image, found: Person, usable: bool) -> Image:
+def _painted(image: Image, person: Person, usable: bool) -> Image:
     colour = np.array((90, 200, 90) if usable else (60, 60, 230), dtype=np.float32)
     painted = image.copy()
-    painted[~found.valid] //= 2
-    painted[found.mask] = (0.5 * painted[found.mask] + 0.5 * colour).astype(np.uint8)
+    painted[~person.valid] //= 2
+    painted[person.mask] = (0.5 * painted[person.mask] + 0.5 * colour).astype(np.uint8)
     return painted

@@ -1,183 +1,78 @@
-"""Masks that are read when their turn comes, so that memory does not grow with their number."""
+"""Masks in memory, a bit a pixel, and what several cameras saw with them, frame by frame."""
 
-import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Observation
-from posefit.footage.given.values import Palette, Reading, many_colours
-from posefit.silhouette.mask import Mask, Silhouette
+from posefit.limits import allowed_bytes
+from posefit.silhouette.mask import Silhouette
 
-DIGITS = 1_000  # of a number in a name
-FPS = 30.0  # of motions and masks, where nobody says
-IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
+FPS = 30.0  # of motions and masks that state no rate
 Range = tuple[int | None, int | None]
-
-
-class Masks(Protocol):
-    """What one camera saw of a person, frame by frame."""
-
-    def __len__(self) -> int:
-        """How many frames there are."""
-        ...
-
-    def is_usable(self, k: int) -> bool:
-        """Return whether frame k shows enough of the person to be searched."""
-        ...
-
-    def silhouette(self, k: int) -> Silhouette:
-        """Return the silhouette of frame k. Raises ValueError naming the frame where there is none."""
-        ...
-
-    def label(self, k: int) -> str:
-        """Return what to call frame k in a message."""
-        ...
+Planes = NDArray[np.uint8]  # (T, bytes): of each frame the bits of its pixels, row by row
 
 
 @dataclass(frozen=True, eq=False)
-class FolderMasks:
-    """The masks of a folder of images, each read when its turn comes."""
-
-    files: Sequence[Path]
-    reading: Reading  # of their values
-    labelled: bool
-    fps: float | None = None  # a folder does not say it
-
-    @classmethod
-    def of(cls, path: Path, frames: Range, label: int | None = None) -> "FolderMasks":
-        """Return the masks of a folder, in the order of their names, cut to `frames`: 2 comes before 10.
-
-        Raises ValueError naming the file where one is no image, or of another size than the first.
-        """
-        from posefit.footage.images import is_colourful
-
-        # a hidden file is none of them: some systems put one beside each image that they copy
-        files = (file for file in path.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
-        found = sorted(files, key=_natural)
-        if not found:
-            raise ValueError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
-        chosen = found[slice(*span(frames, len(found)))]
-        if is_colourful(chosen[0]):
-            raise many_colours(path)
-        palette, shape = Palette(), None
-        for file in chosen:
-            values, soft = _values(file, label is not None)
-            shape = values.shape if shape is None else shape
-            if values.shape != shape:
-                raise ValueError(f"{file}: mask must have shape {shape}, got {values.shape}")
-            palette.add(values, soft)
-        return cls(chosen, palette.reading(label, path), label is not None)
-
-    def __len__(self) -> int:
-        return len(self.files)
-
-    def is_usable(self, k: int) -> bool:
-        """Return that there is a mask k: that too little of the person is seen, a folder cannot say."""
-        return k < len(self)
-
-    def label(self, k: int) -> str:
-        """Return the file of mask k."""
-        return str(self.files[k])
-
-    def silhouette(self, k: int) -> Silhouette:
-        """Return mask k. Raises ValueError naming the file where it is no image."""
-        return Silhouette.of(self.reading.person(_values(self.files[k], self.labelled)[0]))
-
-
-def _values(file: Path, labelled: bool) -> tuple[NDArray[Any], bool]:
-    from posefit.footage.images import FORMATS, read_values
-
-    found = read_values(file, labelled)
-    if found is None:
-        raise ValueError(f"{file}: expected an image ({FORMATS}), got a file that is none")
-    return found
-
-
-def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
-    """Return what files are sorted by: numbers in their names count as such."""
-    parts = re.findall(r"[0-9]+|[^0-9]+", file.name)
-    return [(int(part), "") if part.isdigit() and len(part) < DIGITS else (-1, part) for part in parts], file.name
-
-
 class PackedMasks:
-    """Masks and what is known of them in two files of bits, eight pixels a byte, which stay on the disk."""
+    """The masks of one camera. Images and video are decoded once, to make it; later stages unpack its bits."""
 
-    def __init__(self, folder: Path, size: tuple[int, int], usable: NDArray[np.bool_], name: str, start: int) -> None:
-        self._size, self._usable, self._name, self._start = size, usable, name, start
-        self._stride = (size[0] * size[1] + 7) // 8
-        self._files = [folder / f"{kind}.bits" for kind in KINDS]
-
-    def __len__(self) -> int:
-        return len(self._usable)
-
-    def is_usable(self, k: int) -> bool:
-        """Return whether frame k shows enough of the person to be searched."""
-        return bool(self._usable[k])
-
-    def label(self, k: int) -> str:
-        """Return the video and its frame."""
-        return f"{self._name}, frame {self._start + k}"
-
-    def silhouette(self, k: int) -> Silhouette:
-        """Return the silhouette of frame k."""
-        width, height = self._size
-        planes = []
-        for file in self._files:
-            packed = np.fromfile(file, np.uint8, self._stride, offset=k * self._stride)
-            planes.append(np.unpackbits(packed, count=width * height).reshape(height, width))
-        return Silhouette.of(*planes)
-
-
-KINDS = ("masks", "valid")
-
-
-def packed(mask: Mask) -> bytes:
-    """Return a mask as `PackedMasks` reads it."""
-    return np.packbits(mask).tobytes()
-
-
-@dataclass(frozen=True, eq=False)
-class Straight:
-    """Masks whose lens distortion is undone; what the lens did not see is unknown."""
-
-    masks: Masks
-    maps: tuple[Any, Any] = field(repr=False)
+    names: Sequence[str] = field(repr=False)  # (T,) of the frames, for messages
+    size: tuple[int, int]  # width and height
+    masks: Planes = field(repr=False)
+    valid: Planes | None = field(repr=False)  # which pixels are known; None where all are
+    usable: NDArray[np.bool_] = field(repr=False)  # (T,) whether a frame shows enough of the person to be searched
+    fps: float | None = None  # None where the source does not state it
 
     def __len__(self) -> int:
         return len(self.masks)
 
-    def is_usable(self, k: int) -> bool:
-        """Return whether frame k shows enough of the person to be searched."""
-        return self.masks.is_usable(k)
-
-    def label(self, k: int) -> str:
-        """Return what to call frame k."""
-        return self.masks.label(k)
-
     def silhouette(self, k: int) -> Silhouette:
-        """Return the silhouette of frame k as a pinhole camera would have seen it."""
-        import cv2
+        """Return the silhouette of frame k."""
+        return Silhouette.of(self._plane(self.masks, k), None if self.valid is None else self._plane(self.valid, k))
 
-        bent = self.masks.silhouette(k)
-        mask, valid = (
-            cv2.remap(plane.astype(np.uint8), *self.maps, cv2.INTER_NEAREST) for plane in (bent.mask, bent.valid)
+    def _plane(self, planes: Planes, k: int) -> NDArray[np.bool_]:
+        width, height = self.size
+        return np.unpackbits(planes[k], count=width * height).reshape(height, width).view(np.bool_)
+
+
+def empty_planes(count: int, size: tuple[int, int]) -> Planes:
+    """Return room for so many masks. Raises ValueError where that is more memory than this process may have."""
+    octets, most = (size[0] * size[1] + 7) // 8, allowed_bytes()
+    if count * octets > most:
+        raise ValueError(
+            f"frames must be so few that their masks fit in {most / 1e9:.1f} GB of memory, "
+            f"got {count} of {size[0]}x{size[1]} pixels"
         )
-        return Silhouette.of(mask, valid)
+    return np.empty((count, octets), dtype=np.uint8)
+
+
+def undistorted(masks: PackedMasks, maps: tuple[Any, Any]) -> PackedMasks:
+    """Return masks as a pinhole camera would have seen them; what the lens did not see is unknown."""
+    straight, valid = empty_planes(len(masks), masks.size), empty_planes(len(masks), masks.size)
+    for k in range(len(masks)):
+        bent = masks.silhouette(k)
+        for planes, plane in ((straight, bent.mask), (valid, bent.valid)):
+            planes[k] = np.packbits(cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST))
+    return replace(masks, masks=straight, valid=valid)
 
 
 @dataclass(frozen=True, eq=False)
 class Views(Sequence[Observation]):
-    """What several cameras saw at the same times. A camera that saw too little in a frame counts for nothing there."""
+    """The observations of one camera or several that recorded the same frames.
 
-    masks: Sequence[Masks]
-    # radians (T,): about which way he faces; nan where nobody knows, and none where nobody says
+    A frame is usable where one camera saw enough; the silhouette of a camera that did not is unknown then.
+    """
+
+    masks: Sequence[PackedMasks]
+    # (T,) radians: about which way the person faces, NaN where unknown; empty where no frame's is known
     yaws: Array = field(default_factory=lambda: np.empty(0), repr=False)
 
     def __len__(self) -> int:
@@ -186,44 +81,35 @@ class Views(Sequence[Observation]):
     def __getitem__(self, k):  # type: ignore[no-untyped-def]
         if not 0 <= k < len(self):
             raise IndexError(k)
-        silhouettes = [self._silhouette(v, k) for v in range(len(self.masks))]
-        return Observation(silhouettes, usable=self.is_usable(k), yaw=self.yaw(k))
+        silhouettes = [self._silhouette(masks, k) for masks in self.masks]
+        usable = any(masks.usable[k] for masks in self.masks)
+        return Observation(silhouettes, usable=usable, yaw=self.yaw(k))
 
     def __iter__(self) -> Iterator[Observation]:
         return (self[k] for k in range(len(self)))
 
     def yaw(self, k: int) -> float | None:
-        """Return about which way the person faces in frame k, in radians; None where nobody knows."""
+        """Return about which way the person faces in frame k, in radians; None where that is unknown."""
         return float(self.yaws[k]) if k < len(self.yaws) and np.isfinite(self.yaws[k]) else None
-
-    def is_usable(self, k: int) -> bool:
-        """Return whether a camera saw enough in frame k."""
-        return any(masks.is_usable(k) for masks in self.masks)
 
     @cached_property
     def first(self) -> int:
-        """The first frame that all cameras, or else some, find usable. Raises ValueError where there is none."""
+        """The first frame usable in all cameras, or else in one. Raises ValueError where there is none."""
         for enough in (all, any):
             for k in range(len(self)):
-                if enough(masks.is_usable(k) for masks in self.masks):
+                if enough(masks.usable[k] for masks in self.masks):
                     return k
-        raise ValueError(f"{self.masks[0].label(0)}: expected a frame that is usable, got none from there on")
+        raise ValueError(f"{self.masks[0].names[0]}: expected a frame that is usable, got none from there on")
 
-    @cached_property
-    def sizes(self) -> list[tuple[int, int]]:
-        """Width and height of each camera's masks."""
-        return [masks.silhouette(self.first).size for masks in self.masks]
-
-    def _silhouette(self, view: int, k: int) -> Silhouette:
-        masks = self.masks[view]
+    def _silhouette(self, masks: PackedMasks, k: int) -> Silhouette:
         silhouette = masks.silhouette(k)
-        if len(self.masks) > 1 and not masks.is_usable(k):
+        if len(self.masks) > 1 and not masks.usable[k]:
             return Silhouette.of(silhouette.mask, np.zeros_like(silhouette.mask))
         return silhouette
 
 
 def span(frames: Range, count: int) -> tuple[int, int]:
-    """Return start and stop of some of `count` frames. Raises ValueError where that is none."""
+    """Return start and stop of a range of `count` frames. Raises ValueError where it holds none."""
     start, stop, _ = slice(*frames).indices(count)
     if start >= stop:
         low, high = ("" if value is None else value for value in frames)

@@ -1,4 +1,4 @@
-"""A scene: everything a tracker needs to know of what is to be followed, a known motion or what cameras saw."""
+"""A scene: the person, the cameras and their observations, of a known motion or of footage."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,23 +9,25 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Observation
 from posefit.footage.masks import Range, Views, span
-from posefit.footage.segmenting.agreement import disagreement, extent_of, meeting
+from posefit.footage.quality import disagreement, extent_of, meeting
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
+from posefit.silhouette.corruption import corrupted
 from posefit.silhouette.cost import project
 from posefit.silhouette.cuda.device import check_device
 from posefit.silhouette.cuda.moving import moved_to
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
-VIEW_DEGREES = 45.0  # where the camera of a synthetic sequence stands when nobody says: 0 is in front, 90 to the side
-Placing = Literal["given", "guessed", "placed"]  # where cameras come from: a user, nobody, or a view of a known motion
+VIEW_DEGREES = 45.0  # default place of the camera of a synthetic sequence: 0 is in front, 90 to the side
+RNG_STREAM_CORRUPTION = 2010
+Placing = Literal["given", "guessed", "placed"]  # cameras are the user's, a guess, or set up around a known motion
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is to be followed, whatever it came from: the person, the cameras, and what they saw."""
+    """What a tracker gets, whatever it came from: the person, the cameras, and the observations."""
 
     name: str
     body: Body
@@ -37,8 +39,8 @@ class Scene:
     truth: Motion | None
     observations: Sequence[Observation] = field(repr=False)
     placing: Placing = "placed"
-    warnings: Sequence[str] = ()  # what a user should know before he trusts it
-    # yields the frames that the first camera filmed, of its size; None where nobody filmed
+    warnings: Sequence[str] = ()  # what a user should know before they trust it
+    # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
 
 
@@ -49,7 +51,7 @@ def synthetic(
     cameras: Sequence[Camera],
     frames: Range,
 ) -> Scene:
-    """Return the sequence that cameras see of a motion; masks are drawn frame by frame as they are needed.
+    """Return the scene of a known motion; its masks are drawn frame by frame as they are needed.
 
     Without cameras there is one at each of `views_degrees`, which frames the whole motion.
     """
@@ -81,7 +83,7 @@ def synthetic(
 
 @dataclass(frozen=True, eq=False)
 class Rendered(Sequence[Observation]):
-    """The observations of a known motion, drawn when asked for."""
+    """The observations of a known motion, drawn when they are needed."""
 
     motion: Motion
     body: Body
@@ -99,7 +101,7 @@ class Rendered(Sequence[Observation]):
 
 
 @dataclass(frozen=True, eq=False)
-class OnDevice(Sequence[Observation]):
+class DeviceObservations(Sequence[Observation]):
     """The same observations, their silhouettes on a device: poses are drawn and counted there."""
 
     observations: Sequence[Observation]
@@ -109,14 +111,38 @@ class OnDevice(Sequence[Observation]):
         return len(self.observations)
 
     def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        seen = self.observations[k]
-        return replace(seen, silhouettes=[moved_to(silhouette, self.device) for silhouette in seen.silhouettes])
+        observation = self.observations[k]
+        moved = [moved_to(silhouette, self.device) for silhouette in observation.silhouettes]
+        return replace(observation, silhouettes=moved)
 
 
-def seen_on(scene: Scene, device: str) -> Scene:
+def on_device(scene: Scene, device: str) -> Scene:
     """Return a scene whose poses are drawn on a device, "cpu" or "cuda". Raises ValueError where there is none."""
     check_device(device)
-    return scene if device == "cpu" else replace(scene, observations=OnDevice(scene.observations, device))
+    return scene if device == "cpu" else replace(scene, observations=DeviceObservations(scene.observations, device))
+
+
+@dataclass(frozen=True, eq=False)
+class CorruptedObservations(Sequence[Observation]):
+    """Observations with corruptions of some strength, and a share of the frames dropped; the same each time."""
+
+    observations: Sequence[Observation] = field(repr=False)
+    noise: dict[str, float]
+    dropped: float
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.observations)
+
+    def __getitem__(self, k):  # type: ignore[no-untyped-def]
+        observation = self.observations[k]
+        rng = np.random.default_rng([RNG_STREAM_CORRUPTION, self.seed, k])
+        lost = k > 0 and rng.random() < self.dropped
+        masks = [corrupted(silhouette.mask, self.noise, rng) for silhouette in observation.silhouettes]
+        return replace(observation, silhouettes=[Silhouette.of(mask) for mask in masks], usable=not lost)
+
+    def __iter__(self) -> Iterator[Observation]:
+        return (self[k] for k in range(len(self)))
 
 
 def observed(
@@ -130,13 +156,12 @@ def observed(
     placing: Placing = "given",
     warnings: Sequence[str] = (),
 ) -> Scene:
-    """Return the sequence of masks seen by cameras, whose truth nobody knows.
+    """Return the scene of masks seen by cameras, whose true poses are unknown.
 
-    The person is first sought where the rays through the middles of the masks meet; a single camera finds it as far
-    away as its size asks. Raises ValueError where several cameras cannot see one person of this size.
+    The person is first searched where the rays through the middles of the masks meet; with a single camera, as far away
+    as their size in the image implies. Raises ValueError where several cameras cannot see one person of this size.
     """
-    seen = views[views.first].silhouettes
-    boxes = [extent_of(silhouette) for silhouette in seen]
+    boxes = [extent_of(silhouette) for silhouette in views[views.first].silhouettes]
     if len(cameras) == 1:
         camera, (middle, tall) = cameras[0], boxes[0]
         depth = camera.focal[1] * body.stature / tall

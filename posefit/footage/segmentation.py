@@ -1,55 +1,58 @@
-"""Goes through a video and tells the person in it from the background, frame by frame."""
+"""The person in a video, separated from the background frame by frame."""
 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from inspect import Parameter
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.guard import BrokenRuleError, blamed
+from posefit.footage.facing import facings_on_the_spot
 from posefit.footage.images import read_image
 from posefit.footage.masks import Range, span
-from posefit.footage.segmenting.facing import facings_on_the_spot
-from posefit.footage.segmenting.film import Box, VideoFootage
-from posefit.footage.segmenting.signs import Watch
-from posefit.footage.segmenting.verdict import Verdict, advice, verdict
+from posefit.footage.quality import FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video
 from posefit.registry import registry
 from posefit.settings import check
 from posefit.silhouette.foreground import Footage, Image, Person, Segmenter, person
 from posefit.silhouette.mask import Mask
 
-USUAL = "mixture"  # the segmenter of video, where nobody names another
-PICTURED = "mean"  # that of a background that is given
-NOBODY = "expected a person who moves before a still background, got none in any frame"
+T = TypeVar("T", bound=np.generic)
+Box = tuple[int, int, int, int]  # x, y, width, height
+
+DEFAULT_SEGMENTER = "mixture"
+BACKGROUND_SEGMENTER = "mean"  # where a background is given
 WIDTH = 640  # pixels; larger videos are scaled down to it
-RIVAL = 0.4  # something else that is so large, as a share of the person, may be another person
+RIVAL_AREA = 0.4  # of the person's area: something so large may be another person
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
-LOST = 0.02  # the share of a file's frames that may be missing without a word
-PERIOD = 5  # every so many frames it is looked whether the camera moved
-SMALL = 160  # pixels: the width of the pictures that are compared for it
+MISSING = 0.02  # the share of a file's frames that may be missing without a warning
+
+# whether the camera moved
+PERIOD = 5  # frames between two that are compared with the first
+SMALL = 160  # pixels: the width of the pictures that are compared
 TILES = 4  # to a side
-FINE, COARSE = 1.0, 4.0  # pixels: what is smaller or larger is not looked at
-REACH = 4  # pixels by which a tile is looked for to either side
-TEXTURE = 0.7  # grey levels a pixel: a tile that changes less along some axis does not tell where it went
+FINE, COARSE = 1.0, 4.0  # pixels: smaller and larger structures are filtered out
+REACH = 4  # pixels by which a tile is searched to either side
+TEXTURE = 0.7  # grey levels a pixel: a tile that changes less along some axis does not show where it went
 FREE = 0.25  # the share of these tiles that a person leaves free at least
 SPREAD = 0.5  # the share of all tiles that have such texture at least: else it may be the person's alone
-MOVED = 0.008  # of the width: a camera that moved by more since the first frame is said to move
+MOVED = 0.008  # of the width: a shift since the first frame that counts as a moving camera
 
 
 @dataclass(frozen=True)
 class Extraction:
-    """How the person is told from the rest of a video.
+    """How the person is separated from the rest of a video.
 
     `method` is a segmenter's name: by default a "mixture" of Gaussians learned from the whole video, or the "mean" of
     `background` where that is given: frames without a person, as A:B, or an image. `settings` are the segmenter's own.
-    `roi` x, y, width, height in the video's own pixels is where the person is looked for; `ignore` is an image whose
+    `roi` x, y, width, height in the video's own pixels is where the person is searched; `ignore` is an image whose
     bright pixels are never known, such as a tree in front. Videos wider than `width` are scaled down to it.
     """
 
@@ -69,7 +72,9 @@ class Extraction:
         if self.background is not None:
             if "background" not in needed:
                 offers = registry().offers["segmenter"].values()
-                takers = [one.name for one in offers if any(setting.name == "background" for setting in one.settings)]
+                takers = [
+                    other.name for other in offers if any(setting.name == "background" for setting in other.settings)
+                ]
                 came = f"{self.background!r} with {self.name}"
                 raise ValueError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
             object.__setattr__(self, "settings", {**self.settings, "background": self.background})
@@ -86,19 +91,56 @@ class Extraction:
         return self.method
 
     def segmenter(self, film: Footage) -> Segmenter:
-        """Return the segmenter, which has looked at a film. Raises ValueError where a setting does not fit it."""
+        """Return the segmenter, trained on a film. Raises ValueError where a setting does not fit it."""
         offer = registry().offer("segmenter", self.name)
         with blamed(offer.label, "it", passed=(ValueError, ImportError)):
             return cast(Segmenter, offer.factory(film, **self.settings))
 
 
 def segmenter_name(method: str | None, background: str | None) -> str:
-    """Return the segmenter that is meant: the usual one, or that of a background, where none is named."""
-    return method or (USUAL if background is None else PICTURED)
+    """Return the name of the segmenter: by default one that learns the background, or uses the given one."""
+    return method or (DEFAULT_SEGMENTER if background is None else BACKGROUND_SEGMENTER)
+
+
+@dataclass(frozen=True)
+class VideoFootage:
+    """A video as a segmenter gets it: scaled to `size` and cut to `part`, x, y, width and height in scaled pixels."""
+
+    video: Video
+    size: tuple[int, int]
+    part: Box
+
+    def __len__(self) -> int:
+        return self._count
+
+    @cached_property
+    def _count(self) -> int:
+        return self.video.count()
+
+    def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Image]:
+        """Yield every `step`th frame of start to stop."""
+        return map(self.cut, self.video.frames(start, stop, self.size, step))
+
+    def picture(self, path: str) -> Image:
+        """Return a picture of the video's size as the video shows it. Raises ValueError where there is none."""
+        image = read_image(path, grey=False)
+        if image is None:
+            raise ValueError(f"background must be frames A:B or an image, got {path!r}")
+        came, wanted = (image.shape[1], image.shape[0]), self.video.size
+        if came != wanted:
+            raise ValueError(
+                f"{path}: background must have the video's size {wanted[0]}x{wanted[1]}, got {came[0]}x{came[1]}"
+            )
+        return self.cut(np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8))
+
+    def cut(self, image: NDArray[T]) -> NDArray[T]:
+        """Return the part of a scaled frame or mask (height, width, ...) that a segmenter gets."""
+        x, y, wide, tall = self.part
+        return np.ascontiguousarray(image[y : y + tall, x : x + wide])
 
 
 class Segmentation:
-    """One pass through a video; what it found is known when it has ended."""
+    """One pass through a video; its rows, verdict and warnings are complete when it has ended."""
 
     def __init__(self, video: Video, how: Extraction, frames: Range) -> None:
         """Check that the extraction fits the video. Raises ValueError where it does not."""
@@ -108,47 +150,47 @@ class Segmentation:
         scale = min(1.0, how.width / video.size[0])
         self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
         self.rows: list[dict[str, Any]] = []
-        self.name, self.method, self._video = video.path, how.name, video
+        self.name, self.method, self.fps, self._video = video.path, how.name, video.fps, video
         self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
         self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
         self._learn = partial(how.segmenter, self._film)
         self._given = "background" in how.settings
-        self._segmenter = self._learn() if self._given else None  # what is given is checked now
+        self._segmenter = self._learn() if self._given else None  # a background is checked now
         self._shifts: list[float] = []
-        self._facings: list[float] = []  # of each frame, as the segmenter says; nan where it does not
-        self._middles: list[float] = []  # of the mask's pixels in each frame, from the left; nan where it is empty
+        self._facings: list[float] = []  # of each frame, as `Segmenter.facing`; NaN where unknown
+        self._middles: list[float] = []  # of the mask's pixels in each frame, from the left; NaN where it is empty
 
     def __len__(self) -> int:
         return self.stop - self.start
 
     def __iter__(self) -> Iterator[tuple[Image, Person]]:
-        """Learn the background and yield each frame, scaled, with the person in it; `rows` tells what it is worth."""
+        """Learn the background and yield each frame, scaled, with the person in it; `rows` holds its quality."""
         segmenter = self._segmenter or self._learn()
-        watch = Watch(self._video.fps, getattr(segmenter, "background", None))
-        still = _Still(self.size)
+        quality = FrameQuality(self.fps, getattr(segmenter, "background", None))
+        motion = CameraMotion(self.size)
         for k, image in enumerate(self._video.frames(self.start, self.stop, self.size)):
             if k % PERIOD == 0:
-                self._shifts.append(still.shift(image))
+                self._shifts.append(motion.shift(image))
             found = person(*self._segmented(segmenter, image), self._roi, self._ignored)
             self._facings.append(float(getattr(segmenter, "facing", math.nan)))
             self._middles.append(float((np.flatnonzero(found.mask) % self.size[0]).mean()) if found.area else math.nan)
             part = replace(found, mask=self._film.cut(found.mask), valid=self._film.cut(found.valid))
-            self.rows.append(watch.look(self._film.cut(image), part, self.start + k))
+            self.rows.append(quality.row(self._film.cut(image), part, self.start + k))
             if not self._video.is_filmed(self.start + k):
                 self.rows[-1]["usable"] = 0
             yield image, found
         if not any(row["area"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
-            raise ValueError(f"{self.name}: {NOBODY}{damage or advice(self.method, learned=not self._given)}")
+            none = "expected a person who moves before a still background, got none in any frame"
+            raise ValueError(f"{self.name}: {none}{damage or advice(self.method, learned=not self._given)}")
 
     def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
-        """Return what a segmenter says of the part that it gets to see, at its place in the whole frame."""
+        """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""
         x, y, wide, tall = self._film.part
         with blamed(f"segmenter {self.method!r}", "segment"):
-            said = segmenter.segment(self._film.cut(image))
-            planes = [np.asarray(plane) for plane in said]
-        if len(planes) != 2 or any(one.shape != (tall, wide) or one.dtype != np.bool_ for one in planes):
-            came = ", ".join(f"{one.shape} {one.dtype}" for one in planes)
+            planes = [np.asarray(plane) for plane in segmenter.segment(self._film.cut(image))]
+        if len(planes) != 2 or any(plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes):
+            came = ", ".join(f"{plane.shape} {plane.dtype}" for plane in planes)
             raise BrokenRuleError(
                 f"segmenter {self.method!r}: segment must return two boolean masks of shape {tall, wide}, got {came}"
             )
@@ -158,15 +200,15 @@ class Segmentation:
 
     @property
     def facings(self) -> Array:
-        """Which way the person faces in each frame, as `Segmenter.facing`; nan where nobody knows, or he goes along."""
+        """Which way the person faces in each frame, as `Segmenter.facing`; NaN where unknown or going along."""
         sides = [row["longer_side"] for row in self.rows]
-        return facings_on_the_spot(self._facings, self._middles, sides, self._video.fps)
+        return facings_on_the_spot(self._facings, self._middles, sides, self.fps)
 
     @property
     def verdict(self) -> Verdict | None:
-        """What is wrong with what was found, if anything; known when the pass has ended."""
-        said = verdict(self.rows, self.method, learned=not self._given)
-        return said and replace(said, text=f"{self.name}: {said.text}")
+        """What is wrong with the masks, if anything; known when the pass has ended."""
+        result = verdict(self.rows, self.method, learned=not self._given)
+        return result and replace(result, text=f"{self.name}: {result.text}")
 
     @property
     def _damage(self) -> str:
@@ -174,23 +216,23 @@ class Segmentation:
 
     @property
     def warnings(self) -> list[str]:
-        """What a user should look at before he trusts the masks."""
-        said, name = [*self._video.warnings], self.name
+        """What a user should check before they trust the masks."""
+        texts, name = [*self._video.warnings], self.name
         if self.verdict:
-            said.append(self.verdict.text)
-        if self._missing > LOST * len(self.rows):
-            said.append(f"{name}: {self._damage}")
-        seen = [row for row in self.rows if row["area"]]
-        rivals = sum(row["rival"] > RIVAL for row in seen)
-        if rivals > OFTEN * len(seen):
-            said.append(
-                f"{name}: somebody else seems to be there in {rivals} of {len(seen)} frames; the largest is followed, "
-                "--roi chooses where to look"
+            texts.append(self.verdict.text)
+        if self._missing > MISSING * len(self.rows):
+            texts.append(f"{name}: {self._damage}")
+        filled = [row for row in self.rows if row["area"]]
+        rivals = sum(row["rival"] > RIVAL_AREA for row in filled)
+        if rivals > OFTEN * len(filled):
+            texts.append(
+                f"{name}: another person seems to be in {rivals} of {len(filled)} frames; the largest is followed, "
+                "--roi chooses where to search"
             )
         moved = sum(shift > MOVED * SMALL for shift in self._shifts)
         if moved > OFTEN * len(self._shifts):
-            said.append(f"{name}: the camera seems to move, and silhouettes need a still one; expect poor masks")
-        return said
+            texts.append(f"{name}: the camera seems to move, and silhouettes need a still one; expect poor masks")
+        return texts
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -199,15 +241,15 @@ class Segmentation:
             "frames": len(self.rows),
             "usable": sum(bool(row["usable"]) for row in self.rows),
             "size": list(self.size),
-            "fps": self._video.fps,
+            "fps": self.fps,
             "touching_border": sum(bool(row["touches_border"]) for row in self.rows),
             "in_pieces": sum(row["pieces"] > 1 for row in self.rows),
             "warnings": self.warnings,
         }
 
 
-class _Still:
-    """Compares pictures with the first one: how far did the camera move?"""
+class CameraMotion:
+    """Compares pictures with the first one, to estimate how far the camera moved."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._size = SMALL, max(16 * TILES, round(SMALL * size[1] / size[0]))
@@ -217,18 +259,20 @@ class _Still:
     def shift(self, image: Image) -> float:
         """Return by how many pixels of a picture `SMALL` wide an image is shifted against the first.
 
-        Tiles that a person covers seem to be anywhere, but a camera that moves takes along every tile: what all but a
-        few of those with texture are shifted by at least is the camera's part. Where few have any, nobody can tell.
+        Tiles that a person covers match anywhere, but a camera that moves takes along every tile: what all but a
+        few of those with texture are shifted by at least is the camera's part. Where few have any, it is 0.
         """
         small = cv2.cvtColor(cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
         grey: Any = cv2.GaussianBlur(small.astype(np.float32), (0, 0), FINE)  # noise is no texture,
         grey -= cv2.GaussianBlur(grey, (0, 0), COARSE)  # and light that changes is none
         if self._first is None:
             self._first = [tile[REACH:-REACH, REACH:-REACH] if _textured(tile) else None for tile in self._tiles(grey)]
-        found = [
-            _away(before, now) for before, now in zip(self._first, self._tiles(grey), strict=True) if before is not None
+        shifts = [
+            _shift_of_tile(before, now)
+            for before, now in zip(self._first, self._tiles(grey), strict=True)
+            if before is not None
         ]
-        return float(np.quantile(found, FREE)) if len(found) > SPREAD * TILES**2 else 0.0
+        return float(np.quantile(shifts, FREE)) if len(shifts) > SPREAD * TILES**2 else 0.0
 
     def _tiles(self, image: Any) -> list[Any]:
         wide, tall = self._tile
@@ -237,16 +281,16 @@ class _Still:
 
 
 def _textured(tile: Any) -> bool:
-    """Return whether a tile changes along both axes, so that a shift can be told from it."""
+    """Return whether a tile changes along both axes, so that it shows a shift."""
     down, across = np.gradient(tile)
     tensor = [[np.mean(across * across), np.mean(across * down)], [np.mean(across * down), np.mean(down * down)]]
     return bool(np.linalg.eigvalsh(tensor)[0] > TEXTURE**2)
 
 
-def _away(before: Any, now: Any) -> float:
-    """Return by how many pixels what was in the middle of a tile lies off it now: where it correlates best."""
-    likeness = cv2.matchTemplate(now, before, cv2.TM_CCOEFF_NORMED)  # knows nothing of how bright it is
-    return float(np.hypot(*np.subtract(cv2.minMaxLoc(likeness)[3], REACH)))
+def _shift_of_tile(before: Any, now: Any) -> float:
+    """Return by how many pixels the middle of a tile has moved, to where it correlates best whatever its brightness."""
+    correlation = cv2.matchTemplate(now, before, cv2.TM_CCOEFF_NORMED)
+    return float(np.hypot(*np.subtract(cv2.minMaxLoc(correlation)[3], REACH)))
 
 
 def _scaled_roi(roi: Box | None, video: Video, scale: float) -> Box | None:

@@ -12,7 +12,8 @@ import numpy as np
 
 from posefit.fitting.check import finite_number, pair
 from posefit.footage.cameras import CameraView, calibrated, combined, masks_of, video_of
-from posefit.footage.masks import FPS, IMAGES, Range, existing
+from posefit.footage.masks import FPS, Range, existing
+from posefit.footage.readers import IMAGES
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
@@ -101,10 +102,10 @@ def useless_for(kind: Kind, name: str, value: object, where: str) -> ValueError:
     return ValueError(f"{name} must be given for {where} only, got {quoted(value)} for {_KINDS[kind]}")
 
 
-def scene_of(sources: Sequence[Source], viewing: Viewing, work: Path, listener: Listener = QUIET) -> Scene:
+def scene_of(sources: Sequence[Source], viewing: Viewing, listener: Listener = QUIET) -> Scene:
     """Return the scene of a source, or of what several cameras saw at the same times.
 
-    Masks of videos are written to the folder `work`. Raises ValueError where something does not fit.
+    Raises ValueError where something does not fit.
     """
     kinds = {kind_of(source) for source in sources}
     if len(kinds) > 1:
@@ -116,12 +117,12 @@ def scene_of(sources: Sequence[Source], viewing: Viewing, work: Path, listener: 
         raise ValueError(f"view_degrees must be one for footage, of its first camera, got {len(viewing.view_degrees)}")
     paths = [Path(source) for source in sources if not isinstance(source, Motion)]
     if kinds == {"video"}:
-        seen = _filmed(paths, viewing, work, listener)
+        views = _filmed(paths, viewing, listener)
     else:
         calibrated(viewing.cameras, [None] * len(paths))
-        seen = [masks_of(path, viewing.fps, viewing.frames, viewing.label, viewing.holes) for path in paths]
+        views = [masks_of(path, viewing.frames, viewing.label, viewing.holes) for path in paths]
     facing = viewing.view_degrees[0] if viewing.view_degrees else None
-    return combined(seen, paths[0].stem, _body(viewing), viewing.cameras, facing, viewing.up)
+    return combined(views, paths[0].stem, _body(viewing), viewing.cameras, facing, viewing.up, viewing.fps)
 
 
 def _known(sources: Sequence[Source], viewing: Viewing) -> Scene:
@@ -212,24 +213,19 @@ def _has_folders(source: str | Path) -> bool:
     return os.sep in str(source)
 
 
-def _filmed(
-    paths: Sequence[Path],
-    viewing: Viewing,
-    work: Path,
-    listener: Listener,
-) -> list[CameraView]:
+def _filmed(paths: Sequence[Path], viewing: Viewing, listener: Listener) -> list[CameraView]:
     """Return what videos show, after everything that a user may have got wrong was checked."""
     videos = [Video.of(path) for path in paths]
     rates = {round(video.fps, 3) for video in videos}
     if len(rates) > 1:
         raise ValueError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
     calibrated(viewing.cameras, [video.size for video in videos])
-    found = [Segmentation(video, viewing.extraction or Extraction(), viewing.frames) for video in videos]
-    seen = []
-    for k, (video, one) in enumerate(zip(videos, found, strict=True)):
+    segmentations = [Segmentation(video, viewing.extraction or Extraction(), viewing.frames) for video in videos]
+    views = []
+    for video, segmentation in zip(videos, segmentations, strict=True):
         listener.say(f"taking the person out of {video.path}")
-        seen.append(video_of(video, one, work / f"view-{k}", listener))
-    return seen
+        views.append(video_of(video, segmentation, listener))
+    return views
 
 
 def _cameras(one: Camera | str | Path, viewing: Viewing) -> list[Camera]:

@@ -289,8 +289,7 @@ def _installed() -> frozenset[str]:
 def cell_scene(cell: TrackCell) -> "Scene":
     """Return the observations of a cell; the same for all methods and seeds."""
     from posefit.footage.instance import motion_of_instance, variation
-    from posefit.footage.scene import synthetic
-    from posefit.footage.spoilt import Spoilt
+    from posefit.footage.scene import CorruptedObservations, synthetic
 
     motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
     scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
@@ -298,7 +297,7 @@ def cell_scene(cell: TrackCell) -> "Scene":
     if not cell.corruption:
         return scene
     noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
-    spoilt = Spoilt(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
+    spoilt = CorruptedObservations(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
     return replace(scene, observations=spoilt)
 
 

@@ -10,7 +10,7 @@
     from posefit.tracking.method import Choice
     from posefit.tracking.run import follow
 
-    scene = scene_of(["walk"], Viewing(view_degrees=[90.0]), work=Path())
+    scene = scene_of(["walk"], Viewing(view_degrees=[90.0]))
     training = [built_in.motion(style) for style in built_in.other_styles("walk")]
     result = follow(scene, training, choice=Choice(optimiser="pso"), seed=1)
 

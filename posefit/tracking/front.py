@@ -188,7 +188,7 @@ def track(
             out, force, resume, _told(sources, train, viewing, choice, opening, tracks, seed), listener.say
         )
     with folder as output:
-        scene = source if isinstance(source, Scene) else scene_of(sources, viewing, output.work, listener)
+        scene = source if isinstance(source, Scene) else scene_of(sources, viewing, listener)
         result = follow(
             scene,
             training_motions(clips, scene.fps),

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.tracker import Frame, Task, Tracker
-from posefit.footage.scene import Scene, seen_on
+from posefit.footage.scene import Scene, on_device
 from posefit.geometry.skeleton import Skeleton
 from posefit.listening import QUIET, Listener
 from posefit.measuring.gait import gait_of
@@ -84,7 +84,7 @@ def follow(
     for name, count in (("tracks", tracks), ("passes", passes)):
         if count < 1:
             raise ValueError(f"{name} must be at least 1, got {count}")
-    scene = seen_on(scene, device)
+    scene = on_device(scene, device)
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         for warning in scene.warnings:
             listener.say(f"warning: {warning}")

@@ -203,14 +203,6 @@ def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> 
     assert results[0]["translation"] == "aligned"
 
 
-def test_memory_of_masks_in_a_folder_is_that_of_one(tmp_path: Path) -> None:
-    from posefit.footage.masks import FolderMasks
-
-    source = FolderMasks.of(masks(tmp_path / "masks"), (None, None))
-    assert len(source) == 3
-    assert all(isinstance(file, Path) for file in source.files)  # what it holds are names
-
-
 def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("track", "walk", "--frames", "0:2", "--out", out, *QUICK).exit_code == 0

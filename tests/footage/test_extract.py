@@ -13,8 +13,8 @@ from click.testing import CliRunner, Result
 import posefit
 from posefit.cli import main
 from posefit.footage.extract import extract
+from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction
-from posefit.footage.stacks import StackMasks
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
 from tests.files import arrays
 from tests.footage.conftest import EMPTY, FRAMES, SIZE, truth
@@ -65,7 +65,7 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
     hidden[:, 70:80] = 255
     cv2.imwrite(str(tmp_path / "tree.png"), hidden)
     extract(path, tmp_path / "out", Extraction(ignore=tmp_path / "tree.png"), frames=(EMPTY + 5, EMPTY + 40))
-    masks = StackMasks.of(tmp_path / "out" / "masks.npz", (None, None))
+    masks = read_masks(tmp_path / "out" / "masks.npz", (None, None))
     silhouette = masks.silhouette(15)
     assert not silhouette.valid[:, 70:80].any()
     assert not silhouette.mask[:, 70:80].any()

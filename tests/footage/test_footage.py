@@ -19,10 +19,10 @@ from posefit.fitting import metrics
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.footage.extract import extract
-from posefit.footage.masks import Straight, Views
-from posefit.footage.segmentation import MOVED, OFTEN, PERIOD, SMALL, Extraction, _Still
+from posefit.footage.masks import Views, undistorted
+from posefit.footage.readers import read_masks
+from posefit.footage.segmentation import MOVED, OFTEN, PERIOD, SMALL, CameraMotion, Extraction
 from posefit.footage.source import Viewing, scene_of
-from posefit.footage.stacks import StackMasks
 from posefit.footage.video import Video
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in
@@ -160,7 +160,7 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path
     usable = np.array([True, True, False, True, True, True])
     np.savez(tmp_path / "a.npz", masks=side, usable=usable)
     np.savez(tmp_path / "b.npz", masks=front)
-    views = Views([StackMasks.of(tmp_path / name, (None, None)) for name in ("a.npz", "b.npz")])
+    views = Views([read_masks(tmp_path / name, (None, None)) for name in ("a.npz", "b.npz")])
     assert [views[k].usable for k in range(6)] == [True] * 6
     assert not views[2].silhouettes[0].valid.any()
     assert views[2].silhouettes[1].valid.all()
@@ -190,7 +190,7 @@ def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path:
     undone = cv2.undistortPoints(bent, one.matrix, one.distortion, P=one.matrix).reshape(SIZE[1], SIZE[0], 2)
     seen = cv2.remap(straight.astype(np.uint8), undone.astype(np.float32), None, cv2.INTER_NEAREST)
     np.savez(tmp_path / "a.npz", masks=seen[None])
-    masks = Straight(StackMasks.of(tmp_path / "a.npz", (None, None)), one.maps(SIZE))
+    masks = undistorted(read_masks(tmp_path / "a.npz", (None, None)), one.maps(SIZE))
     found = masks.silhouette(0)
     both = (found.mask & straight).sum() / (found.mask | straight).sum()
     without = ((seen > 0) & straight).sum() / ((seen > 0) | straight).sum()
@@ -312,7 +312,7 @@ def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:
     masks = [NOBODY] * EMPTY + truth()
     crowd = [mask | np.roll(mask, SIZE[0] // 2, axis=1) for mask in masks]  # somebody alike, half the picture away
     found = extract(film(tmp_path / "crowd.avi", crowd), tmp_path / "one")
-    assert any("somebody else seems to be there" in warning and "--roi" in warning for warning in found["warnings"])
+    assert any("another person seems to be in" in warning and "--roi" in warning for warning in found["warnings"])
     capture = cv2.VideoCapture(str(film(tmp_path / "still.avi", masks)))
     writer = cv2.VideoWriter(str(tmp_path / "moving.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
     for k in range(len(masks)):
@@ -339,7 +339,7 @@ def test_a_calibration_fits_footage_that_a_codec_filled_up(
         capture.release()
     else:
         np.savez(source, masks=[np.pad(mask, ((0, 8), (0, 0))) for mask in [NOBODY] * EMPTY + truth()])
-    scene = scene_of([source], Viewing(cameras=[tmp_path / "camera.json"], frames=(EMPTY + 6, EMPTY + 30)), tmp_path)
+    scene = scene_of([source], Viewing(cameras=[tmp_path / "camera.json"], frames=(EMPTY + 6, EMPTY + 30)))
     (one,) = scene.cameras
     assert (one.width, one.height) == (SIZE[0], SIZE[1] + 8)
     np.testing.assert_allclose(one.centre, camera(np.pi / 2).centre)
@@ -383,7 +383,7 @@ def test_a_camera_that_stands_still_does_not_seem_to_move(
     filmed: tuple[Path, list[Any]], tmp_path: Path, change: Any
 ) -> None:
     video = Video.of(repainted(tmp_path / "a.avi", filmed[0], change))
-    still = _Still(SIZE)
+    still = CameraMotion(SIZE)
     shifts = [still.shift(image) for image in video.frames(0, None, SIZE, step=PERIOD)]
     assert np.mean([shift > MOVED * SMALL for shift in shifts]) < OFTEN
 

@@ -10,8 +10,7 @@ import pytest
 
 from posefit.footage import images
 from posefit.footage.images import read_image, size_of
-from posefit.footage.masks import FolderMasks
-from posefit.footage.stacks import StackMasks
+from posefit.footage.readers import read_masks
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".bmp", ".tif", ".pgm", ".ppm"])
@@ -48,7 +47,7 @@ def test_a_picture_of_too_many_pixels_is_refused_before_it_is_unpacked(
     bomb(tmp_path / "a.png", 30_000)
     monkeypatch.setattr(cv2, "imdecode", None)
     with pytest.raises(ValueError, match="a.png: expected at most 50 million pixels, got 30000x30000"):
-        FolderMasks.of(tmp_path, (None, None)).silhouette(0)
+        read_masks(tmp_path, (None, None))
 
 
 def test_a_picture_that_opencv_refuses_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,7 +56,7 @@ def test_a_picture_that_opencv_refuses_is_one_line(tmp_path: Path, monkeypatch: 
     with pytest.raises(
         ValueError, match=r"a.png: expected an image \(PNG, JPEG, BMP, TIFF or PGM\), got a file that is none"
     ):
-        FolderMasks.of(tmp_path, (None, None)).silhouette(0)
+        read_masks(tmp_path, (None, None))
 
 
 def test_a_chunk_that_says_it_has_more_than_the_file_is_not_made_room_for(
@@ -79,16 +78,16 @@ def test_a_size_of_many_digits_is_cut_in_the_message(tmp_path: Path) -> None:
 def test_masks_that_are_objects_are_one_line(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", masks=np.array([[[{}]]], dtype=object))
     with pytest.raises(ValueError, match="a.npz: expected an .npz file with the key masks, got masks of object"):
-        StackMasks.of(tmp_path / "a.npz", (None, None))
+        read_masks(tmp_path / "a.npz", (None, None))
 
 
 def test_masks_are_kept_as_bits_and_chosen_frames_alone(tmp_path: Path) -> None:
     drawn = np.random.default_rng(0).random((9, 31, 45)) < 0.5
     for stack in (drawn, drawn * 255.0, np.asfortranarray(drawn.astype(np.uint8))):
         np.savez_compressed(tmp_path / "a.npz", masks=stack, valid=drawn)
-        found = StackMasks.of(tmp_path / "a.npz", (2, 7))
+        found = read_masks(tmp_path / "a.npz", (2, 7))
         assert found.masks.nbytes == 5 * -(-31 * 45 // 8)
         for k in range(5):
             np.testing.assert_array_equal(found.silhouette(k).mask, drawn[2 + k])
             np.testing.assert_array_equal(found.silhouette(k).valid, drawn[2 + k])
-        assert found.label(0).endswith("a.npz[2]")
+        assert found.names[0].endswith("a.npz[2]")

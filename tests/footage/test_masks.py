@@ -13,10 +13,12 @@ import pytest
 from click.testing import CliRunner, Result
 
 from posefit.cli import main
-from posefit.footage.given.settled import Settled, settled
-from posefit.footage.masks import FolderMasks
-from posefit.footage.stacks import StackMasks
-from tests.footage.conftest import SIZE, truth
+from posefit.footage.cleaning import cleaned
+from posefit.footage.masks import PackedMasks
+from posefit.footage.readers import read_folder, read_masks
+from posefit.footage.source import Viewing, scene_of
+from posefit.tracking.front import track
+from tests.footage.conftest import SIZE, camera, truth
 
 ALL = (None, None)
 QUICK = ["--prior", "loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]
@@ -39,17 +41,16 @@ def folder(path: Path, images: Sequence[Any], suffix: str = ".png") -> Path:
     return path
 
 
-def read(path: Path, label: int | None = None) -> Settled:
-    raw = FolderMasks.of(path, ALL, label) if path.is_dir() else StackMasks.of(path, ALL, label)
-    return settled(raw, path, holes=0.0)
+def read(path: Path, label: int | None = None) -> tuple[PackedMasks, list[str]]:
+    return cleaned(read_masks(path, ALL, label), path, holes=0.0)
 
 
-def check(path: Path, wanted: Sequence[Any], label: int | None = None) -> Settled:
-    found = read(path, label)
-    assert len(found) == len(wanted)
+def check(path: Path, wanted: Sequence[Any], label: int | None = None) -> tuple[PackedMasks, list[str]]:
+    masks, warnings = read(path, label)
+    assert len(masks) == len(wanted)
     for k, mask in enumerate(wanted):
-        np.testing.assert_array_equal(found.silhouette(k).mask, mask)
-    return found
+        np.testing.assert_array_equal(masks.silhouette(k).mask, mask)
+    return masks, warnings
 
 
 def chunk(kind: bytes, data: bytes) -> bytes:
@@ -78,7 +79,7 @@ def test_two_values_are_a_mask_whichever_they_are(
     walk: list[Any], tmp_path: Path, values: tuple[int, int], kind: Any
 ) -> None:
     images = [np.where(mask, values[1], values[0]).astype(kind) for mask in walk]
-    assert check(folder(tmp_path / "a", images), walk).warnings == []
+    assert check(folder(tmp_path / "a", images), walk)[1] == []
     np.savez(tmp_path / "a.npz", masks=np.stack(images))
     check(tmp_path / "a.npz", walk)
 
@@ -101,7 +102,7 @@ def test_soft_masks_are_cut_half_way(walk: list[Any], tmp_path: Path, kind: Any,
     soft[2] = (soft[2] * 0.3).astype(kind)  # nobody, as the network thinks; a frame's own scale would show him
     wanted = [one > (full // 2 if full > 1 else 0.5) for one in soft]
     np.savez(tmp_path / "a.npz", masks=np.stack(soft))
-    assert not check(tmp_path / "a.npz", wanted).is_usable(2)
+    assert not check(tmp_path / "a.npz", wanted)[0].usable[2]
     if np.issubdtype(kind, np.integer):
         check(folder(tmp_path / "a", soft), wanted)
 
@@ -111,7 +112,7 @@ def test_the_alpha_of_somebody_cut_out_is_the_mask(walk: list[Any], tmp_path: Pa
     cut_out = [
         np.dstack([rng.integers(0, 255, (*mask.shape, 3)), 255 * softened(mask)]).astype(np.uint8) for mask in walk
     ]
-    assert check(folder(tmp_path / "a", cut_out), [one[..., 3] > 127 for one in cut_out]).warnings == []
+    assert check(folder(tmp_path / "a", cut_out), [one[..., 3] > 127 for one in cut_out])[1] == []
     opaque = [
         np.dstack([255 * mask, 255 * mask, 255 * mask, np.full(mask.shape, 255)]).astype(np.uint8) for mask in walk
     ]
@@ -224,7 +225,7 @@ def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> N
     for k in (2, 10, 1, 100):
         cv2.imwrite(str(path / f"mask{k}.png"), np.where(walk[0], 255, 0).astype(np.uint8))
     (path / "._mask1.png").write_bytes(b"what a Mac puts beside it")
-    assert [file.name for file in FolderMasks.of(path, ALL).files] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
+    assert [Path(name).name for name in read_folder(path, ALL).names] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
 
 
 # who is in them
@@ -242,14 +243,14 @@ def test_inverted_masks_are_turned_round_and_said(
     walk: list[Any], tmp_path: Path, write: Callable[[Path, Sequence[Any]], Path]
 ) -> None:
     path = write(tmp_path / "a.npz", [~mask for mask in walk])
-    (warning,) = check(path, walk).warnings
+    (warning,) = check(path, walk)[1]
     assert warning == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
 
 
 def test_somebody_who_fills_a_side_is_not_inverted(tmp_path: Path) -> None:
     near = np.zeros((120, 160), dtype=bool)
     near[10:, 30:130] = True  # on the lower border, for most of it
-    assert check(stack(tmp_path / "a.npz", [near] * 3), [near] * 3).warnings == []
+    assert check(stack(tmp_path / "a.npz", [near] * 3), [near] * 3)[1] == []
 
 
 def test_empty_and_full_masks_are_held_and_counted(walk: list[Any], tmp_path: Path) -> None:
@@ -258,8 +259,8 @@ def test_empty_and_full_masks_are_held_and_counted(walk: list[Any], tmp_path: Pa
     masks[3][:] = False
     masks[4][:] = True
     path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in masks])
-    found = check(path, masks)
-    assert [found.is_usable(k) for k in range(6)] == [False, True, True, False, False, True]
+    found, _ = check(path, masks)
+    assert found.usable.tolist() == [False, True, True, False, False, True]
     result = run("track", path, "--out", tmp_path / "out", *QUICK)
     assert result.exit_code == 0, result.stderr
     assert "3 frames show too little of the person: the pose is held" in result.stdout
@@ -276,10 +277,9 @@ def blob(*middles: tuple[int, int], wide: int = 16, tall: int = 60) -> Any:
 def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Path) -> None:
     goer, stander = [(40 + 4 * k, 60) for k in range(25)], (100, 58)
     masks = [blob(one, tall=64) | blob(stander) for one in goer]  # he goes past, and they touch for a while
-    found = read(stack(tmp_path / "a.npz", masks))
+    found, (warning,) = read(stack(tmp_path / "a.npz", masks))
     for k in (*range(10), *range(20, 25)):
         np.testing.assert_array_equal(found.silhouette(k).mask, blob(goer[k], tall=64), err_msg=str(k))
-    (warning,) = found.warnings
     several = sum(cv2.connectedComponents(mask.astype(np.uint8))[0] > 2 for mask in masks)
     assert f"several people in {several} of 25 masks; the largest of the first is followed, then" in warning
     assert "leaps" not in warning
@@ -287,7 +287,7 @@ def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Pat
 
 def test_a_leap_to_somebody_else_is_named(tmp_path: Path) -> None:
     masks = [blob((40, 60), tall=64) | blob((180, 60))] * 3 + [blob((180, 60)) | blob((160, 60))] * 2
-    (warning,) = read(stack(tmp_path / "a.npz", masks)).warnings
+    (warning,) = read(stack(tmp_path / "a.npz", masks))[1]
     assert warning.endswith(
         "then the nearest to the last, which leaps at " + str(tmp_path / "a.npz") + "[3]: look there"
     )
@@ -299,7 +299,7 @@ def test_somebody_in_pieces_is_one_person_and_specks_are_nobody(tmp_path: Path) 
     table[50:62] = False
     speck = blob((60, 60)) | blob((150, 30), wide=6, tall=6)
     for k, mask in enumerate((tree, table, speck)):
-        assert check(stack(tmp_path / f"{k}.npz", [mask] * 3), [mask] * 3).warnings == []
+        assert check(stack(tmp_path / f"{k}.npz", [mask] * 3), [mask] * 3)[1] == []
     known = np.ones_like(tree)
     hidden = blob((60, 60), wide=60)
     known[:, 45:75] = False
@@ -313,9 +313,43 @@ def test_small_holes_are_filled_unless_somebody_asks_otherwise(tmp_path: Path) -
     holed[50:53, 50:53] = False
     holed[60:75, 55:65] = False  # between an arm and the body
     path = stack(tmp_path / "a.npz", [holed] * 2)
-    raw = StackMasks.of(path, ALL)
-    filled = settled(raw, path).silhouette(0).mask
-    assert filled[51, 51]
-    assert not filled[65, 60]
-    np.testing.assert_array_equal(settled(raw, path, holes=0.0).silhouette(0).mask, holed)
-    np.testing.assert_array_equal(settled(raw, path, holes=1.0).silhouette(0).mask, mask)
+
+    def filled(holes: float | None) -> Any:
+        return cleaned(read_masks(path, ALL), path, holes)[0].silhouette(0).mask
+
+    assert filled(None)[51, 51]
+    assert not filled(None)[65, 60]
+    np.testing.assert_array_equal(filled(0.0), holed)
+    np.testing.assert_array_equal(filled(1.0), mask)
+
+
+def test_every_image_is_decoded_once_however_often_its_mask_is_needed(
+    walk: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decoded: list[str] = []
+    for name in ("imread", "imdecode"):
+        real = getattr(cv2, name)
+        monkeypatch.setattr(cv2, name, lambda *words, real=real: decoded.append("image") or real(*words))
+    path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in walk])
+    track(path, out=tmp_path / "out", prior="loose", evaluations=200, restarts=2, body_frames=2)
+    assert len(decoded) == len(walk)
+
+
+def test_views_of_other_frames_or_another_rate_are_refused_by_name(walk: list[Any], tmp_path: Path) -> None:
+    cameras = [camera(np.pi / 2), camera(0.6)]
+    for name, count, fps in (("a", 6, 30.0), ("b", 4, 30.0), ("c", 6, 60.0)):
+        np.savez(tmp_path / f"{name}.npz", masks=walk[:count], fps=fps)
+    a, b, c = (tmp_path / f"{name}.npz" for name in "abc")
+    with pytest.raises(ValueError, match=rf"views must have the same frames, got 6 of {a} and 4 of {b}"):
+        scene_of([a, b], Viewing(cameras=cameras))
+    with pytest.raises(ValueError, match=rf"views must have one frame rate.*, got 30 of {a} and 60 of {c}"):
+        scene_of([a, c], Viewing(cameras=cameras))
+
+
+def test_masks_that_would_not_fit_in_memory_are_refused(
+    walk: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = stack(tmp_path / "a.npz", walk)
+    monkeypatch.setattr("posefit.footage.masks.allowed_bytes", lambda: 6 * SIZE[0] * SIZE[1] // 8 - 1)
+    with pytest.raises(ValueError, match="frames must be so few that their masks fit in .* got 6 of 160x120 pixels"):
+        read(path)

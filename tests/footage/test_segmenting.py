@@ -14,11 +14,10 @@ import posefit
 from posefit.cli import main
 from posefit.fitting.guard import BrokenRuleError
 from posefit.footage import segmentation
-from posefit.footage.masks import FolderMasks, Views
+from posefit.footage.masks import Views
+from posefit.footage.quality import FrameQuality, disagreement, verdict
+from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction, Segmentation
-from posefit.footage.segmenting.agreement import disagreement
-from posefit.footage.segmenting.signs import Watch
-from posefit.footage.segmenting.verdict import verdict
 from posefit.footage.video import Video
 from posefit.registry import Offer
 from posefit.silhouette.foreground import Person
@@ -157,10 +156,8 @@ def of(mask: Any) -> Person:
 
 def looked(shown: Any, frames: int = 8, background: Any = None) -> list[dict[str, Any]]:
     """Return the rows of a figure that moves by 6 pixels a frame, of which `shown` leaves a part in the mask."""
-    watch = Watch(30.0, background)
-    return [
-        watch.look(image, of(shown(mask)), k) for k, (image, mask) in enumerate(scene(6 * k) for k in range(frames))
-    ]
+    watch = FrameQuality(30.0, background)
+    return [watch.row(image, of(shown(mask)), k) for k, (image, mask) in enumerate(scene(6 * k) for k in range(frames))]
 
 
 def test_a_mask_that_covers_what_moves_is_usable() -> None:
@@ -185,21 +182,21 @@ def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
 @pytest.mark.parametrize(("tall", "wide"), [(10, 4), (60, 2), (40, 40)])  # too small, a line, a block
 def test_what_has_no_persons_shape_is_not_usable(tall: int, wide: int) -> None:
     image, mask = scene(0, tall, wide)
-    assert Watch(30.0).look(image, of(mask), 0)["usable"] == 0
+    assert FrameQuality(30.0).row(image, of(mask), 0)["usable"] == 0
 
 
 def test_a_place_that_somebody_has_left_is_a_ghost() -> None:
     with_him, mask = scene()
     empty = np.full_like(with_him, 120)
-    assert Watch(30.0, background=with_him).look(empty, of(mask), 0)["ghost"] == 1
-    assert Watch(30.0, background=empty).look(with_him, of(mask), 0)["ghost"] == 0
-    assert Watch(30.0).look(empty, of(mask), 0)["ghost"] == 0
+    assert FrameQuality(30.0, background=with_him).row(empty, of(mask), 0)["ghost"] == 1
+    assert FrameQuality(30.0, background=empty).row(with_him, of(mask), 0)["ghost"] == 0
+    assert FrameQuality(30.0).row(empty, of(mask), 0)["ghost"] == 0
 
 
 def test_one_mask_twice_as_large_as_the_others_is_not_usable_but_a_person_who_stays_so_is() -> None:
-    watch = Watch(30.0)
+    watch = FrameQuality(30.0)
     sizes = [18] * 6 + [29] + [18] * 6 + [29] * 16
-    rows = [watch.look(image, of(mask), k) for k, (image, mask) in enumerate(scene(0, 60, wide) for wide in sizes)]
+    rows = [watch.row(image, of(mask), k) for k, (image, mask) in enumerate(scene(0, 60, wide) for wide in sizes)]
     assert [row["usable"] for row in rows[:13]] == [1] * 6 + [0] + [1] * 6
     assert rows[-1]["usable"] == 1
 
@@ -255,7 +252,7 @@ def views(folder: Path, azimuths: list[float], part: Any = lambda mask: mask) ->
         (folder / str(k)).mkdir(parents=True)
         for n, mask in enumerate(truth(azimuth)[8:16]):
             cv2.imwrite(str(folder / str(k) / f"{n}.png"), 255 * part(mask).astype(np.uint8))
-        seen.append(FolderMasks.of(folder / str(k), (None, None)))
+        seen.append(read_masks(folder / str(k), (None, None)))
     return Views(seen)
 
 

@@ -27,8 +27,8 @@ LONGEST = 2_000  # characters of a message
 
 def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     """Return what reads each kind of file, as far as a user's file goes before anything is searched."""
-    from posefit.footage.masks import FolderMasks, Views
-    from posefit.footage.stacks import StackMasks
+    from posefit.footage.masks import Views
+    from posefit.footage.readers import read_masks
     from posefit.geometry.calibration import read_calibrations, upright
     from posefit.motion.amc import read_amc
     from posefit.motion.asf import read_asf
@@ -44,14 +44,14 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     plan.MOST = CELLS
 
     def masks(path: Path) -> object:
-        views = Views([StackMasks.of(path, (None, None))])
-        return views.sizes, [views[k] for k in range(min(len(views), 3))]
+        views = Views([read_masks(path, (None, None))])
+        return [views[k] for k in range(min(len(views), 3))]
 
     def images(path: Path) -> object:
         room = path.parent / f"{NAME}-folder"
         room.mkdir()
         shutil.copy(path, room)
-        return [one.silhouettes for one in Views([FolderMasks.of(room, (None, None))])]
+        return [one.silhouettes for one in Views([read_masks(room, (None, None))])]
 
     def calibration(path: Path) -> object:
         found = read_calibrations(path)

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from posefit.footage.scene import seen_on, synthetic
+from posefit.footage.scene import on_device, synthetic
 from posefit.motion import built_in
 from posefit.silhouette.cuda.device import check_device
 from posefit.silhouette.cuda.moving import moved_to
@@ -35,7 +35,7 @@ def test_one_line_says_what_a_gpu_needs() -> None:
     for ask in (
         lambda: check_device("cuda"),
         lambda: moved_to(silhouette, "cuda"),
-        lambda: seen_on(scene, "cuda"),
+        lambda: on_device(scene, "cuda"),
         lambda: follow(scene, [], device="cuda"),
     ):
         with pytest.raises(ValueError) as error:
@@ -48,11 +48,11 @@ def test_one_line_says_what_a_gpu_needs() -> None:
 def test_a_scene_on_a_device_has_its_silhouettes_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("posefit.silhouette.cuda.device._missing", lambda: None)
     scene = synthetic(built_in.motion("walk", frames=2), (45.0, 90.0), (64, 48), [], (None, None))
-    there = seen_on(scene, "cuda")
+    there = on_device(scene, "cuda")
     assert len(there.observations) == 2
     assert [[one.device for one in seen.silhouettes] for seen in there.observations] == [["cuda", "cuda"]] * 2
     np.testing.assert_array_equal(there.observations[1].translation, scene.observations[1].translation)
-    assert seen_on(scene, "cpu") is scene
+    assert on_device(scene, "cpu") is scene
 
 
 @pytest.mark.slow

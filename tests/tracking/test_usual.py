@@ -67,7 +67,7 @@ def test_a_tracker_has_no_optimiser_and_no_prior(named: dict[str, str]) -> None:
 @pytest.fixture(scope="module")
 def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("seen") / "masks.npz"
-    scene = scene_of(["09_01"], Viewing(frames=(0, 8), size=(120, 90)), Path())
+    scene = scene_of(["09_01"], Viewing(frames=(0, 8), size=(120, 90)))
     np.savez(path, masks=np.array([seen.silhouettes[0].mask for seen in scene.observations]))
     return path
 

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 
 from posefit.fitting.tracker import Frame
+from posefit.footage.quality import AROUND, LAG, changed_pixels
 from posefit.footage.scene import Scene
-from posefit.footage.segmenting.signs import AROUND, LAG, changed_pixels
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask

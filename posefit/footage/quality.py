@@ -1,0 +1,256 @@
+"""Signs of whether masks taken from video are a person's: of each frame, of the whole video, and between cameras.
+
+The true mask is unknown. A frame's mask is compared with its picture, the pictures shortly before, and the background
+that was learned, where there is one.
+"""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.footage.masks import Views
+from posefit.geometry.camera import Camera
+from posefit.silhouette.foreground import Image, Person
+from posefit.silhouette.mask import Mask, Silhouette
+
+# of a frame
+AREA_FRAMES = 15  # latest frames that a frame's area is compared with
+AREA_CHANGE = 0.5  # a frame whose area differs by more than this share from the latest is not usable
+# the area of a person's silhouette over the square of its longer side: 0.08 to 0.47 in 1,296 poses of the library seen
+# from anywhere
+FILL = (0.07, 0.5)
+MIN_SIDE = 12  # pixels of the longer side below which a person cannot be distinguished from noise
+LAG = 0.1  # seconds between two pictures that are compared for motion
+MOVING_LEVELS = 25  # grey levels by which a pixel that moved has changed
+MIN_MOVING = 0.1  # of the mask's area: fewer pixels that moved outside the mask are no evidence
+AROUND = 0.5  # of the person's longer side: motion is looked for as far as that from the mask
+SLACK = 0.02  # of the same: motion as near as that to the mask is the mask's own
+MAX_OUTSIDE = 0.5  # a frame is not usable where a larger share of what moves lies outside the mask
+EDGE_RATIO, EDGE_LEVELS = 1.5, 6.0  # an edge is in one picture only where it is stronger there by both
+
+# of a video
+PEOPLE_SEGMENTER = "mediapipe"  # needs no background: for a person who is always in the picture
+MIN_FRAMES = 8  # frames with a whole mask below which there is no verdict
+UNEXPLAINED = 0.3  # more of what moves lies outside the masks, in half of the frames: they are not the person
+TALLER, LARGER = 0.15, 0.25  # changes of the longer side and the area from frame to frame that one in ten exceeds
+GHOSTS, GHOSTS_REFUSED = 0.1, 0.5  # shares of frames with masks of an empty place: worth a warning, refused
+BROKEN = 0.3  # of the frames: masks that are in pieces more often, and unsteady, are parts of a person at best
+MIN_USABLE = 0.5  # where fewer of the frames are usable and the masks are unsteady, there is nothing to track
+
+# between cameras
+CAMERA_FRAMES = 20  # that are compared, spread over the footage
+APART = 0.7  # of the person's height: rays to the middles of masks that pass each other by more do not meet in a person
+SHORT, TALL = 0.45, 1.9  # times their height: what a person may seem, from above, crouching, or with the arms up
+
+
+class FrameQuality:
+    """Compares the mask of one frame after the other with the pictures; its rows become quality.csv."""
+
+    def __init__(self, fps: float, background: Image | None = None) -> None:
+        self._edges = None if background is None else _edges(background)
+        self._before: deque[tuple[Image, Mask]] = deque(maxlen=max(1, round(LAG * fps)))
+        self._areas: deque[int] = deque(maxlen=AREA_FRAMES)
+        self._sides: deque[int] = deque(maxlen=AREA_FRAMES)
+
+    def row(self, image: Image, person: Person, frame: int) -> dict[str, Any]:
+        """Return a frame's row: usable where the mask is whole, looks like a person and covers what moves.
+
+        Its area must not be far from that of the frames before either, as far as they looked like a person.
+        """
+        side = _longer_side(person.mask)
+        outside = self._outside(image, person, side)
+        ghost = self._is_ghost(image, person.mask)
+        whole = person.area > 0 and not person.touches_border
+        likely = (
+            whole
+            and side >= MIN_SIDE
+            and FILL[0] <= person.area / side**2 <= FILL[1]
+            and outside <= MAX_OUTSIDE
+            and not ghost
+        )
+        typical = float(np.median(self._areas)) if self._areas else float(person.area)
+        jitter = abs(person.area / typical - 1.0) if typical else 0.0
+        if likely:
+            self._areas.append(person.area)
+        if whole:
+            self._sides.append(side)
+        self._before.append((image, person.mask))
+        return {
+            "frame": frame,
+            "area": person.area,
+            "longer_side": side,
+            "jitter": round(jitter, 4),
+            "pieces": person.pieces,
+            "rival": round(person.rival, 4),
+            "touches_border": int(person.touches_border),
+            "beside": round(outside, 4),
+            "ghost": int(ghost),
+            "usable": int(likely and jitter <= AREA_CHANGE),
+        }
+
+    def _outside(self, image: Image, person: Person, side: int) -> float:
+        """Return which share of the pixels that moved, at the person and around, lies outside the mask."""
+        if not self._before or not person.area:
+            return 0.0
+        earlier, mask = self._before[0]
+        covered = person.mask | mask
+        reach = max(side, *self._sides) if self._sides else side
+        rows, columns = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
+        far = round(AROUND * reach)
+        window = np.s_[
+            max(0, rows[0] - far) : rows[-1] + 1 + far,
+            max(0, columns[0] - far) : columns[-1] + 1 + far,
+        ]
+        changed = changed_pixels(image, earlier)[window] & person.valid[window]
+        width = 2 * max(1, round(SLACK * reach)) + 1
+        near = cv2.dilate(covered[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
+        outside = int((changed & ~near).sum())
+        return float(outside / changed.sum()) if outside > MIN_MOVING * person.area else 0.0
+
+    def _is_ghost(self, image: Image, mask: Mask) -> bool:
+        """Return whether the outline of a mask is an edge of the background rather than of the picture.
+
+        There a person who was learned into the background has gone away.
+        """
+        if self._edges is None or not mask.any():
+            return False
+        inner = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) > 0
+        outline = mask & ~inner
+        now, before = _edges(image)[outline], self._edges[outline]
+        return bool((before > EDGE_RATIO * now + EDGE_LEVELS).sum() > (now > EDGE_RATIO * before + EDGE_LEVELS).sum())
+
+
+def changed_pixels(image: Image, earlier: Image) -> Mask:
+    """Return which pixels (height, width) changed from one picture to another, but for single ones, which are noise."""
+    changed = np.asarray(cv2.absdiff(image, earlier).max(axis=2) > MOVING_LEVELS, dtype=np.uint8)
+    return np.asarray(cv2.medianBlur(changed, 5) > 0)
+
+
+def _edges(image: Image) -> NDArray[np.float32]:
+    """Return how strong an edge is at each pixel (height, width), or next to it, in grey levels a pixel."""
+    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
+    across, down = (cv2.Sobel(grey, cv2.CV_32F, *way, scale=0.125) for way in ((1, 0), (0, 1)))
+    return np.asarray(cv2.dilate(cv2.magnitude(across, down), np.ones((3, 3), dtype=np.uint8)), dtype=np.float32)
+
+
+def _longer_side(mask: Mask) -> int:
+    """Return the longer side of a mask's bounding box, 0 where it is empty."""
+    if not mask.any():
+        return 0
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return int(max(rows[-1] - rows[0], columns[-1] - columns[0])) + 1
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is wrong with the masks of a video, and whether that is too much to go on."""
+
+    text: str
+    refused: bool
+
+
+def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) -> Verdict | None:
+    """Return what is wrong with masks, by the rows of `FrameQuality`; None where nothing is.
+
+    `learned`: the segmenter was given no picture of the empty scene. What moves outside the masks while their
+    size jumps refuses them, and so does a size that jumps where few frames are usable or most masks are in pieces;
+    either alone may be another person or clothes like the background, and is a warning.
+    """
+    whole = [row for row in rows if row["area"] and not row["touches_border"]]
+    usable = sum(row["usable"] for row in whole)
+    instead = advice(method, learned=learned)
+    none = f"expected masks of a person, got none in any of {len(rows)} frames{instead}"
+    if len(whole) < MIN_FRAMES:
+        return None if usable else Verdict(none, True)
+    outside = float(np.median([row["beside"] for row in whole]))
+    pairs = [(a, b) for a, b in pairwise(whole) if b["frame"] == a["frame"] + 1]
+    taller, larger = (_change(pairs, name) for name in ("longer_side", "area"))
+    unsteady = taller > TALLER or larger > LARGER
+    ghosts = float(np.mean([row["ghost"] for row in whole]))
+    if outside > UNEXPLAINED and unsteady:
+        moves = (
+            f"{outside:.0%} of what moves lies outside the masks, and they change by {larger:.0%} from frame to frame"
+        )
+        where = "the person seems to stand in the background" if learned else "the masks do not show the whole person"
+        return Verdict(f"{where}: {moves}{instead}", True)
+    if ghosts > GHOSTS:
+        text = f"{ghosts:.0%} of the masks show a place that is empty now: the person was learned into the background"
+        return Verdict(f"{text}{instead}", ghosts > GHOSTS_REFUSED)
+    if not usable:
+        return Verdict(none, True)
+    if unsteady:
+        broken = float(np.mean([row["pieces"] > 1 for row in whole]))
+        pieces = f" and are in pieces in {broken:.0%} of the frames" if broken > BROKEN else ""
+        text = f"the masks change by {larger:.0%} from frame to frame{pieces}: parts of the person seem to be missing"
+        return Verdict(f"{text}{instead}", usable < MIN_USABLE * len(whole) or broken > BROKEN)
+    if outside > UNEXPLAINED:
+        text = f"{outside:.0%} of what moves near the person lies outside the masks, which may miss parts of the person"
+        return Verdict(f"{text}{instead}", False)
+    return None
+
+
+def advice(method: str, *, learned: bool) -> str:
+    """Return what to do instead of a segmenter, after a semicolon."""
+    if method == PEOPLE_SEGMENTER:
+        return "; --roi says where to look"
+    empty = "give --background with an empty picture, or " if learned else ""
+    return f"; {empty}--extraction {PEOPLE_SEGMENTER}"
+
+
+def _change(pairs: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]], name: str) -> float:
+    """Return by which share a value changes from frame to frame in one frame of ten, or by more."""
+    if not pairs:
+        return 0.0
+    return float(np.expm1(np.percentile([abs(np.log(b[name] / a[name])) for a, b in pairs], 90)))
+
+
+def extent_of(silhouette: Silhouette) -> tuple[Array, float]:
+    """Return the middle (2,) and the height in pixels of a silhouette's bounding box."""
+    rows, columns = np.flatnonzero(silhouette.mask.any(axis=1)), np.flatnonzero(silhouette.mask.any(axis=0))
+    middle = 0.5 * np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1])
+    return middle, float(rows[-1] + 1 - rows[0])
+
+
+def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array, Array]:
+    """Return where (3,) the rays of cameras through pixels (2,) meet best, and how far (n,) it is from each."""
+    rays = [
+        camera.rotation.T @ np.array([*((middle - camera.centre) / camera.focal), 1.0])
+        for camera, middle in zip(cameras, middles, strict=True)
+    ]
+    across = [np.eye(3) - np.outer(ray, ray) / (ray @ ray) for ray in rays]
+    positions = [camera.position for camera in cameras]
+    place = np.linalg.lstsq(
+        np.sum(across, axis=0), np.sum([a @ p for a, p in zip(across, positions, strict=True)], axis=0)
+    )[0]
+    return place, np.array([np.linalg.norm(a @ (place - p)) for a, p in zip(across, positions, strict=True)])
+
+
+def disagreement(views: Views, cameras: Sequence[Camera], stature: float) -> str | None:
+    """Return what is wrong between the masks of several cameras and a person of a height in metres, if anything."""
+    usable = [k for k in range(len(views)) if all(masks.usable[k] for masks in views.masks)]
+    if not usable:
+        return None
+    misses, heights = [], []
+    for k in np.unique(np.linspace(0, len(usable) - 1, CAMERA_FRAMES).astype(int)):
+        extents = [extent_of(silhouette) for silhouette in views[usable[k]].silhouettes]
+        place, away = meeting(cameras, [middle for middle, _ in extents])
+        depths = [float((camera.rotation @ place + camera.translation)[2]) for camera in cameras]
+        misses.append(2.0 * away.max())
+        seen = zip(cameras, extents, depths, strict=True)
+        heights.append([tall * depth / camera.focal[1] for camera, (_, tall), depth in seen])
+    miss, tall = float(np.median(misses)), np.median(heights, axis=0)
+    reasons = "the masks show only parts of the person, or another one, or the calibrations are in another order"
+    if miss > APART * stature:
+        return f"expected cameras that see one person, got views that pass each other by {miss:.1f} m: {reasons}"
+    wrong = np.flatnonzero((tall < SHORT * stature) | (tall > TALL * stature))
+    if len(wrong):
+        k = int(wrong[0])
+        return f"expected a person of {stature:.2f} m, got masks {tall[k]:.2f} m tall in view {k + 1}: {reasons}"
+    return None

@@ -1,0 +1,249 @@
+"""Masks from a folder of images or an .npz file: which pixels are the person's by the values of all of them.
+
+Values may be 0 and 1, 0 and 255, degrees, an alpha channel or labels. One file does not show which, so the values of
+all files are counted before any pixel is decided. An image is decoded once: its values wait, compressed, in a temporary
+file, which is on the disk where they are many.
+"""
+
+import re
+import tempfile
+import zlib
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.archive import Stored, archived
+from posefit.footage.images import FORMATS, is_colourful, read_values
+from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, existing, span
+from posefit.reading import quoted
+from posefit.silhouette.mask import Mask
+
+IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
+NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
+SPOOLED = 64_000_000  # bytes of compressed values that are kept in memory; more are on the disk
+PACKED = 2_000_000_000  # bytes of an .npz file
+UNPACKED = 6_000_000_000  # bytes that its arrays unpack to; in memory they are an eighth of that
+MAX_FPS = 1000.0
+NAMES = ("masks", "valid", "usable", "fps")
+
+FEW_VALUES = 64  # masks with more values are soft
+COUNTED_VALUES = 4_096
+SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
+LISTED_LABELS = 6  # in a message
+
+Values = NDArray[Any]  # (height, width): grey levels, an alpha channel, indices of a palette, or colours 0xRRGGBB
+Classifier = Callable[[Values], Mask]  # values to the mask (height, width) of the person
+
+
+def read_masks(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
+    """Return the masks of a folder of images, or of an .npz file with `masks`, cut to `frames`.
+
+    `label` is the person's value, where masks hold several. Raises ValueError naming the file.
+    """
+    return read_folder(path, frames, label) if path.is_dir() else read_npz(path, frames, label)
+
+
+def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
+    """Return the masks of a folder of images in the natural order of their names: 2 comes before 10.
+
+    Raises ValueError naming the file where one is no image, or of another size than the first.
+    """
+    # hidden files are ignored: some systems put one beside each image that they copy
+    files = (file for file in path.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
+    found = sorted(files, key=_natural)
+    if not found:
+        raise ValueError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
+    chosen = found[slice(*span(frames, len(found)))]
+    if is_colourful(chosen[0]):
+        raise _many_colours(path)
+    counts, shape = ValueCounts(), (0, 0)
+    stored: list[tuple[int, np.dtype[Any]]] = []
+    with tempfile.SpooledTemporaryFile(SPOOLED) as spool:
+        for file in chosen:
+            read = read_values(file, label is not None)
+            if read is None:
+                raise ValueError(f"{file}: expected an image ({FORMATS}), got a file that is none")
+            values, soft = read
+            shape = shape if stored else values.shape
+            if values.shape != shape:
+                raise ValueError(f"{file}: mask must have shape {shape}, got {values.shape}")
+            counts.add(values, soft)
+            stored.append((spool.write(zlib.compress(np.ascontiguousarray(values), 1)), values.dtype))
+        is_person, size = counts.classifier(label, path), (shape[1], shape[0])
+        masks = empty_planes(len(chosen), size)
+        spool.seek(0)
+        for k, (length, dtype) in enumerate(stored):
+            values = np.frombuffer(zlib.decompress(spool.read(length)), dtype).reshape(shape)
+            masks[k] = np.packbits(is_person(values))
+    return PackedMasks([str(file) for file in chosen], size, masks, None, np.ones(len(chosen), dtype=bool))
+
+
+def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
+    """Return the key that files are sorted by: numbers in their names count as such."""
+    parts = re.findall(r"[0-9]+|[^0-9]+", file.name)
+    return [(int(p), "") if p.isdigit() and len(p) < NUMBER_DIGITS else (-1, p) for p in parts], file.name
+
+
+def read_npz(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
+    """Return the masks of an .npz file. Raises ValueError naming the file where it holds none."""
+    existing(path)
+    with archived(path, NAMES, "the key masks", UNPACKED, PACKED) as found:
+        if "masks" not in found:
+            raise ValueError(f"{path}: expected an .npz file with the key masks, got none")
+        stack, known = found["masks"], found.get("valid")
+        _check_shapes(path, stack, known)
+        usable, fps = _usable(path, found.get("usable"), stack.shape[0]), _fps(path, found.get("fps"))
+        start, stop = span(frames, stack.shape[0])
+        if not usable[start:stop].any():
+            raise ValueError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
+        masks = _pack(stack, start, stop, _npz_classifier(path, stack, start, stop, label))
+        valid = None if known is None else _pack(known, start, stop, _above(0.0))
+    names = [f"{path}[{k}]" for k in range(start, stop)]
+    return PackedMasks(names, (stack.shape[2], stack.shape[1]), masks, valid, usable[start:stop], fps)
+
+
+def _check_shapes(path: Path, stack: Stored, known: Stored | None) -> None:
+    if len(stack.shape) != 3 or 0 in stack.shape or stack.dtype.kind not in "buif":
+        raise ValueError(f"{path}: masks must have shape (frames, height, width), got {_described(stack)}")
+    if known is not None and (known.shape != stack.shape or known.dtype.kind not in "bui"):
+        shape = quoted(tuple(stack.shape))
+        raise ValueError(f"{path}: valid must have the masks' shape {shape}, got {_described(known)}")
+
+
+def _described(stored: Stored) -> str:
+    return f"{quoted(tuple(stored.shape))} {stored.dtype}"
+
+
+def _npz_classifier(path: Path, stored: Stored, start: int, stop: int, label: int | None) -> Classifier:
+    """Return how frames start to stop become masks; booleans need no count."""
+    if stored.dtype.kind == "b" and label is None:
+        return _above(0.0)
+    counts = ValueCounts()
+    for k, frame in enumerate(stored.rows()):
+        if frame.dtype.kind == "f" and not np.isfinite(frame).all():
+            raise ValueError(f"{path}: masks must be finite, got nan or infinity in frame {k}")
+        if start <= k < stop:
+            counts.add(frame, soft=False)
+    return counts.classifier(label, path)
+
+
+def _pack(stored: Stored, start: int, stop: int, is_person: Classifier) -> Planes:
+    """Return the bits of frames start to stop; the others are read to the end, for the checksum."""
+    planes = empty_planes(stop - start, (stored.shape[2], stored.shape[1]))
+    for k, frame in enumerate(stored.rows()):
+        if start <= k < stop:
+            planes[k - start] = np.packbits(is_person(frame))
+    return planes
+
+
+def _usable(path: Path, stored: Stored | None, count: int) -> NDArray[np.bool_]:
+    if stored is None:
+        return np.ones(count, dtype=bool)
+    if stored.shape != (count,) or stored.dtype != np.bool_:
+        raise ValueError(f"{path}: usable must be {count} booleans, got {_described(stored)}")
+    return np.asarray(stored.read(), dtype=np.bool_)
+
+
+def _fps(path: Path, stored: Stored | None) -> float | None:
+    if stored is None:
+        return None
+    number: Any = stored.read() if stored.shape == () and stored.dtype.kind in "iuf" else None
+    if number is None or not 0.0 < number <= MAX_FPS:
+        came = number.tolist() if number is not None else _described(stored)
+        raise ValueError(f"{path}: fps must be a number up to {MAX_FPS:g}, got {came}")
+    return float(number)
+
+
+@dataclass(eq=False)
+class ValueCounts:
+    """Counts the values in the masks of a source, one mask after the other, and decides which are the person's."""
+
+    soft: bool = False  # whether a value is a degree: in lossy images, in fractions, in an alpha channel
+    highest: float = 0.0
+    pixels: Counter[int] = field(default_factory=Counter)  # with each value, while these are few
+    solid: Counter[int] = field(default_factory=Counter)  # masks in which a value is more than an edge between others
+
+    def add(self, values: Values, soft: bool) -> None:
+        """Count the next mask."""
+        self.highest = max(self.highest, float(values.max()))
+        self.soft |= soft or values.dtype.kind == "f"
+        if self.soft:
+            return
+        unique, counts = np.unique(values, return_counts=True) if self.highest > 1 else _binary(values)
+        self.soft = len(unique) + len(self.pixels) > COUNTED_VALUES
+        if self.soft:
+            return
+        self.pixels.update(dict(zip(unique.tolist(), counts.tolist(), strict=True)))
+        if len(unique) > 1:
+            self.solid.update(_solid(values, unique))
+
+    def classifier(self, label: int | None, name: object) -> Classifier:
+        """Return how these values become masks. Raises ValueError where it is open which label is the person."""
+        if label is not None:
+            self._check_label(label, name)
+            return lambda values: np.asarray(values == label)
+        values = sorted(self.pixels)
+        if self.highest > SCALES[-1] and (self.soft or len(values) > FEW_VALUES):
+            raise _many_colours(name)
+        if self.soft or len(values) > FEW_VALUES:
+            return _above(self._half)
+        if len(values) <= 2:  # whichever two they are
+            return _above(float(values[0] if len(values) == 2 else min(values[0], 0)) if values else 0.0)
+        labels = [value for value, _ in self.solid.most_common() if value]
+        if len(labels) > 1:
+            raise ValueError(
+                f"{name}: expected masks of one person, got the labels {self._listed(labels)}; --label N chooses one"
+            )
+        return _above(float(labels[0] // 2) if labels else self._half)
+
+    @property
+    def _half(self) -> float:
+        """The value half way to a whole person: 127 of 255, as whole numbers have no middle."""
+        full = next((scale for scale in SCALES if self.highest <= scale), self.highest)
+        return 0.5 if full == 1.0 else float(full // 2)
+
+    def _check_label(self, label: int, name: object) -> None:
+        if self.soft:
+            raise ValueError(
+                f"{name}: label must be given for masks whose values are labels, PNG or whole numbers, got soft ones"
+            )
+        if label not in self.pixels:
+            there = self._listed([value for value, _ in self.pixels.most_common()])
+            raise ValueError(f"{name}: label must be one of those that are there, {there}, got {label}")
+
+    def _listed(self, labels: list[int]) -> str:
+        """Return some labels, the commonest first; colours as hexadecimal numbers."""
+        written = [str(value) if self.highest <= SCALES[-1] else f"0x{value:06x}" for value in labels[:LISTED_LABELS]]
+        others = len(labels) - LISTED_LABELS
+        return ", ".join(written) + (f" and {others} others" if others > 0 else "")
+
+
+def _above(threshold: float) -> Classifier:
+    return lambda values: np.asarray(values > threshold)
+
+
+def _many_colours(name: object) -> ValueError:
+    return ValueError(f"{name}: expected masks, got pictures in many colours; a person cut out needs an alpha channel")
+
+
+def _binary(values: Values) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the unique values of zeros and ones, and how many pixels have each."""
+    ones = int(np.count_nonzero(values))
+    counts = np.array([values.size - ones, ones])
+    return np.flatnonzero(counts), counts[counts > 0]
+
+
+def _solid(values: Values, unique: NDArray[Any]) -> list[int]:
+    """Return those values that fill 3 x 3 pixels somewhere: what lies between two others at an edge does not."""
+    if len(unique) > FEW_VALUES:
+        return []
+    numbers = np.searchsorted(unique, values).astype(np.uint8)
+    kernel = np.ones((3, 3), np.uint8)
+    same = cv2.erode(numbers, kernel) == cv2.dilate(numbers, kernel)
+    return [int(unique[k]) for k in np.unique(numbers[same])]
