@@ -29,9 +29,8 @@ from posefit.fitting.box import (
     sample_normal,
     wrap,
 )
-from posefit.fitting.bridge import bearable
 from posefit.fitting.check import at_least, between, one_of, positive, whole
-from posefit.fitting.optimiser import Filter, Niching, Optimiser
+from posefit.fitting.optimiser import Filter, Niching, Optimiser, finite_costs
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
 from posefit.hooks import (
@@ -69,12 +68,12 @@ __all__ = [
     "Tracker",
     "areas",
     "at_least",
-    "bearable",
     "between",
     "converted",
     "displacement",
     "draw_population",
     "extent",
+    "finite_costs",
     "fold",
     "hookimpl",
     "mismatch",

@@ -11,8 +11,8 @@ from posefit.arrays import Array
 from posefit.evolution.constants import usual_population
 from posefit.evolution.strategy import LAG, Strategy
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
-from posefit.fitting.bridge import bearable
 from posefit.fitting.check import at_least, positive
+from posefit.fitting.optimiser import finite_costs
 
 SPREAD = 0.5  # sigma_0 in an unknown place, in half-ranges of the box
 GROWTH = 2  # IPOP: each restart has a population so many times as large
@@ -85,7 +85,7 @@ class CMAES:
         """Adapt mean, step size and covariance, and restart where the search has come to an end."""
         if len(proposals) != self._population_size:
             raise ValueError(f"tell must get a population of {self._population_size}, got {len(proposals)}")
-        known, mean = bearable(costs), self._strategy.mean
+        known, mean = finite_costs(costs), self._strategy.mean
         # the mean goes on past the end of a circle, and so must what it learns from
         round_trip = self._space.periodic.any()
         self._strategy.learn(mean + displacement(self._space, mean, proposals) if round_trip else proposals, known)

@@ -8,25 +8,24 @@ J. Rapin, O. Teytaud, Nevergrad, a gradient-free optimization platform, 2018. `p
 True
 """
 
-from functools import partial
+from typing import Any, final
 
 import numpy as np
 
-from posefit import hookimpl
-from posefit.fitting.box import Space, draw_population
-from posefit.fitting.bridge import Bridged, GlobalRandom, Objective
-from posefit.fitting.check import at_least
-from posefit.hooks import RegisterOptimiser
+from posefit.plugin import (
+    Array,
+    RegisterOptimiser,
+    Space,
+    at_least,
+    draw_population,
+    finite_costs,
+    hookimpl,
+    repair,
+)
 
 
-def nevergrad(
-    space: Space,
-    rng: np.random.Generator,
-    *,
-    variant: str = "TwoPointsDE",
-    population_size: int = 40,
-    evaluations: int = 2440,
-) -> Bridged:
+@final
+class Nevergrad:
     """An optimiser of Nevergrad, asked for `population_size` proposals at a time, within a budget of `evaluations`.
 
     Settings:
@@ -34,43 +33,72 @@ def nevergrad(
         population_size: proposals asked for at a time, its `num_workers`, 1 or more.
         evaluations: of a frame, its `budget`, 1 or more; by default that of the search.
     """
-    from nevergrad import optimizers
 
-    at_least("population_size", population_size, 1)
-    at_least("evaluations", evaluations, 1)
-    if variant not in optimizers.registry:
-        known = len(optimizers.registry)
-        raise ValueError(f"variant must be one of {known} names such as TwoPointsDE, CMA, PSO, got {variant!r}")
-    return Bridged(space, rng, partial(_run, variant, population_size, evaluations))
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        variant: str = "TwoPointsDE",
+        population_size: int = 40,
+        evaluations: int = 2440,
+    ) -> None:
+        import nevergrad
+
+        at_least("population_size", population_size, 1)
+        at_least("evaluations", evaluations, 1)
+        known = nevergrad.optimizers.registry
+        if variant not in known:
+            raise ValueError(
+                f"variant must be one of {len(known)} names such as TwoPointsDE, CMA, PSO, got {variant!r}"
+            )
+        self._space, self._home = space, draw_population(space, rng, 1)[0]
+        rng = np.random.default_rng(int(rng.integers(2**63)))
+        self._global = GlobalRandom(int(rng.integers(2**31)))
+        with self._global:
+            spread = 0.5 if space.start is None else np.clip(space.start.spread, 1e-6, 0.5)
+            box = nevergrad.p.Array(init=draw_population(space, rng, 1)[0])
+            box = box.set_mutation(sigma=spread).set_bounds(-1.0, 1.0, method="clipping")
+            box.random_state = np.random.RandomState(int(rng.integers(2**31)))
+            self._optimiser: Any = known[variant](box, budget=evaluations, num_workers=population_size)
+            for proposal in draw_population(space, rng, population_size):
+                self._optimiser.suggest(proposal)
+        self._population_size = population_size
+        self._asked: list[Any] = []
+
+    def ask(self) -> Array:
+        """Return the optimiser's next population (n, d)."""
+        if not self._asked:
+            with self._global:
+                self._asked = [self._optimiser.ask() for _ in range(self._population_size)]
+        return repair(self._space, np.array([candidate.value for candidate in self._asked]), self._home)
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Let the optimiser learn the costs (n,)."""
+        if not self._asked:
+            raise ValueError("tell must follow ask, got costs before proposals")
+        with self._global:
+            for candidate, cost in zip(self._asked, finite_costs(costs).tolist(), strict=True):
+                self._optimiser.tell(candidate, cost)
+        self._asked = []
 
 
-def _run(
-    variant: str, population_size: int, evaluations: int, space: Space, rng: np.random.Generator, objective: Objective
-) -> None:
-    import nevergrad as ng
+class GlobalRandom:
+    """Lends a library a global numpy generator of its own within `with`, as some of Nevergrad's optimisers need one."""
 
-    borrowed = GlobalRandom(int(rng.integers(2**31)))  # some of its optimisers draw from numpy's global generator
-    with borrowed:
-        spread = 0.5 if space.start is None else np.clip(space.start.spread, 1e-6, 0.5)
-        box = (
-            ng.p.Array(init=draw_population(space, rng, 1)[0])
-            .set_mutation(sigma=spread)
-            .set_bounds(-1.0, 1.0, method="clipping")
-        )
-        box.random_state = np.random.RandomState(int(rng.integers(2**31)))
-        optimiser = ng.optimizers.registry[variant](box, budget=evaluations, num_workers=population_size)
-        for proposal in draw_population(space, rng, population_size):
-            optimiser.suggest(proposal)
-    while True:
-        with borrowed:
-            asked = [optimiser.ask() for _ in range(population_size)]
-        costs = objective(np.array([one.value for one in asked]))
-        with borrowed:
-            for one, cost in zip(asked, costs.tolist(), strict=True):
-                optimiser.tell(one, cost)
+    def __init__(self, seed: int) -> None:
+        self._own = np.random.RandomState(seed).get_state()
+
+    def __enter__(self) -> None:
+        self._outer = np.random.get_state()  # noqa: NPY002, the state to be left alone
+        np.random.set_state(self._own)  # noqa: NPY002
+
+    def __exit__(self, *_: object) -> None:
+        self._own = np.random.get_state()  # noqa: NPY002
+        np.random.set_state(self._outer)  # noqa: NPY002
 
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Offer `nevergrad:NAME`."""
-    register("nevergrad", nevergrad, needs=("nevergrad", "posefit[nevergrad]"))
+    """Register `nevergrad:NAME`."""
+    register("nevergrad", Nevergrad, needs=("nevergrad", "posefit[nevergrad]"))

@@ -9,24 +9,27 @@ T. Akiba et al., Optuna: a next-generation hyperparameter optimization framework
 True
 """
 
-from functools import partial
-from typing import Literal
+from typing import Any, Literal, final, get_args
 
 import numpy as np
 
-from posefit import hookimpl
-from posefit.fitting.box import Space, draw_population
-from posefit.fitting.bridge import Bridged, Objective
-from posefit.fitting.check import at_least, one_of
-from posefit.hooks import RegisterOptimiser
+from posefit.plugin import (
+    Array,
+    RegisterOptimiser,
+    Space,
+    at_least,
+    draw_population,
+    finite_costs,
+    hookimpl,
+    one_of,
+    repair,
+)
 
 Variant = Literal["TPESampler", "CmaEsSampler", "GPSampler", "NSGAIISampler", "QMCSampler", "RandomSampler"]
-VARIANTS = ("TPESampler", "CmaEsSampler", "GPSampler", "NSGAIISampler", "QMCSampler", "RandomSampler")
 
 
-def optuna(
-    space: Space, rng: np.random.Generator, *, variant: Variant = "NSGAIISampler", population_size: int = 10
-) -> Bridged:
+@final
+class Optuna:
     """A study of Optuna with that sampler, asked for `population_size` proposals at a time, at first from the start.
 
     NSGAIISampler is quick enough for thousands of proposals; TPESampler and GPSampler take milliseconds each, and more
@@ -36,30 +39,47 @@ def optuna(
         variant: a sampler of `optuna.samplers`; `optuna:SAMPLER` sets it.
         population_size: proposals asked for at a time, 1 or more.
     """
-    at_least("population_size", population_size, 1)
-    one_of("variant", variant, VARIANTS)
-    return Bridged(space, rng, partial(_run, variant, population_size))
 
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        variant: Variant = "NSGAIISampler",
+        population_size: int = 10,
+    ) -> None:
+        import optuna
 
-def _run(variant: str, population_size: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
-    import optuna
+        at_least("population_size", population_size, 1)
+        one_of("variant", variant, get_args(Variant))
+        self._space, self._home = space, draw_population(space, rng, 1)[0]
+        rng = np.random.default_rng(int(rng.integers(2**63)))
+        optuna.logging.set_verbosity(optuna.logging.ERROR)
+        self._study: Any = optuna.create_study(sampler=getattr(optuna.samplers, variant)(seed=int(rng.integers(2**31))))
+        self._names = [f"x{k:03}" for k in range(space.dimensions)]
+        self._box = {name: optuna.distributions.FloatDistribution(-1.0, 1.0) for name in self._names}
+        for proposal in draw_population(space, rng, population_size).tolist():
+            self._study.enqueue_trial(dict(zip(self._names, proposal, strict=True)))
+        self._population_size = population_size
+        self._trials: list[Any] = []
 
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    sampler = getattr(optuna.samplers, variant)(seed=int(rng.integers(2**31)))
-    study = optuna.create_study(sampler=sampler)
-    names = [f"x{k:03}" for k in range(space.dimensions)]
-    box: dict[str, optuna.distributions.BaseDistribution]
-    box = {name: optuna.distributions.FloatDistribution(-1.0, 1.0) for name in names}
-    for proposal in draw_population(space, rng, population_size).tolist():
-        study.enqueue_trial(dict(zip(names, proposal, strict=True)))
-    while True:
-        trials = [study.ask(box) for _ in range(population_size)]
-        costs = objective(np.array([[trial.params[name] for name in names] for trial in trials]))
-        for trial, cost in zip(trials, costs.tolist(), strict=True):
-            study.tell(trial, cost)
+    def ask(self) -> Array:
+        """Return the study's next population (n, d)."""
+        if not self._trials:
+            self._trials = [self._study.ask(self._box) for _ in range(self._population_size)]
+        asked = np.array([[trial.params[name] for name in self._names] for trial in self._trials])
+        return repair(self._space, asked, self._home)
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Let the study learn the costs (n,)."""
+        if not self._trials:
+            raise ValueError("tell must follow ask, got costs before proposals")
+        for trial, cost in zip(self._trials, finite_costs(costs).tolist(), strict=True):
+            self._study.tell(trial, cost)
+        self._trials = []
 
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Offer `optuna:SAMPLER`."""
-    register("optuna", optuna, needs=("optuna", "posefit[optuna]"))
+    """Register `optuna:SAMPLER`."""
+    register("optuna", Optuna, needs=("optuna", "posefit[optuna]"))

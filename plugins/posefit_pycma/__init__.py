@@ -8,19 +8,26 @@ N. Hansen, Y. Akimoto, P. Baudis, CMA-ES/pycma on GitHub, 2019. `pip install pos
 True
 """
 
-from functools import partial
+from typing import Any, final
 
 import numpy as np
 
-from posefit import hookimpl
-from posefit.fitting.box import Space, draw_population
-from posefit.fitting.bridge import Bridged, Objective
-from posefit.fitting.check import at_least, positive
-from posefit.hooks import RegisterOptimiser
+from posefit.plugin import (
+    Array,
+    RegisterOptimiser,
+    Space,
+    at_least,
+    draw_population,
+    finite_costs,
+    hookimpl,
+    positive,
+    repair,
+)
 
 
-def pycma(space: Space, rng: np.random.Generator, *, population_size: int = 0, spread: float = 0.5) -> Bridged:
-    """pycma's evolution strategy with its own handling of the box; `population_size` of 0 is its own choice.
+@final
+class PyCMA:
+    """pycma's evolution strategy with its own handling of the box.
 
     It starts around the prediction with its spread, or anywhere with `spread`, and again where it has stopped.
 
@@ -28,31 +35,56 @@ def pycma(space: Space, rng: np.random.Generator, *, population_size: int = 0, s
         population_size (lambda): 5 or more, or 0 for the library's own choice.
         spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
     """
-    if population_size != 0:
-        at_least("population_size", population_size, 5)
-    positive("spread", spread)
-    return Bridged(space, rng, partial(_evolve, population_size, spread))
+
+    def __init__(
+        self, space: Space, rng: np.random.Generator, *, population_size: int = 0, spread: float = 0.5
+    ) -> None:
+        if population_size != 0:
+            at_least("population_size", population_size, 5)
+        positive("spread", spread)
+        self._space, self._home = space, draw_population(space, rng, 1)[0]
+        self._rng = np.random.default_rng(int(rng.integers(2**63)))
+        self._spare = np.zeros(1 if space.dimensions == 1 else 0)  # pycma cannot search a single dimension
+        stds = np.full(space.dimensions, spread) if space.start is None else np.maximum(space.start.spread, 1e-6)
+        stds = np.append(stds, self._spare + spread)
+        # without a seed, and with our generator, it leaves numpy's global one alone
+        self._options = {"bounds": [-1, 1], "CMA_stds": stds, "verbose": -9, "seed": np.nan, "randn": Normal(self._rng)}
+        if population_size:
+            self._options["popsize"] = population_size
+        self._strategy: Any = None
+        self._asked: list[Array] | None = None
+
+    def ask(self) -> Array:
+        """Return the strategy's next population (n, d)."""
+        from cma import CMAEvolutionStrategy
+
+        if self._asked is None:
+            if self._strategy is None or self._strategy.stop():
+                first = np.append(draw_population(self._space, self._rng, 1)[0], self._spare)
+                self._strategy = CMAEvolutionStrategy(first, 1.0, self._options)
+            self._asked = self._strategy.ask()
+        return repair(self._space, np.array(self._asked)[:, : self._space.dimensions], self._home)
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Let the strategy learn the costs (n,)."""
+        if self._asked is None:
+            raise ValueError("tell must follow ask, got costs before proposals")
+        self._strategy.tell(self._asked, finite_costs(costs).tolist())
+        self._asked = None
 
 
-def _evolve(population_size: int, spread: float, space: Space, rng: np.random.Generator, objective: Objective) -> None:
-    from cma import CMAEvolutionStrategy
+class Normal:
+    """Draws standard normal numbers as `numpy.random.randn` does, from a generator that is copied with it."""
 
-    spare = np.zeros(1 if space.dimensions == 1 else 0)  # it cannot search a single dimension
-    stds = np.full(space.dimensions, spread) if space.start is None else np.maximum(space.start.spread, 1e-6)
-    stds = np.append(stds, spare + spread)
-    options = {"bounds": [-1, 1], "CMA_stds": stds, "verbose": -9} | (
-        {"popsize": population_size} if population_size else {}
-    )
-    # without a seed, and with our generator, it leaves numpy's global one alone
-    options |= {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
-    while True:
-        strategy = CMAEvolutionStrategy(np.append(draw_population(space, rng, 1)[0], spare), 1.0, options)
-        while not strategy.stop():
-            asked = strategy.ask()
-            strategy.tell(asked, objective(np.array(asked)[:, : space.dimensions]).tolist())
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._rng = rng
+
+    def __call__(self, *shape: int) -> Any:
+        """Return numbers of a shape, or one number."""
+        return self._rng.standard_normal(shape)
 
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Offer `pycma`."""
-    register("pycma", pycma, needs=("cma", "posefit[pycma]"))
+    """Register `pycma`."""
+    register("pycma", PyCMA, needs=("cma", "posefit[pycma]"))

@@ -8,52 +8,92 @@ J. Blank, K. Deb, pymoo: multi-objective optimization in Python, IEEE Access 8, 
 True
 """
 
-from functools import partial
 from importlib import import_module
-from typing import Literal
+from typing import Any, Literal, final, get_args
 
 import numpy as np
 
-from posefit import hookimpl
-from posefit.fitting.box import Space, draw_population
-from posefit.fitting.bridge import Bridged, Objective
-from posefit.fitting.check import at_least, one_of
-from posefit.hooks import RegisterOptimiser
+from posefit.plugin import (
+    Array,
+    RegisterOptimiser,
+    Space,
+    at_least,
+    draw_population,
+    finite_costs,
+    hookimpl,
+    one_of,
+    repair,
+)
 
 Variant = Literal["DE", "PSO", "GA", "ES", "SRES", "ISRES"]
 
 
-def pymoo(space: Space, rng: np.random.Generator, *, variant: Variant = "DE", population_size: int = 40) -> Bridged:
+@final
+class Pymoo:
     """An algorithm of pymoo, whose first population is drawn from the start.
 
     Settings:
         variant: a single-objective algorithm with a population; `pymoo:NAME` sets it.
         population_size: size of its population, 5 or more.
     """
-    at_least("population_size", population_size, 5)
-    one_of("variant", variant, ("DE", "PSO", "GA", "ES", "SRES", "ISRES"))
-    return Bridged(space, rng, partial(_run, variant, population_size))
 
+    def __init__(
+        self, space: Space, rng: np.random.Generator, *, variant: Variant = "DE", population_size: int = 40
+    ) -> None:
+        at_least("population_size", population_size, 5)
+        one_of("variant", variant, get_args(Variant))
+        self._space, self._home = space, draw_population(space, rng, 1)[0]
+        self._variant, self._population_size, self._seed = variant, population_size, int(rng.integers(2**63))
+        self._begin()
 
-def _run(variant: str, population_size: int, space: Space, rng: np.random.Generator, objective: Objective) -> None:
-    from pymoo.config import Config
-    from pymoo.core.problem import Problem
-    from pymoo.core.termination import NoTermination
-    from pymoo.problems.static import StaticProblem
+    def ask(self) -> Array:
+        """Return the algorithm's next population (n, d)."""
+        if self._asked is None:
+            self._asked = self._algorithm.ask()
+        return repair(self._space, self._asked.get("X").astype(np.float64), self._home)
 
-    Config.warnings["not_compiled"] = False
-    kind = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{variant.lower()}"), variant)
-    algorithm = kind(pop_size=population_size, sampling=draw_population(space, rng, population_size))
-    problem = Problem(n_var=space.dimensions, n_obj=1, xl=-1.0, xu=1.0)
-    algorithm.setup(problem, termination=NoTermination(), seed=int(rng.integers(2**31)))
-    while True:
-        asked = algorithm.ask()
-        costs = objective(asked.get("X").astype(np.float64))
-        algorithm.evaluator.eval(StaticProblem(problem, F=costs[:, None]), asked)
-        algorithm.tell(infills=asked)
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Let the algorithm learn the costs (n,)."""
+        if self._asked is None:
+            raise ValueError("tell must follow ask, got costs before proposals")
+        self._learn(finite_costs(costs))
+
+    def _begin(self) -> None:
+        from pymoo.config import Config
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+
+        rng, size = np.random.default_rng(self._seed), self._population_size
+        Config.warnings["not_compiled"] = False
+        kind = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{self._variant.lower()}"), self._variant)
+        self._algorithm: Any = kind(pop_size=size, sampling=draw_population(self._space, rng, size))
+        self._problem: Any = Problem(n_var=self._space.dimensions, n_obj=1, xl=-1.0, xu=1.0)
+        self._algorithm.setup(self._problem, termination=NoTermination(), seed=int(rng.integers(2**31)))
+        self._asked: Any = None
+        self._costs: list[Array] = []  # of all populations so far
+
+    def _learn(self, costs: Array) -> None:
+        from pymoo.problems.static import StaticProblem
+
+        self._algorithm.evaluator.eval(StaticProblem(self._problem, F=costs[:, None]), self._asked)
+        self._algorithm.tell(infills=self._asked)
+        self._costs.append(costs)
+        self._asked = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # some of pymoo's algorithms cannot be pickled: a copy is built again and learns the same costs
+        return {**self.__dict__, "_algorithm": None, "_problem": None, "_asked": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        costs = self._costs
+        self._begin()
+        for earlier in costs:
+            self.ask()
+            self._learn(earlier)
 
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Offer `pymoo:NAME`."""
-    register("pymoo", pymoo, needs=("pymoo", "posefit[pymoo]"))
+    """Register `pymoo:NAME`."""
+    register("pymoo", Pymoo, needs=("pymoo", "posefit[pymoo]"))

@@ -14,19 +14,24 @@ from typing import Any, final
 
 import numpy as np
 
-from posefit import hookimpl
-from posefit.arrays import Array
-from posefit.fitting.box import Space, draw_population, repair
-from posefit.fitting.bridge import bearable
-from posefit.fitting.check import at_least, positive
-from posefit.hooks import RegisterOptimiser
+from posefit.plugin import (
+    Array,
+    RegisterOptimiser,
+    Space,
+    at_least,
+    draw_population,
+    finite_costs,
+    hookimpl,
+    positive,
+    repair,
+)
 
-LEAST = 4  # proposals of a strategy: half of them are its parents
+MIN_POPULATION_OF_A_STRATEGY = 4  # proposals of a strategy: half of them are its parents
 
 
 @final
 class Ribs:
-    """CMA-ES that restarts from an archive of dominated novelty search: from whoever is far from all that are better.
+    """CMA-ES that restarts from an archive of dominated novelty search: from proposals far from all better ones.
 
     An archive of `capacity` proposals keeps those that are farthest from their nearest better ones. Several evolution
     strategies search at a time, and each starts again, after so many populations, from a random one of them. `modes`
@@ -56,7 +61,7 @@ class Ribs:
         from ribs.archives import DNSArchive
         from ribs.emitters import EvolutionStrategyEmitter
 
-        at_least("population_size", population_size, LEAST)
+        at_least("population_size", population_size, MIN_POPULATION_OF_A_STRATEGY)
         at_least("strategies", strategies, 1)
         at_least("capacity", capacity, 2)
         at_least("neighbours", neighbours, 1)
@@ -73,7 +78,7 @@ class Ribs:
         )
         if space.start is not None:
             step = min(step, max(float(np.mean(space.start.spread)), 1e-6))
-        strategies = min(strategies, population_size // LEAST)
+        strategies = min(strategies, population_size // MIN_POPULATION_OF_A_STRATEGY)
         self._strategies: list[Any] = [
             EvolutionStrategyEmitter(
                 self._archive,
@@ -98,7 +103,7 @@ class Ribs:
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Let the archive choose among its proposals and these, and every strategy learn from its own."""
-        values, where = -bearable(costs), self._where(proposals)
+        values, where = -finite_costs(costs), self._where(proposals)
         added = self._archive.add(proposals, values, where)
         if self._asked:
             stops = np.cumsum([one.batch_size for one in self._strategies])
@@ -126,5 +131,5 @@ class Ribs:
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Offer `ribs`."""
+    """Register `ribs`."""
     register("ribs", Ribs, needs=("ribs", "posefit[ribs]"))

@@ -10,15 +10,12 @@ True
 """
 
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
-from posefit import hookimpl
-from posefit.fitting.box import Space, draw_population
-from posefit.fitting.bridge import Bridged, Objective
-from posefit.fitting.check import at_least, one_of
-from posefit.hooks import RegisterOptimiser
+from posefit.plugin import RegisterOptimiser, Space, at_least, draw_population, hookimpl, one_of
+from posefit_scipy.bridge import Bridged, Objective
 
 Variant = Literal["differential_evolution", "dual_annealing"]
 
@@ -35,7 +32,7 @@ def scipy(
         population_size: size of differential evolution's population, 5 or more; dual annealing has none.
     """
     at_least("population_size", population_size, 5)
-    one_of("variant", variant, ("differential_evolution", "dual_annealing"))
+    one_of("variant", variant, get_args(Variant))
     return Bridged(space, rng, partial(_evolve, population_size) if variant == "differential_evolution" else _anneal)
 
 
@@ -68,5 +65,5 @@ def _anneal(space: Space, rng: np.random.Generator, objective: Objective) -> Non
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Offer `scipy:NAME`."""
+    """Register `scipy:NAME`."""
     register("scipy", scipy)

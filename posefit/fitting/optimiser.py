@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.box import Space
 
+WORST = 1e15  # few libraries bear nan, infinity or the square of 1e300
+
 
 class Optimiser(Protocol):
     """Proposes populations and learns their costs; nothing to inherit."""
@@ -54,6 +56,11 @@ OptimiserFactory = Callable[..., Optimiser]
 # What an optimiser does when the next frame comes: it is built anew to start around the prediction, SAPSO (6), (7); it
 # is a `Filter`, built once, and carries its particles; or it is built anew and starts anywhere.
 NextFrame = Literal["start", "carry", "forget"]
+
+
+def finite_costs(costs: Array) -> Array:
+    """Return costs (n,) that any library can work with: at most 1e15 to either side, nan the worst of all."""
+    return np.clip(np.where(np.isnan(costs), WORST, costs), -WORST, WORST)
 
 
 @dataclass(frozen=True, eq=False)
