@@ -17,8 +17,7 @@ from typing import Any, TypeVar
 from posefit.reading import parsed_json, read_text
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import cores, swept
-from posefit.sweep.engines.engine import Run
-from posefit.sweep.engines.limits import Limits
+from posefit.sweep.engines.engine import Limits, Run
 from posefit.sweep.engines.processes import Processes
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan

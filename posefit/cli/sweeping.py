@@ -38,7 +38,7 @@ def sweep(
     Exit status 1 where cells were quarantined after three attempts, 130 where somebody stopped it.
     """
     from posefit.sweep import command
-    from posefit.sweep.engines.limits import Limits
+    from posefit.sweep.engines.engine import Limits
 
     limits = Limits(places.pop("cell_seconds"), places.pop("cell_gigabytes"))
     where = command.Where(**places, limits=limits)

@@ -12,8 +12,7 @@ from pathlib import Path
 from posefit.sweep.cell import run_cell
 from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of, progress_of
 from posefit.sweep.driver import Driver
-from posefit.sweep.engines.engine import Engine, Run
-from posefit.sweep.engines.limits import Limits
+from posefit.sweep.engines.engine import Engine, Limits, Run
 from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.plan import Plan
 

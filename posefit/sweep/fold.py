@@ -4,7 +4,6 @@ Whatever happens meanwhile, no row is lost: it is written and brought to the dis
 goes, and until then the same row twice counts once.
 """
 
-import fcntl
 import json
 import os
 from collections.abc import Iterator
@@ -40,7 +39,9 @@ def fold_logs(ledger: Ledger, log: Writer) -> None:
 
 @contextmanager
 def _dead(folder: Path, log: Writer) -> Iterator[list[Path]]:
-    """Give the logs that nobody writes to, locked, so that nobody else folds them."""
+    """Give the logs of dead drivers, locked, so that no other driver folds them."""
+    import fcntl
+
     found, files = [], []
     try:
         for path in sorted(folder.glob(f"*{SUFFIX}")):

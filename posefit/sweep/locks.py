@@ -5,7 +5,6 @@ to the server, unless the disk is mounted with `nolock` or `local_lock`; then th
 leases of another one say nothing.
 """
 
-import fcntl
 import os
 import re
 from pathlib import Path
@@ -27,6 +26,8 @@ def locked(file: int, path: Path) -> None:
 
     Others only ever look whether it is locked, which takes a lock for a moment: that moment is waited for.
     """
+    import fcntl  # which Windows does not have: it can read ledgers
+
     try:
         fcntl.flock(file, fcntl.LOCK_EX)
     except OSError as error:
@@ -36,7 +37,9 @@ def locked(file: int, path: Path) -> None:
 
 
 def is_locked(path: Path) -> bool:
-    """Return whether anybody holds a lock on a file: whether the driver that writes a log lives."""
+    """Return whether a file is locked: whether the driver that writes a log lives."""
+    import fcntl
+
     try:
         file = os.open(path, os.O_RDONLY)
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""A sweep that somebody sabotages: `python -m tests.sweep.chaos --engine pebble|dask --cells 300 --events 60 --seed 1`.
+"""A sweep that somebody sabotages: `python -m tests.sweep.chaos --engine processes|dask --cells 300 --events 60 --seed 1`.
 
 Cells take half a second. While they run, events come at random moments: a process that runs a cell is killed, or a
 Dask worker, the driver, or the driver with its whole group; one is stopped and goes on; a log is cut off as power
@@ -193,7 +193,7 @@ def _ancestors(process: int) -> list[int]:
 def main() -> None:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--engine", choices=("pebble", "dask"), default="pebble")
+    parser.add_argument("--engine", choices=("processes", "dask"), default="processes")
     for name, default in (("cells", 300), ("events", 60), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=default)
     asked = parser.parse_args()

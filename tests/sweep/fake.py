@@ -1,6 +1,6 @@
 """Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
 
-`python -m tests.sweep.fake DIR pebble|dask CELLS` drives a sweep of such cells; what a cell does follows from its
+`python -m tests.sweep.fake DIR processes|dask CELLS` drives a sweep of such cells; what a cell does follows from its
 `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from posefit.sweep.cell import CellResult, TrackCell, packed_joints
-from posefit.sweep.engines.limits import Limits
+from posefit.sweep.engines.engine import Limits
 
 if TYPE_CHECKING:
     from posefit.sweep.drive import Tally
@@ -117,6 +117,7 @@ def main() -> int:
     """Drive a sweep as the command line says, and return its exit status."""
     from posefit.sweep.engines.cluster import Cluster
     from posefit.sweep.engines.processes import Processes
+    from tests.sweep.fake import behave  # by a name that other processes can import
 
     where, kind, many = sys.argv[1:4]
     made: Engine = Processes(2, LIMITS, behave)

@@ -19,7 +19,7 @@ from tests.sweep.fake import LIMITS, STARTS, cells, starts
 
 ROOT = Path(__file__).parents[2]
 CELLS, WORKER_KILLS, DRIVER_KILLS = 300, 5, 2
-ENGINES = ["pebble", pytest.param("dask", marks=pytest.mark.slow)]
+ENGINES = ["processes", pytest.param("dask", marks=pytest.mark.slow)]
 
 
 @contextmanager
@@ -110,7 +110,7 @@ def test_a_sabotaged_sweep_loses_and_doubles_no_row_and_quarantines_no_healthy_c
 
 
 def test_two_drivers_at_once_run_no_cell_twice(tmp_path: Path) -> None:
-    with driver(tmp_path, "pebble", 40, "slow") as one, driver(tmp_path, "pebble", 40, "slow") as other:
+    with driver(tmp_path, "processes", 40, "slow") as one, driver(tmp_path, "processes", 40, "slow") as other:
         assert one.wait(timeout=600) == 0
         assert other.wait(timeout=600) == 0
     assert len(Ledger(tmp_path / "ledger")) == 40
@@ -137,7 +137,7 @@ def test_ctrl_c_finishes_the_running_cells_and_the_next_sweep_goes_on(engine: st
 
 def test_ctrl_c_twice_stops_at_once_and_loses_no_row(tmp_path: Path) -> None:
     noted = tmp_path / "starts"
-    with driver(tmp_path, "pebble", 40, "slow") as process:
+    with driver(tmp_path, "processes", 40, "slow") as process:
         wait_for(lambda: len(starts(noted)) > 5)
         for _ in range(2):
             os.killpg(process.pid, signal.SIGINT)

@@ -18,8 +18,7 @@ import pytest
 from posefit.sweep.cell import TIMES, run_cell
 from posefit.sweep.drive import Tally, drive_cells
 from posefit.sweep.driver import ATTEMPTS, Driver
-from posefit.sweep.engines.engine import Engine, EngineError
-from posefit.sweep.engines.limits import Limits
+from posefit.sweep.engines.engine import Engine, EngineError, Limits
 from posefit.sweep.engines.processes import Processes
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
@@ -32,10 +31,10 @@ ROOT = Path(__file__).parents[2]
 Make = Callable[..., Engine]
 
 
-@pytest.fixture(params=["pebble", pytest.param("dask", marks=pytest.mark.slow)])
+@pytest.fixture(params=["processes", pytest.param("dask", marks=pytest.mark.slow)])
 def make(request: pytest.FixtureRequest) -> Make:
     """Return what makes an engine of two workers."""
-    if request.param == "pebble":
+    if request.param == "processes":
         return lambda run=behave, limits=LIMITS: Processes(2, limits, run)
     pytest.importorskip("distributed")
     from posefit.sweep.engines.cluster import Cluster
@@ -97,7 +96,7 @@ def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(t
         }
     )
     runs: list[tuple[str, Any, Engine]] = [
-        ("pebble", list(plan), Processes(2, Limits(), run_cell)),
+        ("processes", list(plan), Processes(2, Limits(), run_cell)),
         ("again", list(plan)[::-1], Processes(1, Limits(), run_cell)),
         ("dask", list(plan)[::-1], Cluster(workers=2, patience=PATIENCE)),
     ]
@@ -118,7 +117,7 @@ def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(t
     assert first["trace"]["cost"] == sorted(first["trace"]["cost"], reverse=True)
 
 
-@pytest.mark.parametrize("engine", ["pebble", pytest.param("dask", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ["processes", pytest.param("dask", marks=pytest.mark.slow)])
 def test_a_cell_that_ends_its_process_with_status_0_is_noticed_at_once(engine: str, tmp_path: Path) -> None:
     # the limit is an hour: a sweep that waits for it takes three, and no test here does
     bad = [replace(cells(1)[0], frames=n) for n in (fake.LEAVE, fake.EXIT)]
@@ -129,7 +128,7 @@ def test_a_cell_that_ends_its_process_with_status_0_is_noticed_at_once(engine: s
     assert reasons[fake.EXIT] == ["SystemExit: 0"] * 3
 
 
-@pytest.mark.parametrize("engine", ["pebble", pytest.param("dask", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ["processes", pytest.param("dask", marks=pytest.mark.slow)])
 def test_a_process_that_something_outside_kills_costs_its_cell_no_attempt(engine: str, tmp_path: Path) -> None:
     pair = [replace(cell, frames=fake.KILLED) for cell in cells(2)]
     running = made(engine, LIMITS)
@@ -147,7 +146,7 @@ def test_a_process_that_something_outside_kills_costs_its_cell_no_attempt(engine
     ]
 
 
-@pytest.mark.parametrize("engine", ["pebble", pytest.param("dask", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ["processes", pytest.param("dask", marks=pytest.mark.slow)])
 def test_limits_of_memory_and_time_segfaults_and_exceptions_are_the_cells_own_faults(engine: str) -> None:
     bad = [replace(cells(1)[0], frames=n) for n in (fake.SEGFAULT, fake.HOG, fake.RAISE, fake.ENDLESS)]
     running = made(engine, Limits(5.0, 0.6))
@@ -174,8 +173,8 @@ os.environ["NUMBA_NUM_THREADS"] = "2"
 import numba
 from tests.sweep.fake import compiled
 compiled()
-from posefit.sweep.engines.limits import alone
-alone()
+from posefit.sweep.engines.child import become_worker
+become_worker()
 assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
 assert compiled() == 1
 """
@@ -248,7 +247,7 @@ def listening() -> Iterator[str]:
 
 def made(engine: str, limits: Limits) -> Engine:
     """Return an engine of one worker."""
-    if engine == "pebble":
+    if engine == "processes":
         return Processes(1, limits, behave)
     pytest.importorskip("distributed")
     from posefit.sweep.engines.cluster import Cluster

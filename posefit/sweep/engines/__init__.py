@@ -2,7 +2,7 @@
 
     from contextlib import closing
     from posefit.sweep.cell import run_cell
-    from posefit.sweep.engines.limits import Limits
+    from posefit.sweep.engines.engine import Limits
     from posefit.sweep.engines.processes import Processes
 
     with closing(Processes(2, Limits(seconds=600.0), run_cell)) as engine:    # so many worker processes
@@ -11,9 +11,8 @@
 
 | looking for | file |
 |---|---|
-| what an engine is, and what becomes of a cell | engine.py |
-| processes of this machine, one pool a worker | processes.py |
+| what an engine is, the limits of a cell, and why one failed | engine.py |
+| processes of this machine | processes.py |
 | a Dask cluster, here or elsewhere | cluster.py |
-| a process of its own for a cell on a Dask worker | child.py |
-| how long and how much memory a cell may have; one thread of everything | limits.py |
+| the process that a cell runs in, of this machine or of a Dask worker | child.py |
 """

@@ -11,8 +11,7 @@ from typing import Any
 
 from posefit.sweep.cell import Cell, run_cell
 from posefit.sweep.engines.child import called
-from posefit.sweep.engines.engine import EngineError, Outcome, Run
-from posefit.sweep.engines.limits import Limits, text_of
+from posefit.sweep.engines.engine import EngineError, Limits, Outcome, Run, text_of
 
 PATIENCE = 30.0  # seconds to wait for a scheduler, or for workers, that are not there
 CONNECTING = 5.0  # seconds for one try

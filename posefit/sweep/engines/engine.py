@@ -1,20 +1,31 @@
-"""What runs cells, somewhere else: an engine. It keeps no order and no state; the ledger does."""
+"""What runs cells in other processes: an engine. It keeps no order and no state; the ledger does."""
 
 import signal
 from collections.abc import Callable
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 from posefit.sweep.cell import Cell, CellResult
-from posefit.sweep.engines.limits import FailedError, Limits, text_of
 
 J = TypeVar("J")  # a job: a cell, or whatever else its function takes
 R = TypeVar("R")
 Run = Callable[[Any], CellResult]
-# Signals that nothing in a cell brings about by mistake: somebody or something outside sent them. So does the kernel
-# where memory runs out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
+# Signals that nothing in a cell raises by mistake: they were sent from outside. So does the kernel where memory runs
+# out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
 OUTSIDE = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGPWR")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How many seconds a cell may take, and how much memory its process may have."""
+
+    seconds: float = 3600.0
+    gigabytes: float = 4.0
+
+    def __post_init__(self) -> None:
+        for name in ("seconds", "gigabytes"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"the limit of {name} must be above 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
@@ -57,6 +68,14 @@ class EngineError(ValueError):
     """An engine cannot go on."""
 
 
+class FailedError(Exception):
+    """A cell raised something, as one line: what a plugin raises may not survive the way to another process."""
+
+
+class NotStartedError(Exception):
+    """A process ended, or did not answer, before its cell began."""
+
+
 class DiedError(Exception):
     """A process ended before its cell did, with this status; a negative one is the signal that ended it."""
 
@@ -65,29 +84,27 @@ class DiedError(Exception):
         self.exitcode = exitcode
 
 
-def reason_of(error: BaseException, limits: Limits) -> tuple[str, bool]:
+def reason_of(error: Exception, limits: Limits) -> tuple[str, bool]:
     """Return in one line why a cell failed, and whether that is its own fault."""
+    if isinstance(error, DiedError) and error.exitcode < 0:
+        try:
+            name = signal.Signals(-error.exitcode).name
+        except ValueError:
+            name = f"signal {-error.exitcode}"
+        if name != "SIGALRM":  # the timer of `limited`
+            return f"its process died of {name}", name not in OUTSIDE
+        error = TimeoutError()
     if isinstance(error, TimeoutError):
         return f"it ran past its limit of {limits.seconds:g} s", True
     if isinstance(error, MemoryError):
         return f"it wanted more memory than its limit of {limits.gigabytes:g} GB", True
-    if isinstance(error, BrokenProcessPool):  # it had not begun
-        return "its process died before the cell began", False
-    if isinstance(error, FailedError):
-        return str(error), True
-    code = getattr(error, "exitcode", None)  # of `DiedError`, and of pebble's ProcessExpired
-    if isinstance(code, int) and code < 0:
-        name = _signal(-code)
-        if name == "SIGALRM":  # the timer that `limited` sets for when nobody else notices
-            return reason_of(TimeoutError(), limits)
-        return f"its process died of {name}", name not in OUTSIDE
-    if isinstance(code, int):
-        return f"its process ended itself with status {code}", True
+    if isinstance(error, DiedError):
+        return f"its process ended itself with status {error.exitcode}", True
+    if isinstance(error, NotStartedError | FailedError):
+        return str(error), isinstance(error, FailedError)
     return text_of(error), True
 
 
-def _signal(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
+def text_of(error: BaseException) -> str:
+    """Return an exception in one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
