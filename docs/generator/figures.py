@@ -17,7 +17,7 @@ ASKED = {
     "seed": ("", "the seed that everything random follows from"),
     "frames": ("frames", "how many frames were followed"),
     "evaluations_per_frame": ("", "budget of a frame, in each track"),
-    "tracks": (
+    "hypotheses": (
         "",
         "of each of several [tracks](../howto/tracks.md): its `beginning`, silhouette `cost` and pull of `motion`, and "
         "whether it was `kept`; empty where there was one",
@@ -29,7 +29,7 @@ ASKED = {
     "first_pose": ("", "how the first pose is found: searched, or given"),
     "kept_pass": ("", "which of these passes is told, the first being 1"),
     "passes": ("", "how often all frames were followed: [so](../howto/steady.md)"),
-    "steady": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/steady.md)"),
+    "smooth": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/steady.md)"),
     "views": ("", "number of cameras"),
     "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
     "size": ("pixels", "width and height of the first camera's masks"),

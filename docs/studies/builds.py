@@ -19,8 +19,9 @@ from posefit.footage.scene import Rendered, synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
-from posefit.tracking.method import Choice, prepare
+from posefit.tracking.method import prepare
 from posefit.tracking.opening import BODY_FRAMES, built, following
+from posefit.tracking.options import TrackOptions
 from posefit_reproduce.grid import Progress, each
 from posefit_reproduce.known import SIZE, known_task
 from table import WORKERS, bar
@@ -87,14 +88,14 @@ def _told(off: Array) -> dict[str, dict[str, float]]:
 
 def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[float]]:
     """Return by how many percent a subject's parts are off after the fit, and as they were taken to be before it."""
-    choice, average, true = Choice(prior="loose"), Body.of(built_in.average_skeleton()), subject(seed)
+    options, average, true = TrackOptions(method="@loose"), Body.of(built_in.average_skeleton()), subject(seed)
     walk = replace(built_in.motion(motion), skeleton=true.skeleton)
     scene = synthetic(walk, setup.views_degrees, SIZE, [], (None, None))
     scene = replace(scene, body=true, observations=Rendered(walk, true, scene.cameras))
     height = true.stature if setup.stature else None
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
-    task = known_task(scene, choice, start, setup.translation)
-    shape = built(task, scene.observations, following(prepare(choice, task)), BODY_FRAMES, height, seed)
+    task = known_task(scene, options, start, setup.translation)
+    shape = built(task, scene.observations, following(prepare(options, task)), BODY_FRAMES, height, seed)
     return _off(shape.body, true), _off(start, true)
 
 

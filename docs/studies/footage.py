@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.cli.options import box, frame_range
+from posefit.cli.options import FRAMES, box, parsed_by
 from posefit.footage.masks import Range, existing
 from posefit.footage.segmentation import WIDTH, Box, Extraction
 from posefit.footage.video import Video
@@ -152,8 +152,10 @@ def _overlaps(motion: Motion, radii: Array, camera: Camera, seen: list[Mask]) ->
 
 @click.command(help=__doc__)
 @click.argument("video")
-@click.option("--roi", callback=box, required=True, metavar="X,Y,W,H", help="Where the person is, in pixels.")
-@click.option("--frames", callback=frame_range, metavar="A:B", help="Frames that are followed; by default all.")
+@click.option(
+    "--roi", callback=parsed_by(box), required=True, metavar="X,Y,W,H", help="Where the person is, in pixels."
+)
+@FRAMES
 @click.option("--seeds", type=click.IntRange(1), default=5, show_default=True, help="Tracks, one a seed.")
 @WORKERS
 def main(video: str, roi: Box, frames: Range, seeds: int, workers: int | None) -> None:

@@ -25,11 +25,10 @@ from posefit.footage.training import training_clips, training_motions
 from posefit.reading import parsed_json, read_text
 from posefit.silhouette.corruption import shadow, wandering
 from posefit.silhouette.mask import Mask, Silhouette
-from posefit.sweep.cell import TrackCell, cell_scene, parts
+from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.tracking.evaluation import LOST
-from posefit.tracking.method import Choice
-from posefit.tracking.opening import Opening
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.run import follow
 from posefit.uncertainty.calibration import auroc, calibration_error, false_alarms, kept_errors
 from posefit_exemplars.lost import NAMES, Detector, Judge, Memory
@@ -335,11 +334,14 @@ def _tracked(cell: TrackCell, track: Turn) -> dict[str, Any]:
     if track.condition == MASKS:
         seed = [track.clip.instance, *track.clip.name.encode()]
         scene = replace(scene, observations=Worn(scene.observations, seed))
-    optimiser, prior, tracker = parts(cell.method)
-    named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
     training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
-    choice = Choice(evaluations=cell.evaluations, **named)
-    told = follow(scene, training, choice=choice, opening=Opening(translation=cell.translation), seed=cell.seed)  # type: ignore[arg-type]
+    options = TrackOptions(
+        method=cell.method,
+        evaluations=cell.evaluations,
+        translation=cell.translation,  # type: ignore[arg-type]
+        seed=cell.seed,
+    )
+    told = follow(scene, training, options)
     row = {
         "subject": track.clip.subject,
         "group": track.group,

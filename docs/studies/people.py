@@ -26,11 +26,10 @@ from posefit.footage.scene import Rendered, Scene, synthetic
 from posefit.footage.training import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Silhouette
-from posefit.sweep.cell import ALL_AROUND, TrackCell, cell_scene, parts
+from posefit.sweep.cell import ALL_AROUND, TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
-from posefit.tracking.method import Choice
-from posefit.tracking.opening import Opening
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.run import follow
 from posefit_reproduce.grid import Progress, each, rows
 from table import LEDGER, WORKERS, bar, grouped, markdown, percent
@@ -269,11 +268,9 @@ def _cell(method: str, evaluations: int, clip: Piece, views: Views, kind: str) -
 def _tried(cell: TrackCell, clip: Piece, views: Views, kind: str, translation: Translation) -> dict[str, Any]:
     scene = cell_scene(cell)
     scene, gone, back = returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
-    optimiser, prior, tracker = parts(cell.method)
-    named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
     training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
-    choice, opening = Choice(evaluations=cell.evaluations, **named), Opening(translation=translation)
-    track = follow(scene, training, choice=choice, opening=opening)
+    options = TrackOptions(method=cell.method, evaluations=cell.evaluations, translation=translation)
+    track = follow(scene, training, options)
     told = {"clip": clip.name, "views_degrees": list(views), "kind": kind, "translation": translation}
     mpjpe = np.array([row["mpjpe_mm"] for row in track.frames])
     assert track.truth is not None

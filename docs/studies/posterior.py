@@ -25,10 +25,9 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.motion import recorded
 from posefit.searching.doubt import LEAST_COST
-from posefit.sweep.cell import cell_scene, parts, settings_text
+from posefit.sweep.cell import cell_scene, settings_text
 from posefit.sweep.check import cell_of
-from posefit.tracking.method import Choice, parse_settings
-from posefit.tracking.opening import Opening
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.run import follow
 from posefit.uncertainty.calibration import (
     LEVELS,
@@ -167,13 +166,14 @@ def followed(seen: OneTrack) -> Followed:
     """Return a clip that was followed by a library without the person who moves in it."""
     cell = cell_of(seen.spec)
     scene = cell_scene(cell)
-    optimiser, prior, tracker = parts(cell.method)
-    settings: dict[str, Any] = dict(parse_settings(settings_text(cell.settings), optimiser, prior, tracker))
-    named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
-    choice = Choice(evaluations=cell.evaluations, **named, **settings)
     training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
-    opening = Opening(translation="known" if cell.translation == "known" else "aligned")
-    track = follow(scene, training, choice=choice, opening=opening)
+    options = TrackOptions(
+        method=cell.method,
+        settings=settings_text(cell.settings),
+        evaluations=cell.evaluations,
+        translation="known" if cell.translation == "known" else "aligned",
+    )
+    track = follow(scene, training, options)
     assert track.truth is not None
     posteriors = [one.posterior for one in track.found]
     most = max(len(one) for one in posteriors if one is not None)

@@ -14,7 +14,8 @@ from posefit.footage.training import training_clips, training_motions
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check, planned
-from posefit.tracking.method import Choice, prepare
+from posefit.tracking.method import prepare
+from posefit.tracking.options import TrackOptions
 from posefit_envs.searched.desk import Desk
 from posefit_envs.searched.stepwise import Stepwise
 from posefit_envs.track import TrackEnv, committed
@@ -98,7 +99,8 @@ def track_reference(
     made, world = followed.instance, followed.world
     motions = training_motions(training_clips(train or world.training, followed=world.motion), made.task.fps)
     task = replace(made.task, training=motions)
-    method = prepare(Choice(tracker=tracker, tracker_settings=settings), task)
+    own = {f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()}
+    method = prepare(TrackOptions(method=tracker, settings=own), task)
     frames = method.tracker(task).track(made.observations, np.random.default_rng(seed))
     return [
         committed(made, k, frame.pose, frame.translation, frame.cost, errors=True) for k, frame in enumerate(frames)

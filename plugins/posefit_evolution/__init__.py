@@ -5,7 +5,7 @@
 other implementation.
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="cma", frames=(0, 3))
+>>> track = posefit.track("walk", method="cma", frames=(0, 3))
 >>> track.summary["iou"] > 0.5
 True
 """

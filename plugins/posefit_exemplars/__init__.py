@@ -14,7 +14,7 @@ Toyama and Blake, Probabilistic tracking in a metric space, 2001.
 - `tracker` does a frame after the other, `factory` is registered.
 
 >>> import posefit
->>> track = posefit.track("walk-a", tracker="exemplars", train=["walk-b", "walk-c"], frames=(0, 10))
+>>> track = posefit.track("walk-a", method="exemplars", train=["walk-b", "walk-c"], frames=(0, 10))
 >>> track.measures.lost_rate
 0.0
 """

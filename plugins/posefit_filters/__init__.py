@@ -6,7 +6,7 @@
 `resampling` weighs particles and resamples them; `kernels` finds how sharply.
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="annealed", frames=(0, 3))
+>>> track = posefit.track("walk", method="annealed", frames=(0, 3))
 >>> track.summary["iou"] > 0.5
 True
 """

@@ -3,7 +3,7 @@
 J. Rapin, O. Teytaud, Nevergrad, a gradient-free optimization platform, 2018. `pip install posefit[nevergrad]`.
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="nevergrad:OnePlusOne", frames=(0, 3))
+>>> track = posefit.track("walk", method="nevergrad:OnePlusOne", frames=(0, 3))
 >>> track.summary["iou"] > 0.3
 True
 """

@@ -4,7 +4,7 @@ T. Akiba et al., Optuna: a next-generation hyperparameter optimization framework
 `pip install posefit[optuna]`.
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="optuna:CmaEsSampler", frames=(0, 3), evaluations=100)
+>>> track = posefit.track("walk", method="optuna:CmaEsSampler", frames=(0, 3), evaluations=100)
 >>> track.summary["iou"] > 0.3
 True
 """

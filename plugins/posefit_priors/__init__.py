@@ -9,7 +9,7 @@
 `arrays` checks what comes in, `kernels` has the loops.
 
 >>> import posefit
->>> track = posefit.track("walk", prior="loose", frames=(0, 3))
+>>> track = posefit.track("walk", method="@loose", frames=(0, 3))
 >>> track.summary["iou"] > 0.5
 True
 """

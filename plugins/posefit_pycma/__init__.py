@@ -3,7 +3,7 @@
 N. Hansen, Y. Akimoto, P. Baudis, CMA-ES/pycma on GitHub, 2019. `pip install posefit[pycma]`.
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="pycma", frames=(0, 3))
+>>> track = posefit.track("walk", method="pycma", frames=(0, 3))
 >>> track.summary["iou"] > 0.5
 True
 """

@@ -3,7 +3,7 @@
 J. Blank, K. Deb, pymoo: multi-objective optimization in Python, IEEE Access 8, 2020. `pip install posefit[pymoo]`.
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="pymoo:DE", frames=(0, 3))
+>>> track = posefit.track("walk", method="pymoo:DE", frames=(0, 3))
 >>> track.summary["iou"] > 0.5
 True
 """

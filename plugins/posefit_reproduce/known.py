@@ -11,7 +11,8 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
-from posefit.tracking.method import Choice, prepare
+from posefit.tracking.method import prepare
+from posefit.tracking.options import TrackOptions
 
 SIZE = (320, 240)  # pixels
 FRAMES = 60  # at 30 a second
@@ -22,15 +23,15 @@ def known_scene(motion: str, views_degrees: Sequence[float]) -> Scene:
     return synthetic(built_in.motion(motion, frames=FRAMES), views_degrees, SIZE, [], (None, None))
 
 
-def known_task(scene: Scene, choice: Choice, body: Body, translation: Translation = "known") -> Task:
+def known_task(scene: Scene, options: TrackOptions, body: Body, translation: Translation = "known") -> Task:
     """Return the task of following a scene with a body that need not be the true one."""
     training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]
-    return Task(body, scene.cameras, choice.budget(), scene.yaw, scene.anchor, translation, training=training)
+    return Task(body, scene.cameras, options.budget, scene.yaw, scene.anchor, translation, training=training)
 
 
-def follow_known(task: Task, choice: Choice, observations: Sequence[Observation], seed: int) -> list[Frame]:
+def follow_known(task: Task, options: TrackOptions, observations: Sequence[Observation], seed: int) -> list[Frame]:
     """Return the frames of a track."""
-    return list(prepare(choice, task).tracker(task).track(observations, np.random.default_rng(seed)))
+    return list(prepare(options, task).tracker(task).track(observations, np.random.default_rng(seed)))
 
 
 def known_errors(scene: Scene, frames: Sequence[Frame]) -> dict[str, float]:

@@ -5,7 +5,7 @@ M. Faldor et al., Dominated novelty search: rethinking local competition in qual
 `pip install posefit[ribs]`.
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="ribs", frames=(0, 3))
+>>> track = posefit.track("walk", method="ribs", frames=(0, 3))
 >>> track.summary["iou"] > 0.5
 True
 """

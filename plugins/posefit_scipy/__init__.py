@@ -4,7 +4,7 @@ R. Storn, K. Price, Differential evolution, Journal of Global Optimization 11, 1
 simulated annealing for global optimization, The R Journal 5(1), 2013.
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="scipy:differential_evolution", frames=(0, 3))
+>>> track = posefit.track("walk", method="scipy:differential_evolution", frames=(0, 3))
 >>> track.summary["iou"] > 0.5
 True
 """

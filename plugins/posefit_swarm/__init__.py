@@ -8,7 +8,7 @@
 `swarm` has constants and inertia, `flock.Flock` what both swarms share, and `kernels` the equations (1) and (2).
 
 >>> import posefit
->>> track = posefit.track("walk", optimiser="sapso", frames=(0, 3))
+>>> track = posefit.track("walk", method="sapso", frames=(0, 3))
 >>> track.summary["iou"] > 0.5
 True
 """

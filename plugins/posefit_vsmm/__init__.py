@@ -13,7 +13,7 @@ models knows what the person does: walking, arms held out, jumping jacks, jumps,
 `tracker` is `vsmm`, from its settings to a frame; `joined` leads a swarm by the models. `kernels` has the loops.
 
 >>> import posefit
->>> track = posefit.track("jacks", tracker="vsmm", frames=(0, 3), translation="aligned", view_degrees=0.0)
+>>> track = posefit.track("jacks", method="vsmm", frames=(0, 3), translation="aligned", view_degrees=0.0)
 >>> track.summary["iou"] > 0.5
 True
 """

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from posefit.fitting.check import finite_number, whole
 from posefit.fitting.shape import NAMES, shaped
 from posefit.footage.masks import FPS
 from posefit.footage.scene import Scene
-from posefit.footage.source import HEIGHTS, Source, Viewing, kind_of, scene_of, useless_for
+from posefit.footage.source import HEIGHTS, Source, kind_of, scene_of, useless_for
 from posefit.footage.training import training_clips, training_motions
 from posefit.geometry.alike import facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.geometry.body import Body
@@ -38,6 +38,7 @@ from posefit.reading import parsed_json, read_text
 from posefit.silhouette.cost import pose_costs, project
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
+from posefit.tracking.options import TrackOptions
 from posefit.uncertainty.modes import Posterior, modes_of
 from posefit.uncertainty.searches import boltzmann_weights
 
@@ -375,20 +376,21 @@ def ambiguity_of(
     temperature: float = 2.0,
     train: Sequence[Source] = (recorded.LIBRARY,),
     translation: Literal["known", "aligned"] | None = None,
-    viewing: Viewing | None = None,
     build: str | Path | None = None,
     threads: int = 1,
     say: Callable[[str], None] | None = None,
+    **options: Any,
 ) -> Ambiguity:
     """Return every library pose that costs at most `within` more than the best one in one frame of a source.
 
-    `source` and `viewing` are as for `posefit.track`; the frame of a motion is counted after resampling, of footage as
-    filmed. The poses are those of `train` and their mirror images, each at 72 yaws, without the source's own clip;
-    their weights are exp(-cost / temperature). The root stands at its known translation or, for footage and where
-    `translation` is "aligned", where the body fills the silhouettes' borders. `build` is the folder of a track of the
-    same footage, whose fitted build is used; otherwise the body is average. The floor of one camera is compared with
-    that of two: for a known motion a second camera at right angles is added; of several cameras each is also taken
-    alone. Raises ValueError for every mistake in the arguments or files.
+    `source` and the `options` that say how it is looked at, such as `view_degrees`, are as for `posefit.track`; the
+    frame of a motion is counted after resampling, of footage as filmed. The poses are those of `train` and their
+    mirror images, each at 72 yaws, without the source's own clip; their weights are exp(-cost / temperature). The
+    root stands at its known translation or, for footage and where `translation` is "aligned", where the body fills
+    the silhouettes' borders. `build` is the folder of a track of the same footage, whose fitted build is used;
+    otherwise the body is average. The floor of one camera is compared with that of two: for a known motion a second
+    camera at right angles is added; of several cameras each is also taken alone. Raises ValueError for every
+    mistake in the arguments or files.
     """
     frame, threads = whole("frame", frame, 0), whole("threads", threads, 1)
     if not finite_number("within", within) >= 0.0:
@@ -403,12 +405,12 @@ def ambiguity_of(
         raise ValueError("translation must be aligned where only masks are given, got known")
     if motion and build is not None:
         raise useless_for("motion", "build", str(build), "footage")
-    viewing = viewing or Viewing()
+    viewing = TrackOptions(**options)
     clips = training_clips(train, viewing.asf, followed=sources[0])  # before the work, as a name may be wrong
     listener = Listener(say or QUIET.say, QUIET.progress)
     if not motion:
-        viewing = replace(viewing, frames=(frame, frame + 1))
-    scene = scene_of(sources, viewing, listener)
+        viewing = viewing.changed(frames=(frame, frame + 1))
+    scene = scene_of(sources, listener, **viewing.view)
     if build is not None:
         scene = replace(scene, body=body_of(build, scene.body))
     moment = _moment(scene, frame if motion else 0, frame, translation, threads)

@@ -1,6 +1,6 @@
 """The command line. Messages and progress go to stderr, results to stdout; a mistake is one line and exit status 2.
 
-The commands stand in `following`, `doubt`, `sweeping`, `motions`, `suite` and `plugins`; plugins add others, see
+The commands stand in `tracking`, `ambiguity`, `sweeping`, `motions`, `suite` and `plugins`; plugins add others, see
 `posefit.hooks`. What each does is imported when it runs.
 """
 
@@ -8,16 +8,16 @@ from typing import Any
 
 import click
 
-from posefit.cli import following, plugins, suite, sweeping
-from posefit.cli.doubt import ambiguity
+from posefit.cli import plugins, suite, sweeping, tracking
+from posefit.cli.ambiguity import ambiguity
 from posefit.cli.motions import motions
 from posefit.version import __version__
 
 MISTAKE = 2  # the exit status of everything that is told in one line
 BUILT_IN = (
-    following.track,
-    following.fit,
-    following.extract,
+    tracking.track,
+    tracking.fit,
+    tracking.extract,
     ambiguity,
     sweeping.sweep,
     sweeping.report,

@@ -4,13 +4,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from posefit.cli.options import frame_range
+from posefit.cli.options import parsed_by
 from posefit.cli.output import json_line, progress, results_alone, say
+from posefit.tracking.options import text_range
 
 if TYPE_CHECKING:
     from posefit.suites.running import SuiteRun
 
 NAME = "posefit-2026.1"
+
+
+def _instances(default: str) -> Any:
+    return click.option(
+        "--instances",
+        callback=parsed_by(text_range),
+        default=default,
+        show_default=True,
+        metavar="A:B",
+        help="A to B - 1.",
+    )
 
 
 @click.group(invoke_without_command=True)
@@ -39,7 +51,12 @@ def suite(context: click.Context, as_json: bool) -> None:
 @click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
 @click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
 @click.option(
-    "--instances", callback=frame_range, default="10000:10005", show_default=True, metavar="A:B", help="A to B - 1."
+    "--instances",
+    callback=parsed_by(text_range),
+    default="10000:10005",
+    show_default=True,
+    metavar="A:B",
+    help="A to B - 1.",
 )
 @click.option("--budget", type=int, default=100, show_default=True, help="Evaluations for each dimension, as in plans.")
 @click.option("--seed", type=int, default=0, show_default=True)
@@ -130,7 +147,12 @@ def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
 @click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
 @click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
 @click.option(
-    "--instances", callback=frame_range, default="10000:10003", show_default=True, metavar="A:B", help="A to B - 1."
+    "--instances",
+    callback=parsed_by(text_range),
+    default="10000:10003",
+    show_default=True,
+    metavar="A:B",
+    help="A to B - 1.",
 )
 @click.option("--method", "methods", multiple=True, help="Searches with the usual budget; repeatable.")
 @click.option("--times", type=int, default=100, show_default=True, help="How much longer CMA-ES searches; 0 for not.")

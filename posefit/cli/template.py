@@ -42,7 +42,11 @@ def write_plugin(
         class_name += kind.capitalize()
     usage = [f"posefit {name}"]
     if kind != COMMAND:
-        used = f"extract VIDEO --out masks --method {name}" if kind == "segmenter" else f"track walk --{kind} {name}"
+        used = (
+            f"extract VIDEO --out masks --extraction {name}"
+            if kind == "segmenter"
+            else f"track walk --method {'@' if kind == 'prior' else ''}{name}"
+        )
         usage = [f"posefit check {kind} {name}", f"posefit {used}"]
     words = {
         "name": name,

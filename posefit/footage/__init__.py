@@ -1,8 +1,8 @@
 """Motions, masks and videos become a `Scene`: the person, the cameras and what they observed.
 
-    from posefit.footage.source import Viewing, scene_of
+    from posefit.footage.source import scene_of
 
-    scene = scene_of(["walk"], Viewing(view_degrees=[0.0, 90.0]))     # two cameras see a built-in motion
+    scene = scene_of(["walk"], view_degrees=[0.0, 90.0])     # two cameras see a built-in motion
     print(scene.count, scene.observations[0].silhouettes[1].mask.shape)
 
 | looking for | file |

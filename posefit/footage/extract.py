@@ -33,7 +33,7 @@ def extract(
     masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,) and `fps`. The folder appears whole or not at
     all. Raises ValueError for every mistake in arguments or files, where no frame shows a person, and on a full disk.
     """
-    target = Path(out)
+    how, target = how or Extraction(), Path(out)
     if os.path.lexists(target):
         raise ValueError(f"{target}: expected a new folder, got one that exists")
     video, how = Video.of(source), how or Extraction()

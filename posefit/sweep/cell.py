@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from posefit.footage.scene import Scene
     from posefit.geometry.skeleton import Skeleton
     from posefit.motion.motion import Motion
-    from posefit.tracking.method import Choice
-    from posefit.tracking.opening import Opening
 
 MAX_TRACE_POINTS = 64
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
@@ -159,6 +157,7 @@ class TrackCell(Cell):
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
         from posefit.footage.training import training_clips, training_motions
         from posefit.tracking.measures import MEASURES
+        from posefit.tracking.options import TrackOptions
         from posefit.tracking.run import follow
 
         for path, digest in self.files.items():
@@ -166,8 +165,9 @@ class TrackCell(Cell):
                 raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
         scene = cell_scene(self)
         training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
-        options: dict[str, Any] = {"choice": _choice(self), "opening": _opening(self), "tracks": self.tracks}
-        result = follow(scene, training, seed=self.seed, **options)
+        same = {name: getattr(self, name) for name in ("method", "evaluations", "translation", "first_pose", "seed")}
+        options = TrackOptions(settings=settings_text(self.settings), hypotheses=self.tracks, **same)
+        result = follow(scene, training, options)
         truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
         errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
         row = {
@@ -373,22 +373,6 @@ def _spent(frame: "Frame") -> "Array":
         return np.asarray(frame.spent)
     count = len(frame.history)
     return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
-
-
-def _choice(cell: TrackCell) -> "Choice":
-    from posefit.tracking.method import Choice, parse_settings
-
-    optimiser, prior, tracker = parts(cell.method)
-    settings: dict[str, Any] = dict(parse_settings(settings_text(cell.settings), optimiser, prior, tracker))
-    named: dict[str, Any] = {"tracker": tracker} if tracker else {"optimiser": optimiser, "prior": prior}
-    return Choice(evaluations=cell.evaluations, **named, **settings)
-
-
-def _opening(cell: TrackCell) -> "Opening":
-    from posefit.tracking.opening import Opening
-
-    opening: dict[str, Any] = {name: getattr(cell, name) for name in ("translation", "first_pose")}
-    return Opening(**opening)
 
 
 def _joints(motion: "Motion | None") -> "Array":

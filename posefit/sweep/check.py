@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from posefit.fitting.space import TRANSLATIONS
+from posefit.fitting.tracker import Prediction
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
 from posefit.footage.training import training_clips
@@ -20,7 +21,7 @@ from posefit.registry import Kind, Offer, registry
 from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import ALL_AROUND, DROPPED, TrackCell, digest_of, parts, settings_text, version_of
-from posefit.tracking.method import parse_settings
+from posefit.tracking.method import parsed_settings
 
 FIELDS = tuple(one.name for one in fields(TrackCell) if one.name not in ("files", "version"))
 MAX_SIDE = 16_384  # pixels
@@ -90,17 +91,18 @@ def _offers(method: str) -> tuple[Offer, ...]:
 @lru_cache(maxsize=1024)
 def _settings(method: str, texts: tuple[str, ...]) -> dict[str, Any]:
     """Return the settings that texts such as `sapso.cooling=0.9` give, sorted, each of the type that it has to be."""
-    optimiser, prior, tracker = parts(method)
+    tracker = parts(method)[2]
     for text in texts:
         if text.partition(".")[0] not in names_of(method):
             known = ", ".join(names_of(method))
             raise ValueError(f"settings must be of {known}, which {cut(method)} uses, got {quoted(text)}")
-    parsed = parse_settings(texts, optimiser, prior, tracker)
-    homes = {optimiser: "optimiser", prior: "prior", "tracker": "tracker"} if tracker is None else {tracker: "tracker"}
+    places: dict[str, tuple[str, Any]] = {} if tracker else {"tracker": ("tracker", Prediction)}
+    for offer in _offers(method):
+        family = offer.name.partition(":")[0]
+        places[family] = family, offer.factory
     typed: dict[str, Any] = {}
-    for name, kind in homes.items():
-        family = name.partition(":")[0]
-        typed |= {f"{family}.{setting}": value for setting, value in parsed[f"{kind}_settings"].items()}
+    for family, mine in parsed_settings(places, texts).items():
+        typed |= {f"{family}.{setting}": value for setting, value in mine.items()}
     return dict(sorted(typed.items()))
 
 

@@ -5,14 +5,14 @@
     print(result.measures.mpjpe_mm, result.motion.poses.shape)
 
     from pathlib import Path                                    # the same in pieces
-    from posefit.footage.source import Viewing, scene_of
+    from posefit.footage.source import scene_of
     from posefit.motion import built_in
-    from posefit.tracking.method import Choice
+    from posefit.tracking.options import TrackOptions
     from posefit.tracking.run import follow
 
-    scene = scene_of(["walk"], Viewing(view_degrees=[90.0]))
+    scene = scene_of(["walk"], view_degrees=[90.0])
     training = [built_in.motion(style) for style in built_in.other_styles("walk")]
-    result = follow(scene, training, choice=Choice(optimiser="pso"), seed=1)
+    result = follow(scene, training, TrackOptions(method="pso", seed=1))
 
 | looking for | file |
 |---|---|

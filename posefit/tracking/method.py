@@ -1,122 +1,101 @@
-"""A method, by names: an optimiser and a prior, or a tracker; with its settings checked and its plugins watched.
+"""A method by its one string: `sapso@pca`, `cma`, `@loose`, or a tracker's name; its settings checked, plugins watched.
 
-`usual` says which one is used, and what it learns from, where nobody does.
+`resolved` fills in the method of a source, and what it learns from, where the options leave them open.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from posefit import settings
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import Space
 from posefit.fitting.guard import Audit, BrokenRuleError, Guarded, GuardedPrior, GuardedTracker, blamed
-from posefit.fitting.optimiser import NextFrame, Optimiser, OptimiserFactory
+from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
-from posefit.fitting.tracker import (
-    Prediction,
-    SynthesisTracker,
-    Task,
-    Tracker,
-    TrackerFactory,
-)
+from posefit.fitting.tracker import Prediction, SynthesisTracker, Task, Tracker
 from posefit.footage.source import Source, kind_of
 from posefit.motion import built_in, recorded
 from posefit.registry import Kind, Offer, registry
 from posefit.searching.tracker import WeighingTracker
 from posefit.silhouette.cost import BETA
+from posefit.tracking.options import TrackOptions
 
-FOLLOWER = "exemplars"  # the tracker of footage, where nobody names another method and it is installed
-ITERATIONS = 60  # C of the SAPSO paper, section 5.2
-SOME = 1000  # poses of which one at least has to be feasible in a prior
-
-Settings = Mapping[str, Any]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Choice:
-    """What a user chose: names or factories, their settings, and the budget."""
-
-    optimiser: str | OptimiserFactory = "sapso"
-    prior: str | Prior = "pca"
-    tracker: str | TrackerFactory | None = None
-    optimiser_settings: Settings = field(default_factory=dict)
-    prior_settings: Settings = field(default_factory=dict)
-    tracker_settings: Settings = field(default_factory=dict)
-    particles: int | None = None
-    iterations: int | None = None
-    evaluations: int | None = None
-    ask_seconds: float | None = None
-
-    def budget(self) -> int:
-        """Return how many evaluations a frame may have: N (C + 1) where nothing else is said.
-
-        Raises ValueError where a number makes no sense, or two of them contradict each other.
-        """
-        for name in ("particles", "iterations", "evaluations"):
-            value = getattr(self, name)
-            if value is not None and value < 1:
-                raise ValueError(f"{name} must be at least 1, got {value}")
-        if self.ask_seconds is not None and not self.ask_seconds > 0.0:
-            raise ValueError(f"ask_seconds must be above 0, got {self.ask_seconds}")
-        if self.evaluations is not None and self.iterations is not None:
-            raise ValueError("evaluations and iterations must not both be given: a budget has so many iterations")
-        return self.evaluations or (self.particles or settings.POPULATION_SIZE) * ((self.iterations or ITERATIONS) + 1)
+DEFAULT_OPTIMISER = "sapso"
+DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
+DEFAULT_TRACKER = "exemplars"  # of footage, where it is installed
+FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
 
 
-@dataclass(frozen=True, eq=False)
-class Usual:
-    """What a source is followed with, and what that learns from."""
+class MethodNames(NamedTuple):
+    """The plugins that a method names: an optimiser and a prior, or a tracker, which has neither ("")."""
 
-    method: dict[str, Any]  # a tracker, or an optimiser and a prior, as `Choice` takes them
-    train: Sequence[Source]
+    optimiser: str
+    prior: str
+    tracker: str | None = None
+
+    def __str__(self) -> str:
+        return self.tracker or f"{self.optimiser}@{self.prior}"
 
 
-def usual(
-    source: Source,
-    *,
-    optimiser: str | OptimiserFactory | None = None,
-    prior: str | Prior | None = None,
-    tracker: str | TrackerFactory | None = None,
-    train: Sequence[Source] = (),
-    searched: bool = False,
-) -> Usual:
-    """Return what a source is followed with; what a user has not said is as follows.
+def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> MethodNames:
+    """Return the plugins that a method such as `sapso@pca` names. Raises InputError listing those that are known."""
+    optimiser, at, prior = (method or "@").partition("@")
+    if at:
+        return MethodNames(optimiser or DEFAULT_OPTIMISER, prior or default_prior)
+    offers, family = registry().offers, optimiser.partition(":")[0]
+    if family in offers["tracker"]:
+        return MethodNames("", "", optimiser)
+    if family in offers["optimiser"]:
+        return MethodNames(optimiser, default_prior)
+    known = [*sorted(offers["tracker"]), *sorted(offers["optimiser"])]
+    near = get_close_matches(optimiser, known, 1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise InputError(f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {method!r}{hint}")
 
-    A motion is followed by `sapso` with `pca`, which learns from the other styles of a built-in motion, or else from
-    the built-in walks. Footage, whose truth nobody knows, is followed by the tracker `exemplars`, which learns from the
-    library of recorded motions; where an optimiser, a prior or settings of theirs (`searched`) are given, by `sapso`
-    with `loose`. Other trackers than `exemplars`, too, learn from the built-in walks, as they have to be told what kind
-    of motion it is. Raises ValueError for a tracker beside an optimiser or a prior.
+
+def resolved(source: Source, options: TrackOptions) -> TrackOptions:
+    """Return options whose method and training motions are known, by default those of the source.
+
+    A motion is tracked by `sapso@pca`, which learns from the other styles of a built-in motion, or else from the
+    built-in walks. Footage is tracked by `exemplars`, which learns from the library of recorded motions; where an
+    optimiser, a prior or settings of theirs are given, by `sapso@loose`. Other trackers than `exemplars` learn from the
+    built-in walks, too.
     """
-    for name, value in (("optimiser", optimiser), ("prior", prior)):
-        if tracker is not None and value is not None:
-            raise ValueError(f"{name} must not be given beside a tracker, got {value} and {tracker}")
-    footage = kind_of(source) != "motion"
-    if footage and tracker is None and optimiser is None and prior is None and not searched:
-        tracker = FOLLOWER if FOLLOWER in registry().offers["tracker"] else None
-    method: dict[str, Any] = {"tracker": tracker}
-    if tracker is None:
-        method = {"optimiser": optimiser or "sapso", "prior": prior or ("loose" if footage else "pca")}
-    if not train and footage and tracker == FOLLOWER:
+    footage, method = kind_of(source) != "motion", options.method
+    searched = options.optimiser is not None or options.prior is not None or _sets_search(options.settings)
+    if method is None and footage and not searched and DEFAULT_TRACKER in registry().offers["tracker"]:
+        method = DEFAULT_TRACKER
+    elif not callable(method):
+        method = str(method_names(method, DEFAULT_FOOTAGE_PRIOR if footage else DEFAULT_PRIOR))
+    train = options.train
+    if not train and footage and method == DEFAULT_TRACKER:
         train = [recorded.LIBRARY]
-    return Usual(method, train or built_in.other_styles(str(source) if source in built_in.names() else "walk"))
+    train = train or built_in.other_styles(str(source) if source in built_in.names() else "walk")
+    return options.changed(method=method, train=train)
+
+
+def _sets_search(given: Mapping[str, Any] | Sequence[str]) -> bool:
+    """Return whether some settings are those of a search, and not of the default tracker."""
+    return any(name.partition(".")[0] != DEFAULT_TRACKER for name in given)
 
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """What was chosen, ready to follow: a prior has been learned, and trackers are made of it."""
+    """A method ready to track: a prior has been learned, and trackers are made of it."""
 
     name: str
     prior: Prior | None  # of a tracker of its own, None
     beta: float  # of the silhouette cost
     settings: dict[str, dict[str, Any]]
-    audit: Audit  # of what the trackers made of it say
-    look_again: int | None  # frames of a gap after which it looks all around, 0 for never; None where nobody says
+    audit: Audit  # of what the trackers made of it report
+    look_again: int | None  # frames of a gap after which it relocalises, 0 for never; None for the default
     _make: Callable[[Task, float], Tracker] = field(repr=False)
 
     def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
@@ -130,76 +109,85 @@ class Method:
         return 3 + 3 * (task.translation == "searched") + len(self.prior.low)
 
 
-def prepare(choice: Choice, task: Task) -> Method:
-    """Return the method that was chosen, its prior learned from a task's training motions.
+def prepare(options: TrackOptions, task: Task) -> Method:
+    """Return the method of some options, its prior learned from a task's training motions.
 
-    Raises ValueError where a name, a setting or the budget is wrong, ImportError where a library is not installed, and
+    Raises InputError where a name, a setting or the budget is wrong, ImportError where a library is not installed, and
     BrokenRuleError where a plugin does not do what its kind has to.
     """
-    if choice.tracker is not None:
-        return _tracker(choice)
-    offer = _offered("optimiser", choice.optimiser)
-    mine = settings.planned(offer.factory, choice.optimiser_settings, task.evaluations, choice.particles)
-    settings.check(offer.name, offer.factory, mine)
-    settings.check("tracker", Prediction, choice.tracker_settings)
-    prior, learned = _prior(choice, task)
-    # what a prior that came learned has learned from, nobody says: its tilt is not that of other motions
-    usual: dict[str, Any] = {} if isinstance(choice.prior, str) else {"tilt": "box"}
-    prediction = Prediction(**{**usual, **choice.tracker_settings})
+    chosen = options.method
+    if callable(chosen) or (names := method_names(chosen)).tracker is not None:
+        for name in ("optimiser", "prior"):
+            if getattr(options, name) is not None:
+                raise InputError(
+                    f"{name} must not be given beside a tracker, got {getattr(options, name)} and {chosen}"
+                )
+        return _tracker_method(_offered("tracker", chosen), options.settings)
+    optimiser = _offered("optimiser", options.optimiser or names.optimiser)
+    prior = None if options.prior is not None else registry().offer("prior", names.prior)
+    places: dict[str, tuple[str, Callable[..., Any]]] = {_family(optimiser.name): ("optimiser", optimiser.factory)}
+    if prior is not None:
+        places[_family(prior.name)] = "prior", prior.factory
+    mine = parsed_settings({**places, "tracker": ("tracker", Prediction)}, options.settings)
+    mine.setdefault("prior", {})
+    mine["optimiser"] = settings.planned(
+        optimiser.factory, mine["optimiser"], task.evaluations, options.population_size
+    )
+    settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
+    if prior is not None:
+        learned, name = _learned(prior, mine["prior"], task), prior.name
+    else:
+        assert options.prior is not None
+        learned, name = options.prior, type(options.prior).__name__
+    # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
+    prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **mine["tracker"]})
     tilt = prediction.tilted(learned, task.training)
 
     def make(task: Task, patience: float) -> Tracker:
-        limit = None if choice.ask_seconds is None else choice.ask_seconds + patience
-        build = partial(_guarded, offer, mine, limit, task.evaluations)
-        tracker = SynthesisTracker(task, learned, build, offer.next_frame, prediction, tilt)
+        limit = None if options.ask_seconds is None else options.ask_seconds + patience
+        build = partial(_guarded, optimiser, mine["optimiser"], limit, task.evaluations)
+        tracker = SynthesisTracker(task, learned, build, optimiser.next_frame, prediction, tilt)
         return WeighingTracker(tracker) if prediction.modes else tracker
 
-    made_of = {"optimiser": mine, "prior": dict(choice.prior_settings), "tracker": dict(choice.tracker_settings)}
-    return Method(f"{offer.name} + {prior}", learned, prediction.beta, made_of, Audit(), prediction.look_again, make)
+    label = f"{optimiser.name}@{name}"
+    return Method(label, learned, prediction.beta, mine, Audit(), prediction.look_again, make)
 
 
-def parse_settings(
-    texts: Sequence[str],
-    optimiser: str = "sapso",
-    prior: str = "pca",
-    tracker: str | None = None,
-    segmenter: str | None = None,
+def parsed_settings(
+    places: Mapping[str, tuple[str, Callable[..., Any]]], given: Mapping[str, Any] | Sequence[str]
 ) -> dict[str, dict[str, Any]]:
-    """Return the settings of optimiser, prior, tracker and segmenter that texts such as `sapso.cooling=0.9` give.
+    """Return settings by the kind of plugin that they are of.
 
-    The name before the dot is the plugin's, or its family's for `family:NAME`; `tracker` stands for what drives an
-    optimiser and a prior. Raises ValueError where a text has another form, names a plugin that is not in use, or a
-    setting that it does not know, or where a value does not fit.
+    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`. `places` has the kind and
+    the factory of each name before the dot. Raises InputError where a text has another form, names a plugin that is not
+    in use or a setting that it does not know, or where a value does not fit.
     """
-    places: dict[str, tuple[str, Callable[..., Any]]] = {}
-    if tracker is None:
-        chosen: list[tuple[Kind, str]] = [("optimiser", optimiser), ("prior", prior)]
-        places["tracker"] = "tracker", Prediction
-    else:
-        chosen = [("tracker", tracker)]
-    if segmenter is not None:
-        chosen.append(("segmenter", segmenter))
-    for one, name in chosen:
-        places[name.partition(":")[0]] = one, registry().offer(one, name).factory
-    given: dict[str, dict[str, str]] = {name: {} for name in places}
-    for text in texts:
-        left, equals, value = text.partition("=")
+    each: dict[str, dict[str, Any]] = {name: {} for name in places}
+    texts = not isinstance(given, Mapping)
+    for item in given:
+        left, equals, value = item.partition("=") if texts else (item, "=", None)
         name, dot, setting = left.partition(".")
         if not (equals and dot):
-            raise ValueError(f"--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {text!r}")
+            raise InputError(f"--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {item!r}")
         if name not in places:
-            raise ValueError(f"--set must name one of {', '.join(places)}, which are in use here, got {text!r}")
-        given[name][setting] = value
-    parsed: dict[str, dict[str, Any]] = {}
+            raise InputError(f"--set must name one of {', '.join(places)}, which are in use here, got {item!r}")
+        each[name][setting] = given[item] if isinstance(given, Mapping) else value
+    found: dict[str, dict[str, Any]] = {}
     for name, (kind, factory) in places.items():
-        parsed[f"{kind}_settings"] = settings.parse(name, factory, given[name])
-    return parsed
+        if texts:
+            found[kind] = settings.parse(name, factory, each[name])
+        else:
+            settings.check(name, factory, each[name])
+            found[kind] = each[name]
+    return found
 
 
-def _tracker(choice: Choice) -> Method:
-    assert choice.tracker is not None
-    offer, mine = _offered("tracker", choice.tracker), dict(choice.tracker_settings)
-    settings.check(offer.name, offer.factory, mine)
+def _family(name: str) -> str:
+    return name.partition(":")[0]
+
+
+def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> Method:
+    mine = parsed_settings({_family(offer.name): ("tracker", offer.factory)}, given)["tracker"]
     audit, beta = Audit(), _beta(offer, mine)
 
     def make(task: Task, _patience: float) -> Tracker:
@@ -210,24 +198,20 @@ def _tracker(choice: Choice) -> Method:
     return Method(offer.name, None, beta, {"tracker": mine}, audit, None, make)
 
 
-def _beta(offer: Offer, given: Settings) -> float:
+def _beta(offer: Offer, given: Mapping[str, Any]) -> float:
     """Return the beta of the costs that a tracker gives: its setting of that name, if it has one."""
-    usual = {setting.name: setting.default for setting in offer.settings}.get("beta", BETA)
-    beta = given.get("beta", usual)
+    default = {setting.name: setting.default for setting in offer.settings}.get("beta", BETA)
+    beta = given.get("beta", default)
     return float(beta) if isinstance(beta, float | int) else BETA
 
 
-def _prior(choice: Choice, task: Task) -> tuple[str, Prior]:
-    """Return the prior's name, and the prior itself, fitted."""
-    if not isinstance(choice.prior, str):
-        return type(choice.prior).__name__, choice.prior
-    offer = registry().offer("prior", choice.prior)
-    settings.check(offer.name, offer.factory, choice.prior_settings)
+def _learned(offer: Offer, given: Mapping[str, Any], task: Task) -> Prior:
+    """Return a prior fitted to a task's training motions."""
     angles = task.angles
     with _rules(offer):
-        prior: Prior = offer.factory(**choice.prior_settings).fit(angles, task.body.skeleton)
+        prior: Prior = offer.factory(**given).fit(angles, task.body.skeleton)
         _check_prior(prior, angles, offer)
-    return offer.name, GuardedPrior(prior, offer.label)
+    return GuardedPrior(prior, offer.label)
 
 
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
@@ -258,19 +242,18 @@ def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
 
 
 def _check_feasible(prior: Prior, training: Array, offer: Offer) -> None:
-    """Look farther for something feasible, as a search would, which cannot say whose prior it is."""
-    some = training[np.unique(np.linspace(0, len(training) - 1, SOME).astype(np.int64))]
-    drawn = np.random.default_rng(0).uniform(prior.low, prior.high, (SOME, len(prior.low)))
+    """Return nothing. Raises BrokenRuleError where a larger sample holds no feasible pose either."""
+    some = training[np.unique(np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64))]
+    drawn = np.random.default_rng(0).uniform(prior.low, prior.high, (FEASIBILITY_SAMPLES, len(prior.low)))
     for latents in (np.asarray(prior.transform(some)), drawn):
         if np.any(prior.feasible(latents)):
             return
-    raise BrokenRuleError(
-        f"{offer.label}: feasible must allow some poses, got none of {len(some)} training poses and {SOME} of the range"
-    )
+    came = f"none of {len(some)} training poses and {FEASIBILITY_SAMPLES} of the range"
+    raise BrokenRuleError(f"{offer.label}: feasible must allow some poses, got {came}")
 
 
 def _guarded(
-    offer: Offer, mine: Settings, limit: float | None, evaluations: int, space: Space, rng: np.random.Generator
+    offer: Offer, mine: Mapping[str, Any], limit: float | None, evaluations: int, space: Space, rng: np.random.Generator
 ) -> Optimiser:
     with _rules(offer):
         optimiser = offer.factory(space, rng, **mine)
@@ -278,11 +261,11 @@ def _guarded(
 
 
 def _rules(offer: Offer) -> AbstractContextManager[None]:
-    """Pass on what a user did wrong; whatever else a plugin raises is the plugin's fault, and the error says so."""
+    """Return a context that passes ValueErrors on, and blames the plugin for whatever else it raises."""
     return blamed(offer.label, "it", passed=(ValueError, ImportError))
 
 
-def _offered(kind: Kind, chosen: str | Callable[..., Any]) -> Offer:
+def _offered(kind: Kind, chosen: "str | Callable[..., Any] | None") -> Offer:
     if isinstance(chosen, str):
         return registry().offer(kind, chosen)
     frames: NextFrame = "carry" if hasattr(chosen, "advance") else "start"

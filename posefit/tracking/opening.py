@@ -3,13 +3,11 @@
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 
 from posefit.fitting.shape import Shape, fit_shape
-from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.listening import Listener
@@ -17,6 +15,7 @@ from posefit.motion.motion import Motion
 from posefit.searching.starts import RESTARTS, STRIDE, Follow, begun, best_seen, usable
 from posefit.settings import POPULATION_SIZE
 from posefit.tracking.method import Method
+from posefit.tracking.options import TrackOptions
 
 BODY_FRAMES = 12  # from which a build is found
 COMPILING = 60.0  # seconds that a plugin's first calls may take longer than its limit
@@ -24,52 +23,25 @@ POPULATIONS = 8  # that are searched to compile what a search needs
 LEAST = 5  # frames; a body is not fitted to fewer
 
 
-@dataclass(frozen=True, kw_only=True)
-class Opening:
-    """What is to be found out before the first frame; None leaves it to whether somebody knows the truth."""
-
-    translation: Translation | None = None
-    first_pose: Literal["searched", "given"] = "searched"
-    restarts: int | None = None
-    body_frames: int | None = None
-    height: float | None = None  # metres
-
-    def __post_init__(self) -> None:
-        if self.first_pose not in ("searched", "given"):
-            raise ValueError(f"first_pose must be one of searched, given, got {self.first_pose!r}")
-        for name in ("restarts", "body_frames"):
-            value = getattr(self, name)
-            if value is not None and value < 0:
-                raise ValueError(f"{name} must be 0 or more, got {value}")
-
-    def check(self, known: bool) -> None:
-        """Raise ValueError where something is taken for known although nobody knows the truth."""
-        if not known and self.translation == "known":
-            raise ValueError("translation must be searched or aligned where only masks are given, got known")
-        if not known and self.first_pose == "given":
-            raise ValueError("first_pose must be searched where only masks are given, got given")
-
-
-def task_of(scene: Scene, how: Opening, training: Sequence[Motion], evaluations: int, threads: int) -> Task:
-    """Return the task of following a scene, as far as it is known before anything is searched."""
-    how.check(scene.truth is not None)
-    known = None if scene.truth is None or how.first_pose == "searched" else scene.truth.poses[0, 3:]
+def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> Task:
+    """Return the task of tracking a scene, as far as it is known before anything is searched."""
+    known = None if scene.truth is None or options.first_pose == "searched" else scene.truth.poses[0, 3:]
     return Task(
         scene.body,
         scene.cameras,
-        evaluations,
+        options.budget,
         scene.yaw,
         scene.anchor,
-        translation=how.translation or ("aligned" if scene.truth is None else "known"),
+        translation=options.translation or ("aligned" if scene.truth is None else "known"),
         fps=scene.fps,
         training=training,
         first_pose=known,
-        threads=threads,
+        threads=options.threads,
     )
 
 
 def opened(
-    scene: Scene, method: Method, task: Task, how: Opening, seed: int, listener: Listener
+    scene: Scene, method: Method, task: Task, options: TrackOptions, listener: Listener
 ) -> tuple[Task, Shape | None]:
     """Return a task with what was found out before the first frame, and the person's build where it was fitted."""
     began = time.perf_counter()
@@ -78,11 +50,11 @@ def opened(
     listener.say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
 
     follow, blind = following(method), scene.truth is None
-    restarts = (RESTARTS if blind and not looks_ahead else 0) if how.restarts is None else how.restarts
-    body_frames = (BODY_FRAMES if blind else 0) if how.body_frames is None else how.body_frames
+    restarts = (RESTARTS if blind and not looks_ahead else 0) if options.restarts is None else options.restarts
+    body_frames = (BODY_FRAMES if blind else 0) if options.body_frames is None else options.body_frames
     if restarts:
         listener.say(f"looking for the first pose, {restarts} times")
-        task = begun(task, scene.observations, follow, restarts, seed)
+        task = begun(task, scene.observations, follow, restarts, options.seed)
     shape = None
     if body_frames and (seen := len(usable(scene.observations, body_frames))) < LEAST:
         few = f"{seen} of them show enough of the person" if seen < body_frames else f"{seen} are too few"
@@ -92,8 +64,8 @@ def opened(
     elif body_frames:
         listener.say(f"fitting the person's build to {body_frames} frames")
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
-        height = how.height or (task.body.stature if alone else None)
-        shape = built(task, scene.observations, follow, body_frames, height, seed)
+        height = options.height or (task.body.stature if alone else None)
+        shape = built(task, scene.observations, follow, body_frames, height, options.seed)
         task = replace(task, body=shape.body)
     return task, shape
 

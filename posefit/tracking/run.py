@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from posefit.errors import InputError
 from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.tracker import Frame, Task, Tracker
 from posefit.footage.scene import Scene, on_device
@@ -23,8 +24,9 @@ from posefit.searching.whirls import FASTEST
 from posefit.steadying.passes import Pass, followed_again
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.measures import Measures
-from posefit.tracking.method import Choice, Method, prepare
-from posefit.tracking.opening import Opening, following, opened, task_of
+from posefit.tracking.method import Method, prepare
+from posefit.tracking.opening import following, opened, task_of
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Nowhere, Output
 from posefit.tracking.tracks import (
     SEARCHED,
@@ -56,57 +58,42 @@ class Track:
 def follow(
     scene: Scene,
     training: Sequence[Motion],
+    options: TrackOptions | None = None,
     *,
-    choice: Choice | None = None,
-    opening: Opening | None = None,
-    seed: int = 0,
-    threads: int = 1,
-    device: str = "cpu",
     output: Output | None = None,
     listener: Listener = QUIET,
     source: Mapping[str, Any] | None = None,
-    tracks: int = 1,
-    steady: bool | None = None,
-    passes: int = 1,
 ) -> Track:
-    """Return a scene's motion followed by a method that learns from `training`, with what it is worth.
+    """Return a scene's motion tracked by a method that learns from `training`, with its errors or signs of trust.
 
-    With several `tracks`, each from another beginning and at the full budget, the one is kept whose whole cost is
-    least; evaluations and times are those of all. `output` gets every frame as it comes and everything at the end;
-    `source` is what the summary says of where the scene is from. What was found is `steady` in the end, by
-    default where nobody knows the truth, and what is steady may be followed in several `passes`: see
-    `posefit.steadying.passes`. Poses are drawn on a `device`, "cpu" or "cuda". Raises ValueError where something does
-    not fit.
+    `output` gets every frame as it comes and everything at the end; `source` is what the summary holds of where the
+    scene is from. Raises InputError where something does not fit.
     """
-    choice, opening = choice or Choice(), opening or Opening()
-    if seed < 0:
-        raise ValueError(f"seed must be 0 or more, got {seed}")
-    for name, count in (("tracks", tracks), ("passes", passes)):
-        if count < 1:
-            raise ValueError(f"{name} must be at least 1, got {count}")
-    scene = on_device(scene, device)
+    options = options or TrackOptions()
+    seed, tracks, passes = options.seed, options.hypotheses, options.passes
+    scene = on_device(scene, options.device)
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         for warning in scene.warnings:
             listener.say(f"warning: {warning}")
-        task = task_of(scene, opening, training, choice.budget(), threads)
-        steady = scene.truth is None if steady is None else steady
-        if steady and task.translation == "known":
-            raise ValueError("steady must be given where the translation is searched or aligned, got known")
-        if passes > 1 and not steady:
-            raise ValueError(f"passes must be 1 where a track is not steady, got {passes}")
-        method = prepare(choice, task)
-        task, shape = opened(scene, method, task, opening, seed, listener)
+        task = task_of(scene, options, training)
+        smooth = scene.truth is None if options.smooth is None else options.smooth
+        if smooth and task.translation == "known":
+            raise InputError("smooth must be given where the translation is searched or aligned, got known")
+        if passes > 1 and not smooth:
+            raise InputError(f"passes must be 1 where a track is not smooth, got {passes}")
+        method = prepare(options, task)
+        task, shape = opened(scene, method, task, options, listener)
         scene = replace(scene, body=task.body)
         method.audit.forget()  # what was tried before the first frame is in no row
         output = output or Nowhere()
-        known = Known(scene.yaw, opening.first_pose == "given")
+        known = Known(scene.yaw, options.first_pose == "given")
         usable = [observation.usable for observation in scene.observations] if tracks > 1 else []
         each = _found(scene, method, task, known, output, seed, tracks, usable, listener)
         found, told = _kept(scene, each, usable, training)
         anew = _without_whirls(scene, method, task, found, seed, listener)
         raw, found, kept_pass = anew.frames, anew.frames, 1
         task = replace(task, fastest_turn=None if anew.start is None else FASTEST)
-        if steady:
+        if smooth:
             begun = Pass.of(scene, found, shape, method.beta)
             make = partial(_tracker, method)
             passed, kept = followed_again(begun, task, make, passes, seed, method.beta, listener)
@@ -142,12 +129,12 @@ def follow(
             **({"history": found[0].history.tolist()} if len(found) == 1 else {}),
             "evaluations_per_frame": task.evaluations,
             "dimensions": method.dimensions(task),
-            "tracks": told,
+            "hypotheses": told,
             "version": __version__,
             "train": [motion.name for motion in training],
             "translation": task.translation,
-            "first_pose": opening.first_pose,
-            "steady": steady,
+            "first_pose": options.first_pose,
+            "smooth": smooth,
             "passes": passes,
             "kept_pass": kept_pass,
             "views": len(scene.cameras),

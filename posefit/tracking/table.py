@@ -55,7 +55,7 @@ def table(summary: Mapping[str, Any]) -> str:
         lines.append(
             "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
         )
-    used, tracks = summary["evaluations"] / summary["frames"], summary["tracks"]
+    used, tracks = summary["evaluations"] / summary["frames"], summary["hypotheses"]
     lines += [_chosen(tracks)] if tracks else []
     budget = summary["evaluations_per_frame"] * max(len(tracks), 1)
     lines.append(

@@ -10,7 +10,6 @@ from click.testing import CliRunner, Result
 
 from posefit.ambiguity.estimate import ambiguity_of
 from posefit.cli import main
-from posefit.footage.source import Viewing
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS
@@ -107,10 +106,10 @@ def test_a_camera_that_does_not_see_the_person_in_this_frame_is_a_mistake() -> N
     walk = built_in.motion("walk")
     away = walk.translations[:3] * 0.0 + [[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     there_and_back = Motion("hopping", walk.skeleton, walk.poses[:3], away, 30.0)
-    viewing = Viewing(cameras=[Camera.around(np.zeros(3), 0.0, 4.0, (64, 48))])
+    viewing = {"camera": [Camera.around(np.zeros(3), 0.0, 4.0, (64, 48))]}
     with pytest.raises(ValueError, match=r"^frame must show the person, got an empty mask in frame 1 of hopping$"):
-        ambiguity_of(there_and_back, frame=1, train=["walk-a"], viewing=viewing)
-    assert ambiguity_of(there_and_back, frame=2, train=["walk-a"], viewing=viewing).clusters
+        ambiguity_of(there_and_back, frame=1, train=["walk-a"], **viewing)
+    assert ambiguity_of(there_and_back, frame=2, train=["walk-a"], **viewing).clusters
 
 
 def test_a_frame_that_shows_too_little_of_the_person_is_a_mistake(tmp_path: Path) -> None:
@@ -167,14 +166,14 @@ def test_json_says_everything_and_weights_sum_to_one() -> None:
 
 
 def test_what_the_same_person_does_in_another_clip_is_near_the_truth() -> None:
-    found = ambiguity_of("walk", frame=5, train=["walk-a", "walk-b"], viewing=Viewing(size=(160, 120)))
+    found = ambiguity_of("walk", frame=5, train=["walk-a", "walk-b"], size=(160, 120))
     assert found.truth_mm is not None
     assert min(found.truth_mm) < 60.0
 
 
 def test_several_cameras_are_held_against_each_of_them() -> None:
-    viewing = Viewing(view_degrees=(0.0, 90.0), size=(120, 90))
-    found = ambiguity_of("walk", frame=5, within=2.0, train=["walk-a"], viewing=viewing)
+    viewing = {"view_degrees": (0.0, 90.0), "size": (120, 90)}
+    found = ambiguity_of("walk", frame=5, within=2.0, train=["walk-a"], **viewing)
     assert [floor.views for floor in found.floors] == ["both cameras", "camera 1", "camera 2"]
 
 
@@ -206,13 +205,13 @@ def test_masks_of_two_calibrated_cameras_are_seen_together_and_alone(tmp_path: P
 
 
 def test_the_clip_itself_is_left_out_of_the_library() -> None:
-    found = ambiguity_of("16_15", frame=5, train=["library:16"], viewing=Viewing(size=(120, 90)))
+    found = ambiguity_of("16_15", frame=5, train=["library:16"], size=(120, 90))
     assert "16_15" not in found.library.names
     assert {name[:3] for name in found.library.names} == {"16_"}
 
 
 def test_the_result_is_the_same_with_any_number_of_threads() -> None:
-    viewing = Viewing(size=(160, 120))
-    one, two = (ambiguity_of("walk", frame=9, train=["walk-a"], viewing=viewing, threads=k) for k in (1, 2))
+    viewing = {"size": (160, 120)}
+    one, two = (ambiguity_of("walk", frame=9, train=["walk-a"], **viewing, threads=k) for k in (1, 2))
     np.testing.assert_array_equal(one.states.costs, two.states.costs)
     assert [cluster.weight for cluster in one.clusters] == [cluster.weight for cluster in two.clusters]

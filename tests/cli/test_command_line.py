@@ -21,7 +21,7 @@ from posefit.motion.asf import write_asf
 from tests.files import arrays
 from tests.plugins.test_registry import point
 
-FEW = ["--particles", "10", "--iterations", "4"]
+FEW = ["--population-size", "10", "--iterations", "4"]
 QUICK = [*FEW, "--size", "120x90"]
 FILES = {
     "poses.npz",
@@ -137,16 +137,17 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
 
 def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None:
     tracks = [
-        posefit.track("walk", frames=(0, 4), particles=40, iterations=5, seed=3, threads=threads) for threads in (1, 2)
+        posefit.track("walk", frames=(0, 4), population_size=40, iterations=5, seed=3, threads=threads)
+        for threads in (1, 2)
     ]
     np.testing.assert_array_equal(tracks[0].motion.poses, tracks[1].motion.poses)
-    other = posefit.track("walk", frames=(0, 4), particles=40, iterations=5, seed=4)
+    other = posefit.track("walk", frames=(0, 4), population_size=40, iterations=5, seed=4)
     assert np.abs(other.motion.poses - tracks[0].motion.poses).max() > 0.0
 
 
 def test_the_command_is_the_typed_call() -> None:
     printed = json.loads(run("track", "walk", "--frames", "0:3", "--seed", "7", "--json", *QUICK).stdout)
-    called = posefit.track("walk", frames=(0, 3), seed=7, particles=10, iterations=4, size=(120, 90)).summary
+    called = posefit.track("walk", frames=(0, 3), seed=7, population_size=10, iterations=4, size=(120, 90)).summary
     for key in KEYS - {"seconds_per_frame", "cpu_seconds_per_frame", "evaluations_per_second"}:
         assert printed[key] == called[key]
 
@@ -157,7 +158,7 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
     printed = json.loads(result.stdout)
     assert len(printed["pose_degrees"]) == 66
     assert printed["frames"] == 1
-    found = posefit.fit("walk", frame=7, particles=10, iterations=4, size=(120, 90))
+    found = posefit.fit("walk", frame=7, population_size=10, iterations=4, size=(120, 90))
     np.testing.assert_allclose(np.degrees(found.pose), printed["pose_degrees"], atol=1e-5)
     assert found.history.shape == (5,)
 
@@ -195,7 +196,7 @@ def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> 
     stack = np.stack([cv2.imread(str(path), 0) for path in sorted(folder.iterdir())])
     np.savez(tmp_path / "masks.npz", masks=stack > 0)
     results = [
-        json.loads(run("track", source, "--view-degrees", "45", "--prior", "loose", "--json", *FEW).stdout)
+        json.loads(run("track", source, "--view-degrees", "45", "--method", "@loose", "--json", *FEW).stdout)
         for source in (folder, tmp_path / "masks.npz")
     ]
     assert results[0]["error_degrees"] is None
@@ -229,10 +230,10 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
         (["lost.avi", "--size", "320x240"], "size must be given for motions only, got (320, 240) for a video"),
         (["lost.amc"], "lost.amc: expected a file, got nothing of that name"),
         (["walk.txt"], "walk.txt: expected a file"),
-        (["walk", "--particles", "0"], "particles must be at least 1, got 0"),
+        (["walk", "--population-size", "0"], "population_size must be at least 1, got 0"),
         (["walk", "--iterations", "0"], "iterations must be at least 1, got 0"),
-        (["walk", "--optimiser", "sapzo"], "optimiser must be one of"),
-        (["walk", "--prior", "pcb"], "prior must be one of"),
+        (["walk", "--method", "sapzo"], "method must be OPTIMISER@PRIOR, or one of"),
+        (["walk", "--method", "@pcb"], "prior must be one of"),
         (["walk", "--size", "320"], "expected WIDTHxHEIGHT"),
         (["walk", "--size", "0x9"], "size must be from 1x1"),
         (["walk", "--frames", "3"], "expected A:B"),
@@ -277,9 +278,9 @@ def test_bad_masks_are_refused(tmp_path: Path) -> None:
     good = cv2.imread(str(folder / "0002.png"), 0)
     cv2.imwrite(str(folder / "0002.png"), good[:, :60])
     message = "0002.png: mask must have shape (90, 120), got (90, 60)"
-    assert message in fails("track", folder, "--out", out, "--prior", "loose", *FEW)
+    assert message in fails("track", folder, "--out", out, "--method", "@loose", *FEW)
     (folder / "0002.png").write_bytes(b"no image")
-    assert "0002.png: expected an image" in fails("track", folder, "--out", out, "--prior", "loose", *FEW)
+    assert "0002.png: expected an image" in fails("track", folder, "--out", out, "--method", "@loose", *FEW)
     (tmp_path / "empty").mkdir()
     assert "expected a folder with mask images" in fails("track", tmp_path / "empty")
     np.savez(tmp_path / "a.npz", other=np.zeros(3))
@@ -508,7 +509,7 @@ def test_settings_are_given_by_plugin_and_name() -> None:
     [
         ("sapso", "--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
         ("sapso=3", "--set must be NAME.SETTING=VALUE"),
-        ("pso.phi=4.2", "--set must name one of tracker, sapso, pca, which are in use here, got 'pso.phi=4.2'"),
+        ("pso.phi=4.2", "--set must name one of sapso, pca, tracker, which are in use here, got 'pso.phi=4.2'"),
         ("sapso.coling=1", "did you mean 'cooling'"),
         ("sapso.cooling=cold", "sapso.cooling must be float, got 'cold'"),
         ("sapso.cooling=2", "cooling must lie in 0 to 1, got 2"),
@@ -524,7 +525,7 @@ def test_evaluations_are_the_same_for_every_method() -> None:
     used = {}
     for name in ("sapso", "annealed", "cma"):
         result = run(
-            "track", "walk", "--frames", "0:2", "--size", "120x90", "--evaluations", 400, "--optimiser", name, "--json"
+            "track", "walk", "--frames", "0:2", "--size", "120x90", "--evaluations", 400, "--method", name, "--json"
         )
         summary = json.loads(result.stdout)
         used[name] = summary["evaluations"]
@@ -546,7 +547,7 @@ def test_help_loads_nothing_heavy() -> None:
 def test_following_a_motion_loads_no_library_for_what_it_can_do_itself(tmp_path: Path) -> None:
     script = (
         "import sys; from posefit.cli import main\n"
-        "command = 'track walk --frames 0:2 --size 120x90 --particles 20 --iterations 3 --out'.split()\n"
+        "command = 'track walk --frames 0:2 --size 120x90 --population-size 20 --iterations 3 --out'.split()\n"
         f"main([*command, {str(tmp_path / 'out')!r}], standalone_mode=False)\n"
         "slow = 'sklearn', 'scipy.stats', 'scipy.spatial', 'scipy.optimize', 'pandas', 'matplotlib', 'cmaes', 'skimage'\n"
         "print([name for name in slow if name in sys.modules])"

@@ -30,7 +30,7 @@ def test_it_keeps_the_rules_of_the_kit() -> None:
 
 
 def test_somebody_unknown_walks_and_nobody_says_that_it_is_a_walk(seed: int) -> None:
-    track = posefit.track("02_01", train=ELSEWHERE, tracker="exemplars", frames=(0, 30), seed=seed)
+    track = posefit.track("02_01", train=ELSEWHERE, method="exemplars", frames=(0, 30), seed=seed)
     assert track.measures.mpjpe_mm < 60.0  # a swarm in nine components of the same library is 200 mm off
     assert track.measures.lost_rate == 0.0
     assert track.measures.swap_rate == 0.0
@@ -38,7 +38,7 @@ def test_somebody_unknown_walks_and_nobody_says_that_it_is_a_walk(seed: int) -> 
 
 def test_who_is_recorded_is_found_again() -> None:
     himself = replace(recorded.clip("16_15").motion(), name="again")  # nobody learns from a clip of the same name
-    track = posefit.track(himself, train=["library:16"], tracker="exemplars", frames=(0, 20))
+    track = posefit.track(himself, train=["library:16"], method="exemplars", frames=(0, 20))
     assert track.measures.mpjpe_mm < 15.0
 
 
@@ -66,7 +66,7 @@ def test_an_unknown_walker_is_found_as_well_where_nobody_says_where_he_is(seed: 
         posefit.track(
             "02_01",
             train=ELSEWHERE,
-            tracker="exemplars",
+            method="exemplars",
             frames=(0, 20),
             view_degrees=90.0,
             translation=translation,
@@ -80,7 +80,7 @@ def test_an_unknown_walker_is_found_as_well_where_nobody_says_where_he_is(seed: 
 def test_several_cameras_see_better_than_one(seed: int) -> None:
     one, two = (
         posefit.track(
-            "09_01", train=["library:16,127"], tracker="exemplars", frames=(0, 20), view_degrees=views, seed=seed
+            "09_01", train=["library:16,127"], method="exemplars", frames=(0, 20), view_degrees=views, seed=seed
         )
         for views in ((90.0,), (90.0, 0.0))
     )
@@ -116,7 +116,7 @@ def test_a_track_goes_on_where_it_was_interrupted(walker: Walk, seed: int) -> No
 
 def test_the_same_clip_again_is_the_same_track() -> None:
     one, other = (
-        posefit.track(recorded.clip("17_03").motion(), train=["library:09"], tracker="exemplars", frames=(0, 5), seed=3)
+        posefit.track(recorded.clip("17_03").motion(), train=["library:09"], method="exemplars", frames=(0, 5), seed=3)
         for _ in range(2)
     )
     assert one.motion.poses.tobytes() == other.motion.poses.tobytes()
@@ -146,7 +146,7 @@ def test_the_same_clip_again_is_the_same_track() -> None:
     ],
 )
 def test_settings_that_make_no_sense_are_refused_in_one_line(setting: str, message: str) -> None:
-    done = CliRunner().invoke(main, ["track", "walk", "--tracker", "exemplars", "--set", f"exemplars.{setting}"])
+    done = CliRunner().invoke(main, ["track", "walk", "--method", "exemplars", "--set", f"exemplars.{setting}"])
     assert done.exit_code == 2
     told, last = done.stderr.strip().splitlines()  # the first says that the clip is ready
     assert told.startswith("ready")

@@ -13,7 +13,8 @@ from posefit.fitting.tracker import Follower, Observation, Prediction, Synthesis
 from posefit.geometry.body import Body
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
-from posefit.tracking.method import Choice, prepare
+from posefit.tracking.method import prepare
+from posefit.tracking.options import TrackOptions
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
 
@@ -173,15 +174,15 @@ def test_a_prior_that_has_learned_already_has_a_box_unless_somebody_wants_its_ti
     task = task_of(*walks)
     learned = PCA().fit(task.angles)
 
-    def tilt(choice: Choice) -> Tilt | None:
+    def tilt(choice: TrackOptions) -> Tilt | None:
         tracker = prepare(choice, task).tracker(task)
         assert isinstance(tracker, SynthesisTracker)
         return Follower(task, learned, tracker.prediction, tracker.tilt).space(Observation([], np.zeros(3))).tilt
 
-    assert tilt(Choice(prior="pca")) is not None
-    assert tilt(Choice(prior="pca", tracker_settings={"tilt": "box"})) is None
-    assert tilt(Choice(prior=learned)) is None
-    assert tilt(Choice(prior=learned, tracker_settings={"tilt": "learned"})) is not None
+    assert tilt(TrackOptions(method="@pca")) is not None
+    assert tilt(TrackOptions(method="@pca", settings={"tracker.tilt": "box"})) is None
+    assert tilt(TrackOptions(prior=learned)) is None
+    assert tilt(TrackOptions(prior=learned, settings={"tracker.tilt": "learned"})) is not None
 
 
 def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:

@@ -70,7 +70,7 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
     assert not silhouette.valid[:, 70:80].any()
     assert not silhouette.mask[:, 70:80].any()
     result = posefit.track(
-        tmp_path / "out" / "masks.npz", prior="loose", frames=(5, 9), view_degrees=90, evaluations=400
+        tmp_path / "out" / "masks.npz", method="@loose", frames=(5, 9), view_degrees=90, evaluations=400
     )
     assert result.summary["iou"] > 0.4
 
@@ -266,7 +266,7 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     masks = np.stack(truth()[10:22]).astype(np.uint8)
     masks[6] = 0  # nobody at all
     path = stored_masks(tmp_path / "a.npz", masks=masks, usable=usable)
-    result = posefit.track(path, prior="loose", view_degrees=90, evaluations=400, steady=False, out=tmp_path / "out")
+    result = posefit.track(path, method="@loose", view_degrees=90, evaluations=400, smooth=False, out=tmp_path / "out")
     assert result.summary["frames"] == 12
     assert result.summary["held_frames"] == 3
     assert result.summary["evaluations"] == 9 * 400
@@ -278,14 +278,14 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     assert result.summary["iou"] == pytest.approx(
         np.mean([row["iou"] for row, ok in zip(result.frames, usable, strict=True) if ok])
     )
-    text = run("track", path, "--prior", "loose", "--view-degrees", "90", "--evaluations", "400").stdout
+    text = run("track", path, "--method", "@loose", "--view-degrees", "90", "--evaluations", "400").stdout
     assert "3 frames show too little of the person: the pose is held or carried on, not searched" in text
 
 
 def test_a_filter_goes_on_after_a_frame_that_was_held(tmp_path: Path) -> None:
     usable = np.arange(12) != 4
     path = stored_masks(tmp_path / "a.npz", usable=usable)
-    summary = posefit.track(path, optimiser="annealed", view_degrees=90, evaluations=400).summary
+    summary = posefit.track(path, method="annealed", view_degrees=90, evaluations=400).summary
     assert summary["evaluations"] == 11 * 400
 
 

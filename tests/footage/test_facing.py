@@ -10,7 +10,7 @@ import pytest
 from posefit.footage import segmentation
 from posefit.footage.facing import facings_on_the_spot, yaws_of
 from posefit.footage.segmentation import Extraction
-from posefit.footage.source import Viewing, scene_of
+from posefit.footage.source import scene_of
 from posefit.geometry.camera import Camera
 from posefit.registry import Offer
 from posefit.silhouette.foreground import Image
@@ -86,12 +86,11 @@ def test_a_scene_knows_what_the_segmenter_says(
 
     monkeypatch.setattr(segmentation, "registry", Known)
     camera = Camera.around(MIDDLE, 0.25, 5.0, (160, 120))
-    viewing = Viewing(cameras=(camera,), frames=(0, 6), extraction=Extraction("half"))
-    scene = scene_of([filmed[0]], viewing)
+    scene = scene_of([filmed[0]], camera=(camera,), frames=(0, 6), extraction=Extraction("half"))
     assert [one.yaw for one in scene.observations] == pytest.approx([0.75] * 6)
     assert scene.yaw == pytest.approx(0.75)
     (tmp_path / "other").mkdir()
-    other = scene_of([filmed[0]], Viewing(cameras=(camera,)))
+    other = scene_of([filmed[0]], camera=(camera,))
     assert [one.yaw for one in other.observations] == [None] * len(other.observations)
     assert other.yaw is None
 

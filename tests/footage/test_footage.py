@@ -22,7 +22,7 @@ from posefit.footage.extract import extract
 from posefit.footage.masks import Views, undistorted
 from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import MOVED, OFTEN, PERIOD, SMALL, CameraMotion, Extraction
-from posefit.footage.source import Viewing, scene_of
+from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in
@@ -34,15 +34,15 @@ from tests.files import arrays
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, truth, walk
 
 QUICK: dict[str, Any] = {
-    "optimiser": "sapso",
+    "method": "sapso",
     "evaluations": 400,
     "restarts": 2,
     "body_frames": 0,
     "frames": (EMPTY + 6, EMPTY + 30),
 }
 BRIEF = [
-    "--prior",
-    "loose",
+    "--method",
+    "@loose",
     "--evaluations",
     "200",
     "--restarts",
@@ -68,7 +68,7 @@ def tracked(filmed: tuple[Path, list[Any]], tmp_path_factory: pytest.TempPathFac
 def test_a_video_is_tracked_from_nothing_but_its_frames(tracked: tuple[Path, posefit.Track]) -> None:
     _, result = tracked
     assert result.summary["frames"] == 24
-    assert result.summary["method"] == "sapso + loose"
+    assert result.summary["method"] == "sapso@loose"
     assert result.summary["fps"] == 25.0
     assert result.summary["translation"] == "aligned"
     assert result.summary["iou"] > 0.75  # masks of 900 pixels
@@ -131,7 +131,7 @@ def test_two_calibrated_cameras_find_the_person_where_he_is(filmed: tuple[Path, 
     for name, azimuth in (("a.npz", np.pi / 2), ("b.npz", 0.6)):
         np.savez(tmp_path / name, masks=np.stack(truth(azimuth)[6:30]).astype(np.uint8))
     seen = [tmp_path / "a.npz", tmp_path / "b.npz"]
-    result = posefit.track(seen, camera=calibration, up="y", prior="pca", **{**QUICK, "frames": (None, None)})
+    result = posefit.track(seen, camera=calibration, up="y", method="@pca", **{**QUICK, "frames": (None, None)})
     assert result.summary["views"] == 2
     motion = walk().frames(6, 30)
     away = np.linalg.norm(result.motion.translations - motion.translations, axis=1)
@@ -168,7 +168,7 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path
     calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
     sources = [tmp_path / "a.npz", tmp_path / "b.npz"]
     result = posefit.track(
-        sources, camera=calibration, up="y", prior="loose", evaluations=200, restarts=1, body_frames=0
+        sources, camera=calibration, up="y", method="@loose", evaluations=200, restarts=1, body_frames=0
     )
     assert result.summary["held_frames"] == 0
     blind = PoseProblem(AVERAGE, [camera(np.pi / 2), camera(0.6)], views[2].silhouettes, line(AVERAGE))
@@ -226,7 +226,7 @@ def stopping(after: int, error: BaseException) -> Any:
 def test_a_track_goes_on_where_it_ended(tmp_path: Path, optimiser: str) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8), usable=np.arange(20) != 11)
-    settings: dict[str, Any] = {"evaluations": 400, "restarts": 1, "body_frames": 0, "optimiser": optimiser}
+    settings: dict[str, Any] = {"evaluations": 400, "restarts": 1, "body_frames": 0, "method": optimiser}
     if optimiser == "annealed":  # what is steady is so over all frames, and those that are found anew are others
         settings["steady"] = False
     whole = posefit.track(path, out=tmp_path / "whole", **settings)
@@ -249,7 +249,7 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8))
     settings: dict[str, Any] = {
-        "prior": "loose",
+        "method": "@loose",
         "evaluations": 200,
         "restarts": 1,
         "body_frames": 0,
@@ -288,7 +288,7 @@ def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
         "resource.setrlimit(resource.RLIMIT_FSIZE, (24_000, 24_000))\n"
         "from posefit.cli import main\n"
         f"sys.exit(main(['track', {str(tmp_path / 'a.npz')!r}, '--out', {str(tmp_path / 'out')!r}, '--evaluations', "
-        "'200', '--prior', 'loose', '--restarts', '0', '--body-frames', '0']))\n"
+        "'200', '--method', '@loose', '--restarts', '0', '--body-frames', '0']))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     lines = [line for line in done.stderr.splitlines() if line.startswith("posefit:")]
@@ -298,7 +298,7 @@ def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
     assert "finished frames are kept" in lines[0]
     assert not (tmp_path / "out").exists()
     again = run(
-        "track", tmp_path / "a.npz", "--out", tmp_path / "out", "--evaluations", "200", "--prior", "loose",
+        "track", tmp_path / "a.npz", "--out", tmp_path / "out", "--evaluations", "200", "--method", "@loose",
         "--restarts", "0", "--body-frames", "0", "--resume",
     )  # fmt: skip
     assert again.exit_code == 0, again.stderr
@@ -339,7 +339,7 @@ def test_a_calibration_fits_footage_that_a_codec_filled_up(
         capture.release()
     else:
         np.savez(source, masks=[np.pad(mask, ((0, 8), (0, 0))) for mask in [NOBODY] * EMPTY + truth()])
-    scene = scene_of([source], Viewing(cameras=[tmp_path / "camera.json"], frames=(EMPTY + 6, EMPTY + 30)))
+    scene = scene_of([source], camera=[tmp_path / "camera.json"], frames=(EMPTY + 6, EMPTY + 30))
     (one,) = scene.cameras
     assert (one.width, one.height) == (SIZE[0], SIZE[1] + 8)
     np.testing.assert_allclose(one.centre, camera(np.pi / 2).centre)

@@ -16,12 +16,12 @@ from posefit.cli import main
 from posefit.footage.cleaning import cleaned
 from posefit.footage.masks import PackedMasks
 from posefit.footage.readers import read_folder, read_masks
-from posefit.footage.source import Viewing, scene_of
+from posefit.footage.source import scene_of
 from posefit.tracking.front import track
 from tests.footage.conftest import SIZE, camera, truth
 
 ALL = (None, None)
-QUICK = ["--prior", "loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]
+QUICK = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]
 
 
 @pytest.fixture(scope="module")
@@ -341,9 +341,9 @@ def test_views_of_other_frames_or_another_rate_are_refused_by_name(walk: list[An
         np.savez(tmp_path / f"{name}.npz", masks=walk[:count], fps=fps)
     a, b, c = (tmp_path / f"{name}.npz" for name in "abc")
     with pytest.raises(ValueError, match=rf"views must have the same frames, got 6 of {a} and 4 of {b}"):
-        scene_of([a, b], Viewing(cameras=cameras))
+        scene_of([a, b], camera=cameras)
     with pytest.raises(ValueError, match=rf"views must have one frame rate.*, got 30 of {a} and 60 of {c}"):
-        scene_of([a, c], Viewing(cameras=cameras))
+        scene_of([a, c], camera=cameras)
 
 
 def test_masks_that_would_not_fit_in_memory_are_refused(

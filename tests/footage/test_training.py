@@ -161,8 +161,8 @@ def test_a_folder_with_a_clip_that_cannot_be_read_is_one_line(spoil: object, mes
 @pytest.mark.parametrize(
     ("method", "message"),
     [
-        (["--tracker", "exemplars"], "a must have at least 2 frames to be followed, got 1"),
-        (["--prior", "pca"], "angles must hold at least 7 frames, got 1"),
+        (["--method", "exemplars"], "a must have at least 2 frames to be followed, got 1"),
+        (["--method", "@pca"], "angles must hold at least 7 frames, got 1"),
     ],
 )
 def test_a_clip_of_one_frame_is_too_short_to_learn_from(method: list[str], message: str, tmp_path: Path) -> None:
@@ -173,5 +173,5 @@ def test_a_clip_of_one_frame_is_too_short_to_learn_from(method: list[str], messa
 
 
 def test_a_library_of_one_person_is_one_to_learn_from() -> None:
-    track = posefit.track("02_01", train=["library:17"], tracker="exemplars", frames=(0, 3), evaluations=400)
+    track = posefit.track("02_01", train=["library:17"], method="exemplars", frames=(0, 3), evaluations=400)
     assert track.summary["train"] == ["17_03", "17_10"]

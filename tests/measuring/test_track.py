@@ -41,13 +41,13 @@ def test_a_track_of_a_walk_says_its_gait(tracked: posefit.Track, out: Path) -> N
 
 
 def test_a_track_of_no_walk_says_so() -> None:
-    summary = posefit.track("jacks", size=(80, 60), particles=10, iterations=2, frames=(0, 20)).summary
+    summary = posefit.track("jacks", size=(80, 60), population_size=10, iterations=2, frames=(0, 20)).summary
     assert summary["gait"]["walk"] is False
     assert "no figures of gait: no strikes of a foot detected" in table(summary).splitlines()
 
 
 def test_a_single_frame_is_not_asked_for_a_gait() -> None:
-    summary = posefit.fit("walk", size=(80, 60), particles=10, iterations=2).summary
+    summary = posefit.fit("walk", size=(80, 60), population_size=10, iterations=2).summary
     assert "gait" not in table(summary)
 
 

@@ -41,7 +41,7 @@ def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
     threads = threading.active_count()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        summary = posefit.track("walk", optimiser=name, frames=(0, 2), size=(120, 90), evaluations=400).summary
+        summary = posefit.track("walk", method=name, frames=(0, 2), size=(120, 90), evaluations=400).summary
     assert summary["evaluations_per_frame"] == 400
     assert 720 <= summary["evaluations"] <= 800
     assert summary["iou"] > 0.5
@@ -60,7 +60,7 @@ def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
 )
 def test_an_unknown_variant_is_named(name: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        posefit.track("walk", optimiser=name, frames=(0, 1), size=(60, 45), evaluations=100)
+        posefit.track("walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100)
 
 
 def test_ribs_tells_the_two_hills_of_a_landscape_apart() -> None:

@@ -129,10 +129,10 @@ def test_one_union_tracks_walk_and_run_and_the_wrong_prior_does_not(source: str,
     joined, other, lost = [], [], []
     for seed in range(5):
         settings: dict[str, Any] = {"frames": (0, 30), "view_degrees": 0, "seed": seed}
-        union = posefit.track(source, train=both, prior="union", **settings).summary
+        union = posefit.track(source, train=both, method="@union", **settings).summary
         lost.append(union["lost_rate"])
         joined.append(union["error_degrees"]["mean"])
-        other.append(posefit.track(source, train=one, prior="pca", **settings).summary["error_degrees"]["mean"])
+        other.append(posefit.track(source, train=one, method="@pca", **settings).summary["error_degrees"]["mean"])
     assert np.median(lost) == 0.0
     assert np.median(joined) < 0.5 * np.median(other)
 

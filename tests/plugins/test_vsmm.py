@@ -207,7 +207,7 @@ def test_a_file_of_groups_that_is_wrong_is_named(tmp_path: Path, text: str, said
 
 
 def test_a_file_of_groups_that_is_not_there_is_one_line_and_status_2(tmp_path: Path) -> None:
-    result = CliRunner().invoke(main, ["track", "walk", "--tracker", "vsmm", "--set", "vsmm.groups=no.toml"])
+    result = CliRunner().invoke(main, ["track", "walk", "--method", "vsmm", "--set", "vsmm.groups=no.toml"])
     assert result.exit_code == 2
     assert result.output.splitlines()[-1] == "posefit: no.toml: expected a file of groups, got none"
 
@@ -228,14 +228,14 @@ def test_a_file_of_groups_that_is_not_there_is_one_line_and_status_2(tmp_path: P
     ],
 )
 def test_a_senseless_setting_is_one_line_and_status_2(setting: str, said: str) -> None:
-    result = CliRunner().invoke(main, ["track", "walk", "--tracker", "vsmm", "--set", f"vsmm.{setting}"])
+    result = CliRunner().invoke(main, ["track", "walk", "--method", "vsmm", "--set", f"vsmm.{setting}"])
     assert result.exit_code == 2
     assert said in result.output.splitlines()[-1]
 
 
 @pytest.mark.parametrize("setting", ["dimensions=0", "weight=0.0", "optimiser=spaso"])
 def test_a_senseless_setting_of_the_joined_tracker_is_one_line(setting: str) -> None:
-    result = CliRunner().invoke(main, ["track", "walk", "--tracker", "sapso+vsmm", "--set", f"sapso+vsmm.{setting}"])
+    result = CliRunner().invoke(main, ["track", "walk", "--method", "sapso+vsmm", "--set", f"sapso+vsmm.{setting}"])
     assert result.exit_code == 2
     assert f"{setting.split('=')[0]} must be" in result.output.splitlines()[-1]
 
@@ -277,21 +277,13 @@ def test_two_cameras_are_better_than_one() -> None:
 
 def test_it_follows_motion_capture(cmu: Path) -> None:
     found = posefit.track(
-        cmu / "14" / "14_06.amc", tracker="vsmm", frames=(0, 60), view_degrees=0.0, translation="aligned"
+        cmu / "14" / "14_06.amc", method="vsmm", frames=(0, 60), view_degrees=0.0, translation="aligned"
     )
     assert found.summary["iou"] > 0.55
 
 
 def test_it_writes_what_a_track_writes(tmp_path: Path) -> None:
     posefit.track(
-        "squat-a", tracker="vsmm", view_degrees=10.0, translation="aligned", frames=(0, 12), out=tmp_path / "new"
+        "squat-a", method="vsmm", view_degrees=10.0, translation="aligned", frames=(0, 12), out=tmp_path / "new"
     )
     assert (tmp_path / "new" / "track.amc").stat().st_size > 0  # only free axes turn
-
-
-@pytest.mark.parametrize("option", [("--optimiser", "cma"), ("--prior", "full"), ("--optimiser", "sapso")])
-def test_an_optimiser_or_a_prior_beside_a_tracker_is_refused(option: tuple[str, str]) -> None:
-    result = CliRunner().invoke(main, ["track", "walk", "--tracker", "vsmm", *option])
-    assert result.exit_code == 2
-    said = f"posefit: {option[0][2:]} must not be given beside a tracker, got {option[1]} and vsmm"
-    assert result.output.splitlines()[-1] == said

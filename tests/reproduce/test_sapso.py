@@ -190,7 +190,9 @@ def test_a_turned_motion_keeps_its_steps_and_ends_to_the_left() -> None:
 
 
 def test_baselines_are_what_a_track_reports(walk: PaperMotion) -> None:
-    found = track(paper_scene(walk, 45.0), train=walk.training, particles=5, iterations=1).summary["baselines_degrees"]
+    found = track(paper_scene(walk, 45.0), train=walk.training, population_size=5, iterations=1).summary[
+        "baselines_degrees"
+    ]
     for name, poses in baseline_poses(walk, 45.0).items():
         away = np.degrees(np.abs(wrapped(poses - walk.test.poses)))
         assert away.mean() == pytest.approx(found[name])
@@ -201,10 +203,9 @@ def test_a_run_is_a_track_of_the_same_seed(walk: PaperMotion) -> None:
     again = track(
         paper_scene(walk, 45.0),
         train=walk.training,
-        optimiser="pso",
-        prior="pca",
+        method="pso@pca",
         iterations=4,
-        tracker_settings={"tilt": "box"},  # Interpretation S16
+        settings={"tracker.tilt": "box"},  # Interpretation S16
         seed=3,
     )
     np.testing.assert_array_equal(found.poses, again.motion.poses)
@@ -217,10 +218,10 @@ def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
     again = track(
         paper_scene(walk, 45.0, (0, 1)),
         train=walk.training,
-        particles=30,
+        population_size=30,
         iterations=6,
-        optimiser="sapso",
-        tracker_settings={"tilt": "box"},  # Interpretation S16
+        method="sapso",
+        settings={"tracker.tilt": "box"},  # Interpretation S16
         seed=1,
     )
     np.testing.assert_array_equal(seen.history, again.found[0].history)

@@ -44,7 +44,7 @@ def followed(folder: Path, comes: str, **given: Any) -> tuple[posefit.Track, Arr
     """Return a track of a film, and in which frames it faces as the walker does."""
     masks, yaws = film(comes)
     np.savez(folder / "masks.npz", masks=masks)
-    usual = {"camera": SIDE, "prior": "loose", "body_frames": 0, "iterations": 20}
+    usual = {"camera": SIDE, "method": "@loose", "body_frames": 0, "iterations": 20}
     stature = Body.of(MOTION.skeleton).stature
     track = posefit.track(folder / "masks.npz", height=stature, **{**usual, **given})
     return track, np.cos(track.motion.poses[:, 0] - yaws) > 0.0
@@ -54,14 +54,14 @@ def followed(folder: Path, comes: str, **given: Any) -> tuple[posefit.Track, Arr
 @pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
 def test_who_comes_back_faces_where_he_goes_in_nine_of_ten_seeds(tmp_path: Path, optimiser: str) -> None:
     # which way he is followed is decided before the track is steadied
-    tracks = [followed(tmp_path, "back", optimiser=optimiser, seed=seed, steady=False) for seed in range(10)]
+    tracks = [followed(tmp_path, "back", method=optimiser, seed=seed, smooth=False) for seed in range(10)]
     right = [faces[AFTER].mean() for _, faces in tracks]
     assert np.mean(np.array(right) > 0.95) >= 0.9, right
 
 
 @pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
 def test_who_comes_back_is_told_with_what_it_took(tmp_path: Path, optimiser: str) -> None:
-    track, right = followed(tmp_path, "back", optimiser=optimiser)
+    track, right = followed(tmp_path, "back", method=optimiser)
     assert right[:WALKS].all()
     assert right[AFTER].mean() > 0.95
     assert track.summary["looked_again"] == [WALKS + GAP]
@@ -73,7 +73,7 @@ def test_who_comes_back_is_told_with_what_it_took(tmp_path: Path, optimiser: str
 
 
 def test_with_0_he_is_followed_backwards_which_is_told(tmp_path: Path) -> None:
-    track, right = followed(tmp_path, "back", tracker_settings={"look_again": 0})
+    track, right = followed(tmp_path, "back", settings={"tracker.look_again": 0})
     assert not right[AFTER].any()
     assert track.summary["looked_again"] == []
     assert track.summary["backwards_share"] > 0.1
@@ -82,7 +82,7 @@ def test_with_0_he_is_followed_backwards_which_is_told(tmp_path: Path) -> None:
 
 
 def test_who_goes_on_after_a_gap_is_followed_on(tmp_path: Path) -> None:
-    track, right = followed(tmp_path, "on", steady=False)
+    track, right = followed(tmp_path, "on", smooth=False)
     assert right[AFTER].all()
     assert all(frame.evaluations == 0 for frame in track.found[WALKS : WALKS + GAP])
     np.testing.assert_array_equal(
@@ -92,7 +92,7 @@ def test_who_goes_on_after_a_gap_is_followed_on(tmp_path: Path) -> None:
 
 def test_where_the_truth_is_known_nobody_looks_around_unless_he_is_asked_to() -> None:
     given: dict[str, Any] = {"frames": (0, 3), "size": (80, 60), "evaluations": 80}
-    plain, asked = (posefit.track("walk", tracker_settings=one, **given) for one in ({}, {"look_again": 5}))
+    plain, asked = (posefit.track("walk", settings=one, **given) for one in ({}, {"tracker.look_again": 5}))
     np.testing.assert_array_equal(plain.motion.poses, asked.motion.poses)
     assert plain.summary["looked_again"] == asked.summary["looked_again"] == []
 
@@ -103,7 +103,7 @@ def test_where_the_truth_is_known_nobody_looks_around_unless_he_is_asked_to() ->
 )
 def test_a_wrong_number_of_frames_is_one_clear_error(wrong: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        posefit.track("walk", frames=(0, 1), tracker_settings={"look_again": wrong})
+        posefit.track("walk", frames=(0, 1), settings={"tracker.look_again": wrong})
 
 
 TASK = Task(Body.of(MOTION.skeleton), [SIDE], 10, 0.0, MIDDLE, fps=10.0)

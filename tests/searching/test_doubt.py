@@ -19,9 +19,9 @@ def test_a_frame_is_as_likely_lost_as_not_at_one_cost_and_likelier_the_more_it_c
 
 @pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
 def test_frames_say_it_where_modes_are_asked_for(optimiser: str) -> None:
-    given = {"optimiser": optimiser, "frames": (0, 2), "evaluations": 400, "particles": 40, "size": (160, 120)}
+    given = {"method": optimiser, "frames": (0, 2), "evaluations": 400, "population_size": 40, "size": (160, 120)}
     assert [frame.lost for frame in posefit.track("walk", **given).found] == [None, None]
-    track = posefit.track("walk", tracker_settings={"modes": 1}, **given)
+    track = posefit.track("walk", settings={"tracker.modes": 1}, **given)
     assert [frame.lost for frame in track.found] == [
         pytest.approx(float(lost_at(np.array(f.cost)))) for f in track.found
     ]

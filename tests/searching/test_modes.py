@@ -19,7 +19,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import pose_problem, walking_angles
 from posefit.uncertainty.modes import Posterior, modes_of
 
-FEW = {"evaluations": 400, "particles": 40, "size": (160, 120)}
+FEW = {"evaluations": 400, "population_size": 40, "size": (160, 120)}
 
 
 def side_view(frame: int = 0) -> tuple[PoseProblem, Any, Any]:
@@ -108,7 +108,9 @@ def test_numbers_that_make_no_sense_are_refused(given: dict[str, Any], said: str
 )
 def test_a_wrong_setting_of_the_tracker_is_one_clear_error(given: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        posefit.track("walk", frames=(0, 1), tracker_settings=given, **FEW)
+        posefit.track(
+            "walk", frames=(0, 1), settings={f"tracker.{name}": value for name, value in given.items()}, **FEW
+        )
 
 
 @pytest.mark.parametrize(("share", "searches"), [(0.2, 0), (0.5, 1), (2.0, 3)])
@@ -120,9 +122,9 @@ def test_all_that_modes_take_is_within_their_share(share: float, searches: int) 
         made: posefit.Optimiser = registry().optimiser("sapso")(space, rng)
         return made
 
-    settings = {"modes": 4, "modes_share": share}
+    settings = {"tracker.modes": 4, "tracker.modes_share": share}
     given = {**FEW, "evaluations": 2000}
-    track = posefit.track("walk", optimiser=counted, frames=(0, 2), tracker_settings=settings, **given)
+    track = posefit.track("walk", optimiser=counted, frames=(0, 2), settings=settings, **given)
     count = len(begun)
     posefit.track("walk", optimiser=counted, frames=(0, 2), **given)
     # of the two frames; those that would have less than 200 evaluations are not begun
@@ -134,9 +136,9 @@ def test_all_that_modes_take_is_within_their_share(share: float, searches: int) 
 @pytest.mark.parametrize("optimiser", ["sapso", "annealed", "particle"])
 @pytest.mark.parametrize("searches", [1, 3])
 def test_a_track_is_the_same_with_modes_and_without(optimiser: str, searches: int) -> None:
-    given = {"optimiser": optimiser, "frames": (0, 3), **FEW}
+    given = {"method": optimiser, "frames": (0, 3), **FEW}
     without = posefit.track("walk", **given)
-    found = posefit.track("walk", tracker_settings={"modes": searches}, **given)
+    found = posefit.track("walk", settings={"tracker.modes": searches}, **given)
     np.testing.assert_array_equal(found.motion.poses, without.motion.poses)
     for frame, plain in zip(found.found, without.found, strict=True):
         assert plain.posterior is None

@@ -13,8 +13,7 @@ from posefit.cli import main
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, synthetic
 from posefit.motion import built_in
-from posefit.tracking.method import Choice
-from posefit.tracking.opening import Opening
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.run import Track, follow
 
 WALK = built_in.motion("walk", frames=60).frames(5, 11)
@@ -62,9 +61,7 @@ def followed(passes: int = 2, **off: float) -> Track:
     return follow(
         footage(),
         [WALK],
-        choice=Choice(tracker=Walker, evaluations=300),
-        opening=Opening(body_frames=0),
-        passes=passes,
+        TrackOptions(method=Walker, evaluations=300, body_frames=0, passes=passes),
     )
 
 
@@ -97,7 +94,7 @@ def test_of_passes_the_better_one_is_kept() -> None:
 
 
 def test_a_track_is_followed_once_where_nobody_asks_for_more() -> None:
-    found = posefit.track("walk", frames=(0, 3), translation="aligned", evaluations=300, steady=True)
+    found = posefit.track("walk", frames=(0, 3), translation="aligned", evaluations=300, smooth=True)
     assert (found.summary["passes"], found.summary["kept_pass"]) == (1, 1)
 
 
@@ -111,7 +108,7 @@ def test_more_passes_are_followed_where_they_are_asked_for() -> None:
     ("settings", "said"),
     [
         ({"passes": 0}, "passes must be at least 1, got 0"),
-        ({"passes": 2}, "passes must be 1 where a track is not steady, got 2"),
+        ({"passes": 2}, "passes must be 1 where a track is not smooth, got 2"),
     ],
 )
 def test_passes_that_make_no_sense_are_refused(settings: dict[str, Any], said: str) -> None:
@@ -122,4 +119,4 @@ def test_passes_that_make_no_sense_are_refused(settings: dict[str, Any], said: s
 def test_a_command_that_asks_for_passes_of_what_is_not_steady_says_so_in_a_line() -> None:
     result = CliRunner().invoke(main, ["track", "walk", "--frames", "0:2", "--passes", "2"])
     assert result.exit_code == 2
-    assert result.output.strip().splitlines()[-1].endswith("passes must be 1 where a track is not steady, got 2")
+    assert result.output.strip().splitlines()[-1].endswith("passes must be 1 where a track is not smooth, got 2")

@@ -150,12 +150,12 @@ def test_the_shortest_tracks_are_told(frames: int) -> None:
 def test_a_track_is_steady_where_it_is_asked_for_and_tells_the_cost_of_what_it_tells() -> None:
     settings = {"frames": (0, 8), "translation": "aligned", "evaluations": 400}
     found = posefit.track("walk", **settings)
-    told = posefit.track("walk", **settings, steady=True)
-    assert (found.summary["steady"], told.summary["steady"]) == (False, True)
+    told = posefit.track("walk", **settings, smooth=True)
+    assert (found.summary["smooth"], told.summary["smooth"]) == (False, True)
     assert told.summary["acceleration"] < found.summary["acceleration"]
     assert told.summary["cost"] != found.summary["cost"]
     assert [frame.evaluations for frame in told.found] == [frame.evaluations for frame in found.found]
     with pytest.raises(
-        ValueError, match="steady must be given where the translation is searched or aligned, got known"
+        ValueError, match="smooth must be given where the translation is searched or aligned, got known"
     ):
-        posefit.track("walk", frames=(0, 3), steady=True)
+        posefit.track("walk", frames=(0, 3), smooth=True)

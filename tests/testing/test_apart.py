@@ -77,9 +77,9 @@ def test_what_a_plugin_prints_is_in_no_result() -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_what_a_plugin_prints_in_a_track_is_in_no_result() -> None:
-    ran = posefit("track", "walk", "--optimiser", "talks", "--frames", ":1", "--evaluations", "80", "--json")
+    ran = posefit("track", "walk", "--method", "talks", "--frames", ":1", "--evaluations", "80", "--json")
     assert ran.returncode == 0, ran.stderr
-    assert json.loads(ran.stdout)["method"] == "talks + pca"
+    assert json.loads(ran.stdout)["method"] == "talks@pca"
     assert "asked, too\n" in ran.stderr
 
 
@@ -87,14 +87,14 @@ def test_what_a_plugin_prints_in_a_track_is_in_no_result() -> None:
     ("words", "said"),
     [
         (
-            ("--optimiser", "exits-in-tell"),
+            ("--method", "exits-in-tell"),
             "optimiser 'exits-in-tell' of posefit-sabotage 1.0: tell must not end the program, got SystemExit: 0",
         ),
         (
-            ("--tracker", "exits-in-track"),
+            ("--method", "exits-in-track"),
             "tracker 'exits-in-track' of posefit-sabotage 1.0: it must not end the program, got SystemExit: 0",
         ),
-        (("--optimiser", "ends-the-process"), f"nothing may end the program, got os._exit(0) in {planted.__file__}:"),
+        (("--method", "ends-the-process"), f"nothing may end the program, got os._exit(0) in {planted.__file__}:"),
     ],
 )
 @pytest.mark.usefixtures("installed")

@@ -63,18 +63,18 @@ def test_what_a_tracker_says_is_held_against_what_the_host_finds(kind: Any, said
 
 def test_a_track_is_marked_by_a_warning_and_has_the_hosts_figures() -> None:
     told: list[str] = []
-    result = posefit.track("walk", tracker=planted.SpendsInSecret, say=told.append, **QUICK)
+    result = posefit.track("walk", method=planted.SpendsInSecret, say=told.append, **QUICK)
     said, spent = result.summary["warnings"]
     assert "frame 0 must say how many poses it drew, 20,001, got 100 (3 such frames)" in said
     assert "frame 0 must use at most 2,440 evaluations, got 20,001 (3 such frames)" in spent
     assert result.summary["evaluations"] == 3 * 20_001
     assert [line for line in told if line.startswith("warning")] == [f"warning: {said}", f"warning: {spent}"]
-    free = posefit.track("walk", tracker=planted.CostsNothing, **QUICK)
-    assert free.summary["cost"] == posefit.track("walk", tracker=planted.Holds, **QUICK).summary["cost"] > 0.0
+    free = posefit.track("walk", method=planted.CostsNothing, **QUICK)
+    assert free.summary["cost"] == posefit.track("walk", method=planted.Holds, **QUICK).summary["cost"] > 0.0
     assert len(free.summary["warnings"]) == 1
 
 
-@pytest.mark.parametrize("method", [{"optimiser": "sapso"}, {"tracker": "vsmm"}, {"tracker": "sapso+vsmm"}])
+@pytest.mark.parametrize("method", [{"method": "sapso"}, {"method": "vsmm"}, {"method": "sapso+vsmm"}])
 def test_no_method_of_posefits_own_is_warned_of(method: dict[str, str]) -> None:
     seen = posefit.track("walk", view_degrees=(45.0, 135.0), **method, **{**QUICK, "evaluations": 400}).summary
     assert seen["warnings"] == []

@@ -34,7 +34,7 @@ def test_cameras_at_two_azimuths_are_not_the_same_track(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with pytest.raises(StopError):
         posefit.track("walk", camera=camera(0.5), out=out, progress=stopping, **QUICK)
-    with pytest.raises(ValueError, match="cameras must be .* as it was, to resume, got one with another content"):
+    with pytest.raises(ValueError, match="camera must be .* as it was, to resume, got one with another content"):
         posefit.track("walk", camera=camera(1.5), out=out, resume=True, **QUICK)
     resumed = posefit.track(
         "walk", camera=camera(0.5), out=out, resume=True, **QUICK

@@ -14,6 +14,7 @@ from posefit.fitting.guard import BrokenRuleError
 from posefit.footage.scene import synthetic
 from posefit.registry import Offer, Plugin, Registry, registry
 from posefit.tracking import method, opening
+from posefit.tracking.options import TrackOptions
 from tests.testing import planted
 
 QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 200}
@@ -22,16 +23,16 @@ QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 200
 @pytest.mark.parametrize("name", ["sapso", "pso", "particle", "annealed", "cma", "random"])
 def test_every_method_gets_the_same_number_of_evaluations_and_says_how_many_it_used(name: str) -> None:
     for budget in (200, 437):
-        summary = posefit.track("walk", optimiser=name, **{**QUICK, "evaluations": budget}).summary
+        summary = posefit.track("walk", method=name, **{**QUICK, "evaluations": budget}).summary
         assert summary["evaluations_per_frame"] == budget
         used = summary["evaluations"] / summary["frames"]
         assert 0.85 * budget < used <= budget
 
 
 def test_a_budget_is_particles_times_iterations_and_one_where_nothing_else_is_said() -> None:
-    assert method.Choice().budget() == 2440
-    assert method.Choice(particles=10, iterations=4).budget() == 50
-    assert method.Choice(particles=10, evaluations=300).budget() == 300
+    assert TrackOptions().budget == 2440
+    assert TrackOptions(population_size=10, iterations=4).budget == 50
+    assert TrackOptions(population_size=10, evaluations=300).budget == 300
 
 
 @pytest.mark.parametrize(
@@ -44,13 +45,15 @@ def test_a_budget_is_particles_times_iterations_and_one_where_nothing_else_is_sa
         ({"view_degrees": float("nan")}, "view_degrees must be a finite number, got nan"),
         ({"fps": 0.0}, "fps must be a positive number, got 0.0"),
         ({"fps": float("inf")}, "fps must be a positive number, got inf"),
-        ({"optimiser": "sapzo"}, "did you mean 'sapso'"),
-        ({"prior": "pcb"}, "prior must be one of full, loose, pca, sklearn, union, got 'pcb'; did you mean 'pca'"),
-        ({"tracker": "vsmn"}, "tracker must be one of exemplars, sapso.vsmm, vsmm, got 'vsmn'; did you mean 'vsmm'"),
+        ({"method": "sapzo"}, "method must be OPTIMISER@PRIOR, or one of .*, got 'sapzo'; did you mean 'sapso'"),
+        ({"method": "sapzo@pca"}, "optimiser must be one of .*did you mean 'sapso'"),
+        ({"method": "@pcb"}, "prior must be one of full, loose, pca, sklearn, union, got 'pcb'; did you mean 'pca'"),
+        ({"method": "vsmn"}, "method must be .*, got 'vsmn'; did you mean 'vsmm'"),
+        ({"method": "vsmm", "optimiser": Registry}, "optimiser must not be given beside a tracker, got .* and vsmm"),
         ({"first_pose": "mine"}, "first_pose must be one of searched, given, got 'mine'"),
-        ({"optimiser_settings": {"coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),
-        ({"prior_settings": {"components": "six"}}, "pca.components must be float, got 'six'"),
-        ({"tracker_settings": {"flor": 1.0}}, "a setting of tracker must be one of .*did you mean 'floor'"),
+        ({"settings": {"sapso.coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),
+        ({"settings": {"pca.components": "six"}}, "pca.components must be float, got 'six'"),
+        ({"settings": {"tracker.flor": 1.0}}, "a setting of tracker must be one of .*did you mean 'floor'"),
     ],
 )
 def test_mistakes_are_named(settings: dict[str, Any], message: str) -> None:
@@ -72,7 +75,7 @@ def test_a_filter_carries_its_particles_and_the_others_are_built_anew(monkeypatc
         found = Registry((Plugin("test", "test", "1", "loaded", offers=(counted, registry().offer("prior", "pca"))),))
         monkeypatch.setattr(method, "registry", lambda found=found: found)
         built.clear()
-        posefit.track("walk", optimiser=name, **QUICK)
+        posefit.track("walk", method=name, **QUICK)
         first = "anywhere"  # of the track to warm up, and of the track itself
         assert (
             built
@@ -136,7 +139,7 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
     settings = {**QUICK, "ask_seconds": 0.3} if factory is NeverReturns else QUICK
     if rule is not None:
         with pytest.raises(BrokenRuleError, match=f"^optimiser 'bad' of posefit-bad 1.0: {rule}$"):
-            posefit.track("walk", optimiser="bad", **settings)
+            posefit.track("walk", method="bad", **settings)
     assert posefit.track("walk", **QUICK).summary["frames"] == 3
 
 
@@ -170,7 +173,7 @@ def test_a_broken_prior_is_named(change: dict[str, Any], rule: str, installed: A
 
     installed("prior", Bad)
     with pytest.raises(BrokenRuleError, match=f"prior 'bad' of posefit-bad 1.0: {rule}"):
-        posefit.track("walk", prior="bad", **QUICK)
+        posefit.track("walk", method="@bad", **QUICK)
 
 
 @pytest.mark.parametrize("method", ["inverse_transform", "feasible"])
@@ -193,12 +196,12 @@ def test_a_prior_that_fails_in_a_search_is_named_and_not_the_optimiser_that_meet
     setattr(Tires, method, tires)
     installed("prior", Tires)
     with pytest.raises(BrokenRuleError, match=f"^prior 'bad' of posefit-bad 1.0: {method} must not {said}$"):
-        posefit.track("walk", prior="bad", **QUICK)
+        posefit.track("walk", method="@bad", **QUICK)
 
 
 def test_a_tracker_is_reached_by_name(installed: Any) -> None:
     installed("tracker", planted.Holds)
-    summary = posefit.track("walk", tracker="bad", **QUICK).summary
+    summary = posefit.track("walk", method="bad", **QUICK).summary
     assert summary["method"] == "bad"
     assert summary["prior_floor_degrees"] is None
     assert summary["skill"]["mean_pose"] is not None
@@ -225,12 +228,12 @@ class FailingTracker(planted.Holds):
 def test_a_broken_tracker_is_named(factory: Any, rule: str, installed: Any) -> None:
     installed("tracker", factory)
     with pytest.raises(BrokenRuleError, match=f"tracker 'bad' of posefit-bad 1.0: {rule}"):
-        posefit.track("walk", tracker="bad", **QUICK)
+        posefit.track("walk", method="bad", **QUICK)
 
 
 def test_a_given_first_pose_starts_the_first_frame_around_it() -> None:
     first = {
-        kind: posefit.track("walk-a", prior="full", first_pose=kind, **QUICK).frames[0]
+        kind: posefit.track("walk-a", method="@full", first_pose=kind, **QUICK).frames[0]
         for kind in ("searched", "given")
     }
     assert first["given"]["error_degrees"] < 0.5 * first["searched"]["error_degrees"]
@@ -239,8 +242,8 @@ def test_a_given_first_pose_starts_the_first_frame_around_it() -> None:
 
 @pytest.mark.parametrize("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])
 def test_every_prior_can_be_searched(prior: str) -> None:
-    summary = posefit.track("walk", prior=prior, **QUICK).summary
-    assert summary["method"] == f"sapso + {prior}"
+    summary = posefit.track("walk", method=f"@{prior}", **QUICK).summary
+    assert summary["method"] == f"sapso@{prior}"
     assert summary["iou"] > 0.4
 
 
@@ -254,9 +257,9 @@ def test_a_scene_is_followed_as_it_is() -> None:
     by_name = posefit.track(motion, train=built_in.other_styles("walk"), evaluations=200, size=(120, 90))
     np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
     assert [frame.cost for frame in result.found] == [row["cost"] for row in result.frames]
-    with pytest.raises(ValueError, match="a scene must be followed as it is, got Viewing"):
+    with pytest.raises(ValueError, match="a scene must be tracked as it is, got fps"):
         posefit.track(seen, fps=20.0)
-    with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth nobody knows"):
+    with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth is unknown"):
         posefit.track(replace(seen, truth=None))
 
 
@@ -273,5 +276,5 @@ def test_the_prior_is_learned_once_whatever_a_track_searches_before(tmp_path: Pa
     scene = synthetic(motion, [45.0, 135.0], (120, 90), [], (None, None))
     np.savez(tmp_path / "one.npz", masks=np.stack([one.silhouettes[0].mask for one in scene.observations] * 3))
     installed("prior", Counted, "counted")
-    posefit.track(tmp_path / "one.npz", prior="counted", restarts=2, body_frames=5, evaluations=80)
+    posefit.track(tmp_path / "one.npz", method="@counted", restarts=2, body_frames=5, evaluations=80)
     assert len(fits) == 1

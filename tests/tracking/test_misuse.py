@@ -16,7 +16,7 @@ from posefit.registry import registry
 
 MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"evaluations": 1e3}, "evaluations must be a whole number of at least 1, got 1000.0"),
-    ({"particles": 2.5}, "particles must be a whole number of at least 1, got 2.5"),
+    ({"population_size": 2.5}, "population_size must be a whole number of at least 1, got 2.5"),
     ({"restarts": 1.5}, "restarts must be a whole number of at least 0, got 1.5"),
     ({"frames": 5}, r"frames must be \(start, stop\), either of which may be None, got 5"),
     ({"frames": (1.5, None)}, r"frames must be two whole numbers or None, got \(1.5, None\)"),

@@ -19,12 +19,13 @@ from posefit.searching.starts import begun, best_seen
 from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.opening import Opening, built, task_of
+from posefit.tracking.opening import built, task_of
+from posefit.tracking.options import TrackOptions
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
 
-@pytest.mark.parametrize("method", [{}, {"optimiser": "annealed"}, {"tracker": "vsmm"}])
+@pytest.mark.parametrize("method", [{}, {"method": "annealed"}, {"method": "vsmm"}])
 def test_a_search_is_made_once(method: dict[str, Any]) -> None:
     drawn = PoseCount()
     with drawn.counting():
@@ -53,9 +54,9 @@ def test_a_tracker_that_needs_its_whole_budget_works_all_the_same() -> None:
                 raise ValueError(f"evaluations must be at least 2000, got {task.evaluations}")
             super().__init__(task)
 
-    assert posefit.track("walk", tracker=Demanding, frames=(0, 2), size=(120, 90)).summary["frames"] == 2
+    assert posefit.track("walk", method=Demanding, frames=(0, 2), size=(120, 90)).summary["frames"] == 2
     with pytest.raises(ValueError, match="evaluations must be at least 2000, got 400"):
-        posefit.track("walk", tracker=Demanding, frames=(0, 2), size=(120, 90), evaluations=400)
+        posefit.track("walk", method=Demanding, frames=(0, 2), size=(120, 90), evaluations=400)
 
 
 @pytest.mark.parametrize(("size", "rows"), [((320, 240), 240), ((640, 479), 479), ((640, 480), 240), ((960, 721), 240)])
@@ -104,7 +105,7 @@ def test_too_few_frames_for_a_build_are_said(tmp_path: Path, count: int, asked: 
     np.savez(tmp_path / "a.npz", masks=[scene.observations[k].silhouettes[0].mask for k in range(count)])
     heard: list[str] = []
     track = posefit.track(
-        tmp_path / "a.npz", prior="loose", evaluations=80, restarts=1, body_frames=asked, say=heard.append
+        tmp_path / "a.npz", method="@loose", evaluations=80, restarts=1, body_frames=asked, say=heard.append
     )
     assert any(line.startswith(said) for line in heard)
     assert (track.summary["body"] is None) == said.startswith("no build")
@@ -112,7 +113,7 @@ def test_too_few_frames_for_a_build_are_said(tmp_path: Path, count: int, asked: 
 
 def test_a_build_sees_every_third_frame_where_there_are_so_many() -> None:
     scene = synthetic(built_in.motion("walk", frames=30), [90.0], (120, 90), [], (None, None))
-    task = task_of(scene, Opening(), [built_in.motion("walk")], 80, 1)
+    task = task_of(scene, TrackOptions(evaluations=80), [built_in.motion("walk")])
     looked: list[tuple[int, float]] = []
 
     def follow(mine: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -128,7 +129,7 @@ def test_a_build_sees_every_third_frame_where_there_are_so_many() -> None:
 
 def test_a_build_begins_where_most_cameras_see_the_person() -> None:
     scene = synthetic(built_in.motion("walk", frames=40), [0.0, 90.0], (120, 90), [], (None, None))
-    task = task_of(scene, Opening(), [built_in.motion("walk")], 80, 1)
+    task = task_of(scene, TrackOptions(evaluations=80), [built_in.motion("walk")])
     nothing = Silhouette.of(np.zeros((90, 120), dtype=bool), np.zeros((90, 120), dtype=bool))
     seen = [scene.observations[k] for k in range(40)]
     seen[:10] = [replace(one, silhouettes=[one.silhouettes[0], nothing]) for one in seen[:10]]

@@ -194,22 +194,22 @@ def test_what_all_tracks_spent_is_said_of_the_one_that_is_kept() -> None:
     assert spent_by_all([one, two], 0)[0].cpu_seconds is None
 
 
-@pytest.mark.parametrize("method", [{}, {"tracker": "vsmm"}, {"tracker": "exemplars"}, {"optimiser": "annealed"}])
+@pytest.mark.parametrize("method", [{}, {"method": "vsmm"}, {"method": "exemplars"}, {"method": "annealed"}])
 def test_the_evaluations_of_all_tracks_are_counted(method: dict[str, Any]) -> None:
     drawn = PoseCount()
     with drawn.counting():
-        result = posefit.track("walk", tracks=3, view_degrees=90.0, **method, **QUICK)
+        result = posefit.track("walk", hypotheses=3, view_degrees=90.0, **method, **QUICK)
     summary = result.summary
     alone = posefit.track("walk", view_degrees=90.0, **method, **QUICK).summary["evaluations"]
     assert summary["warnings"] == []
     assert summary["evaluations"] == sum(row["evaluations"] for row in result.frames) <= drawn.poses
     assert summary["evaluations"] > 2 * alone
     assert summary["evaluations_per_frame"] == 400
-    assert len(summary["tracks"]) == 3
-    assert [one["kept"] for one in summary["tracks"]].count(True) == 1
-    kept = next(one for one in summary["tracks"] if one["kept"])
+    assert len(summary["hypotheses"]) == 3
+    assert [one["kept"] for one in summary["hypotheses"]].count(True) == 1
+    kept = next(one for one in summary["hypotheses"] if one["kept"])
     assert kept["cost"] == pytest.approx(summary["cost"])
-    assert kept["cost"] + kept["motion"] == min(one["cost"] + one["motion"] for one in summary["tracks"])
+    assert kept["cost"] + kept["motion"] == min(one["cost"] + one["motion"] for one in summary["hypotheses"])
 
 
 class Told(planted.Holds):
@@ -224,32 +224,32 @@ class Told(planted.Holds):
 
 def test_a_tracker_gets_the_beginnings_as_tasks() -> None:
     Told.tasks.clear()
-    result = posefit.track("walk", tracker=Told, tracks=3, view_degrees=90.0, **QUICK)
+    result = posefit.track("walk", method=Told, hypotheses=3, view_degrees=90.0, **QUICK)
     first, mirror, reflection = Told.tasks[-3:]
     assert first.first_pose is None
     assert mirror.first_pose is not None
     assert reflection.first_pose is not None
-    assert [one["beginning"] for one in result.summary["tracks"]] == ["searched", "mirrored", "reflected"]
-    assert result.summary["tracks"][0]["kept"]  # which all cost the same
+    assert [one["beginning"] for one in result.summary["hypotheses"]] == ["searched", "mirrored", "reflected"]
+    assert result.summary["hypotheses"][0]["kept"]  # which all cost the same
 
 
 def test_one_track_is_what_it_was() -> None:
-    one, same = (posefit.track("walk", seed=4, **given, **QUICK) for given in ({}, {"tracks": 1}))
+    one, same = (posefit.track("walk", seed=4, **given, **QUICK) for given in ({}, {"hypotheses": 1}))
     np.testing.assert_array_equal(one.motion.poses, same.motion.poses)
-    assert one.summary["tracks"] == []
+    assert one.summary["hypotheses"] == []
 
 
 def test_tracks_that_begin_alike_are_no_worse_than_the_first() -> None:
-    first, kept = (posefit.track("walk", tracks=tracks, seed=2, view_degrees=90.0, **QUICK) for tracks in (1, 4))
-    costs = [one["cost"] + one["motion"] for one in kept.summary["tracks"]]
+    first, kept = (posefit.track("walk", hypotheses=tracks, seed=2, view_degrees=90.0, **QUICK) for tracks in (1, 4))
+    costs = [one["cost"] + one["motion"] for one in kept.summary["hypotheses"]]
     assert costs[0] >= min(costs)
-    assert kept.summary["tracks"][0]["cost"] == pytest.approx(first.summary["cost"])
+    assert kept.summary["hypotheses"][0]["cost"] == pytest.approx(first.summary["cost"])
 
 
 @pytest.mark.parametrize("tracks", [0, -1, 1.5, "2"])
 def test_tracks_that_are_no_number_are_a_mistake(tracks: Any) -> None:
-    with pytest.raises(ValueError, match=f"tracks must be .* got {tracks!r}"):
-        posefit.track("walk", tracks=tracks, **QUICK)
+    with pytest.raises(ValueError, match=f"hypotheses must be .* got {tracks!r}"):
+        posefit.track("walk", hypotheses=tracks, **QUICK)
 
 
 def stopping(after: int) -> Any:
@@ -267,22 +267,22 @@ def stopping(after: int) -> Any:
 
 @pytest.mark.parametrize("after", [1, 3, 4, 7])
 def test_tracks_that_were_interrupted_go_on_where_they_were(tmp_path: Path, after: int) -> None:
-    asked: dict[str, Any] = {"tracks": 3, "seed": 1, "view_degrees": 90.0, "out": tmp_path / "walk", **QUICK}
+    asked: dict[str, Any] = {"hypotheses": 3, "seed": 1, "view_degrees": 90.0, "out": tmp_path / "walk", **QUICK}
     whole = posefit.track("walk", **{**asked, "out": tmp_path / "whole"})
     with pytest.raises(KeyboardInterrupt):
         posefit.track("walk", progress=stopping(after), **asked)
-    with pytest.raises(ValueError, match="tracks must be 3, as before, to resume, got 2"):
-        posefit.track("walk", resume=True, **{**asked, "tracks": 2})
+    with pytest.raises(ValueError, match="hypotheses must be 3, as before, to resume, got 2"):
+        posefit.track("walk", resume=True, **{**asked, "hypotheses": 2})
     told: list[str] = []
     again = posefit.track("walk", resume=True, say=told.append, **asked)
-    assert len(again.summary["tracks"]) == 3
+    assert len(again.summary["hypotheses"]) == 3
     done, frames = divmod(after, 3)
     names = ("searched", "mirrored", "reflected")
     anew = [f"track {k + 1} of 3: {names[k]}" for k in range(-(-after // 3), 3)]
     assert [line for line in told if line.startswith("track ")] == anew  # what was found before is not searched again
     going = [f"going on from frame {frames} of 3 of track {done + 1} of 3, {names[done]}"] if frames else []
     assert [line for line in told if line.startswith("going on")] == going
-    costs = [[one["cost"] for one in result.summary["tracks"]][:done] for result in (whole, again)]
+    costs = [[one["cost"] for one in result.summary["hypotheses"]][:done] for result in (whole, again)]
     assert costs[0] == costs[1]
     assert again.summary["evaluations"] == whole.summary["evaluations"]
 
@@ -291,7 +291,7 @@ def test_the_command_says_which_track_was_kept(tmp_path: Path) -> None:
     words = [
         "track",
         "walk",
-        "--tracks",
+        "--hypotheses",
         "2",
         "--view-degrees",
         "90",
@@ -309,9 +309,9 @@ def test_the_command_says_which_track_was_kept(tmp_path: Path) -> None:
     assert "of 2; whole cost by beginning: searched " in line
     assert "800 of 800 evaluations" in shown.stdout
     summary = json.loads((tmp_path / "walk" / "summary.json").read_text("utf-8"))
-    assert [one["beginning"] for one in summary["tracks"]] == ["searched", "mirrored"]
-    wrong = CliRunner().invoke(main, ["track", "walk", "--tracks", "0"])
-    assert (wrong.exit_code, wrong.stderr) == (2, "posefit: tracks must be at least 1, got 0\n")
+    assert [one["beginning"] for one in summary["hypotheses"]] == ["searched", "mirrored"]
+    wrong = CliRunner().invoke(main, ["track", "walk", "--hypotheses", "0"])
+    assert (wrong.exit_code, wrong.stderr) == (2, "posefit: hypotheses must be at least 1, got 0\n")
 
 
 @pytest.mark.slow
@@ -323,7 +323,7 @@ def test_four_tracks_halve_what_is_swapped_from_the_side(cmu: Path) -> None:
                 train=[cmu / "16" / "16_15.amc"],
                 view_degrees=90.0,
                 frames=(0, 60),
-                tracks=tracks,
+                hypotheses=tracks,
                 seed=seed,
             ).summary
             for seed in range(5)

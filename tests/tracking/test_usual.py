@@ -1,8 +1,8 @@
 """What a source is followed with, and what that learns from, where nobody says."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,64 +10,49 @@ from click.testing import CliRunner
 
 import posefit
 from posefit.cli import main
-from posefit.footage.source import Viewing, scene_of
+from posefit.footage.source import scene_of
 from posefit.motion import recorded
-from posefit.registry import Registry
+from posefit.registry import registry
 from posefit.tracking import method
-from posefit.tracking.method import usual
+from posefit.tracking.method import resolved
+from posefit.tracking.options import TrackOptions
 
 WALKS = ("walk-a", "walk-b", "walk-c")
-SEARCH = {"optimiser": "sapso", "prior": "loose"}
-FOLLOWED = {"tracker": "exemplars"}
 
 
-@pytest.mark.parametrize(
-    ("source", "named", "method", "train"),
-    [
-        ("walk", {}, {"optimiser": "sapso", "prior": "pca"}, WALKS),
-        ("run-a", {}, {"optimiser": "sapso", "prior": "pca"}, ("run-b",)),
-        ("16_15", {}, {"optimiser": "sapso", "prior": "pca"}, WALKS),
-        ("16_15.amc", {"tracker": "exemplars"}, FOLLOWED, WALKS),
-        ("16_15", {"train": ["library"]}, {"optimiser": "sapso", "prior": "pca"}, ["library"]),
-        ("a.mp4", {}, FOLLOWED, ["library"]),
-        ("a.npz", {}, FOLLOWED, ["library"]),
-        ("masks/", {"tracker": "exemplars"}, FOLLOWED, ["library"]),
-        ("a.npz", {"train": ["library:-16"]}, FOLLOWED, ["library:-16"]),
-        ("a.npz", {"optimiser": "annealed"}, {"optimiser": "annealed", "prior": "loose"}, WALKS),
-        ("a.npz", {"prior": "pca"}, {"optimiser": "sapso", "prior": "pca"}, WALKS),
-        ("a.npz", {"searched": True}, SEARCH, WALKS),
-        ("a.npz", {"tracker": "vsmm"}, {"tracker": "vsmm"}, WALKS),
-    ],
-)
-def test_what_is_left_open(source: str, named: dict[str, Any], method: dict[str, str], train: Any) -> None:
-    found = usual(source, **named)
-    assert found.method == method
-    assert found.train == train
-    # what was decided decides the same again
-    again = usual(source, **found.method, **({"train": named["train"]} if "train" in named else {}))
-    assert (again.method, again.train) == (method, train)
+def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
+    for source, given, expected, train in (
+        ("walk", {}, "sapso@pca", WALKS),
+        ("run-a", {}, "sapso@pca", ("run-b",)),
+        ("16_15", {}, "sapso@pca", WALKS),
+        ("16_15.amc", {"method": "exemplars"}, "exemplars", WALKS),
+        ("16_15", {"train": ["library"]}, "sapso@pca", ["library"]),
+        ("a.mp4", {}, "exemplars", ["library"]),
+        ("a.npz", {}, "exemplars", ["library"]),
+        ("masks/", {"method": "exemplars"}, "exemplars", ["library"]),
+        ("a.npz", {"train": ["library:-16"]}, "exemplars", ["library:-16"]),
+        ("a.npz", {"method": "annealed"}, "annealed@loose", WALKS),
+        ("a.npz", {"method": "@pca"}, "sapso@pca", WALKS),
+        ("a.npz", {"settings": {"sapso.cooling": 0.9}}, "sapso@loose", WALKS),
+        ("a.npz", {"method": "vsmm"}, "vsmm", WALKS),
+    ):
+        options = resolved(source, TrackOptions(**given))
+        assert (options.method, options.train) == (expected, train), (source, given)
+        again = resolved(source, TrackOptions(**{**given, "method": options.method}))
+        assert (again.method, again.train) == (expected, train), (source, given)
 
 
 def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(method, "registry", lambda: Registry(()))
-    assert usual("a.npz").method == SEARCH
-    assert usual("a.npz").train == WALKS
-
-
-@pytest.mark.parametrize("named", [{"optimiser": "sapso"}, {"prior": "pca"}])
-def test_a_tracker_has_no_optimiser_and_no_prior(named: dict[str, str]) -> None:
-    (name, value) = next(iter(named.items()))
-    message = f"{name} must not be given beside a tracker, got {value} and vsmm"
-    with pytest.raises(ValueError, match=message):
-        posefit.track("walk", tracker="vsmm", **named)  # type: ignore[arg-type]
-    done = CliRunner().invoke(main, ["track", "walk", "--tracker", "vsmm", f"--{name}", value])
-    assert (done.exit_code, done.stderr) == (2, f"posefit: {message}\n")
+    without = replace(registry(), plugins=tuple(one for one in registry().plugins if one.name != "exemplars"))
+    monkeypatch.setattr(method, "registry", lambda: without)
+    options = resolved("a.npz", TrackOptions())
+    assert (options.method, options.train) == ("sapso@loose", WALKS)
 
 
 @pytest.fixture(scope="module")
 def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("seen") / "masks.npz"
-    scene = scene_of(["09_01"], Viewing(frames=(0, 8), size=(120, 90)))
+    scene = scene_of(["09_01"], frames=(0, 8), size=(120, 90))
     np.savez(path, masks=np.array([seen.silhouettes[0].mask for seen in scene.observations]))
     return path
 
@@ -92,10 +77,10 @@ def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
     ("words", "method"),
     [
         ([], "exemplars"),
-        (["--tracker", "exemplars"], "exemplars"),
+        (["--method", "exemplars"], "exemplars"),
         (["--set", "exemplars.lag=0"], "exemplars"),
-        (["--set", "sapso.cooling=0.9"], "sapso + loose"),
-        (["--set", "tracker.floor=0.1"], "sapso + loose"),
+        (["--set", "sapso.cooling=0.9"], "sapso@loose"),
+        (["--set", "tracker.floor=0.1"], "sapso@loose"),
     ],
 )
 def test_settings_say_whose_they_are(masks: Path, words: list[str], method: str) -> None:

@@ -12,7 +12,8 @@ from posefit.fitting.tracker import Observation
 from posefit.footage.scene import synthetic
 from posefit.motion import recorded
 from posefit.registry import registry
-from posefit.tracking.opening import Opening, task_of
+from posefit.tracking.opening import task_of
+from posefit.tracking.options import TrackOptions
 
 CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes
 SETTLED = 100  # frames after which memory should grow no more
@@ -30,7 +31,7 @@ def follow_figures(frames: int) -> dict[str, float]:
     library = time.process_time() - began
     training = [clip.motion() for clip in others]
     scene = synthetic(recorded.clip(CLIP).motion(), (45.0,), (320, 240), [], (None, None))
-    task = replace(task_of(scene, Opening(translation="aligned"), training, BUDGET, 1), yaw=None)
+    task = replace(task_of(scene, TrackOptions(translation="aligned", evaluations=BUDGET), training), yaw=None)
     began = time.process_time()
     with threadpool_limits(1):
         tracker = registry().offer("tracker", "exemplars").factory(task)

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from posefit.tracking.method import ITERATIONS
+from posefit.tracking.options import ITERATIONS
 from posefit_reproduce.sapso.numbers import FRAMES
 
-DRIVEN: dict[str, Any] = {"tilt": "box"}  # Interpretation S16: the paper learns nothing of the root
+DRIVEN: dict[str, Any] = {"tracker.tilt": "box"}  # Interpretation S16: the paper learns nothing of the root
 WORKERS = 2  # tracks at once: what a frame takes depends on it
 
 

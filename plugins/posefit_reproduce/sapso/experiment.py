@@ -74,10 +74,8 @@ def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack
     found = track(
         paper_scene(motion, key.view),
         train=motion.training,
-        optimiser=method.optimiser,
-        prior=method.prior,
-        prior_settings=method.prior_settings,
-        tracker_settings=DRIVEN,
+        method=f"{method.optimiser}@{method.prior}",
+        settings={**{f"{method.prior}.{name}": value for name, value in method.prior_settings.items()}, **DRIVEN},
         iterations=scale.iterations,
         seed=key.seed,
     )
@@ -107,9 +105,9 @@ def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array
         track(
             scene,
             train=motion.training,
-            particles=count,
+            population_size=count,
             iterations=scale.iterations,
-            tracker_settings=DRIVEN,
+            settings=DRIVEN,
             seed=seed,
         )
         for count in scale.swarms

@@ -66,11 +66,10 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
     found = track(
         scene,
         optimiser=Watched,
-        optimiser_settings={"population_size": particles},
         train=motion.training,
-        particles=particles,
+        population_size=particles,
         iterations=scale.iterations,
-        tracker_settings=DRIVEN,
+        settings=DRIVEN,
         seed=seed,
     )
     seen = searches[-1]  # the one before it only compiles

@@ -17,21 +17,22 @@ from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
-from posefit.tracking.method import Choice, prepare
+from posefit.tracking.method import prepare
+from posefit.tracking.options import TrackOptions
 from posefit_reproduce.grid import Progress, check_seeds, each
 from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
 from posefit_reproduce.vsmm.switches import switching_figures
 from posefit_reproduce.vsmm.told import told_by
 
 # What is compared, by the name under which the figures are given.
-METHODS: dict[str, Choice] = {
-    "vsmm": Choice(tracker="vsmm"),
-    "imm_all_six": Choice(tracker="vsmm", tracker_settings={"structure": "all"}),
+METHODS: dict[str, TrackOptions] = {
+    "vsmm": TrackOptions(method="vsmm"),
+    "imm_all_six": TrackOptions(method="vsmm", settings={"vsmm.structure": "all"}),
 }
-SEARCHES: dict[str, Choice] = {
-    "sapso_loose": Choice(optimiser="sapso", prior="loose"),
-    "sapso_pca": Choice(optimiser="sapso", prior="pca"),
-    "sapso_vsmm": Choice(tracker="sapso+vsmm"),
+SEARCHES: dict[str, TrackOptions] = {
+    "sapso_loose": TrackOptions(method="sapso@loose"),
+    "sapso_pca": TrackOptions(method="sapso@pca"),
+    "sapso_vsmm": TrackOptions(method="sapso+vsmm"),
 }
 SHOWN = 0  # the seed that is drawn
 WORKERS = 1  # what a frame takes is measured, so nothing runs beside it
@@ -46,13 +47,13 @@ class PatentTrack:
     figures: dict[str, Any]
 
 
-def follow_film(choice: Choice, seed: int) -> PatentTrack:
+def follow_film(options: TrackOptions, seed: int) -> PatentTrack:
     """Follow the film of a seed with a method and return what it is worth; the first pose is not known."""
     seen = film_of(seed)
     task = Task(
         seen.body,
         [seen.camera],
-        choice.budget(),
+        options.budget,
         float(seen.truth.poses[0, 0]),
         seen.truth.translations[0],
         "aligned",
@@ -60,7 +61,7 @@ def follow_film(choice: Choice, seed: int) -> PatentTrack:
         [built_in.motion(one) for one in TRAINING],
     )
     with threadpool_limits(1):
-        frames = list(prepare(choice, task).tracker(task).track(seen.observations, np.random.default_rng(seed)))
+        frames = list(prepare(options, task).tracker(task).track(seen.observations, np.random.default_rng(seed)))
     return PatentTrack(frames, {**patent_errors(seen, frames), **switching_figures(seen, told_by(frames))})
 
 
@@ -119,7 +120,7 @@ def repeat_patent(
     return {"seeds": seeds, **outer, **figures}, found[SHOWN, "vsmm"]
 
 
-def _followed(choice: Choice, seed: int) -> PatentTrack:
+def _followed(options: TrackOptions, seed: int) -> PatentTrack:
     """Return a track, without its frames where nobody will look at them."""
-    found = follow_film(choice, seed)
+    found = follow_film(options, seed)
     return found if seed == SHOWN else replace(found, frames=())

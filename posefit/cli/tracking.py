@@ -1,0 +1,127 @@
+"""`posefit track`, `fit` and `extract`."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from typing import Any
+
+import click
+
+from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, options
+from posefit.cli.output import json_line, progress, results_alone, say
+from posefit.errors import InputError
+
+
+@click.command()
+@options(TRACK)
+@FRAMES
+def track(as_json: bool, **options: Any) -> None:
+    """Track a person through SOURCE.
+
+    A built-in motion, an .amc or .bvh file, a folder or .npz of masks, a video; or what several cameras saw.
+    """
+    from posefit.tracking.front import track as run
+
+    with results_alone() if as_json else nullcontext():
+        result = run(progress=progress, say=say, **_arguments(options))
+    _print(result.summary, as_json, {}, options["out"], "open track.html, watch overlay.mp4, look at summary.png")
+
+
+@click.command()
+@options(TRACK)
+@click.option("--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling.")
+def fit(as_json: bool, **options: Any) -> None:
+    """Find the pose in one frame of SOURCE."""
+    from posefit.tracking.front import fit as run
+
+    with results_alone() if as_json else nullcontext():
+        result = run(say=say, **_arguments(options))
+    degrees = [round(math.degrees(angle), 6) for angle in result.pose]
+    _print(result.summary, as_json, {"pose_degrees": degrees}, options["out"], "open track.html, look at summary.png")
+
+
+def _print(summary: Mapping[str, Any], as_json: bool, more: Mapping[str, Any], out: str | None, hint: str) -> None:
+    """Print a track's summary, as JSON with something more, or as the table."""
+    from posefit.tracking.table import table
+
+    click.echo(json_line({**summary, **more}) if as_json else table(summary))
+    if out and not as_json:
+        click.echo(f"written to {out}: {hint}")
+
+
+@click.command()
+@click.argument("video")
+@click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
+@options(EXTRACTION)
+@click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Of the segmenter; repeatable.")
+@FRAMES
+@JSON
+def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], **options: Any) -> None:
+    """Take the masks of one person out of a VIDEO before a still background."""
+    from posefit.footage.extract import extract as run
+
+    how = extraction_of(options, video, lambda _: settings)
+    result = run(video, out, how, frames=frames, progress=progress)
+    for warning in result["warnings"]:
+        say(f"warning: {warning}")
+    if as_json:
+        click.echo(json_line(result))
+        return
+    click.echo(
+        f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border, "
+        f"{result['in_pieces']} in pieces; written to {out}: watch preview.mp4"
+    )
+
+
+def _arguments(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the keywords of `posefit.track` that the command's options stand for."""
+    from posefit.tracking.method import resolved
+    from posefit.tracking.options import TrackOptions
+
+    source = options["source"] = options["source"] or ("walk",)
+    texts = options["settings"]
+
+    def of_segmenter(name: str) -> list[str]:
+        mine = [text for text in texts if text.partition(".")[0] == name]
+        options["settings"] = tuple(text for text in texts if text not in mine)
+        return mine
+
+    options["extraction"] = extraction_of(options, source[0], of_segmenter)
+    if left_out := options.pop("without_subject"):
+        chosen = TrackOptions(**{name: options[name] for name in ("method", "settings", "train")})
+        options["train"] = without_subjects(resolved(source[0], chosen).train, left_out)
+    return options
+
+
+def extraction_of(options: dict[str, Any], source: str, settings: Callable[[str], Sequence[str]] = lambda _: ()) -> Any:
+    """Return how the person is taken out of a video, by options that are taken out of them; None by default.
+
+    `settings` returns the texts of a segmenter's settings by its name. Raises InputError where the options are given
+    for another kind of source.
+    """
+    from posefit.footage.segmentation import Extraction, segmenter_name
+    from posefit.footage.source import kind_of, useless_for
+    from posefit.registry import registry
+    from posefit.settings import parse_texts
+
+    given = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
+    given = {name: value for name, value in given.items() if value is not None}
+    if (kind := kind_of(source)) != "video":
+        for name, value in given.items():
+            raise useless_for(kind, name, value, "video")
+        return None
+    if "extraction" in given:
+        given["method"] = given.pop("extraction")
+    name = segmenter_name(given.get("method"), given.get("background"))
+    if texts := settings(name):
+        given["settings"] = parse_texts(name, registry().offer("segmenter", name).factory, texts)
+    return Extraction(**given) if given else None
+
+
+def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:
+    """Return what a method learns from, some people of the library left out."""
+    from posefit.motion import recorded
+
+    if not any(recorded.is_library(one) for one in train):
+        raise InputError(f"without_subject must be given with --train library, got {', '.join(train)}")
+    return [recorded.leaving_out(one, subjects) if recorded.is_library(one) else one for one in train]

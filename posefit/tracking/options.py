@@ -1,0 +1,328 @@
+"""The options of a track, each declared once: `posefit.track` and the flags of the command line are made of them.
+
+An option is one line of `TrackOptions`: its type and default, and with `option(...)` its help, unit and check. Nothing
+slow is imported here, as every start of the command line reads it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+
+from posefit.errors import InputError
+from posefit.settings import POPULATION_SIZE
+
+if TYPE_CHECKING:
+    from posefit.fitting.optimiser import OptimiserFactory
+    from posefit.fitting.prior import Prior
+    from posefit.fitting.space import Translation
+    from posefit.fitting.tracker import TrackerFactory
+    from posefit.footage.masks import Range
+    from posefit.footage.segmentation import Extraction
+    from posefit.footage.source import Source
+    from posefit.geometry.calibration import Up
+    from posefit.geometry.camera import Camera
+
+ITERATIONS = 60  # C of the SAPSO paper, section 5.2
+LARGEST_SIDE = 16_384  # pixels of a rendered picture
+
+Check = Callable[[str, Any], Any]  # of a name and a value that is not None: the value as it is used; raises InputError
+
+
+class Option(NamedTuple):
+    """What is declared of an option beside its name, type and default."""
+
+    help: str
+    check: Check | None = None
+    unit: str = ""  # or the form of its text; what the command line shows as a placeholder
+    flag: str | None = None  # of the command line; None for the name itself, "" for none
+    parse: Callable[[str], Any] = str  # of a text of the command line; bool for a pair of flags
+    repeated: bool = False  # whether the flag may be given several times
+    identifies: bool = True  # whether a track that goes on must have the same value
+
+
+def option(default: Any, text: str, *more: Any, **others: Any) -> Any:
+    """Return the dataclass field of an option; see `Option` for what else may be given."""
+    return field(default=default, metadata={"option": Option(text, *more, **others)})
+
+
+def declared(one: "Field[Any]") -> Option:
+    """Return what is declared of a field of `TrackOptions`."""
+    return one.metadata["option"]  # type: ignore[no-any-return]
+
+
+def _whole(least: int) -> Check:
+    def check(name: str, value: Any) -> int:
+        from posefit.fitting.check import whole
+
+        return whole(name, value, least)
+
+    return check
+
+
+def _one_of(*choices: str) -> Check:
+    def check(name: str, value: Any) -> Any:
+        if value not in choices:
+            raise InputError(f"{name} must be one of {', '.join(choices)}, got {value!r}")
+        return value
+
+    return check
+
+
+def _positive(name: str, value: Any) -> float:
+    from posefit.fitting.check import finite_number
+
+    if not finite_number(name, value) > 0.0:
+        raise InputError(f"{name} must be above 0, got {value}")
+    return float(value)
+
+
+def _rate(name: str, value: Any) -> float:
+    import math
+    from numbers import Real
+
+    from posefit.motion.motion import RATES
+    from posefit.reading import quoted
+
+    if not (isinstance(value, Real) and 0.0 < value < math.inf):
+        raise InputError(f"{name} must be a positive number, got {quoted(value)}")
+    if not RATES[0] <= value <= RATES[1]:
+        raise InputError(f"{name} must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(value)}")
+    return float(value)
+
+
+def _size(name: str, value: Any) -> tuple[int, int]:
+    from posefit.fitting.check import pair
+
+    sides = pair(name, value, "(width, height)")
+    if not all(_is_whole(side) and 1 <= side <= LARGEST_SIDE for side in sides):
+        largest = f"{LARGEST_SIDE}x{LARGEST_SIDE}"
+        raise InputError(f"{name} must be from 1x1 to {largest} pixels, got {sides[0]}x{sides[1]}")
+    return int(sides[0]), int(sides[1])
+
+
+def _range(name: str, value: Any) -> tuple[int | None, int | None]:
+    from posefit.fitting.check import pair
+    from posefit.reading import quoted
+
+    start, stop = pair(name, value, "(start, stop), either of which may be None")
+    if not all(end is None or _is_whole(end) for end in (start, stop)):
+        raise InputError(f"{name} must be two whole numbers or None, got {quoted(value)}")
+    return start, stop
+
+
+def _label(name: str, value: Any) -> int:
+    from posefit.reading import quoted
+
+    if not _is_whole(value):
+        raise InputError(f"{name} must be a whole number, got {quoted(value)}")
+    return int(value)
+
+
+def _between(low: float, high: float, unit: str) -> Check:
+    def check(name: str, value: Any) -> float:
+        from posefit.fitting.check import finite_number
+
+        if not low <= finite_number(name, value) <= high:
+            raise InputError(f"{name} must lie in {low:g} to {high:g}{unit}, got {value}")
+        return float(value)
+
+    return check
+
+
+def _height(name: str, value: Any) -> float:
+    from posefit.footage.source import HEIGHTS
+
+    return float(_between(*HEIGHTS, " metres")(name, value))
+
+
+def _device(_name: str, value: Any) -> str:
+    from posefit.silhouette.cuda.device import check_device
+
+    check_device(value)
+    return str(value)
+
+
+def _degrees(name: str, value: Any) -> tuple[float, ...]:
+    from posefit.fitting.check import finite_number
+
+    several = hasattr(value, "__len__") and not isinstance(value, str)
+    return tuple(finite_number(name, degrees) for degrees in (value if several else [value]))
+
+
+def _cameras(_name: str, value: Any) -> tuple[Any, ...]:
+    return tuple(value) if isinstance(value, list | tuple) else (value,)
+
+
+def _sources(name: str, value: Any) -> Sequence[Any]:
+    from posefit.reading import quoted
+
+    if isinstance(value, str | Path) or not isinstance(value, Sequence):
+        raise InputError(f"{name} must be a list of motions, got {quoted(value)}")
+    return value
+
+
+def _is_whole(value: Any) -> bool:
+    from numpy import integer
+
+    return isinstance(value, int | integer) and not isinstance(value, bool)
+
+
+def text_size(text: str) -> tuple[int, int]:
+    """Return the width and the height of a text WxH. Raises InputError where it is none."""
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise InputError(f"expected WIDTHxHEIGHT such as 320x240, got {text!r}")
+    return int(width), int(height)
+
+
+def text_range(text: str) -> tuple[int | None, int | None]:
+    """Return the ends of a text A:B, either of which may be left out. Raises InputError where it is none."""
+    start, colon, stop = text.partition(":")
+    try:
+        if colon:
+            return int(start) if start else None, int(stop) if stop else None
+    except ValueError:
+        pass
+    raise InputError(f"expected A:B such as 0:50, :50 or 10:, got {text!r}")
+
+
+def text_label(text: str) -> int:
+    """Return the number that a label is: 15, or 0x800000 for a colour. Raises InputError where it is none."""
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise InputError(f"expected a whole number such as 15, or a colour 0xRRGGBB, got {text!r}") from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackOptions:
+    """The options of a track, checked; what is None or empty is decided by the source."""
+
+    method: "str | TrackerFactory | None" = option(
+        None,
+        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default sapso@pca, or exemplars "
+        "where the truth is not known.",
+        unit="METHOD",
+    )
+    optimiser: "OptimiserFactory | None" = option(None, "An optimiser's factory instead of a name.", flag="")
+    prior: "Prior | None" = option(None, "A prior that has learned instead of a name.", flag="")
+    settings: Mapping[str, Any] | Sequence[str] = option(
+        (),
+        "A plugin's setting, such as sapso.cooling=0.9; repeatable.",
+        None,
+        "NAME.SETTING=VALUE",
+        "set",
+        repeated=True,
+    )
+    train: "Sequence[Source]" = option(
+        (),
+        "What the method learns from: a motion, a folder, library, or library:16; repeatable. By default library for "
+        "exemplars where the truth is not known, else other styles of a built-in motion, or walks.",
+        _sources,
+        "SOURCE",
+        repeated=True,
+    )
+    asf: str | Path | None = option(None, "Skeleton of SOURCE; by default the only .asf beside an .amc.", None, "FILE")
+    camera: "Camera | str | Path | Sequence[Camera | str | Path]" = option(
+        (), "Calibration, one a view; guessed where absent.", _cameras, "FILE", repeated=True
+    )
+    up: "Up | None" = option(None, "Axis that points up in the calibration's world.", _one_of("x", "y", "z"), "x|y|z")
+    view_degrees: float | Sequence[float] = option(
+        (), "Where a camera stands: 0 in front, 90 to the side; repeatable.", _degrees, "DEGREES", None, float, True
+    )
+    size: tuple[int, int] | None = option(
+        None, "Image of a rendered motion, by default 320x240.", _size, "WxH", parse=text_size
+    )
+    fps: float | None = option(
+        None, "Rate to resample a motion to, or of masks; by default 30, or theirs.", _rate, "HZ", parse=float
+    )
+    frames: "Range" = option(
+        (None, None),
+        "Only these frames: of footage as filmed, of a motion after resampling.",
+        _range,
+        "A:B",
+        "",  # `track` has it, and `fit` one frame instead
+        text_range,
+    )
+    extraction: "Extraction | None" = option(None, "How the person is taken out of video.", flag="")
+    height: float | None = option(None, "How tall the person in the footage stands.", _height, "METRES", parse=float)
+    label: int | None = option(
+        None, "Of masks: the value or the colour that the person has.", _label, "N", parse=text_label
+    )
+    holes: float | None = option(
+        None,
+        "Of masks: fill holes up to this share of the person; by default 0.02.",
+        _between(0.0, 1.0, ", a share of the person's area"),
+        "SHARE",
+        parse=float,
+    )
+    evaluations: int | None = option(
+        None, "Budget of a frame; by default N (C + 1) = 2440.", _whole(1), "POSES", parse=int
+    )
+    population_size: int | None = option(None, "N, by default 40.", _whole(1), "N", parse=int)
+    iterations: int | None = option(None, "C, by default 60.", _whole(1), "C", parse=int)
+    ask_seconds: float | None = option(
+        None, "How long a plugin may take to propose a population.", _positive, "SECONDS", parse=float
+    )
+    translation: "Translation | None" = option(
+        None,
+        "Root translation: known where the truth is, searched, or aligned.",
+        _one_of("known", "searched", "aligned"),
+        "HOW",
+    )
+    first_pose: Literal["searched", "given"] = option(
+        "searched", "searched, or given (the true one).", _one_of("searched", "given"), "HOW"
+    )
+    restarts: int | None = option(
+        None, "Searches of an unknown first pose: 8, or 0 for a tracker that looks ahead.", _whole(0), "N", parse=int
+    )
+    body_frames: int | None = option(
+        None,
+        "Frames a build is fitted to, every third; by default 12 for footage, 0 for none.",
+        _whole(0),
+        "N",
+        parse=int,
+    )
+    hypotheses: int = option(
+        1, "Tracks from different initial guesses, each at the full budget; one is kept.", _whole(1), "N", parse=int
+    )
+    smooth: bool | None = option(
+        None,
+        "The root moves smoothly, and standing feet do not slide; the default for footage.",
+        parse=bool,
+        identifies=False,
+    )
+    passes: int = option(1, "How often a smooth track is followed.", _whole(1), "N", parse=int, identifies=False)
+    seed: int = option(0, "Of all random numbers.", _whole(0), "N", parse=int)
+    threads: int = option(1, "The result is the same with any number.", _whole(1), "N", parse=int, identifies=False)
+    device: str = option(
+        "cpu", "Where poses are drawn: cpu, or cuda with a GPU.", _device, "cpu|cuda", identifies=False
+    )
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            value, check = getattr(self, one.name), declared(one).check
+            if value is None and isinstance(one.default, tuple):
+                object.__setattr__(self, one.name, one.default)
+            elif value is not one.default and check is not None:
+                object.__setattr__(self, one.name, check(one.name, value))
+        if self.evaluations is not None and self.iterations is not None:
+            raise InputError("evaluations and iterations must not both be given: a budget has so many iterations")
+
+    @property
+    def budget(self) -> int:
+        """The evaluations of a frame: N (C + 1) where they are not given."""
+        return self.evaluations or (self.population_size or POPULATION_SIZE) * ((self.iterations or ITERATIONS) + 1)
+
+    @property
+    def view(self) -> dict[str, Any]:
+        """The options that say how a source is looked at, as `posefit.footage.source.scene_of` takes them."""
+        return {name: getattr(self, name) for name in VIEW}
+
+    def changed(self, **values: Any) -> Self:
+        """Return these options with some of them replaced, checked again."""
+        return replace(self, **values)
+
+
+VIEW = ("asf", "camera", "view_degrees", "size", "fps", "frames", "extraction", "height", "up", "label", "holes")
