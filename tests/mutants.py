@@ -120,7 +120,7 @@ MUTANTS = (
     ),
     Mutant(
         "velocities of SAPSO (7) are not clipped to the limits",
-        "plugins/posefit_swarm/flock.py",
+        "plugins/posefit_swarm/swarm.py",
         (("return np.clip(drawn, *self._limits)", "return drawn"),),
         "tests/sources/test_sapso.py::test_eq_7_velocities_of_the_first_population_keep_within_the_limits",
     ),
@@ -268,7 +268,7 @@ MUTANTS = (
     Mutant(
         "Configure's swarm is not SAPSO's: another inertia",
         "envs/posefit_envs/configure.py",
-        (("flock.fly(inertia, ACCELERATION", "flock.fly(0.999 * inertia, ACCELERATION"),),
+        (("flock.move(inertia, ACCELERATION", "flock.move(0.999 * inertia, ACCELERATION"),),
         "tests/envs/test_environments.py::test_configure_with_sapsos_own_schedule_finds_what_sapso_finds",
     ),
     Mutant(

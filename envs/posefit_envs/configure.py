@@ -16,7 +16,7 @@ from posefit_envs.drawing import Picture, portray
 from posefit_envs.fit import Episode
 from posefit_envs.instance import Arguments, World, approved, select
 from posefit_envs.scales import scaled
-from posefit_swarm.flock import Flock, speed_limits
+from posefit_swarm.swarm import SwarmState, speed_limits
 
 POPULATION_SIZE, ITERATIONS = 40, 60
 ACCELERATION, ALPHA, REDRAWS = 2.0, 0.15, 20  # as SAPSO's, but for fewer redraws
@@ -139,7 +139,7 @@ class SteeredSwarm:
         self.episode = Episode(world, number, population_size * (iterations + 1))
         self.rng = np.random.default_rng(int(generator.integers(2**63)))
         space = self.space = self.episode.space
-        self.flock = Flock(
+        self.flock = SwarmState(
             space, self.rng, population_size, speed_limits(space, ALPHA, "symmetric"), REDRAWS, "dimension"
         )
         self.left, self.used, self._iterations = iterations, 0, iterations
@@ -171,13 +171,13 @@ class SteeredSwarm:
 
     def fly(self, inertia: float) -> None:
         """Move every particle, for another iteration."""
-        self.flock.fly(inertia, ACCELERATION, self.leader)
+        self.flock.move(inertia, ACCELERATION, self.leader)
         self.left -= 1
 
     def settle(self, costs: Array, temperature: float) -> None:
         """Accept or refuse each particle's move, which has these costs (particles,)."""
         self.costs = costs
-        self.accepted, _ = self.flock.settle(self.flock.moved, costs, temperature)
+        self.accepted, _ = self.flock.accept(self.flock.moved, costs, temperature)
         self.used += len(costs)
 
 

@@ -5,7 +5,7 @@
 - `pso.PSO` is the swarm of Kennedy and Eberhart (1995), constricted as by Clerc and Kennedy (2002).
 - `random.Random` draws uniformly.
 
-`swarm` has constants and inertia, `flock.Flock` what both swarms share, and `kernels` the equations (1) and (2).
+`swarm.SwarmState` is what both swarms share, and `kernels` has the equations (1) and (2).
 
 >>> import posefit
 >>> track = posefit.track("walk", method="sapso", frames=(0, 3))

@@ -1,6 +1,6 @@
-"""How particles fly, in numba: plain functions over arrays, shapes checked by the callers.
+"""How particles move, in numba: plain functions over arrays, shapes checked by the callers.
 
-`swarm` is what a flock knows, as a tuple: positions (n, d) and their costs (n,), personal bests (n, d) and their costs
+`swarm` is a tuple: positions (n, d) and their costs (n,), personal bests (n, d) and their costs
 (n,), velocities (n, d), the lowest and highest velocities (d,) and which coordinates are periodic (d,).
 """
 
@@ -16,10 +16,10 @@ def wrap(x):
 
 
 @jit
-def flight(r1, r2, omega, acceleration, x, v, best, swarm_best, low, high, periodic):
+def step(r1, r2, omega, acceleration, x, v, best, swarm_best, low, high, periodic):
     """Return the next velocity, kept within low and high, and the next position of one coordinate of a particle.
 
-    A periodic coordinate flies the short way round and wraps.
+    A periodic coordinate goes the short way round and wraps.
     """
     to_personal, to_swarm = best - x, swarm_best - x
     if periodic:
@@ -41,13 +41,14 @@ def reachable(omega, acceleration, x, v, best, swarm_best, low, high):
 
 
 @jit
-def fly(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, flown, moved, stuck):
+def move(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, velocities, moved, stopped):
     """Write the next velocities and positions (k, d) of particles `rows` (k,), from the one that is `first` among them.
 
     The last 2 k d numbers of `rand` are the draws of rand(): one for each coordinate's pull towards the personal best,
     then one for each towards the swarm's. A coordinate out of the box has its two drawn again, from `spare` after the
-    first `used`, at most `redraws` times. `stuck` (k,) says who was stopped at the border: a coordinate would be out of
-    the box whatever was drawn, and then none was drawn again, or one was so after all redraws.
+    first `used`, at most `redraws` times. `stopped` (k,) marks particles
+    stopped at the border: no draw could keep a coordinate in the box, and then none is drawn again, or all redraws of
+    one left it.
 
     Returns `first` and `used` as they are then: the first is k, or whose turn it was when `spare` held too little.
     """
@@ -62,33 +63,33 @@ def fly(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_best
         for j in range(d):
             r1, r2 = rand[personal + k * d + j], rand[swarms + k * d + j]
             x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
-            v, x = flight(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
-            flown[k, j], moved[k, j] = v, x
+            v, x = step(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
+            velocities[k, j], moved[k, j] = v, x
             inside &= abs(x) <= 1.0
         if not inside:
             for j in range(d):
                 x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
                 hope &= periodic[j] or reachable(omega, acceleration, x, v, p, g, low[j], high[j])
-        stuck[k] = not hope
+        stopped[k] = not hope
         j = 0
-        while j < d and not (inside or stuck[k]):
+        while j < d and not (inside or stopped[k]):
             left = redraws
             while left > 0 and abs(moved[k, j]) > 1.0:
                 r1, r2 = spare[used], spare[used + 1]
                 x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
-                v, x = flight(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
-                flown[k, j], moved[k, j] = v, x
+                v, x = step(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
+                velocities[k, j], moved[k, j] = v, x
                 left, used = left - 1, used + 2
-            stuck[k] = redraws > 0 and abs(moved[k, j]) > 1.0
+            stopped[k] = redraws > 0 and abs(moved[k, j]) > 1.0
             j += 1
-        if stuck[k]:
+        if stopped[k]:
             for j in range(d):
-                flown[k, j], moved[k, j] = 0.0, min(max(moved[k, j], -1.0), 1.0)
+                velocities[k, j], moved[k, j] = 0.0, min(max(moved[k, j], -1.0), 1.0)
     return rows.size, used
 
 
 @jit
-def settle(moved, costs, chances, temperature, kept, swarm, accepted):
+def accept(moved, costs, chances, temperature, kept, swarm, accepted):
     """Accept or refuse each move by the annealing rule and update the personal bests; return the swarm's best row.
 
     The rule is Metropolis' criterion: a rise of the cost is accepted with probability exp(-rise / temperature). The
@@ -118,7 +119,7 @@ def settle(moved, costs, chances, temperature, kept, swarm, accepted):
 
 
 @jit
-def settle_and_fly(
+def accept_and_move(
     costs,
     temperature,
     kept,
@@ -131,22 +132,24 @@ def settle_and_fly(
     omega,
     acceleration,
     swarm,
-    flown,
+    velocities,
     moved,
-    stuck,
+    stopped,
 ):
-    """Settle the moves of a whole swarm and let it fly on towards its new best, with one block of draws for both.
+    """Accept or refuse the moves of a swarm and move it on towards its new best, with one block of draws for both.
 
-    Returns the swarm's best row, and what `fly` returns.
+    Returns the swarm's best row, and what `move` returns.
     """
-    leader = settle(moved, costs, rand, temperature, kept, swarm, accepted)
+    leader = accept(moved, costs, rand, temperature, kept, swarm, accepted)
     swarm_best = swarm[2][leader]
-    first, used = fly(rows, 0, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, flown, moved, stuck)
+    first, used = move(
+        rows, 0, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, velocities, moved, stopped
+    )
     return leader, first, used
 
 
 @jit
-def mend(broken, works, flown, moved, velocity, position):
+def repair(broken, works, velocities, moved, velocity, position):
     """Give each broken particle its first attempt that works (rows in equal shares); return those that have none."""
     many, left = works.size // broken.size, 0
     for k in range(broken.size):
@@ -154,8 +157,8 @@ def mend(broken, works, flown, moved, velocity, position):
         while first < many and not works[k * many + first]:
             first += 1
         if first < many:
-            for j in range(flown.shape[1]):  # numba would compile seven times as long for two rows at once
-                velocity[broken[k], j] = flown[k * many + first, j]
+            for j in range(velocities.shape[1]):  # numba would compile seven times as long for two rows at once
+                velocity[broken[k], j] = velocities[k * many + first, j]
                 position[broken[k], j] = moved[k * many + first, j]
         else:
             broken[left] = broken[k]

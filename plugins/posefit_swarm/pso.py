@@ -12,8 +12,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import REDRAWS, Space
 from posefit.fitting.check import at_least, one_of, positive
-from posefit_swarm.flock import Flock, speed_limits
-from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, inertia
+from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, inertia, speed_limits
 
 POPULATION_SIZE = 40
 ITERATIONS = 60
@@ -70,15 +69,15 @@ class PSO:
         self._inertia, self._acceleration = inertia, acceleration
         self._iteration, self._iterations = 0, iterations
         limits = speed_limits(space, alpha, "symmetric")
-        self._flock = Flock(space, rng, population_size, limits, redraws, "dimension")
+        self._swarm = SwarmState(space, rng, population_size, limits, redraws, "dimension")
 
     def ask(self) -> Array:
         """Return the particles (n, d) after their move."""
-        return self._flock.moved.copy()
+        return self._swarm.moved.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Remember the bests and fly on."""
-        self._flock.settle_and_fly(proposals, costs, ALWAYS, 1.0, *self._weights())  # KENNEDY1995 (pbest, gbest)
+        """Remember the bests and move on."""
+        self._swarm.accept_and_move(proposals, costs, ALWAYS, 1.0, *self._weights())  # KENNEDY1995 (pbest, gbest)
         self._iteration += 1
 
     def _weights(self) -> tuple[float, float]:

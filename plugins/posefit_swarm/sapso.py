@@ -7,8 +7,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import REDRAWS, Space
 from posefit.fitting.check import at_least, between, one_of, positive
-from posefit_swarm.flock import Flock, speed_limits
-from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, inertia
+from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, inertia, speed_limits
 
 POPULATION_SIZE = 40  # N, section 5.2
 ITERATIONS = 60  # C, section 5.2
@@ -68,23 +67,23 @@ class SAPSO:
         self._kept = 1.0 if rejected_velocity == "kept" else 0.0  # Interpretation S11
         self._iteration, self._dimensions = 0, space.dimensions
         limits = speed_limits(space, alpha, velocity_limits)
-        self._flock = Flock(space, rng, population_size, limits, redraws, rand)  # SAPSO A1.1
+        self._swarm = SwarmState(space, rng, population_size, limits, redraws, rand)  # SAPSO A1.1
 
     def ask(self) -> Array:
         """Return the particles (n, d) after their move; none once the iterations or the temperature are used up."""
         # Interpretation S10: the last generation is evaluated too
         if self._iteration > self._iterations or self._temperature <= self._stop:  # SAPSO A1.2
             return np.empty((0, self._dimensions))
-        return self._flock.moved.copy()
+        return self._swarm.moved.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Accept or refuse the move, remember the best, and fly on."""
-        flock, how = self._flock, (self._temperature, self._kept)
+        """Accept or refuse the move, remember the best, and move on."""
+        swarm, how = self._swarm, (self._temperature, self._kept)
         if self._iteration < self._iterations:
             omega = inertia(self._iteration, self._iterations, self._inertia)
-            accepted = flock.settle_and_fly(proposals, costs, *how, omega, self._acceleration)
+            accepted = swarm.accept_and_move(proposals, costs, *how, omega, self._acceleration)
         else:
-            accepted, _ = flock.settle(proposals, costs, *how)
+            accepted, _ = swarm.accept(proposals, costs, *how)
         if self._iteration > 0:
             # SAPSO A1.2e, Interpretation S6
             self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)

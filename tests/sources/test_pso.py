@@ -53,12 +53,12 @@ class Twin:
 def matches_twin(velocity: Any, omega: float, acceleration: float) -> None:
     space = Toy(3)
     pso = PSO(space, np.random.default_rng(3), population_size=8, velocity=velocity, alpha=0.05)
-    flock = pso._flock
-    twin = Twin(0.2 * flock.position, flock.velocity, omega, acceleration, 0.05)
-    flock.position[:], flock.best[:], flock.moved = twin.x, twin.x, twin.x.copy()  # far from the sides of the box
+    state = pso._swarm
+    twin = Twin(0.2 * state.position, state.velocity, omega, acceleration, 0.05)
+    state.position[:], state.best[:], state.moved = twin.x, twin.x, twin.x.copy()  # far from the sides of the box
     rng = np.random.default_rng()
     for _ in range(6):
-        rng.bit_generator.state = flock._rng.bit_generator.state
+        rng.bit_generator.state = state._rng.bit_generator.state
         proposals = pso.ask()
         np.testing.assert_allclose(proposals, twin.x, atol=1e-12)
         costs = sphere(proposals)
@@ -82,10 +82,10 @@ def test_bests_are_remembered_and_every_move_is_accepted() -> None:  # KENNEDY19
     pso.tell(first, np.array([3.0, 1.0, 2.0]))
     second = pso.ask()
     pso.tell(second, np.array([5.0, 4.0, 1.5]))
-    flock = pso._flock
-    np.testing.assert_array_equal(flock.position, second)  # worse moves too
-    np.testing.assert_array_equal(flock.best, [first[0], first[1], second[2]])
-    np.testing.assert_array_equal(flock.best_cost, [3.0, 1.0, 1.5])
+    state = pso._swarm
+    np.testing.assert_array_equal(state.position, second)  # worse moves too
+    np.testing.assert_array_equal(state.best, [first[0], first[1], second[2]])
+    np.testing.assert_array_equal(state.best_cost, [3.0, 1.0, 1.5])
 
 
 def test_inertia_falls_from_0_9_to_0_1() -> None:

@@ -7,8 +7,9 @@ from scipy.stats import ks_2samp, kstest
 
 from posefit.arrays import Array
 from posefit.testing.toy import Toy
-from posefit_swarm import flock, kernels
-from posefit_swarm.flock import Flock, speed_limits
+from posefit_swarm import kernels
+from posefit_swarm import swarm as swarm_module
+from posefit_swarm.swarm import SwarmState, speed_limits
 
 OMEGA, ACCELERATION = 0.9, 2.0
 REACH = 0.5  # the largest speed
@@ -25,7 +26,7 @@ def redrawn(
     flown, moved, stuck = np.empty((count, d)), np.empty((count, d)), np.empty(count, dtype=bool)
     rand, spare = rng.random(2 * count * d), rng.random(2 * redraws * d * (count + 1))
     pull = OMEGA, ACCELERATION, np.array(target)
-    kernels.fly(np.arange(count), 0, rand, spare, 0, redraws, *pull, swarm, flown, moved, stuck)
+    kernels.move(np.arange(count), 0, rand, spare, 0, redraws, *pull, swarm, flown, moved, stuck)
     np.testing.assert_allclose(moved[~stuck], (where + flown)[~stuck], atol=1e-15)
     np.testing.assert_array_equal(flown[stuck], 0.0)
     return moved, stuck
@@ -96,7 +97,7 @@ def test_a_coordinate_is_out_of_reach_if_no_rand_could_keep_it_in_the_box() -> N
         x, best = rng.uniform(-1.0, 1.0, 2)
         one = OMEGA, ACCELERATION, x, rng.uniform(-0.3, 0.3), best, 0.99, -0.15, 0.15
         # rand() of 0 or 1 gives the extremes, and all between them can be had
-        ends = [kernels.flight(r1, r2, *one, False)[1] for r1 in (0.0, 1.0) for r2 in (0.0, 1.0)]
+        ends = [kernels.step(r1, r2, *one, False)[1] for r1 in (0.0, 1.0) for r2 in (0.0, 1.0)]
         reachable = kernels.reachable(*one)
         assert reachable == (min(ends) <= 1.0 and max(ends) >= -1.0)
         found.add(reachable)
@@ -104,12 +105,12 @@ def test_a_coordinate_is_out_of_reach_if_no_rand_could_keep_it_in_the_box() -> N
 
 
 def test_a_swarm_that_runs_out_of_numbers_draws_more(monkeypatch: pytest.MonkeyPatch) -> None:  # Interpretation S7
-    monkeypatch.setattr(flock, "SPARE", 0)  # so that a block serves one particle
+    monkeypatch.setattr(swarm_module, "SPARE", 0)  # so that a block serves one particle
     space = Toy(4)
-    swarm = Flock(space, np.random.default_rng(0), 50, speed_limits(space, REACH, "symmetric"), 100, "dimension")
+    swarm = SwarmState(space, np.random.default_rng(0), 50, speed_limits(space, REACH, "symmetric"), 100, "dimension")
     # 0.95 + 0.3 * 0.1 + 2 rand() * 0.02, twice: uniform from 0.98, in the box if r1 + r2 <= 0.5, 1 in 8
     swarm.position[:], swarm.best[:], swarm.velocity[:] = 0.95, 0.97, 0.1
-    swarm.fly(0.3, ACCELERATION, swarm.best[0])
+    swarm.move(0.3, ACCELERATION, swarm.best[0])
     assert len(swarm._spare) == 2 * 100 * 4
     assert (swarm.velocity > 0.0).all()  # so none was stopped
     assert swarm.moved.min() >= 0.98
@@ -120,13 +121,13 @@ def test_a_swarm_that_runs_out_of_numbers_draws_more(monkeypatch: pytest.MonkeyP
 def test_a_particle_whose_redraws_all_fail_is_stopped_in_the_box(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # Interpretation S7
-    monkeypatch.setattr(flock, "SPARE", 0)
+    monkeypatch.setattr(swarm_module, "SPARE", 0)
     space = Toy(2)
-    swarm = Flock(space, np.random.default_rng(0), 400, speed_limits(space, REACH, "symmetric"), 2, "dimension")
+    swarm = SwarmState(space, np.random.default_rng(0), 400, speed_limits(space, REACH, "symmetric"), 2, "dimension")
     swarm.position[:], swarm.best[:], swarm.velocity[:] = 0.95, 0.97, 0.1
     swarm.position[:, 1] = swarm.best[:, 1] = 0.0
     swarm.velocity[:, 1] = 0.01
-    swarm.fly(0.3, ACCELERATION, swarm.best[0])
+    swarm.move(0.3, ACCELERATION, swarm.best[0])
     stopped = (swarm.velocity == 0.0).all(axis=1)
     assert stopped.mean() == pytest.approx((7 / 8) ** 3, abs=0.08)
     np.testing.assert_array_equal(swarm.moved[stopped, 0], 1.0)  # clipped

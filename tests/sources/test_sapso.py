@@ -20,7 +20,7 @@ from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import built_in
 from posefit.silhouette.cost import areas, mismatch, project
 from posefit_priors.pca import PCA
-from posefit_swarm import flock, kernels, sapso, swarm
+from posefit_swarm import kernels, sapso, swarm
 from posefit_swarm.sapso import SAPSO
 
 ROOT = Path(__file__).parents[2]
@@ -170,7 +170,7 @@ def test_2_2_chi_is_the_99th_percentile_of_the_training_distances(walk: Array) -
 
 
 def test_2_2_velocities_keep_within_alpha_of_the_half_range() -> None:
-    low, high = flock.speed_limits(line_space(), 0.15, "symmetric")
+    low, high = swarm.speed_limits(line_space(), 0.15, "symmetric")
     np.testing.assert_allclose([low[3], high[3]], [-0.15, 0.15])
 
 
@@ -178,7 +178,7 @@ def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None:
     prior = Line()
     prior.low, prior.high = np.array([2.0]), np.array([6.0])  # half-range 2: alpha 2 / 2 and alpha 6 / 2
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
-    low, high = flock.speed_limits(space, 0.15, "literal")
+    low, high = swarm.speed_limits(space, 0.15, "literal")
     np.testing.assert_allclose([low[3], high[3]], [0.15, 0.45])
 
 
@@ -199,7 +199,7 @@ def flown(**changed: Any) -> tuple[float, float]:
         "high": 9.0,
         "periodic": False,
     }
-    velocity, position = kernels.flight(*{**given, **changed}.values())
+    velocity, position = kernels.step(*{**given, **changed}.values())
     return velocity, position
 
 
@@ -228,7 +228,7 @@ def test_every_particle_flies_with_draws_of_its_own() -> None:
     swarm = *known, np.full(2, -1.0), np.full(2, 1.0), np.zeros(2, dtype=bool)
     rand, target, rows = np.arange(0.1, 0.9, 0.1), np.array([0.3, 0.3]), np.array([1, 0])
     moved, stuck = np.empty((2, 2, 2)), np.ones(2, dtype=bool)
-    done = kernels.fly(rows, 0, rand, np.empty(0), 0, 0, 0.5, 2.0, target, swarm, *moved, stuck)
+    done = kernels.move(rows, 0, rand, np.empty(0), 0, 0, 0.5, 2.0, target, swarm, *moved, stuck)
     assert done == (2, 0)
     assert stuck.tolist() == [False, False]
     r1, r2 = rand.reshape(2, 2, 2)
@@ -313,7 +313,7 @@ def settled(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool,
     limits = np.array([-9.0]), np.array([9.0]), np.array([False])
     swarm = position, np.array([2.0]), best, np.array([1.5]), velocity, *limits
     accepted, moved = np.empty(1, dtype=bool), np.array([[0.7]])
-    kernels.settle(moved, np.array([cost]), np.array([chance]), temperature, 1.0, swarm, accepted)
+    kernels.accept(moved, np.array([cost]), np.array([chance]), temperature, 1.0, swarm, accepted)
     return bool(accepted[0]), float(position[0, 0]), float(best[0, 0])
 
 
@@ -346,11 +346,11 @@ def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:
 def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border(rand: Any) -> None:  # Interpretation S7
     space = line_space()
     optimiser = SAPSO(space, Fixed(1.0), population_size=2, redraws=0, alpha=1.0, rand=rand)
-    optimiser._flock.position[:], optimiser._flock.best[:] = 0.9, 0.9
-    optimiser._flock.velocity[:] = 0.5
-    optimiser._flock.fly(0.9, 2.0, np.full(4, 0.9))
-    np.testing.assert_array_equal(optimiser._flock.moved, 1.0)
-    np.testing.assert_array_equal(optimiser._flock.velocity, 0.0)
+    optimiser._swarm.position[:], optimiser._swarm.best[:] = 0.9, 0.9
+    optimiser._swarm.velocity[:] = 0.5
+    optimiser._swarm.move(0.9, 2.0, np.full(4, 0.9))
+    np.testing.assert_array_equal(optimiser._swarm.moved, 1.0)
+    np.testing.assert_array_equal(optimiser._swarm.velocity, 0.0)
 
 
 @pytest.mark.parametrize(("cool", "expected"), [("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))])
@@ -370,9 +370,9 @@ def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
     space = line_space()
     for kind, alike in (("scalar", True), ("dimension", False)):
         optimiser = SAPSO(space, np.random.default_rng(0), population_size=1, rand=kind, alpha=9.0)  # type: ignore[arg-type]
-        optimiser._flock.position[:], optimiser._flock.best[:], optimiser._flock.velocity[:] = 0.0, 0.1, 0.0
-        optimiser._flock.fly(0.9, 2.0, np.full(4, 0.1))
-        assert (np.ptp(optimiser._flock.moved) < 1e-12) == alike
+        optimiser._swarm.position[:], optimiser._swarm.best[:], optimiser._swarm.velocity[:] = 0.0, 0.1, 0.0
+        optimiser._swarm.move(0.9, 2.0, np.full(4, 0.1))
+        assert (np.ptp(optimiser._swarm.moved) < 1e-12) == alike
 
 
 @pytest.mark.parametrize("kind", ["kept", "zeroed"])
@@ -381,11 +381,11 @@ def test_s11_a_refused_move_keeps_or_loses_its_velocity(kind: Any) -> None:
         line_space(), Fixed(1.0), population_size=1, iterations=2, rejected_velocity=kind, acceleration=0.0
     )
     optimiser.tell(optimiser.ask(), np.array([0.0]))
-    before = optimiser._flock.velocity.copy()
-    optimiser._flock.position[:] = 0.0
+    before = optimiser._swarm.velocity.copy()
+    optimiser._swarm.position[:] = 0.0
     optimiser.tell(optimiser.ask(), np.array([50.0]))
     omega = swarm.inertia(1, 2, 0.9)
-    np.testing.assert_allclose(optimiser._flock.velocity, omega * before if kind == "kept" else 0.0)
+    np.testing.assert_allclose(optimiser._swarm.velocity, omega * before if kind == "kept" else 0.0)
 
 
 # Section 4
@@ -395,7 +395,7 @@ def test_eq_7_velocities_of_the_first_population_keep_within_the_limits() -> Non
     # v_pred of 3, -3 and 0.1: drawn from U(0, 3) no more than a twentieth lies below the limit 0.15; the rest is
     # clipped to it. U(0, 0.1) needs no clipping.
     start = Start(np.zeros(4), np.full(4, 0.1), np.array([3.0, -3.0, 0.1, 0.0]))
-    velocity = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=400)._flock.velocity
+    velocity = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=400)._swarm.velocity
     assert velocity.max(axis=0)[[0, 2]].tolist() == [0.15, pytest.approx(0.1, abs=0.005)]
     assert velocity.min(axis=0)[1] == -0.15
     assert (np.abs(velocity) <= 0.15).all()
@@ -442,7 +442,7 @@ def test_eq_7_first_velocities_are_uniform_from_zero_to_the_predicted_one() -> N
     velocity = np.array([0.1, -0.1, 0.0, 0.05])  # Interpretation S12: a negative bound is sorted, not refused
     start = Start(np.zeros(4), np.full(4, 0.01), velocity)
     optimiser = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=4000)
-    drawn = optimiser._flock.velocity
+    drawn = optimiser._swarm.velocity
     np.testing.assert_allclose(drawn.min(axis=0), np.minimum(0.0, velocity), atol=2e-3)
     np.testing.assert_allclose(drawn.max(axis=0), np.maximum(0.0, velocity), atol=2e-3)
     np.testing.assert_allclose(drawn.mean(axis=0), velocity / 2.0, atol=2e-3)

@@ -11,9 +11,8 @@ from posefit_envs.configuring.orders import Order
 from posefit_envs.drawing import Picture, portray
 from posefit_envs.fit import Episode
 from posefit_envs.instance import World
-from posefit_swarm.flock import Flock, speed_limits
 from posefit_swarm.sapso import COOLING
-from posefit_swarm.swarm import INERTIA, inertia
+from posefit_swarm.swarm import INERTIA, SwarmState, inertia, speed_limits
 
 LEAST = 4  # particles that move at a time
 
@@ -33,7 +32,7 @@ class Herd:
         self.rng = np.random.default_rng(int(generator.integers(2**63)))
         self.space = self.episode.space
         self.limits = speed_limits(self.space, ALPHA, "symmetric")
-        self.flock = Flock(self.space, self.rng, population_size, self.limits, REDRAWS, "dimension")
+        self.flock = SwarmState(self.space, self.rng, population_size, self.limits, REDRAWS, "dimension")
         self.population_size, self.steps, self.every = population_size, steps, every
         self.left, self.used = steps, 0
         root = 6 if world.translation == "searched" else 3
@@ -68,7 +67,7 @@ class Herd:
         else:
             ranks = np.where(np.isinf(flock.best_cost), -1.0, flock.best_cost)
             self._rows = ranks.argsort(kind="stable")[:count]
-            self._part = part = flock.some(self._rows)
+            self._part = part = flock.subset(self._rows)
         fresh = np.isinf(part.best_cost)
         anew = part.best[fresh]
         if not fresh.all():
@@ -77,7 +76,7 @@ class Herd:
             part.moved[fresh], part.velocity[fresh] = anew, 0.0
         return part.moved
 
-    def _move(self, part: Flock) -> None:
+    def _move(self, part: SwarmState) -> None:
         """Move the particles of a part, whose shares become whole numbers of them in the order of the optimisers.
 
         Of n particles the swarm has the first round(n share), differential evolution the next round(n share), or all
@@ -93,7 +92,7 @@ class Herd:
         swarm = round(order.shares[0] * count)
         apart = min(swarm + round(order.shares[1] * count), count)
         if swarm:
-            part.fly(stride, ACCELERATION, bests[ranks[0]])
+            part.move(stride, ACCELERATION, bests[ranks[0]])
         if swarm < count:
             pieces = [part.moved[:swarm]]
             if swarm < apart:
@@ -119,9 +118,9 @@ class Herd:
         lowest = int(costs.argmin())
         if costs[lowest] < self.best:
             self.best, self.leader, self.stale = float(costs[lowest]), part.moved[lowest].copy(), 0
-        accepted, _ = part.settle(part.moved, costs, self.order.temperature * self._cooler(COOLING))
+        accepted, _ = part.accept(part.moved, costs, self.order.temperature * self._cooler(COOLING))
         if part is not self.flock:
-            self.flock.join(self._rows, part)
+            self.flock.update(self._rows, part)
         self._told.append((costs, accepted))
         self.used += len(costs)
         self.open -= len(costs)
