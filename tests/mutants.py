@@ -108,13 +108,13 @@ MUTANTS = (
     ),
     Mutant(
         "what renders a tracker's observations counts as its evaluations",
-        "posefit/fitting/guard.py",
+        "posefit/fitting/validation.py",
         (("with uncounted():", "if True:"),),
         "tests/tracking/test_audit.py::test_a_track_is_marked_by_a_warning_and_has_the_hosts_figures",
     ),
     Mutant(
         "a tracker that looks ahead is held to have drawn in secret",
-        "posefit/fitting/guard.py",
+        "posefit/fitting/validation.py",
         (("self._task.evaluations * (stream.count - given)", "0 * (stream.count - given)"),),
         "tests/tracking/test_audit.py::test_a_tracker_that_looks_ahead_is_honest",
     ),

@@ -9,7 +9,7 @@
 | what an optimiser is, and the loop that drives one | optimiser.py |
 | what a tracker is; the search a frame around a prediction. SAPSO section 4 | tracker.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
-| what plugins return is checked and their frames are audited | guard.py |
+| what plugins return is checked and their frames are audited | validation.py |
 | the build of one person, fitted with the poses | shape.py |
 | aligning and decoding, compiled | kernels.py |
 """

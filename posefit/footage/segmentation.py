@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.guard import BrokenRuleError, blamed
+from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.facing import facings_on_the_spot
 from posefit.footage.images import read_image
 from posefit.footage.masks import Range, span
@@ -93,7 +93,7 @@ class Extraction:
     def segmenter(self, film: Footage) -> Segmenter:
         """Return the segmenter, trained on a film. Raises ValueError where a setting does not fit it."""
         offer = registry().offer("segmenter", self.name)
-        with blamed(offer.label, "it", passed=(ValueError, ImportError)):
+        with plugin_errors(offer.label, "it", passed=(ValueError, ImportError)):
             return cast(Segmenter, offer.factory(film, **self.settings))
 
 
@@ -187,7 +187,7 @@ class Segmentation:
     def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
         """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""
         x, y, wide, tall = self._film.part
-        with blamed(f"segmenter {self.method!r}", "segment"):
+        with plugin_errors(f"segmenter {self.method!r}", "segment"):
             planes = [np.asarray(plane) for plane in segmenter.segment(self._film.cut(image))]
         if len(planes) != 2 or any(plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes):
             came = ", ".join(f"{plane.shape} {plane.dtype}" for plane in planes)

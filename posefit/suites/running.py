@@ -8,8 +8,8 @@ import numpy as np
 
 from posefit import settings
 from posefit.arrays import Array
-from posefit.fitting.guard import Guarded, blamed
 from posefit.fitting.optimiser import BudgetError, minimise
+from posefit.fitting.validation import CheckedOptimiser, plugin_errors
 from posefit.registry import registry
 from posefit.suites.problem import EVALUATIONS, Problem
 
@@ -62,9 +62,9 @@ def run_on(
     rng = np.random.default_rng([SALT, seed, problem.id_function, problem.instance, problem.dimension])
     factory = registry().optimiser(method)
     settings.check(method, factory, chosen)
-    with blamed(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):
+    with plugin_errors(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):
         optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
-    guarded = Guarded(optimiser, space, f"optimiser {method}", None, evaluations)
+    guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", None, evaluations)
     minimise(problem.evaluate, guarded, evaluations, told=True)
     if not len(problem.trace[0]):
         raise ValueError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")

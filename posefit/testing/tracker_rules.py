@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from posefit.fitting import metrics
-from posefit.fitting.guard import LEEWAY
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
+from posefit.fitting.validation import UNCOUNTED_POSES
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
@@ -167,7 +167,7 @@ def honest_evaluations(case: TrackerCase) -> str:
     drawn, least = np.array(case.first.drawn), np.arange(1, len(said) + 1)
     # a frame that looks ahead may have drawn for the next observation already
     ahead = EVALUATIONS * (np.array(case.first.taken) - least)
-    over = drawn - said - ahead > LEEWAY * least
+    over = drawn - said - ahead > UNCOUNTED_POSES * least
     if over.any():
         k = int(over.argmax())
         expect(False, f"{k + 1} frames drew {drawn[k]:.0f} poses, and must say so, got {said[k]} evaluations")

@@ -16,10 +16,17 @@ from posefit import settings
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
-from posefit.fitting.guard import Audit, BrokenRuleError, Guarded, GuardedPrior, GuardedTracker, blamed
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task, Tracker
+from posefit.fitting.validation import (
+    Audit,
+    AuditedTracker,
+    BrokenRuleError,
+    CheckedOptimiser,
+    CheckedPrior,
+    plugin_errors,
+)
 from posefit.footage.source import Source, kind_of
 from posefit.motion import built_in, recorded
 from posefit.registry import Kind, Offer, registry
@@ -193,7 +200,7 @@ def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> M
     def make(task: Task, _patience: float) -> Tracker:
         with _rules(offer):
             tracker = offer.factory(task, **mine)
-        return GuardedTracker(tracker, task, offer.label, beta, audit)
+        return AuditedTracker(tracker, task, offer.label, beta, audit)
 
     return Method(offer.name, None, beta, {"tracker": mine}, audit, None, make)
 
@@ -211,7 +218,7 @@ def _learned(offer: Offer, given: Mapping[str, Any], task: Task) -> Prior:
     with _rules(offer):
         prior: Prior = offer.factory(**given).fit(angles, task.body.skeleton)
         _check_prior(prior, angles, offer)
-    return GuardedPrior(prior, offer.label)
+    return CheckedPrior(prior, offer.label)
 
 
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
@@ -257,12 +264,12 @@ def _guarded(
 ) -> Optimiser:
     with _rules(offer):
         optimiser = offer.factory(space, rng, **mine)
-    return Guarded(optimiser, space, offer.label, limit, evaluations)
+    return CheckedOptimiser(optimiser, space, offer.label, limit, evaluations)
 
 
 def _rules(offer: Offer) -> AbstractContextManager[None]:
     """Return a context that passes ValueErrors on, and blames the plugin for whatever else it raises."""
-    return blamed(offer.label, "it", passed=(ValueError, ImportError))
+    return plugin_errors(offer.label, "it", passed=(ValueError, ImportError))
 
 
 def _offered(kind: Kind, chosen: "str | Callable[..., Any] | None") -> Offer:

@@ -84,7 +84,7 @@ def follow(
         method = prepare(options, task)
         task, shape = opened(scene, method, task, options, listener)
         scene = replace(scene, body=task.body)
-        method.audit.forget()  # what was tried before the first frame is in no row
+        method.audit.clear()  # what was tried before the first frame is in no row
         output = output or Nowhere()
         known = Known(scene.yaw, options.first_pose == "given")
         usable = [observation.usable for observation in scene.observations] if tracks > 1 else []

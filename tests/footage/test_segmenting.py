@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 import posefit
 from posefit.cli import main
-from posefit.fitting.guard import BrokenRuleError
+from posefit.fitting.validation import BrokenRuleError
 from posefit.footage import segmentation
 from posefit.footage.masks import Views
 from posefit.footage.quality import FrameQuality, disagreement, verdict

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.fitting.guard import Audit, BrokenRuleError, GuardedTracker
+from posefit.fitting.validation import Audit, AuditedTracker, BrokenRuleError
 from posefit.silhouette.drawn import PoseCount
 from posefit.testing.tracker_rules import FRAMES, scene
 from tests.testing import planted
@@ -17,9 +17,9 @@ from tests.testing import planted
 QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 2440}
 
 
-def guarded(kind: Any, audit: Audit) -> GuardedTracker:
+def guarded(kind: Any, audit: Audit) -> AuditedTracker:
     task = scene()[0]
-    return GuardedTracker(kind(task), task, "tracker 'bad' of posefit-bad 1.0", 0.5, audit)
+    return AuditedTracker(kind(task), task, "tracker 'bad' of posefit-bad 1.0", 0.5, audit)
 
 
 def found(kind: Any) -> tuple[list[Any], list[str]]:

@@ -10,7 +10,7 @@ import pytest
 
 import posefit
 from posefit import registry as registry_package
-from posefit.fitting.guard import BrokenRuleError
+from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.scene import synthetic
 from posefit.registry import Offer, Plugin, Registry, registry
 from posefit.tracking import method, opening

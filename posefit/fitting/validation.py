@@ -1,7 +1,7 @@
-"""Watches over optimisers, priors and trackers that somebody else wrote.
+"""Checks what optimisers, priors and trackers of plugins return.
 
-Whatever they do wrong ends the search with one line; and what a tracker says of its frames is held against what the
-host counts and computes itself.
+A broken rule ends the search with one line that names the plugin. The evaluations, areas and cost of a tracker's
+frames are compared with what is counted and computed here, and put right.
 """
 
 import math
@@ -25,20 +25,19 @@ from posefit.limits import timed
 from posefit.silhouette.cost import pose_costs
 from posefit.silhouette.drawn import PoseCount, uncounted
 
-LEEWAY = 10  # ours: poses a frame that may be drawn beyond the evaluations, as to draw once more what was found
-NEAR = 1e-6  # ours: how far a cost may be off, as it is rounded where it is added up in another order
+UNCOUNTED_POSES = 10  # ours: a frame may draw so many beyond its evaluations, as to draw its result once more
+COST_TOLERANCE = 1e-6  # ours: costs are rounded where they are added up in another order
 
 
 class BrokenRuleError(ValueError):
     """A plugin broke one of the rules that its kind has to keep."""
 
 
-class Guarded:
-    """An optimiser whose every answer is checked; `name` says whose it is in the error.
+class CheckedOptimiser:
+    """An optimiser whose proposals are checked; errors name it by `name`.
 
-    `limit` is how many seconds an `ask` or a `tell` may take; see `posefit.limits.timed` for where it is kept, which
-    is in a sweep's workers and on the command line. `evaluations` is the budget of a search, which has to hold the
-    first population.
+    `limit` is how many seconds an `ask` or a `tell` may take, where `posefit.limits.timed` can measure that.
+    `evaluations` is the budget of a search, which has to hold the first population.
     """
 
     def __init__(
@@ -54,7 +53,7 @@ class Guarded:
 
     def ask(self) -> Array:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
-        with blamed(self._name, "ask", self._limit):
+        with plugin_errors(self._name, "ask", self._limit):
             proposals = self._optimiser.ask()
         shape = getattr(proposals, "shape", None)
         if not isinstance(proposals, np.ndarray) or proposals.shape[1:] != (self._space.dimensions,):
@@ -77,13 +76,13 @@ class Guarded:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Pass the costs on."""
         self._first = False
-        with blamed(self._name, "tell", self._limit):
+        with plugin_errors(self._name, "tell", self._limit):
             self._optimiser.tell(proposals, costs)
 
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
         self._space, self._first = space, True
-        with blamed(self._name, "advance", self._limit):
+        with plugin_errors(self._name, "advance", self._limit):
             self._optimiser.advance(space)  # type: ignore[attr-defined]
 
     def _check_first(self, count: int) -> None:
@@ -97,34 +96,33 @@ class Guarded:
 
 
 @contextmanager
-def blamed(
+def plugin_errors(
     name: str, what: str, limit: float | None = None, passed: tuple[type[BaseException], ...] = ()
 ) -> Iterator[None]:
-    """Raise BrokenRuleError for whatever a plugin raises in the body, but for what is `passed`.
+    """Raise BrokenRuleError, naming the plugin, for whatever the body raises, SystemExit too, but for what is `passed`.
 
-    It may try to end the program, too.
+    A BrokenRuleError stays as it is: it names another plugin, which this one called.
     """
-    passed = (BrokenRuleError, *passed)  # another plugin's fault, perhaps, which this one met
     try:
         with timed(limit):
             yield
-    except passed:
+    except (BrokenRuleError, *passed):
         raise
     except (Exception, SystemExit) as error:
         if limit is not None and isinstance(error, TimeoutError):
             raise BrokenRuleError(f"{name}: {what} must return within {limit:g} s, and did not") from None
-        raise _fault(name, what, error) from error
+        raise _broken_by(name, what, error) from error
 
 
-def _fault(name: str, what: str, error: BaseException) -> BrokenRuleError:
-    """Return what is said of something that a plugin raised."""
+def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
+    """Return the error that names the plugin which raised another."""
     if isinstance(error, SystemExit):
         return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
     return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}")
 
 
-class GuardedPrior:
-    """A prior that has learned; whatever it raises is its own fault, whoever calls it."""
+class CheckedPrior:
+    """A prior that has learned; an error in it names it, whichever plugin called it."""
 
     def __init__(self, prior: Prior, name: str) -> None:
         self._prior, self._name = prior, name
@@ -132,79 +130,79 @@ class GuardedPrior:
         self.affine = getattr(prior, "affine", None)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn anew, and return itself."""
-        GuardedPrior.__init__(self, self._asked("fit", angles, skeleton), self._name)
+        """Learn from joint angles (T, 63), and return itself."""
+        CheckedPrior.__init__(self, self._call("fit", angles, skeleton), self._name)
         return self
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63)."""
-        latents: Array = self._asked("transform", angles)
+        latents: Array = self._call("transform", angles)
         return latents
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
-        angles: Array = self._asked("inverse_transform", latents)
+        angles: Array = self._call("inverse_transform", latents)
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are poses at all (n,)."""
-        allowed: NDArray[np.bool_] = self._asked("feasible", latents)
+        allowed: NDArray[np.bool_] = self._call("feasible", latents)
         return allowed
 
     def save(self, path: str | Path) -> None:
         """Write what it learned to an .npz file."""
-        self._asked("save", path)
+        self._call("save", path)
 
-    def _asked(self, method: str, *arguments: Any) -> Any:
-        try:
+    def _call(self, method: str, *arguments: Any) -> Any:
+        try:  # not `plugin_errors`, which takes as long as a few poses
             return getattr(self._prior, method)(*arguments)
         except (Exception, SystemExit) as error:
-            raise _fault(self._name, method, error) from error
+            raise _broken_by(self._name, method, error) from error
 
 
 @dataclass(eq=False)
 class Audit:
-    """What trackers said of their frames that is not so; `warnings` tells it, a line for each kind."""
+    """What trackers reported wrongly of their frames; `warnings` has a line for each kind."""
 
     _findings: dict[str, tuple[str, int]] = field(default_factory=dict)  # by kind: the first of them, and how many
 
     @property
     def warnings(self) -> list[str]:
-        """One line for each kind of thing that was not so."""
+        """One line for each kind: the first of it, and how many frames it concerns."""
         return [f"{first} ({count} such frame{'s' if count > 1 else ''})" for first, count in self._findings.values()]
 
-    def forget(self) -> None:
-        """Start anew."""
+    def clear(self) -> None:
+        """Forget all findings."""
         self._findings.clear()
 
     def note(self, kind: str, what: str) -> None:
-        """Keep something that was not so; only the first of a kind is told in full."""
+        """Add a finding; only the first of a kind is kept in full."""
         first, count = self._findings.get(kind, (what, 0))
         self._findings[kind] = first, count + 1
 
 
-class GuardedTracker:
-    """A tracker whose every frame is checked, and audited: what the host finds otherwise, it notes and puts right.
+class AuditedTracker:
+    """A tracker whose frames are checked and audited: a wrong figure is noted and put right.
 
-    Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed anew from the
-    pose. Where a frame says the same it stays as it is.
+    Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed again from the
+    pose. An honest frame stays as it is.
     """
 
     def __init__(self, tracker: Tracker, task: Task, name: str, beta: float, audit: Audit) -> None:
         self._tracker, self._task, self._name, self._beta, self._audit = tracker, task, name, beta, audit
-        self.lag: int | None = getattr(tracker, "lag", None)  # None where it does not say that it looks ahead
+        self.lag: int | None = getattr(tracker, "lag", None)  # None for one that does not look ahead
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        """Yield the tracker's frame for each observation. Raises BrokenRuleError where it is none, or misses."""
+        """Yield the tracker's frame for each observation. Raises BrokenRuleError where one is missing or wrong."""
         drawn = PoseCount()
         stream = _Stream(observations, drawn)
         passed = (ImportError, GeneratorExit)
-        said = given = 0
-        with blamed(self._name, "it", passed=passed):
+        reported = given = 0
+        with plugin_errors(self._name, "it", passed=passed):
             frames = iter(self._tracker.track(stream, rng))
         while True:
             try:
-                with drawn.counting(), blamed(self._name, "it", passed=passed):
+                with drawn.counting(), plugin_errors(self._name, "it", passed=passed):
                     frame = next(frames, None)
             except BrokenRuleError as broken:
                 if stream.error is not None and broken.__cause__ is stream.error:
@@ -216,12 +214,12 @@ class GuardedTracker:
             if given > stream.count:
                 raise self._broken(f"track must yield a frame for each observation, got {given} for {given - 1}")
             self._check(frame)
-            # what it may have drawn already for observations that it looks at ahead
+            # it may have drawn poses for observations that it looks at ahead
             ahead = self._task.evaluations * (stream.count - given)
-            counted = math.ceil(drawn.poses / len(self._task.cameras)) - said - ahead
-            frame = self._counted(frame, given - 1, counted, LEEWAY * stream.count)
+            counted = math.ceil(drawn.poses / len(self._task.cameras)) - reported - ahead
+            frame = self._counted(frame, given - 1, counted, UNCOUNTED_POSES * stream.count)
             frame = self._computed(frame, given - 1, stream.waiting.popleft())
-            said += frame.evaluations
+            reported += frame.evaluations
             yield frame
         if given < stream.count or next(stream, None) is not None:
             raise self._broken(f"track must yield a frame for each observation, got {given} and then no more")
@@ -237,7 +235,7 @@ class GuardedTracker:
             raise self._broken(f"seconds must be a number, 0 or more, got {frame.seconds!r}")
 
     def _counted(self, frame: Frame, number: int, counted: int, leeway: int) -> Frame:
-        """Return the frame with the evaluations that were counted, where it says fewer, and note it."""
+        """Return the frame with the evaluations that were counted, where it reports fewer, and note it."""
         label, budget = f"{self._name}: frame {number}", self._task.evaluations
         if counted > frame.evaluations + leeway:
             self._audit.note("said", f"{label} must say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
@@ -247,18 +245,18 @@ class GuardedTracker:
         return frame
 
     def _computed(self, frame: Frame, number: int, observation: Observation) -> Frame:
-        """Return the frame with the areas and the cost of its pose, and note where it says others."""
+        """Return the frame with the areas and the cost of its pose, and note where it reports others."""
         label = f"{self._name}: frame {number}"
         pose, place = np.asarray(frame.pose, np.float64)[None], np.asarray(frame.translation, np.float64)[None]
         scene = self._task.body, self._task.cameras, observation.silhouettes
         costs, counts = pose_costs(*scene, pose, place, self._beta)
         true = counts[:, 0]
         if not np.array_equal(true, frame.areas):
-            self._audit.note("areas", f"{label} must have its pose's areas, {true.tolist()}, got {_told(frame.areas)}")
+            self._audit.note("areas", f"{label} must have its pose's areas, {true.tolist()}, got {_short(frame.areas)}")
             frame = replace(frame, areas=true)
         cost = float(costs[0])
-        if not (isinstance(frame.cost, float | int | np.number) and abs(frame.cost - cost) <= NEAR):
-            self._audit.note("cost", f"{label} must have its pose's cost, {cost:.6g}, got {_told(frame.cost)}")
+        if not (isinstance(frame.cost, float | int | np.number) and abs(frame.cost - cost) <= COST_TOLERANCE):
+            self._audit.note("cost", f"{label} must have its pose's cost, {cost:.6g}, got {_short(frame.cost)}")
             frame = replace(frame, cost=cost, history=np.array([cost]), spent=None)
         return frame
 
@@ -267,7 +265,7 @@ class GuardedTracker:
 
 
 class _Stream:
-    """The observations that a tracker takes, with silhouettes of its own, so that what it draws of them is known."""
+    """The observations that a tracker takes, with silhouettes of its own, so that its drawing is counted."""
 
     def __init__(self, observations: Iterable[Observation], drawn: PoseCount) -> None:
         self._rest, self._drawn = iter(observations), drawn
@@ -292,6 +290,6 @@ class _Stream:
         return replace(observation, silhouettes=self._drawn.own(observation.silhouettes))
 
 
-def _told(value: object) -> str:
+def _short(value: object) -> str:
     text = f"{value:.6g}" if isinstance(value, float) else str(np.asarray(value).tolist())
     return text if len(text) <= 80 else text[:77] + "..."

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from posefit import minimise
-from posefit.fitting.guard import BrokenRuleError, Guarded
 from posefit.fitting.optimiser import BudgetError
+from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
 from posefit.testing.toy import Toy, sphere
 
 
@@ -51,21 +51,21 @@ def fails() -> None:
     ],
 )
 def test_a_broken_rule_is_named(answer: Any, rule: str) -> None:
-    guarded = Guarded(Answers(answer), Toy(9), "optimiser 'bad' of posefit-bad 1.0", 0.2)
+    guarded = CheckedOptimiser(Answers(answer), Toy(9), "optimiser 'bad' of posefit-bad 1.0", 0.2)
     with pytest.raises(BrokenRuleError, match=rf"^optimiser 'bad' of posefit-bad 1.0: {rule}$"):
         minimise(sphere, guarded, 40)
 
 
 def test_an_empty_population_ends_a_search_and_is_a_mistake_where_it_is_the_first() -> None:
     answers = Answers(np.zeros((4, 9)))
-    guarded = Guarded(answers, Toy(9), "it")
+    guarded = CheckedOptimiser(answers, Toy(9), "it")
     guarded.tell(guarded.ask(), np.zeros(4))
     answers.answer = np.empty((0, 9))
     assert guarded.ask().shape == (0, 9)
     with pytest.raises(
         BrokenRuleError, match="it: ask must return a first population of one proposal or more, got none"
     ):
-        Guarded(answers, Toy(9), "it").ask()
+        CheckedOptimiser(answers, Toy(9), "it").ask()
 
 
 def test_a_filter_may_not_begin_a_frame_with_an_empty_population() -> None:
@@ -73,7 +73,7 @@ def test_a_filter_may_not_begin_a_frame_with_an_empty_population() -> None:
         def advance(self, space: Any) -> None: ...
 
     answers = Filter(np.zeros((4, 9)))
-    guarded = Guarded(answers, Toy(9), "it")
+    guarded = CheckedOptimiser(answers, Toy(9), "it")
     guarded.tell(guarded.ask(), np.zeros(4))
     guarded.advance(Toy(9))
     answers.answer = np.empty((0, 9))
@@ -82,7 +82,9 @@ def test_a_filter_may_not_begin_a_frame_with_an_empty_population() -> None:
 
 
 def test_a_population_that_no_budget_holds_is_named() -> None:
-    guarded = Guarded(Answers(np.zeros((100_000, 9))), Toy(9), "optimiser 'bad' of posefit-bad 1.0", evaluations=2440)
+    guarded = CheckedOptimiser(
+        Answers(np.zeros((100_000, 9))), Toy(9), "optimiser 'bad' of posefit-bad 1.0", evaluations=2440
+    )
     message = "^optimiser 'bad' of posefit-bad 1.0: evaluations must hold one population of 100000, got 2440$"
     with pytest.raises(BudgetError, match=message):
         minimise(sphere, guarded, 2440)
@@ -93,7 +95,7 @@ def test_a_plugin_that_exits_ends_no_program() -> None:
         raise SystemExit(0)
 
     with pytest.raises(BrokenRuleError, match="^it: ask must not end the program, got SystemExit: 0$"):
-        Guarded(Answers(exits), Toy(9), "it").ask()
+        CheckedOptimiser(Answers(exits), Toy(9), "it").ask()
 
 
 def test_a_plugins_own_timeout_is_not_the_hosts() -> None:
@@ -101,12 +103,12 @@ def test_a_plugins_own_timeout_is_not_the_hosts() -> None:
         raise TimeoutError("the network")
 
     with pytest.raises(BrokenRuleError, match="^it: ask must not fail, got TimeoutError: the network$"):
-        Guarded(Answers(late), Toy(9), "it").ask()
+        CheckedOptimiser(Answers(late), Toy(9), "it").ask()
 
 
 def test_without_a_main_thread_there_is_no_limit_but_it_works() -> None:
     found: list[Any] = []
-    guarded = Guarded(Answers(np.zeros((4, 9))), Toy(9), "it", 0.2)
+    guarded = CheckedOptimiser(Answers(np.zeros((4, 9))), Toy(9), "it", 0.2)
     thread = threading.Thread(target=lambda: found.append(guarded.ask()))
     thread.start()
     thread.join()
@@ -115,4 +117,4 @@ def test_without_a_main_thread_there_is_no_limit_but_it_works() -> None:
 
 def test_a_filter_without_advance_is_named() -> None:
     with pytest.raises(BrokenRuleError, match="advance must not fail, got AttributeError"):
-        Guarded(Answers(np.zeros((4, 9))), Toy(9), "it").advance(Toy(9))
+        CheckedOptimiser(Answers(np.zeros((4, 9))), Toy(9), "it").advance(Toy(9))
