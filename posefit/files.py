@@ -1,18 +1,17 @@
-"""Folders and files that appear whole under their name, or not at all: the one home of that.
+"""Folders and files that appear whole under their name, or not at all.
 
-- `new_folder`, `new_file`: what must not be there yet.
-- `replaced_file`: what may replace an earlier file of its kind, which its first bytes tell.
-- `Unfinished`: a folder that is worked on for so long that it may have to be gone on with later.
-- `check_new`, `check_place`: what is refused before anything is computed for a new name.
-- `appear`: a small file that many may want to be the first to make, such as a claim.
+- `new_folder`, `new_file`: their name must be free.
+- `replaced_file`: it may replace an earlier file of its kind, which is recognised by its first bytes.
+- `Unfinished`: a folder that is written for so long that it may have to be continued later.
+- `check_new`, `check_place`: refuse a name before anything is computed for it.
+- `create_once`: a small file that several processes may try to create, such as a claim; exactly one succeeds.
 
-What is being written stands beside its place, under a random name that begins with a dot. It is created exclusively, so
-that nobody's file or link is written through; and nothing is ever removed but what the call itself has made, or what
-carries the mark of an earlier one that has ended.
+Files are written beside their place, under a random name that begins with a dot. They are created exclusively, so that
+no other file or link is written through; and nothing is ever removed but what the call itself has made, or what carries
+the mark of an earlier one that has ended.
 """
 
 import errno
-import fcntl
 import glob
 import json
 import os
@@ -25,11 +24,9 @@ from typing import Any, Self
 
 from posefit.reading import cut, parsed_json, read_text
 
-MARK = "unfinished.json"  # in a folder that we work on
-LARGEST_MARK = 10_000_000  # bytes
-# what a file system says that has no hard links
-_NO_LINKS = (errno.EPERM, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EMLINK)
-_TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # what it says where a folder's new name is no longer free
+MARK = "unfinished.json"  # in a folder that is being written
+MAX_MARK_BYTES = 10_000_000
+_TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # errors of a rename to a folder's name that is no longer free
 
 
 def check_new(path: str | Path) -> None:
@@ -47,12 +44,12 @@ def check_place(path: str | Path) -> None:
 
 @contextmanager
 def new_folder(path: str | Path) -> Iterator[Path]:
-    """Give an empty folder to write to, which takes the name `path` where nothing fails; else nothing is left.
+    """Yield an empty folder to write to, which takes the name `path` where nothing fails; else nothing is left.
 
     Raises ValueError where `path` exists or cannot be written, a full disk included.
     """
     target = Path(path)
-    with _told(target):
+    with _as_value_error(target):
         check_new(target)
         building = _beside(target)
         building.mkdir()
@@ -68,12 +65,12 @@ def new_folder(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def new_file(path: str | Path) -> Iterator[Path]:
-    """Give an empty file to write, which becomes `path` where nothing fails; else nothing is left.
+    """Yield an empty file to write, which becomes `path` where nothing fails; else nothing is left.
 
     It has the suffix of `path`. Raises ValueError where `path` exists or cannot be written, a full disk included.
     """
     target = Path(path)
-    with _told(target):
+    with _as_value_error(target):
         check_new(target)
         building = _created(target)
         with _undone(building.unlink):
@@ -86,13 +83,13 @@ def new_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def replaced_file(path: str | Path, mark: bytes) -> Iterator[Path]:
-    """Give an empty file to write, which takes the place of an earlier one where nothing fails; else that one stays.
+    """Yield an empty file to write, which takes the place of an earlier one where nothing fails; else that one stays.
 
     Only a file that begins with `mark` is replaced, and no link. Raises ValueError where something else has the name,
     or it cannot be written, a full disk included.
     """
     target = Path(path)
-    with _told(target):
+    with _as_value_error(target):
         if not replaceable(target, mark):
             raise ValueError(f"{target}: expected a new name or an earlier file of this kind, got something else")
         building = _created(target)
@@ -113,19 +110,19 @@ def replaceable(path: str | Path, mark: bytes) -> bool:
 
 
 class Unfinished:
-    """A hidden folder beside its target, which carries our mark while it is worked on and where that ended too early.
+    """A hidden folder beside its target, which carries a mark while it is written, and after that was interrupted.
 
-    The mark is a file that its worker holds a lock on, so that everybody sees whether somebody is at work. Where a file
-    system has no locks, nobody seems to be.
+    The mark is a file that its writer holds a lock on, so that others see whether it is in use. Where there are no
+    locks, it seems not to be.
     """
 
-    def __init__(self, target: Path, path: Path, file: int, told: Mapping[str, Any]) -> None:
-        self.path, self.told = path, told
+    def __init__(self, target: Path, path: Path, file: int, info: Mapping[str, Any]) -> None:
+        self.path, self.info = path, info
         self._target, self._file = target, file
 
     @classmethod
-    def begun(cls, target: Path, told: Mapping[str, Any]) -> Self:
-        """Return a new folder, whose mark says what is `told`. Raises OSError where there is no room."""
+    def begin(cls, target: Path, info: Mapping[str, Any]) -> Self:
+        """Return a new folder, whose mark holds `info`. Raises OSError where there is no room."""
         target.parent.mkdir(parents=True, exist_ok=True)
         path = _beside(target)
         path.mkdir()
@@ -133,46 +130,46 @@ class Unfinished:
             file = os.open(path / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
             with _undone(lambda: os.close(file)):
                 _locked(file)
-                (path / MARK).write_text(json.dumps({"target": target.name, "told": told}), encoding="utf-8")
-        return cls(target, path, file, told)
+                (path / MARK).write_text(json.dumps({"target": target.name, "info": info}), encoding="utf-8")
+        return cls(target, path, file, info)
 
     @classmethod
-    def left(cls, target: Path) -> list[Self]:
-        """Return those of a target that carry our mark and nobody works on, the latest first."""
+    def interrupted(cls, target: Path) -> list[Self]:
+        """Return the folders of a target that carry a mark and are not in use, the latest first."""
         found = []
         for entry in sorted(target.parent.glob(f".{glob.escape(target.name)}.*/{MARK}"), key=_age):
             if entry.is_symlink() or entry.parent.is_symlink():
                 continue
             with suppress(OSError, ValueError, KeyError, TypeError):
-                file = os.open(entry, os.O_RDWR | os.O_NOFOLLOW)
-                mark = parsed_json(read_text(entry, LARGEST_MARK)) if _locked(file) else None
-                if mark is not None and mark["target"] == target.name and isinstance(mark["told"], dict):
-                    found.append(cls(target, entry.parent, file, mark["told"]))
+                file = os.open(entry, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+                mark = parsed_json(read_text(entry, MAX_MARK_BYTES)) if _locked(file) else None
+                if mark is not None and mark["target"] == target.name and isinstance(mark["info"], dict):
+                    found.append(cls(target, entry.parent, file, mark["info"]))
                 else:
                     os.close(file)
         return found[::-1]
 
     def close(self) -> None:
-        """Leave the folder to whoever goes on with it; again does nothing."""
+        """Release the folder, so that it can be continued; a second call does nothing."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove the folder with what of it has these names; where there is more, all that stays."""
+        """Remove the entries of these names, and the folder where nothing else is in it."""
         emptied(self.path, [*names, MARK])
         self.close()
 
     def finish(self, names: Iterable[str]) -> None:
-        """Give the folder its target's name. Of an earlier folder of that name, what has these names is removed.
+        """Give the folder its target's name. An earlier folder of that name, with entries of these names, is removed.
 
-        Raises OSError where that one holds anything else, or has come meanwhile.
+        Raises OSError where that one holds anything else, or has appeared meanwhile.
         """
         names = [*names, MARK]
         aside = None
         if os.path.lexists(self._target):
-            if strange := strangers(self._target, names):
-                raise OSError(errno.ENOTEMPTY, f"a folder with {cut(strange[0])}")
+            if others := other_entries(self._target, names):
+                raise OSError(errno.ENOTEMPTY, f"a folder with {cut(others[0])}")
             aside = _beside(self._target)
             self._target.rename(aside)
         try:
@@ -187,14 +184,14 @@ class Unfinished:
         self.close()
 
 
-def strangers(folder: Path, names: Iterable[str]) -> list[str]:
-    """Return what a folder holds that has none of these names, sorted."""
+def other_entries(folder: Path, names: Iterable[str]) -> list[str]:
+    """Return the entries of a folder that have none of these names, sorted."""
     known = {*names, MARK}
     return sorted(entry.name for entry in folder.iterdir() if entry.name not in known)
 
 
 def emptied(folder: Path, names: Iterable[str]) -> None:
-    """Remove what has these names from a folder, and the folder where nothing is left; a link is only unlinked."""
+    """Remove the entries of these names from a folder, and the folder once it is empty; a link is only unlinked."""
     with suppress(OSError):
         if folder.is_symlink():
             folder.unlink()
@@ -208,7 +205,11 @@ def emptied(folder: Path, names: Iterable[str]) -> None:
 
 
 def _locked(file: int) -> bool:
-    """Lock a file; return whether nobody else has."""
+    """Lock a file; return False where another process has."""
+    try:
+        import fcntl
+    except ImportError:  # an operating system without it
+        return True
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -225,16 +226,16 @@ def _age(path: Path) -> float:
         return 0.0
 
 
-def appear(path: Path, content: object) -> bool:
-    """Write a file that appears whole, and only where nothing has its name; return whether it did.
+def create_once(path: Path, content: object) -> bool:
+    """Create a file with this content where its name is free; return whether this call did.
 
-    Bytes are written as they are, anything else as JSON. Of any number of writers exactly one is told that it was the
-    one. Raises OSError where there is no room.
+    Bytes are written as they are, anything else as JSON. Of any number of callers exactly one gets True. Raises OSError
+    where there is no room.
     """
     building = _created(path)
     try:
         building.write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
-        os.link(building, path)
+        _named(building, path)
     except FileExistsError:
         return False
     finally:
@@ -243,8 +244,8 @@ def appear(path: Path, content: object) -> bool:
 
 
 @contextmanager
-def _told(target: Path) -> Iterator[None]:
-    """Tell what the operating system says as a user's mistake."""
+def _as_value_error(target: Path) -> Iterator[None]:
+    """Raise an error of the operating system as a ValueError, as the user's mistake."""
     try:
         yield
     except OSError as error:
@@ -253,7 +254,7 @@ def _told(target: Path) -> Iterator[None]:
 
 @contextmanager
 def _undone(remove: Callable[[], None]) -> Iterator[None]:
-    """Remove what was begun where anything fails."""
+    """Call `remove` where the body fails."""
     try:
         yield
     except BaseException:
@@ -267,26 +268,30 @@ def _exists(target: str | Path) -> ValueError:
 
 
 def _beside(target: Path) -> Path:
-    """Return a name in the target's folder that nobody can guess."""
+    """Return a random name in the target's folder."""
     return target.with_name(f".{target.name}.{secrets.token_hex(8)}{target.suffix}")
 
 
 def _created(target: Path) -> Path:
-    """Return an empty file beside the target; created exclusively, so that it is no link and nobody else's."""
+    """Return an empty file beside the target, created exclusively, so that it is no link and no other's file."""
     building = _beside(target)
     os.close(os.open(building, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     return building
 
 
 def _named(building: Path, target: Path) -> None:
-    """Give a file its name, where nothing has it. Raises FileExistsError where something does."""
+    """Give a file its name where that is free. Raises FileExistsError where it is not.
+
+    With a hard link the file appears whole. A file system without links lets one writer create the name, which is
+    empty until its content replaces it.
+    """
     try:
         os.link(building, target)
-    except OSError as error:
-        if error.errno not in _NO_LINKS:
-            raise
-        if os.path.lexists(target):
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from None
-        building.rename(target)
+    except FileExistsError:
+        raise
+    except (OSError, AttributeError, NotImplementedError):
+        os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        with _undone(target.unlink):
+            building.replace(target)
     else:
         building.unlink()

@@ -1,105 +1,98 @@
-"""What is written appears whole or not at all."""
+"""Files and folders appear whole or not at all."""
 
 import errno
 import json
 import os
+import subprocess
+import sys
 from threading import Barrier, Thread
 
 import pytest
 
 from posefit.files import MARK as UNFINISHED
-from posefit.files import Unfinished, appear, check_new, check_place, new_file, new_folder, replaceable, replaced_file
+from posefit.files import (
+    Unfinished,
+    check_new,
+    check_place,
+    create_once,
+    new_file,
+    new_folder,
+    replaceable,
+    replaced_file,
+)
 
 MARK = b"<!-- ours -->"
+NEW = pytest.mark.parametrize("opened", [new_folder, new_file])
 
 
-def test_a_folder_appears_when_it_is_whole(tmp_path):
-    with new_folder(tmp_path / "out") as folder:
-        (folder / "a.txt").write_text("a")
-        assert not (tmp_path / "out").exists()
-    assert (tmp_path / "out" / "a.txt").read_text() == "a"
-    assert [one.name for one in tmp_path.iterdir()] == ["out"]
+def write(building, text="a"):
+    (building / "a" if building.is_dir() else building).write_text(text)
 
 
-def test_a_file_appears_when_it_is_whole_and_keeps_its_suffix_meanwhile(tmp_path):
-    with new_file(tmp_path / "out.csv") as building:
-        building.write_text("a")
+@NEW
+def test_a_name_appears_when_its_content_is_whole(tmp_path, opened):
+    target = tmp_path / "out.csv"
+    with opened(target) as building:
+        write(building)
         assert building.suffix == ".csv"
-        assert not (tmp_path / "out.csv").exists()
-    assert [one.name for one in tmp_path.iterdir()] == ["out.csv"]
+        assert not target.exists()
+    assert (target / "a" if target.is_dir() else target).read_text() == "a"
+    assert list(tmp_path.iterdir()) == [target]
 
 
-@pytest.mark.parametrize("opened", [new_folder, new_file])
-@pytest.mark.parametrize("error", [RuntimeError("no"), KeyboardInterrupt()])
-def test_nothing_is_left_of_what_fails(tmp_path, opened, error):
+@NEW
+@pytest.mark.parametrize(
+    ("error", "raised", "message"),
+    [
+        (RuntimeError("no"), RuntimeError, "no"),
+        (KeyboardInterrupt("stop"), KeyboardInterrupt, "stop"),
+        (
+            OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)),
+            ValueError,
+            "out: expected a place to write to, got No space left on device",
+        ),
+    ],
+)
+def test_a_failure_leaves_nothing(tmp_path, opened, error, raised, message):
     def fail():
         with opened(tmp_path / "out") as building:
-            (building / "a" if building.is_dir() else building).write_text("a")
+            write(building)
             raise error
 
-    with pytest.raises(type(error)):
+    with pytest.raises(raised, match=message):
         fail()
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("opened", [new_folder, new_file])
-def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path, opened):
-    def fail():
-        with opened(tmp_path / "out") as building:
-            (building / "a" if building.is_dir() else building).write_text("a")
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    with pytest.raises(ValueError, match="out: expected a place to write to, got No space left on device"):
-        fail()
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("opened", [new_folder, new_file])
-def test_what_exists_is_kept(tmp_path, opened):
-    (tmp_path / "out").write_text("mine")
-    with (
-        pytest.raises(ValueError, match="out: expected a new name to write to, got one that exists"),
-        opened(tmp_path / "out"),
+@NEW
+def test_a_name_that_is_taken_or_has_no_place_is_refused(tmp_path, opened):
+    (tmp_path / "file").write_text("mine")
+    for path, message in (
+        ("file", "file: expected a new name to write to, got one that exists"),
+        ("none/out", "out: expected a place to write to, got No such file or directory"),
+        ("file/out", "out: expected a place to write to, got Not a directory"),
     ):
-        pass
-    assert (tmp_path / "out").read_text() == "mine"
+        with pytest.raises(ValueError, match=message), opened(tmp_path / path):
+            pass
+    assert (tmp_path / "file").read_text() == "mine"
 
 
-@pytest.mark.parametrize("opened", [new_folder, new_file])
-def test_a_place_that_is_not_there_is_one_line(tmp_path, opened):
-    (tmp_path / "file").write_text("")
-    for parent, reason in (("none", "No such file or directory"), ("file", "Not a directory")):
-
-        def fail(where=tmp_path / parent / "out"):
-            with opened(where) as building:
-                building.write_text("a")
-
-        with pytest.raises(ValueError, match=f"out: expected a place to write to, got {reason}"):
-            fail()
-
-
-def test_what_a_killed_run_left_is_neither_in_the_way_nor_removed(tmp_path):
+def test_a_folder_that_a_killed_run_left_is_neither_in_the_way_nor_removed(tmp_path):
     (tmp_path / ".out.partial").mkdir()
     (tmp_path / ".out.partial" / "old").write_text("old")
     with new_folder(tmp_path / "out") as folder:
         (folder / "new").write_text("new")
-    assert [one.name for one in (tmp_path / "out").iterdir()] == ["new"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["new"]
     assert (tmp_path / ".out.partial" / "old").read_text() == "old"
-
-
-def planted(folder):
-    """Return somebody's file, to which links lead from every name that could once be guessed."""
-    theirs = folder / "theirs"
-    theirs.write_text("theirs")
-    for name in (".out.partial", ".out.partial.html", ".out.html.partial", ".out.html"):
-        (folder / name).symlink_to(theirs)
-    return theirs
 
 
 @pytest.mark.parametrize("opened", [new_file, lambda path: replaced_file(path, MARK)], ids=["new", "replaced"])
 @pytest.mark.parametrize("fails", [False, True])
 def test_no_link_is_followed_and_none_removed(tmp_path, opened, fails):
-    theirs = planted(tmp_path)
+    theirs = tmp_path / "theirs"
+    theirs.write_text("theirs")
+    for name in (".out.partial", ".out.partial.html", ".out.html.partial", ".out.html"):
+        (tmp_path / name).symlink_to(theirs)
     before = sorted(tmp_path.iterdir())
     try:
         with opened(tmp_path / "out.html") as building:
@@ -115,7 +108,7 @@ def test_no_link_is_followed_and_none_removed(tmp_path, opened, fails):
 
 
 @pytest.mark.parametrize("opened", [new_folder, new_file, lambda path: replaced_file(path, MARK)])
-def test_a_link_at_the_name_itself_is_something_that_exists(tmp_path, opened):
+def test_a_link_at_the_name_itself_counts_as_existing(tmp_path, opened):
     (tmp_path / "theirs").write_bytes(MARK)
     (tmp_path / "out").symlink_to(tmp_path / "theirs")
     (tmp_path / "dangling").symlink_to(tmp_path / "nothing")
@@ -140,10 +133,11 @@ def test_a_name_and_its_place_are_checked_before_anything_is_computed(tmp_path):
     check_place(tmp_path / "out")
 
 
-@pytest.mark.parametrize("opened", [new_folder, new_file])
-def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, opened):
-    def write(path, text):
-        (path / "a" if path.is_dir() else path).write_text(text)
+@NEW
+@pytest.mark.parametrize("links", [True, False])
+def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, monkeypatch, opened, links):
+    if not links:
+        without_links(monkeypatch)
 
     def both():
         with opened(tmp_path / "out") as late:
@@ -159,18 +153,37 @@ def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, opened):
     assert list(tmp_path.iterdir()) == [found]
 
 
-def test_a_new_file_needs_no_hard_links(tmp_path, monkeypatch):
+def without_links(monkeypatch):
+    """Behave as a file system without hard links."""
+
     def refuse(*_):
         raise OSError(errno.EPERM, os.strerror(errno.EPERM))
 
     monkeypatch.setattr(os, "link", refuse)
-    with new_file(tmp_path / "out") as building:
-        building.write_text("a")
-    assert (tmp_path / "out").read_text() == "a"
-    with pytest.raises(ValueError, match="got one that exists"), new_file(tmp_path / "late") as building:
-        (tmp_path / "late").write_text("early")
-    assert (tmp_path / "late").read_text() == "early"
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["late", "out"]
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_of_many_that_create_a_file_exactly_one_does(tmp_path, monkeypatch, links):
+    if not links:
+        without_links(monkeypatch)
+    start, created = Barrier(8), []
+
+    def work(k):
+        start.wait()
+        for name in range(50):
+            if create_once(tmp_path / str(name), {"by": k}):
+                created.append((name, k))
+
+    threads = [Thread(target=work, args=(k,)) for k in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(name for name, _ in created) == list(range(50))
+    assert all(json.loads((tmp_path / str(name)).read_text()) == {"by": k} for name, k in created)
+    assert len(list(tmp_path.iterdir())) == 50
+    assert create_once(tmp_path / "a", b"\x00\x01")
+    assert (tmp_path / "a").read_bytes() == b"\x00\x01"
 
 
 def test_only_a_file_that_carries_the_mark_is_replaced(tmp_path):
@@ -181,16 +194,6 @@ def test_only_a_file_that_carries_the_mark_is_replaced(tmp_path):
     assert path.read_bytes() == MARK + b"two"
     assert replaceable(path, MARK)
     assert not replaceable(tmp_path, MARK)
-    path.write_text("a letter")
-    wanted = r"out.html: expected a new name or an earlier file of this kind"
-    with pytest.raises(ValueError, match=wanted), replaced_file(path, MARK):
-        pass
-    assert path.read_text() == "a letter"
-
-
-def test_what_was_there_stays_where_its_replacement_fails(tmp_path):
-    path = tmp_path / "out.html"
-    path.write_bytes(MARK)
 
     def fail():
         with replaced_file(path, MARK) as building:
@@ -199,81 +202,88 @@ def test_what_was_there_stays_where_its_replacement_fails(tmp_path):
 
     with pytest.raises(ValueError, match="got No space left on device"):
         fail()
-    assert path.read_bytes() == MARK
+    assert path.read_bytes() == MARK + b"two"
+    path.write_text("a letter")
+    wanted = r"out.html: expected a new name or an earlier file of this kind"
+    with pytest.raises(ValueError, match=wanted), replaced_file(path, MARK):
+        pass
+    assert path.read_text() == "a letter"
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_of_many_that_make_a_file_appear_exactly_one_did(tmp_path):
-    start, did = Barrier(8), []
-
-    def work(k):
-        start.wait()
-        for name in range(50):
-            if appear(tmp_path / str(name), {"by": k}):
-                did.append((name, k))
-
-    threads = [Thread(target=work, args=(k,)) for k in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert sorted(name for name, _ in did) == list(range(50))
-    assert all(json.loads((tmp_path / str(name)).read_text()) == {"by": k} for name, k in did)
-    assert len(list(tmp_path.iterdir())) == 50
-
-
-def test_bytes_appear_as_they_are(tmp_path):
-    assert appear(tmp_path / "a", b"\x00\x01")
-    assert not appear(tmp_path / "a", b"other")
-    assert (tmp_path / "a").read_bytes() == b"\x00\x01"
-
-
-def test_only_what_carries_our_mark_for_this_target_and_nobody_works_on_is_left_of_an_earlier_run(tmp_path):
+def test_only_marked_folders_of_this_target_that_are_not_in_use_count_as_interrupted(tmp_path):
     target = tmp_path / "out"
-    at_work = Unfinished.begun(target, {"seed": 0})
-    ended = Unfinished.begun(target, {"seed": 1})
+    in_use = Unfinished.begin(target, {"seed": 0})
+    ended = Unfinished.begin(target, {"seed": 1})
     ended.close()
     for name, mark in (
         (".out.partial", None),
         (".out.1", "no JSON"),
-        (".out.2", '{"target": "other", "told": {}}'),
+        (".out.2", '{"target": "other", "info": {}}'),
         (".out.3", "[]"),
     ):
         (tmp_path / name).mkdir()
         if mark is not None:
             (tmp_path / name / UNFINISHED).write_text(mark)
     (tmp_path / ".out.4").symlink_to(ended.path)
-    found = Unfinished.left(target)
+    found = Unfinished.interrupted(target)
     assert [one.path for one in found] == [ended.path]
-    assert found[0].told == {"seed": 1}
-    assert Unfinished.left(target) == []  # somebody works on it now
-    at_work.close()
-    assert [one.path for one in Unfinished.left(target)] == [at_work.path]
+    assert found[0].info == {"seed": 1}
+    assert Unfinished.interrupted(target) == []  # it is in use now
+    in_use.close()
+    assert [one.path for one in Unfinished.interrupted(target)] == [in_use.path]
 
 
 def test_of_an_unfinished_folder_only_named_files_are_removed(tmp_path):
-    one = Unfinished.begun(tmp_path / "out", {})
-    (one.path / "ours").write_text("")
-    (one.path / "theirs").write_text("theirs")
-    one.remove(["ours"])
-    assert [path.name for path in one.path.iterdir()] == ["theirs"]
-    other = Unfinished.begun(tmp_path / "out", {})
-    (other.path / "ours").write_text("")
-    other.remove(["ours"])
-    assert not other.path.exists()
+    kept = Unfinished.begin(tmp_path / "out", {})
+    (kept.path / "ours").write_text("")
+    (kept.path / "theirs").write_text("theirs")
+    kept.remove(["ours"])
+    assert [path.name for path in kept.path.iterdir()] == ["theirs"]
+    removed = Unfinished.begin(tmp_path / "out", {})
+    (removed.path / "ours").write_text("")
+    removed.remove(["ours"])
+    assert not removed.path.exists()
 
 
-def test_a_finished_folder_replaces_an_earlier_one_but_nothing_that_came_meanwhile(tmp_path):
+def test_a_finished_folder_replaces_an_earlier_one_but_no_other_files(tmp_path):
     target = tmp_path / "out"
     for text in ("one", "two"):
-        place = Unfinished.begun(target, {})
+        place = Unfinished.begin(target, {})
         (place.path / "ours").write_text(text)
         place.finish(["ours"])
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert [(path.name, path.read_text()) for path in target.iterdir()] == [("ours", "two")]
-    place = Unfinished.begun(target, {})
+    place = Unfinished.begin(target, {})
     (target / "theirs").write_text("theirs")
     with pytest.raises(OSError, match="theirs"):
         place.finish(["ours"])
     assert sorted(path.name for path in target.iterdir()) == ["ours", "theirs"]
     assert place.path.is_dir()
+
+
+def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():
+    script = (
+        "import sys\n"
+        "sys.modules['fcntl'] = sys.modules['resource'] = None\n"
+        "import numpy as np\n"
+        "from posefit import Body, Camera, PoseProblem, Silhouette\n"
+        "from posefit.files import Unfinished\n"
+        "from posefit.limits import allowed_bytes\n"
+        "from posefit.motion import built_in\n"
+        "from posefit.silhouette.cost import pose_costs, project\n"
+        "body, pose = Body.of(built_in.average_skeleton()), np.zeros((1, 66))\n"
+        "camera = Camera.around(np.zeros(3), 0.0, 4.0, (40, 30))\n"
+        "seen = Silhouette.of(project(body, camera, pose[0], np.zeros(3)))\n"
+        "print(PoseProblem.__name__, pose_costs(body, [camera], [seen], pose, np.zeros((1, 3)))[0][0])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.stdout == "PoseProblem 0.0\n", done.stderr
+
+
+def test_a_motion_is_tracked_without_any_segmenter(tmp_path):
+    words = ["track", "walk", "--frames", "0:1", "--evaluations", "50", "--out", str(tmp_path / "out")]
+    script = f"import sys\nfrom posefit.cli import main\nsys.exit(main({words!r}))\n"
+    blocked = os.environ | {"POSEFIT_BLOCK_PLUGINS": "background,mediapipe"}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, env=blocked)
+    assert done.returncode == 0, done.stderr

@@ -9,7 +9,6 @@ another, and no two functions call each other. Where there is no lock to be had,
 cannot be written to, everybody compiles, as without this module.
 """
 
-import fcntl
 import gc
 import os
 import time
@@ -77,8 +76,10 @@ def in_turn(path: Path | None, patience: float = PATIENCE) -> Iterator[None]:
         yield
         return
     try:
+        import fcntl
+
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    except OSError:
+    except (ImportError, OSError):
         yield
         return
     _held.add(path)
@@ -93,6 +94,8 @@ def in_turn(path: Path | None, patience: float = PATIENCE) -> Iterator[None]:
 
 
 def _wait(file: int, until: float) -> None:
+    import fcntl
+
     while True:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

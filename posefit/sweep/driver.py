@@ -20,7 +20,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Self
 
-from posefit.files import appear, replaced_file
+from posefit.files import create_once, replaced_file
 from posefit.reading import parsed_json
 from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.fold import LEFT, fold_logs
@@ -122,7 +122,7 @@ class Driver:
             f"something outside ended it {LOSSES} times while no other cell got done", *losses[-ATTEMPTS:]
         ]  # fmt: skip
         content = {"key": cell.key, "spec": cell.spec, "status": "quarantined", "reasons": reasons}
-        if appear(self.ledger.path / QUARANTINE / f"{cell.key}.json", content):
+        if create_once(self.ledger.path / QUARANTINE / f"{cell.key}.json", content):
             self._clear(cell.key)
         return State.QUARANTINED
 
@@ -175,9 +175,9 @@ class Driver:
 
     def _taken(self, path: Path) -> bool:
         try:
-            return appear(path, {**self._me, "rows": len(self.ledger)})
+            return create_once(path, {**self._me, "rows": len(self.ledger)})
         except FileNotFoundError:  # another driver, whose clock is ahead, took what was being written for left behind
-            return appear(path, {**self._me, "rows": len(self.ledger)})
+            return create_once(path, {**self._me, "rows": len(self.ledger)})
 
     def _mine(self, lease: Lease) -> bool:
         try:

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from posefit.files import appear, replaced_file
+from posefit.files import create_once, replaced_file
 from posefit.reading import cut, parsed_json, quoted, read_text
 from posefit.sweep.cell import other_version
 from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, joints_at, lines
@@ -265,7 +265,7 @@ def create(path: Path) -> None:
                 raise ValueError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
             for name in FOLDERS:
                 (path / name).mkdir(parents=True, exist_ok=True)
-            appear(path / INDEX, {"format": FORMAT})
+            create_once(path / INDEX, {"format": FORMAT})
     except OSError as error:
         raise ValueError(f"{path}: expected a folder that can be written to, got {error.strerror}") from None
     _check_format(path)

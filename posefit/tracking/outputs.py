@@ -5,8 +5,6 @@ early, because a disk is full or somebody stops it, those frames are kept, and t
 """
 
 import json
-import shutil
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
@@ -14,7 +12,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from posefit.files import Unfinished, strangers
+from posefit.files import Unfinished, other_entries
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
@@ -29,16 +27,14 @@ from posefit.tracking.picture import Painter
 from posefit.tracking.table import undetermined
 from posefit.uncertainty.modes import Posterior
 
-_FOUND, _WORK = "found.jsonl", "work"
-_MINE = (*FILES, _FOUND, _WORK)  # what a track writes to its folder
+_FOUND = "found.jsonl"
+_MINE = (*FILES, _FOUND)  # what a track writes to its folder
 _ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
 _NUMBERS = ("cost", "evaluations", "seconds", "lost")
 
 
 class Output(Protocol):
     """Where a track goes."""
-
-    work: Path  # a folder for what is needed meanwhile
 
     def earlier(self) -> tuple[list[Frame], State | None]:
         """Return the frames that were found before, and the state of the random generator after them."""
@@ -57,12 +53,10 @@ class Nowhere:
     """The output of a track that is not written."""
 
     def __enter__(self) -> Self:
-        self._folder = tempfile.TemporaryDirectory(prefix="posefit-")
-        self.work = Path(self._folder.name)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._folder.cleanup()
+        """Nothing has to be closed."""
 
     def earlier(self) -> tuple[list[Frame], State | None]:
         """Return that there is nothing."""
@@ -89,18 +83,18 @@ class OutputFolder:
             raise ValueError(f"{self.path}: expected a folder to write to, got a file")
         if self.path.exists() and not force:
             raise ValueError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
-        if self.path.exists() and (strange := strangers(self.path, _MINE)):
-            came = f"one with {cut(strange[0])}"
+        if self.path.exists() and (others := other_entries(self.path, _MINE)):
+            came = f"one with {cut(others[0])}"
             raise ValueError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
         self._recorded = 0
         self._place = self._same() if resume else None
 
     def _same(self) -> Unfinished:
         """Return the folder of the track that goes on: the latest that was told the same."""
-        left = Unfinished.left(self.path)
+        left = Unfinished.interrupted(self.path)
         if not left:
             raise ValueError(f"{self.path}: expected a track that was interrupted to resume, got none")
-        others = [difference(one.told, self._spec) for one in left]
+        others = [difference(one.info, self._spec) for one in left]
         place = left[others.index(None)] if None in others else None
         for one in left:
             if one is not place:
@@ -113,20 +107,16 @@ class OutputFolder:
         told = {name: one.as_json() for name, one in self._spec.items()}
         try:
             if self._place is None:
-                for earlier in Unfinished.left(self.path):
+                for earlier in Unfinished.interrupted(self.path):
                     earlier.remove(_MINE)
-                self._place = Unfinished.begun(self.path, told)
+                self._place = Unfinished.begin(self.path, told)
             self._building = self._place.path
-            self.work = self._building / _WORK
-            shutil.rmtree(self.work, ignore_errors=True)
-            self.work.mkdir()
         except OSError as error:
             raise ValueError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
         assert self._place is not None
-        shutil.rmtree(self.work, ignore_errors=True)
         if kind is None:
             try:
                 self._place.finish(_MINE)

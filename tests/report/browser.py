@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.files import appear
+from posefit.files import create_once
 from posefit.sweep.cell import CellResult, TrackCell, packed_joints
 from posefit.sweep.driver import Driver
 from posefit.sweep.ledger import QUARANTINE, ROWS
@@ -111,5 +111,5 @@ def ledger(
     writer.close()
     for cell, reasons in failures or []:
         content = {"key": cell.key, "spec": cell.spec, "status": "quarantined", "reasons": reasons}
-        appear(path / QUARANTINE / f"{cell.key}.json", content)
+        create_once(path / QUARANTINE / f"{cell.key}.json", content)
     return path
