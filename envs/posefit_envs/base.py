@@ -1,54 +1,401 @@
-"""What single environments share: instances, actions that are checked, and the window."""
+"""Base classes: searches side by side, a single environment as a vector of one, checked actions, rendering."""
 
 from abc import ABC, abstractmethod
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple, Unpack
 
 import gymnasium as gym
-from gymnasium import Space, error
+import numpy as np
+from gymnasium import Space, error, logger
+from gymnasium.spaces import Box
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
 
-from posefit_envs.drawing import MODES, Picture, Screen, check_mode
-from posefit_envs.instance import Selection
-from posefit_envs.search import Doorkeeper
+from posefit import SearchSpace
+from posefit.arrays import Array
+from posefit.fitting.check import finite_number, whole
+from posefit.fitting.metrics import pose_error_degrees
+from posefit.geometry.skeleton import ANGLES
+from posefit.reading import quoted
+from posefit_envs.instance import (
+    ArgumentError,
+    Arguments,
+    Episode,
+    Instance,
+    World,
+    checked,
+    instance_number,
+    select,
+)
+from posefit_envs.rendering import MODES, Picture, Window, check_mode
+from posefit_envs.stage import Stage
 
-S = TypeVar("S")
+Flags = NDArray[np.bool_]  # (n,)
+Infos = dict[str, Any]
 
 
-class SearchEnv(gym.Env[Any, Any], ABC, Generic[S]):
-    """One environment, whose episode is a search: its state is `_search`, None before the first reset."""
+class VectorArguments(Arguments, total=False):
+    """The arguments of every vector environment: those of single ones, and how they run side by side."""
+
+    threads: int
+    max_episode_steps: int | None
+    render_mode: str | None
+
+
+class Outcome(NamedTuple):
+    """The results of one step of n environments; rows of those that reset in this step need not mean anything."""
+
+    observations: Any  # (n, ...), or a dict of them
+    rewards: Array  # (n,)
+    terminated: Flags
+    truncated: Flags  # by a budget of the environment's own
+    infos: Infos  # (n, ...) by name
+    reset_infos: Infos  # those that a reset gives too
+    row_infos: Mapping[int, Infos] = {}  # further ones of some rows
+
+
+class ActionValidator:
+    """Checks actions, and warns once when it clips one."""
+
+    def __init__(self, dimensions: int) -> None:
+        self._dimensions, self._warned = dimensions, False
+
+    def check(self, actions: object, shape: tuple[int, ...]) -> Array:
+        """Return actions of that shape in [-1, 1] as float64, which does not round them.
+
+        Raises gymnasium.error.InvalidAction where they have another shape, or are not finite numbers.
+        """
+        try:
+            values = np.array(actions, dtype=np.float64)
+        except (TypeError, ValueError) as mistake:
+            raise error.InvalidAction(f"an action must be {self._dimensions} numbers, got {actions!r}") from mistake
+        if values.shape != shape:
+            raise error.InvalidAction(f"actions must have shape {shape}, got {values.shape}")
+        largest = np.abs(values).max(initial=0.0)
+        if not np.isfinite(largest):
+            raise error.InvalidAction("actions must be finite, got nan or infinity")
+        if largest > 1.0:
+            if not self._warned:
+                logger.warn(
+                    f"actions must lie in [-1, 1], got {largest:.6g} from 0; it is clipped, as all others will be"
+                )
+                self._warned = True
+            np.clip(values, -1.0, 1.0, out=values)
+        return values
+
+
+class RenderedEnv(gym.Env[Any, Any], ABC):
+    """A single environment that can be rendered."""
 
     metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
 
-    def __init__(self, selection: Selection, spaces: tuple[Space[Any], Space[Any]], render_mode: str | None) -> None:
+    def __init__(self, render_mode: str | None) -> None:
         check_mode(render_mode)
         self.render_mode = render_mode
-        self._selection, self.world = selection, selection.world
-        self.action_space, self.observation_space = spaces
-        self._shape = self.action_space.shape or ()
-        self._door = Doorkeeper(self._shape[0])
-        self._search: S | None = None
-        self._screen = Screen(self.metadata["render_fps"])
+        self._window = Window(self.metadata["render_fps"])
 
     def render(self) -> Any:
         """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
         if self.render_mode is None:
             return None
-        picture = self._portrait(self._current())
-        return picture if self.render_mode == "rgb_array" else self._screen.show(picture)
+        picture = self._render_frame()
+        return picture if self.render_mode == "rgb_array" else self._window.show(picture)
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        self._screen.close()
+        self._window.close()
 
-    def _show(self) -> None:
-        """Show the picture where `render_mode` asks for a window."""
+    def _update_window(self) -> None:
         if self.render_mode == "human":
             self.render()
 
-    def _current(self) -> S:
-        if self._search is None:
+    @abstractmethod
+    def _render_frame(self) -> Picture:
+        """Return the picture (height, width, 3) of the current state."""
+
+
+class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
+    """`num_envs` environments side by side: a proposal in each is one compiled call, whatever their instances.
+
+    The arguments are those of the single environment, and `threads`, the number that draw, which changes nothing but
+    the time. Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an
+    episode's last one resets, as `AutoresetMode.NEXT_STEP` has it.
+    """
+
+    metadata = {  # noqa: RUF012, as Gymnasium has it
+        "render_modes": list(MODES),
+        "render_fps": 10,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int,
+        spaces: Callable[[World], tuple[Box, Space[Any]]],
+        *,
+        threads: int = 1,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+        **arguments: Unpack[Arguments],
+    ) -> None:
+        checked(whole, "num_envs", num_envs, 1)
+        self._selection = select(**arguments)
+        self.world = self._selection.world
+        check_mode(render_mode)
+        if render_mode == "human":
+            raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self._stage = Stage(self.world, num_envs, checked(whole, "threads", threads, 1))
+        self.single_action_space, self.single_observation_space = spaces(self.world)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._shape = self.action_space.shape or ()
+        self._validator = ActionValidator(self._shape[1])
+        self._longest = np.inf if max_episode_steps is None else max_episode_steps
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._ended = np.zeros(num_envs, dtype=bool)
+        self._numbers = np.zeros(num_envs, dtype=np.int64)
+        self._steps = np.zeros(num_envs, dtype=np.int64)
+        self._episodes: list[Episode | None] = [None] * num_envs
+        self._truths = np.empty((num_envs, ANGLES))
+
+    @property
+    def episodes(self) -> list[Episode]:
+        """What each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
+        episodes = [episode for episode in self._episodes if episode is not None]
+        if len(episodes) < self.num_envs:
             raise error.ResetNeeded("reset must come before anything else")
-        return self._search
+        return episodes
+
+    @property
+    def search_spaces(self) -> list[SearchSpace]:
+        """The space that each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return [episode.space for episode in self.episodes]
+
+    def render(self) -> Any:
+        """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        return tuple(self._render_row(i, episode) for i, episode in enumerate(self.episodes))
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, Infos]:
+        """Begin with an instance each; `options={"instance": 17}` chooses one for all, [17, 18, ...] one for each.
+
+        The option "reset_mask" selects the environments that begin; the others go on.
+        """
+        begun = None not in self._episodes
+        seeds, mask = _seeds(seed, self.num_envs), _reset_mask(options, self.num_envs, begun)
+        numbers = _chosen_instances(options, self.num_envs)
+        for i in np.flatnonzero(mask).tolist():
+            if seeds[i] is not None:
+                self._generators[i] = seeding.np_random(seeds[i])[0]
+            self._begin(i, numbers[i])
+        observations, infos = self._opened(mask)
+        return observations, _masked_infos(mask, infos, {})
+
+    def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
+        """Step each environment; one whose episode has ended resets instead."""
+        actions = self._validator.check(actions, self._shape)
+        assert self.episodes
+        stepping = ~self._ended
+        for i in np.flatnonzero(self._ended).tolist():
+            self._begin(i, None)
+        self._steps += stepping
+        outcome = self._advance(actions, stepping)
+        # the time limit of Gymnasium cuts an episode that ends by itself, too
+        truncated = stepping & (outcome.truncated | (self._steps >= self._longest))
+        self._ended = outcome.terminated | truncated
+        infos = _masked_infos(stepping, outcome.infos, outcome.reset_infos)
+        for i, row in outcome.row_infos.items():
+            infos = self._add_info(infos, row, i)
+        rewards = np.where(stepping, outcome.rewards, 0.0)
+        return outcome.observations, rewards, outcome.terminated, truncated, infos
+
+    def _begin(self, i: int, chosen: int | None) -> None:
+        """Begin the next episode of environment i, with a chosen instance or another."""
+        number = self._selection.number({"instance": chosen}, lambda: self._generator(i))
+        self._numbers[i], self._steps[i], self._ended[i] = number, 0, False
+        self._begin_search(i, number)
+
+    def _generator(self, i: int) -> np.random.Generator:
+        generator = self._generators[i]
+        if generator is None:
+            generator = self._generators[i] = seeding.np_random(None)[0]
+        return generator
+
+    def _enter(self, i: int, episode: Episode) -> None:
+        """Make this what environment i searches."""
+        self._episodes[i] = episode
+        self._stage.set_scene(i, episode.scenery, episode.space)
+        self._truths[i] = episode.instance.truth.poses[episode.frame]
+
+    def _progress(self, best: Array, evaluations: NDArray[np.int64], poses: Callable[[], Array]) -> Infos:
+        """Return the infos that all searches have; `poses` returns the poses (n, 66) to compare with the truth."""
+        infos: Infos = {"best_cost": best, "evaluations": evaluations, "instance": self._numbers.copy()}
+        if self._selection.errors:
+            infos["error_degrees"] = pose_error_degrees(self._truths, poses())
+        return infos
 
     @abstractmethod
-    def _portrait(self, search: S) -> Picture:
-        """Return the picture of a search."""
+    def _begin_search(self, i: int, number: int) -> None:
+        """Make environment i begin with an instance."""
+
+    @abstractmethod
+    def _opened(self, begun: Flags) -> tuple[Any, Infos]:
+        """Return observations (n, ...) after a reset of some environments, and the infos (n, ...) of those by name."""
+
+    @abstractmethod
+    def _advance(self, actions: Array, stepping: Flags) -> Outcome:
+        """Return the outcome of actions (n, ...) in [-1, 1]; environments that do not step have just begun."""
+
+    @abstractmethod
+    def _render_row(self, i: int, episode: Episode) -> Picture:
+        """Return the picture of environment i."""
+
+
+class SearchEnv(RenderedEnv):
+    """A single environment: a vector of one, whose rows are taken out, and which does not reset by itself."""
+
+    vector: ClassVar[type[SearchVectorEnv]]
+
+    def __init__(self, *, render_mode: str | None = None, **arguments: Any) -> None:
+        super().__init__(render_mode)
+        self._vector = self.vector(1, **arguments)  # type: ignore[call-arg, arg-type]
+        self.world = self._vector.world
+        self.action_space = self._vector.single_action_space
+        self.observation_space = self._vector.single_observation_space
+        self._shape = self.action_space.shape or ()
+
+    @property
+    def instance(self) -> Instance:
+        """The current instance. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return self._vector.episodes[0].instance
+
+    @property
+    def search_space(self) -> SearchSpace:
+        """The space that is searched. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return self._vector.episodes[0].space
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Infos]:
+        """Begin with an instance; `options={"instance": 17}` chooses it."""
+        super().reset(seed=seed)
+        self._vector._generators[0] = self.np_random
+        self._vector._begin(0, options.get("instance") if options else None)
+        observations, infos = self._vector._opened(np.ones(1, dtype=bool))
+        self._update_window()
+        return row_of(observations, 0), _single_infos(infos)
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, Infos]:
+        """Make one step. Raises gymnasium.error.ResetNeeded where the episode has ended."""
+        vector = self._vector
+        assert vector.episodes
+        if vector._ended[0]:
+            raise error.ResetNeeded("the episode has ended: reset before the next step")
+        action = vector._validator.check(action, self._shape)
+        vector._steps += 1
+        outcome = vector._advance(action[None], np.ones(1, dtype=bool))
+        terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
+        vector._ended[0] = terminated or truncated
+        self._update_window()
+        infos = _single_infos(outcome.infos) | outcome.row_infos.get(0, {})
+        return row_of(outcome.observations, 0), float(outcome.rewards[0]), terminated, truncated, infos
+
+    def _render_frame(self) -> Picture:
+        return self._vector._render_row(0, self._vector.episodes[0])
+
+
+def row_of(observations: Any, i: int) -> Any:
+    """Return the observation of environment i, of observations (n, ...) or a dict of them."""
+    return {name: one[i] for name, one in observations.items()} if isinstance(observations, dict) else observations[i]
+
+
+def check_budget(target_cost: float, name: str, evaluations: int) -> None:
+    """Return nothing. Raises ArgumentError where a number is not what it must be."""
+    checked(finite_number, "target_cost", target_cost)
+    checked(whole, name, evaluations, 2)
+
+
+def proposal_dimensions(world: World) -> int:
+    """Return how many numbers a world's proposals have."""
+    return len(world.learned.low) + (6 if world.translation == "searched" else 3)
+
+
+def image_spaces(world: World) -> tuple[Box, Box]:
+    """Return the space of a world's proposals, and that of its pictures."""
+    width, height = world.size
+    return (
+        Box(-1.0, 1.0, (proposal_dimensions(world),), np.float32),
+        Box(0, 255, (height, width, 2 * len(world.view_degrees)), np.uint8),
+    )
+
+
+def _single_infos(infos: Infos) -> Infos:
+    return {name: values[0].item() if values.ndim == 1 else values[0] for name, values in infos.items()}
+
+
+def _masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:
+    """Return infos as Gymnasium has them: `values` where the mask (n,) is true, zeros elsewhere, and the masks.
+
+    A name that `others` has too has those values where the mask is false.
+    """
+    everywhere, nowhere = bool(mask.all()), not mask.any()
+    infos: Infos = {}
+    for name, value in values.items():
+        if name in others:
+            infos[f"_{name}"] = np.ones(len(mask), dtype=bool)
+        elif nowhere:
+            continue
+        else:
+            infos[f"_{name}"] = mask.copy()
+        if everywhere or others.get(name) is value:
+            infos[name] = value
+        else:
+            shape = (-1, *[1] * (value.ndim - 1))
+            infos[name] = np.where(mask.reshape(shape), value, others.get(name, np.zeros_like(value)))
+    return infos
+
+
+def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+    """Return a seed for each environment: s gives s, s + 1, ... Raises gymnasium.error.Error for a wrong count."""
+    if seed is None:
+        return [None] * count
+    if isinstance(seed, int | np.integer):
+        return [int(seed) + i for i in range(count)]
+    if len(seed) != count:
+        raise error.Error(f"seed must be one number or {count}, got {len(seed)}")
+    return list(seed)
+
+
+def _chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int | None]:
+    """Return the instance that a reset's options choose for each environment, None where they choose none.
+
+    One number is for all. Raises ArgumentError where the count is wrong, or there is no such instance.
+    """
+    chosen = options.get("instance") if options else None
+    if chosen is None:
+        return [None] * count
+    if isinstance(chosen, int | np.integer) or not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
+        return [instance_number(chosen)] * count
+    if (isinstance(chosen, np.ndarray) and chosen.ndim != 1) or len(chosen) != count:
+        raise ArgumentError(f"instance must be one number or {count}, one for each environment, got {quoted(chosen)}")
+    return [instance_number(number) for number in chosen]
+
+
+def _reset_mask(options: Mapping[str, Any] | None, count: int, begun: bool) -> Flags:
+    """Return which environments (count,) a reset is for: all, or those of the option "reset_mask".
+
+    Raises gymnasium.error.Error where the mask does not fit, gymnasium.error.ResetNeeded where the others have not
+    `begun`.
+    """
+    if not options or options.get("reset_mask") is None:
+        return np.ones(count, dtype=bool)
+    mask = np.asarray(options["reset_mask"])
+    if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
+        raise error.Error(f"reset_mask must be {count} booleans, at least one of them true, got {mask!r}")
+    if not begun and not mask.all():
+        raise error.ResetNeeded("the first reset must be of all environments")
+    return mask

@@ -1,233 +1,188 @@
-"""Configure-v0: dynamic algorithm configuration. The action steers a swarm that searches for the pose."""
+"""Configure-v0: dynamic algorithm configuration, with a choice of optimisers, populations, restarts and diffusions."""
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple, Unpack
+from typing import Unpack
 
 import numpy as np
-from gymnasium import error, spaces
-from numpy.typing import NDArray
+from gymnasium import spaces
 
-from posefit import PoseProblem
 from posefit.arrays import Array
-from posefit.fitting.box import sample_normal
 from posefit.fitting.check import whole
-from posefit_envs.base import SearchEnv
-from posefit_envs.drawing import Picture, portray
-from posefit_envs.fit import Episode
-from posefit_envs.instance import Arguments, World, approved, select
-from posefit_envs.scales import scaled
-from posefit_swarm.swarm import SwarmState, speed_limits
+from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, VectorArguments
+from posefit_envs.instance import ArgumentError, Episode, World, checked
+from posefit_envs.population import (
+    ACTION_NUMBERS,
+    INSTANCE_FEATURES,
+    MIN_PARTICLES,
+    PROGRESS_FEATURES,
+    Population,
+    State,
+    control_of,
+    instance_features,
+    observed_state,
+)
+from posefit_envs.rendering import Picture, render_frame
+from posefit_envs.scales import log_improvement
 
 POPULATION_SIZE, ITERATIONS = 40, 60
-ACCELERATION, ALPHA, REDRAWS = 2.0, 0.15, 20  # as SAPSO's, but for fewer redraws
-FIRST = 1.0  # the temperature at which a first population is settled, where nothing is refused
-INERTIA = (0.0, 1.2)  # what the first number of an action stands for
-LOG_TEMPERATURE = (-3.0, 1.5)  # the second: powers of ten
-SPREAD = (0.0, 0.3)  # the third: standard deviations in half-ranges of the box
-
-State = NDArray[np.float32]
+EVERY = 5  # iterations a step
 
 
-class ConfigureEnv(SearchEnv["SteeredSwarm"]):
+class ConfigureVectorEnv(SearchVectorEnv):
+    """`num_envs` environments as ConfigureEnv; a turn of all their searches is one compiled call."""
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        population_size: int = POPULATION_SIZE,
+        iterations: int = ITERATIONS,
+        every: int = EVERY,
+        **arguments: Unpack[VectorArguments],
+    ) -> None:
+        checked(whole, "population_size", population_size, MIN_PARTICLES)
+        checked(whole, "iterations", iterations, 2)
+        if iterations % checked(whole, "every", every, 1):
+            raise ArgumentError(f"iterations must be a multiple of every {every}, got {iterations}")
+        super().__init__(num_envs, _spaces, **arguments)
+        self.population_size, self.every = int(population_size), int(every)
+        self._step_count = int(iterations) // self.every
+        self._populations: dict[int, Population] = {}
+        self._features: list[Array] = [np.empty(0)] * num_envs
+
+    def _begin_search(self, i: int, number: int) -> None:
+        population = Population(
+            self.world, number, self._generator(i), self.population_size, self._step_count, self.every
+        )
+        self._populations[i] = population
+        self._enter(i, population.episode)
+
+    def _opened(self, begun: Flags) -> tuple[State, Infos]:
+        self._evaluate_first(np.flatnonzero(begun).tolist())
+        return self._states(), self._infos()
+
+    def _advance(self, actions: Array, stepping: Flags) -> Outcome:
+        if not stepping.all():
+            self._evaluate_first(np.flatnonzero(~stepping).tolist())
+        populations = list(self._populations.values())
+        before = [population.best for population in populations]
+        for i in np.flatnonzero(stepping).tolist():
+            populations[i].begin_step(control_of(actions[i]))
+        while open_rows := [i for i, population in enumerate(populations) if population.open]:
+            asked = {i: populations[i].ask() for i in open_rows}
+            widest = max(len(proposals) for proposals in asked.values())
+            # a narrower population is filled up with its first proposal, whose further costs are ignored
+            proposals = np.zeros((self.num_envs, widest, populations[0].space.dimensions))
+            for i, own in asked.items():
+                proposals[i], proposals[i, : len(own)] = own[0], own
+            costs = self._stage.costs(proposals, np.array(open_rows))
+            for i, own in asked.items():
+                populations[i].tell(costs[i, : len(own)])
+        rewards = [log_improvement(cost, population.best) for cost, population in zip(before, populations, strict=True)]
+        terminated = stepping & np.array([population.left == 0 for population in populations])
+        infos = self._infos()
+        return Outcome(self._states(), np.array(rewards), terminated, np.zeros_like(terminated), infos, infos)
+
+    def _evaluate_first(self, rows: list[int]) -> None:
+        """Evaluate the first populations of some environments."""
+        moved = np.stack([population.swarm.moved for population in self._populations.values()])
+        costs = self._stage.costs(moved, np.array(rows))
+        for i in rows:
+            self._populations[i].tell(costs[i])
+            self._features[i] = instance_features(self._populations[i])
+
+    def _states(self) -> State:
+        pairs = zip(self._features, self._populations.values(), strict=True)
+        return np.stack([observed_state(features, population) for features, population in pairs])
+
+    def _infos(self) -> Infos:
+        best = np.array([population.best for population in self._populations.values()])
+        used = np.array([population.used for population in self._populations.values()])
+        leaders = np.stack([population.leader for population in self._populations.values()])
+        return self._progress(best, used, lambda: self._stage.poses(leaders))
+
+    def _render_row(self, i: int, episode: Episode) -> Picture:
+        population = self._populations[i]
+        poses, places = episode.scenery.problem(episode.space).decode(population.leader[None])
+        label = f"best {population.best:.1f}, {population.used} evaluations"
+        return render_frame(episode.scenery, poses[0], places[0], label)
+
+
+class ConfigureEnv(SearchEnv):
     """
     ## Description
-    A swarm searches for the pose in one silhouette. Each step is one iteration of the swarm, and the action sets how it
-    flies: for people who learn to control optimisers. With the action held at SAPSO's own schedule it is SAPSO.
+    A population searches for the pose in one silhouette. Each step is `every` iterations of it, and the action sets
+    which optimisers move it, how far, how much of it at a time, what is scattered and what is restarted: dynamic
+    algorithm configuration with a choice of algorithms. With `posefit_envs.policies.sapso_action` it is SAPSO: its
+    proposals are SAPSO's but for the rounding of stride and temperature in an action, and cost the same.
 
     ## Action Space
-    `Box(-1, 1, (3,), float32)`
+    `Box(-1, 1, (10,), float32)`
 
     | Num | Meaning | -1 stands for | 1 stands for |
     |---|---|---|---|
-    | 0 | inertia omega of SAPSO (1) | 0 | 1.2 |
-    | 1 | temperature at which worse moves are accepted, by powers of ten | 0.001 | 32 |
-    | 2 | standard deviation of a random kick to every particle, in half-ranges of the box | 0 | 0.3 |
+    | 0 | share of the particles that move as a swarm | none, nearly | all, nearly |
+    | 1 | share that moves by differential evolution | none, nearly | all, nearly |
+    | 2 | share that is drawn from the normal distribution of the better half | none, nearly | all, nearly |
+    | 3 | how much of the population moves at a time, the best first, by powers of two | all | a quarter |
+    | 4 | stride: inertia of the swarm, weight of differences, width of the draws in 0.6ths | 0 | 1.2 |
+    | 5 | temperature at which worse moves are accepted, by powers of ten | 0.001 | 32 |
+    | 6 | how much of the population is restarted, anywhere, the worst first | none | all |
+    | 7 | standard deviation of a random kick in the root, in half-ranges of the box | 0 | 0.3 |
+    | 8, 9 | the same in the first and in the second half of the latents | 0 | 0.3 |
 
-    Actions outside are clipped, with one warning.
+    The shares are e^(5 a) of the first three numbers over their sum. Of the n particles that move at a time the first
+    round(n share) are the swarm's, the next round(n share) differential evolution's, the rest are drawn from the normal
+    distribution. They are in the order of their bests where a part of the population moves, restarted ones first, and
+    in an order that never changes where all of it does. Number 3 reaches its ends at -0.5 and 0.5. Numbers 6 to 9 stand
+    for nothing from 0 down.
+
+    A step always has `every * population_size` evaluations: so a smaller part moves more often. Stride and temperature
+    fall with each iteration of a step as SAPSO's do. The best pose of all is kept, whatever is restarted. Actions
+    outside are clipped, with one warning.
 
     ## Observation Space
-    `Box(0, 1, (8,), float32)`
+    `Box(0, 1, (25,), float32)`
 
     | Num | Meaning |
     |---|---|
-    | 0 | best cost so far / 100 |
-    | 1 | lowest cost of the last iteration / 100 |
-    | 2 | mean cost of the last iteration / 100 |
-    | 3 | standard deviation of its costs / 100 |
-    | 4 | spread of the particles' bests: mean standard deviation, in half-ranges |
-    | 5 | mean speed of the particles / the largest allowed |
-    | 6 | share of moves accepted in the last iteration |
-    | 7 | budget left |
+    | 0, 1, 2 | of the silhouette, mean over views: share of the picture, height, width |
+    | 3, 4 | its share of the box around it, share of its pixels at an edge |
+    | 5 | dimensions / 66 |
+    | 6, 7 | median and standard deviation of the first population's costs / 100 |
+    | 8 | correlation of those costs with the distance to the cheapest, -1 to 1 |
+    | 9, 10 | best cost so far, and best that the population knows: ln(1 + cost) / ln 101 |
+    | 11, 12, 13 | lowest, mean and standard deviation of the last step's costs, in the same way |
+    | 14, 15, 16 | spread of the bests in the root and either half of the latents, 0.001 to 1, by its logarithm |
+    | 17 | mean speed of the particles / the largest allowed |
+    | 18 | share of moves accepted in the last step |
+    | 19, 20 | budget left; steps since the best cost fell / 10 |
+    | 21 to 24 | shares and part of the population of the last action |
 
     ## Rewards
-    By how much the best cost fell in this iteration, 0 to 100.
+    ln((1 + best cost before) / (1 + best cost after)); the sum over an episode is the logarithm of the factor by which
+    the best cost fell.
 
     ## Starting State
-    A first population of `population_size`, drawn uniformly and evaluated; the instance as in `Fit-v0`.
+    A first population of `population_size`, drawn uniformly and evaluated; the instance as in `FitImage-v0`.
 
     ## Episode End
-    Terminates after `iterations` iterations. It is never truncated.
+    Terminates after `iterations` iterations, `iterations / every` steps. It is never truncated.
 
     ## Information
     `best_cost`, `evaluations`, `instance`, and unless `errors=False` `error_degrees`, of the best pose against the
     truth; a reset too.
 
     ## Arguments
-    As in `Fit-v0`, with `population_size=40` and `iterations=60` instead of `target_cost` and `max_evaluations`.
-
-    ## Version History
-    - v0: first version. Before its release its instances changed: number n is now the motion, speed, phase and view of
-      a sweep's instance n, and 0 the motion as it is. Results from before cannot be compared with later ones.
-      Its vector form and `errors` came later, before its release as well, and change nothing by default.
+    As in `FitImage-v0`, with `population_size=40`, 4 or more, `iterations=60` and `every=5`, of which `iterations`
+    must be a multiple, instead of `target_cost` and `max_evaluations`.
     """
 
-    def __init__(
-        self,
-        *,
-        population_size: int = POPULATION_SIZE,
-        iterations: int = ITERATIONS,
-        render_mode: str | None = None,
-        **arguments: Unpack[Arguments],
-    ) -> None:
-        check_swarm(population_size, iterations)
-        super().__init__(select(**arguments), spaces_of_swarm(), render_mode)
-        self._population_size, self._iterations = int(population_size), int(iterations)
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[State, dict[str, Any]]:
-        """Begin with an instance; `options={"instance": 17}` chooses it."""
-        super().reset(seed=seed)
-        number = self._selection.number(options, lambda: self.np_random)
-        search = self._search = SteeredSwarm(
-            self.world, number, self.np_random, self._population_size, self._iterations
-        )
-        search.settle(search.problem.evaluate(search.flock.moved), FIRST)
-        self._show()
-        return standings([search]).states[0], self._info(search)
-
-    def step(self, action: Any) -> tuple[State, float, bool, bool, dict[str, Any]]:
-        """Fly one iteration."""
-        search = self._current()
-        if search.left == 0:
-            raise error.ResetNeeded("the episode has ended: reset before the next step")
-        (inertia,), (temperature,), (spread,) = steering(self._door.proposals(action, self._shape)[None])
-        before = search.best
-        search.fly(inertia)
-        flock, space = search.flock, search.space
-        if spread > 0.0:
-            flock.moved = sample_normal(space, search.rng, flock.moved, np.full(space.dimensions, spread))
-        search.settle(search.problem.evaluate(flock.moved), temperature)
-        self._show()
-        return standings([search]).states[0], before - search.best, search.left == 0, False, self._info(search)
-
-    def _info(self, search: "SteeredSwarm") -> dict[str, Any]:
-        info = {"best_cost": search.best, "evaluations": search.used, "instance": search.episode.instance.number}
-        if self._selection.errors:
-            poses, _ = search.space.decode(search.leader[None])
-            info |= search.episode.instance.errors(0, poses[0])
-        return info
-
-    def _portrait(self, search: "SteeredSwarm") -> Picture:
-        return search.portrait()
+    vector = ConfigureVectorEnv
 
 
-class SteeredSwarm:
-    """A swarm in the middle of its search: whoever holds it has its moves evaluated, and settles them."""
-
-    def __init__(
-        self, world: World, number: int, generator: np.random.Generator, population_size: int, iterations: int
-    ) -> None:
-        self.episode = Episode(world, number, population_size * (iterations + 1))
-        self.rng = np.random.default_rng(int(generator.integers(2**63)))
-        space = self.space = self.episode.space
-        self.flock = SwarmState(
-            space, self.rng, population_size, speed_limits(space, ALPHA, "symmetric"), REDRAWS, "dimension"
-        )
-        self.left, self.used, self._iterations = iterations, 0, iterations
-
-    def portrait(self) -> Picture:
-        """Return the picture (height, width, 3) of the best pose."""
-        poses, places = self.problem.decode(self.leader[None])
-        return portray(self.episode.scenery, poses[0], places[0], f"best {self.best:.1f}, {self.used} evaluations")
-
-    @property
-    def problem(self) -> PoseProblem:
-        """The problem that is searched."""
-        return self.episode.scenery.problem(self.space)
-
-    @property
-    def best(self) -> float:
-        """The lowest cost so far."""
-        return float(self.flock.best_cost.min())
-
-    @property
-    def leader(self) -> Array:
-        """The proposal (d,) that costs so little."""
-        return np.array(self.flock.best[self.flock.best_cost.argmin()])
-
-    @property
-    def budget(self) -> float:
-        """The share of the iterations that is left."""
-        return self.left / self._iterations
-
-    def fly(self, inertia: float) -> None:
-        """Move every particle, for another iteration."""
-        self.flock.move(inertia, ACCELERATION, self.leader)
-        self.left -= 1
-
-    def settle(self, costs: Array, temperature: float) -> None:
-        """Accept or refuse each particle's move, which has these costs (particles,)."""
-        self.costs = costs
-        self.accepted, _ = self.flock.accept(self.flock.moved, costs, temperature)
-        self.used += len(costs)
-
-
-def steering(actions: Array) -> tuple[list[float], list[float], list[float]]:
-    """Return the inertias, temperatures and deviations of kicks that actions (n, 3) in [-1, 1] stand for."""
-    columns = zip((INERTIA, LOG_TEMPERATURE, SPREAD), actions.T, strict=True)
-    inertias, powers, spreads = (scaled(bounds, column).tolist() for bounds, column in columns)
-    return inertias, [10.0**power for power in powers], spreads
-
-
-class Standings(NamedTuple):
-    """How far swarms have come."""
-
-    best: Array  # (n,) lowest costs so far
-    leaders: Array  # (n, d) the proposals that cost so little
-    states: State  # (n, 8) observations
-
-
-def standings(swarms: Sequence[SteeredSwarm]) -> Standings:
-    """Return how far swarms have come that have equally many particles."""
-    flocks, n = [swarm.flock for swarm in swarms], len(swarms)
-    costs, bests = _stacked([swarm.costs for swarm in swarms]) / 100.0, _stacked([flock.best for flock in flocks])
-    best_costs = _stacked([flock.best_cost for flock in flocks])
-    leading = best_costs.argmin(axis=1)
-    best = best_costs[np.arange(n), leading]
-    values = [
-        best / 100.0,
-        costs.min(axis=1),
-        costs.mean(axis=1),
-        costs.std(axis=1),
-        bests.std(axis=1).mean(axis=1),
-        np.abs(_stacked([flock.velocity for flock in flocks])).reshape(n, -1).mean(axis=1) / ALPHA,
-        _stacked([swarm.accepted for swarm in swarms]).mean(axis=1),
-        [swarm.budget for swarm in swarms],
-    ]
-    states = np.clip(np.array(values, dtype=np.float32).T, 0.0, 1.0)
-    return Standings(best, bests[np.arange(n), leading], states)
-
-
-def _stacked(arrays: list[NDArray[Any]]) -> NDArray[Any]:
-    """Return equal arrays (n, ...) as one; of a single one no copy is made, as its view takes a tenth of the time."""
-    return arrays[0][None] if len(arrays) == 1 else np.stack(arrays)
-
-
-def spaces_of_swarm() -> tuple[spaces.Box, spaces.Box]:
-    """Return the action space and the observation space."""
-    return spaces.Box(-1.0, 1.0, (3,), np.float32), spaces.Box(0.0, 1.0, (8,), np.float32)
-
-
-def check_swarm(population_size: int, iterations: int) -> None:
-    """Return nothing. Raises ArgumentError where a number makes no sense."""
-    for name, value in (("population_size", population_size), ("iterations", iterations)):
-        approved(whole, name, value, 2)
+def _spaces(_: World) -> tuple[spaces.Box, spaces.Box]:
+    features = INSTANCE_FEATURES + PROGRESS_FEATURES
+    return (
+        spaces.Box(-1.0, 1.0, (ACTION_NUMBERS,), np.float32),
+        spaces.Box(0.0, 1.0, (features,), np.float32),
+    )

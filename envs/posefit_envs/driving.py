@@ -1,6 +1,6 @@
-"""What searches a library searches an environment: optimisers step it, and trackers give its references."""
+"""Optimisers that search by stepping an environment, and trackers that give its references."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,16 +9,73 @@ from gymnasium import Env, error
 from gymnasium.vector import VectorEnv
 
 from posefit import Minimum, Optimiser, SearchSpace, minimise
-from posefit.fitting.optimiser import BudgetError
+from posefit.arrays import Array
+from posefit.fitting.optimiser import BudgetError, minimum_of
 from posefit.footage.training import training_clips, training_motions
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check, planned
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_envs.searched.desk import Desk
-from posefit_envs.searched.stepwise import Stepwise
-from posefit_envs.track import TrackEnv, committed
+from posefit_envs.fit_image import FitImageEnv, FitImageVectorEnv
+from posefit_envs.fit_state import FitStateEnv, FitStateVectorEnv
+from posefit_envs.policies import WHOLE_WAY
+from posefit_envs.track import TrackEnv, committed_infos
+
+
+class EnvObjective:
+    """The costs of proposals by stepping `posefit/FitImage-v0` or `FitState-v0`, a single one or a vector.
+
+    An episode that ends begins again with the same instance. Raises gymnasium.error.Error for another environment.
+    """
+
+    def __init__(self, env: VectorEnv[Any, Any, Any] | Env[Any, Any], dtype: Any) -> None:
+        self._env, self._dtype = env, dtype
+        bare: Any = env.unwrapped
+        if not isinstance(bare, FitImageEnv | FitImageVectorEnv | FitStateEnv | FitStateVectorEnv):
+            raise error.Error(f"env must be posefit/FitImage-v0 or FitState-v0, got {type(bare).__name__}")
+        self._bare = bare
+        self.count = env.num_envs if isinstance(env, VectorEnv) else 1
+        self._with_step = isinstance(bare, FitStateEnv | FitStateVectorEnv)
+        self._numbers: list[int] = []
+
+    def begin(self, seed: int, instance: int | Sequence[int] | None) -> list[int]:
+        """Reset with an instance for all or for each, or with random ones; return their numbers."""
+        options = {} if instance is None else {"options": {"instance": instance}}
+        _, info = self._env.reset(seed=seed, **options)
+        self._numbers = np.atleast_1d(info["instance"]).tolist()
+        return self._numbers
+
+    def spaces(self) -> list[SearchSpace]:
+        """Return the space that each environment searches."""
+        bare = self._bare
+        return [bare.search_space] if isinstance(bare, FitImageEnv | FitStateEnv) else bare.search_spaces
+
+    def step(self, proposals: Array) -> Array:
+        """Return the costs (n,) of proposals (n, d), one in each environment."""
+        actions = proposals.astype(self._dtype)
+        if self._with_step:
+            actions = np.append(actions, np.full((len(actions), 1), WHOLE_WAY, dtype=self._dtype), axis=1)
+        if not isinstance(self._env, VectorEnv):
+            _, _, ended, cut, info = self._env.step(actions[0])
+            if ended or cut:
+                self._env.reset(options={"instance": self._numbers[0]})
+            return np.array([info["cost"]])
+        _, _, terminated, truncated, infos = self._env.step(actions)
+        costs: Array = np.array(infos["cost"])
+        done = np.asarray(terminated) | np.asarray(truncated)
+        if done.any():
+            self._env.reset(options={"reset_mask": done, "instance": self._numbers})
+        return costs
+
+    def costs(self, proposals: Array) -> Array:
+        """Return the costs (m,) of any number of proposals (m, d), in environments of one instance."""
+        costs = np.empty(len(proposals))
+        for first in range(0, len(proposals), self.count):
+            rows = proposals[first : first + self.count]
+            filling = np.repeat(rows[-1:], self.count - len(rows), axis=0)
+            costs[first : first + self.count] = self.step(np.concatenate([rows, filling]))[: len(rows)]
+        return costs
 
 
 def drive(
@@ -31,25 +88,23 @@ def drive(
     dtype: Any = np.float64,
     **settings: Any,
 ) -> Minimum:
-    """Return what an optimiser finds by stepping `posefit/Fit-v0` or `Fit-v1`: one environment, or a vector of them.
+    """Return the minimum of an optimiser that steps `posefit/FitImage-v0` or `FitState-v0`, single or a vector.
 
-    A population of any size is proposed in as many steps as it takes; what is left over in the last of them is filled
-    up with its last proposal, which counts for nothing. An episode that ends, at its target or with its budget, begins
-    anew with the same instance: `evaluations` alone end the search. Actions go in as float64, so the result is the
-    library's, bit for bit. With `dtype` numpy.float32, what the action space asks of others, a proposal is rounded to 7
-    digits; a pixel at a silhouette's edge may then count otherwise, and from the first such pixel on the search goes
-    another way. Raises gymnasium.error.Error for another environment, and where the budget does not hold one
-    population or the environments have not all the same instance; `drive_each` is for those.
+    A population of any size is proposed in as many steps as it takes; the last of them is filled up with its last
+    proposal, which does not count. An episode that ends, at its target or with its budget, begins again with the same
+    instance: only `evaluations` end the search. Actions are float64, so the result is the library's, bit for bit. With
+    `dtype` numpy.float32, that of the action space, a proposal is rounded to 7 digits; a pixel at a silhouette's edge
+    may then change, and with it the rest of the search. Raises gymnasium.error.Error for another environment, where the
+    budget does not hold one population, and where the environments have several instances: `drive_each` is for those.
     """
-    desk = Desk(env, dtype)
-    numbers = desk.begin(seed, instance)
+    objective = EnvObjective(env, dtype)
+    numbers = objective.begin(seed, instance)
     if len(set(numbers)) > 1:
         raise error.Error(f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each")
-    searching = (
-        _built(desk.space(0), optimiser, seed, evaluations, settings) if isinstance(optimiser, str) else optimiser
-    )
+    if isinstance(optimiser, str):
+        optimiser = _optimiser(objective.spaces()[0], optimiser, seed, evaluations, settings)
     try:
-        return minimise(desk.costs, searching, evaluations, told=True)
+        return minimise(objective.costs, optimiser, evaluations, told=True)
     except BudgetError as mistake:
         raise error.Error(str(mistake)) from None
 
@@ -64,52 +119,80 @@ def drive_each(
     dtype: Any = np.float64,
     **settings: Any,
 ) -> list[Minimum]:
-    """Return what an optimiser finds in each environment of a vector of `posefit/Fit-v0` or `Fit-v1`, by itself.
+    """Return the minimum of a search of its own in each environment of a vector of `FitImage-v0` or `FitState-v0`.
 
     The searches run side by side, a proposal of each in a step, with a population of any size and the seeds `seed`,
-    `seed` + 1 and so on. `instances` names an instance for each environment; without, each draws its own. Raises
+    `seed` + 1 and so on. `instances` names an instance for each environment; by default each has a random one. Raises
     gymnasium.error.Error as `drive` does.
     """
-    desk = Desk(env, dtype)
-    count = len(desk.begin(seed, instances))
+    objective = EnvObjective(env, dtype)
+    objective.begin(seed, instances)
     searches = [
-        Stepwise(_built(desk.space(i), optimiser, seed + i, evaluations, settings), evaluations) for i in range(count)
+        _stepwise(_optimiser(space, optimiser, seed + i, evaluations, settings), evaluations)
+        for i, space in enumerate(objective.spaces())
     ]
-    while any(search.waiting for search in searches):
-        rows = np.stack([search.following() for search in searches])
-        for search, cost in zip(searches, desk.step(rows).tolist(), strict=True):
-            search.told(cost)
-    return [search.found() for search in searches]
+    proposals = np.stack([next(search) for search in searches])
+    minima: dict[int, Minimum] = {}
+    while len(minima) < len(searches):
+        costs = objective.step(proposals).tolist()
+        for i, search in enumerate(searches):
+            if i in minima:
+                continue
+            try:
+                proposals[i] = search.send(costs[i])
+            except StopIteration as stop:
+                minima[i], proposals[i] = stop.value, 0.0
+    return [minima[i] for i in range(len(searches))]
 
 
 def track_reference(
     env: Env[Any, Any], tracker: str = "exemplars", *, seed: int = 0, train: Sequence[str] = (), **settings: Any
 ) -> list[dict[str, Any]]:
-    """Return what a tracker would commit in each frame of the current episode of `posefit/Track-v0`, as infos say it.
+    """Return the infos of what a tracker would commit in each frame of the current episode of `posefit/Track-v0`.
 
-    It has the environment's budget for a frame, and sees the same silhouettes: all of them, if it looks ahead, so it is
-    a measure for policies and no policy. Its poses need not lie in the box of proposals. It learns from `train`, named
-    as in `posefit.track`; by default from what the environment's prior learns from. The episode is not stepped. Raises
-    gymnasium.error.ResetNeeded before the first reset, gymnasium.error.Error for another environment, and ValueError
-    where a name or a setting is wrong.
+    The tracker has the environment's budget for a frame, and the same silhouettes: all of them, if it looks ahead, so
+    it is a reference for policies and no policy. Its poses need not lie in the box of proposals. It learns from
+    `train`, named as in `posefit.track`; by default from what the environment's prior learns from. The episode is not
+    stepped. Raises gymnasium.error.ResetNeeded before the first reset, gymnasium.error.Error for another environment,
+    and ValueError where a name or a setting is wrong.
     """
-    followed = env.unwrapped
-    if not isinstance(followed, TrackEnv):
-        raise error.Error(f"env must be posefit/Track-v0, got {type(followed).__name__}")
-    made, world = followed.instance, followed.world
-    motions = training_motions(training_clips(train or world.training, followed=world.motion), made.task.fps)
-    task = replace(made.task, training=motions)
-    own = {f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()}
-    method = prepare(TrackOptions(method=tracker, settings=own), task)
-    frames = method.tracker(task).track(made.observations, np.random.default_rng(seed))
+    bare = env.unwrapped
+    if not isinstance(bare, TrackEnv):
+        raise error.Error(f"env must be posefit/Track-v0, got {type(bare).__name__}")
+    instance, world = bare.instance, bare.world
+    motions = training_motions(training_clips(train or world.training, followed=world.motion), instance.task.fps)
+    task = replace(instance.task, training=motions)
+    tracker_settings = {f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()}
+    method = prepare(TrackOptions(method=tracker, settings=tracker_settings), task)
+    frames = method.tracker(task).track(instance.observations, np.random.default_rng(seed))
     return [
-        committed(made, k, frame.pose, frame.translation, frame.cost, errors=True) for k, frame in enumerate(frames)
+        committed_infos(instance, k, frame.pose, frame.translation, frame.cost, errors=True)
+        for k, frame in enumerate(frames)
     ]
 
 
-def _built(space: SearchSpace, name: str, seed: int, evaluations: int, settings: dict[str, Any]) -> Optimiser:
+def _stepwise(optimiser: Optimiser, evaluations: int) -> Generator[Array, float, Minimum]:
+    """Yield the proposals (d,) of an optimiser, each to be sent its cost, and return the minimum.
+
+    Only whole populations are evaluated. Raises gymnasium.error.Error where the budget does not hold one.
+    """
+    populations: list[tuple[Array, Array]] = []
+    left = evaluations
+    while 0 < len(asked := optimiser.ask()) <= left:
+        costs = np.empty(len(asked))
+        for k, proposal in enumerate(asked):
+            costs[k] = yield proposal
+        left -= len(costs)
+        populations.append((asked, costs))
+        optimiser.tell(asked, costs)
+    if not populations:
+        raise error.Error(f"evaluations must hold one population of {len(asked)}, got {evaluations}")
+    return minimum_of(populations)
+
+
+def _optimiser(space: SearchSpace, name: str, seed: int, evaluations: int, settings: dict[str, Any]) -> Optimiser:
     offer = registry().offer("optimiser", name)
-    filled = planned(offer.factory, settings, evaluations)
-    check(offer.name, offer.factory, filled)
-    made: Optimiser = offer.factory(space, np.random.default_rng(seed), **filled)
-    return made
+    all_settings = planned(offer.factory, settings, evaluations)
+    check(offer.name, offer.factory, all_settings)
+    optimiser: Optimiser = offer.factory(space, np.random.default_rng(seed), **all_settings)
+    return optimiser

@@ -1,8 +1,9 @@
-"""Instances, numbered as in other benchmarks: a number and an environment's arguments are a person and what is seen.
+"""Instances, numbered as in other benchmarks: a number and an environment's arguments are a person and its images.
 
-The motion, its speed and phase, and from where it is seen, are those of a sweep's instance of that number.
+The motion, its speed and phase, and the camera's azimuth are those of a sweep's instance of that number.
 """
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -11,8 +12,9 @@ from typing import Any, TypedDict
 
 import numpy as np
 from gymnasium import error
+from numpy.typing import NDArray
 
-from posefit import Body, Camera, Motion, Observation, SearchSpace, Silhouette, Task
+from posefit import Body, Camera, Motion, Observation, PoseProblem, SearchSpace, Silhouette, Task
 from posefit.arrays import Array
 from posefit.fitting.check import finite_number
 from posefit.fitting.metrics import pose_error_degrees
@@ -26,25 +28,27 @@ from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
-from posefit_envs.search import Scenery
 
-RESERVED = {"train": (0, 10_000), "test": (10_000, 20_000)}  # instance numbers; those of the test split are held out
-SALT = 2012  # part of the seed of what is drawn here for an instance, beside what `posefit.footage.instance` says
+SPLITS = {"train": (0, 10_000), "test": (10_000, 20_000)}  # instance numbers; those of the test split are held out
+RNG_STREAM = 2012  # part of the seed of noise, yaw and build of an instance
 FPS = 30.0
 SIZE = (64, 48)  # pixels
-YAW_DEGREES = 20.0  # how far the middle of the searched yaw is from the truth at most
+YAW_DEGREES = 20.0  # largest difference between the middle of the searched yaw and the truth
 DISTANCE, HEIGHT = 3.5, 0.9  # metres from camera to person; of the camera above the ground
+BODY = 0xFF00 if sys.byteorder == "little" else 0x00FF  # the byte of a pixel's pair that shows the body
+OBSERVED = 0xFFFF ^ BODY
 
+Image = NDArray[np.uint8]  # (height, width, 2 views): observed, body, observed, body, ...
 Views = float | Sequence[float]
 
 
 class ArgumentError(error.Error, ValueError):
-    """An argument of an environment makes no sense."""
+    """An argument of an environment is not what it must be."""
 
 
 @dataclass(frozen=True)
 class World:
-    """What the arguments of an environment say, checked. Arguments are names and numbers, as JSON can hold."""
+    """The arguments of an environment that decide what its instances are, checked: names and numbers, as in JSON."""
 
     motion: str = "walk"
     view_degrees: tuple[float, ...] = (45.0,)
@@ -72,7 +76,7 @@ class World:
 
 
 class Arguments(TypedDict, total=False):
-    """The arguments that all environments share; their docstrings say what each means."""
+    """The arguments that all environments share; FitImageEnv documents them."""
 
     motion: str
     instance: int | None
@@ -89,7 +93,7 @@ class Arguments(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Selection:
-    """A world, which of its instances come, and whether their infos hold errors against the truth."""
+    """A world, which of its instances are used, and whether infos hold errors against the truth."""
 
     world: World
     instance: int | None
@@ -97,13 +101,13 @@ class Selection:
     errors: bool
 
     def number(self, options: Mapping[str, Any] | None, generator: Callable[[], np.random.Generator]) -> int:
-        """Return the number of the next instance: of a reset's options, the one that is fixed, or one drawn.
+        """Return the number of the next instance: that of a reset's options, the fixed one, or a random one.
 
-        Raises ArgumentError where the options name one that there is not.
+        Raises ArgumentError where the options name an unknown one.
         """
         if options and options.get("instance") is not None:
             return instance_number(options["instance"])
-        return self.instance if self.instance is not None else int(generator().integers(*RESERVED[self.split]))
+        return self.instance if self.instance is not None else int(generator().integers(*SPLITS[self.split]))
 
 
 def select(
@@ -121,14 +125,17 @@ def select(
     errors: bool = True,
     **unknown: Any,
 ) -> Selection:
-    """Return what the arguments describe.
+    """Return the selection of instances that the arguments describe.
 
-    Raises ArgumentError where one of them makes no sense, and TypeError where there is none of that name.
+    Raises ArgumentError where a value is wrong, and TypeError where there is no argument of that name.
     """
-    if unknown:
-        raise TypeError(_unknown(next(iter(unknown))))
-    if split not in RESERVED:
-        raise ArgumentError(f"split must be one of {', '.join(RESERVED)}, got {quoted(split)}")
+    for name in unknown:
+        known = tuple(Arguments.__annotations__)
+        near = get_close_matches(name, known, 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise TypeError(f"an argument must be one of {', '.join(known)}, got {quoted(name)}{hint}")
+    if split not in SPLITS:
+        raise ArgumentError(f"split must be one of {', '.join(SPLITS)}, got {quoted(split)}")
     for name, value in (("motion", motion), ("prior", prior)):
         if not isinstance(value, str):
             raise ArgumentError(f"{name} must be a name, got {quoted(value)}")
@@ -141,9 +148,9 @@ def select(
     if len(sides) != 2 or not all(isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides):
         raise ArgumentError(f"size must be (width, height) of 36 to 4096 pixels, got {quoted(size)}")
     strengths = _strengths(noise)
-    if not 0.0 <= approved(finite_number, "mismatch_percent", mismatch_percent) <= 50.0:
+    if not 0.0 <= checked(finite_number, "mismatch_percent", mismatch_percent) <= 50.0:
         raise ArgumentError(f"mismatch_percent must lie in 0 to 50, got {mismatch_percent}")
-    if isinstance(train, str) or not all(isinstance(one, str) for one in train or ()):
+    if isinstance(train, str) or not all(isinstance(name, str) for name in train or ()):
         raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {quoted(train)}")
     if not isinstance(errors, bool):
         raise ArgumentError(f"errors must be true or false, got {quoted(errors)}")
@@ -164,17 +171,10 @@ def select(
     return Selection(made, instance, split, errors)
 
 
-def _unknown(name: str) -> str:
-    known = tuple(Arguments.__annotations__)
-    near = get_close_matches(name, known, 1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"an argument must be one of {', '.join(known)}, got {quoted(name)}{hint}"
-
-
-def approved(check: Callable[..., Any], name: str, *given: Any) -> Any:
-    """Return what a check of posefit returns; what it raises is an error of Gymnasium's too."""
+def checked(check: Callable[..., Any], name: str, *values: Any) -> Any:
+    """Return the result of one of posefit's checks. Raises ArgumentError, which is Gymnasium's error too."""
     try:
-        return check(name, *given)
+        return check(name, *values)
     except ValueError as mistake:
         raise ArgumentError(str(mistake)) from None
 
@@ -182,7 +182,7 @@ def approved(check: Callable[..., Any], name: str, *given: Any) -> Any:
 def _views(view_degrees: Any) -> tuple[float, ...]:
     several = isinstance(view_degrees, Sequence) and not isinstance(view_degrees, str)
     try:
-        views = tuple(finite_number("view_degrees", one) for one in (view_degrees if several else [view_degrees]))
+        views = tuple(finite_number("view_degrees", view) for view in (view_degrees if several else [view_degrees]))
     except ValueError:
         views = ()
     if not views:
@@ -196,14 +196,14 @@ def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
     for name, strength in (noise or {}).items():
         if name not in CORRUPTIONS:
             raise ArgumentError(f"noise must be of {', '.join(CORRUPTIONS)}, got {quoted(name)}")
-        if not 0.0 <= approved(finite_number, f"noise {name}", strength) <= 1.0:
+        if not 0.0 <= checked(finite_number, f"noise {name}", strength) <= 1.0:
             raise ArgumentError(f"noise {name} must have a strength of 0 to 1, got {strength}")
     return tuple(sorted((noise or {}).items()))
 
 
 def instance_number(number: Any) -> int:
-    """Return the number of an instance. Raises ArgumentError where there is none of it."""
-    last = RESERVED["test"][1] - 1
+    """Return the number of an instance as an int. Raises ArgumentError where there is no such instance."""
+    last = SPLITS["test"][1] - 1
     if isinstance(number, bool) or not isinstance(number, int | np.integer):
         raise ArgumentError(f"instance must be a whole number from 0 to {last}, got {quoted(number)}")
     if not 0 <= number <= last:
@@ -223,23 +223,45 @@ def _body(motion: str) -> Body:
 
 @lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
-    angles = np.concatenate([motion_of(one, None, FPS).poses[:, 3:] for one in train])
+    angles = np.concatenate([motion_of(name, None, FPS).poses[:, 3:] for name in train])
     fitted: Prior = registry().prior(prior)().fit(angles, _source(motion).skeleton)
     return fitted
 
 
 @dataclass(frozen=True, eq=False)
+class Scenery:
+    """The observation of one frame, and the picture of it into which bodies are drawn."""
+
+    task: Task
+    observation: Observation
+    backdrop: NDArray[np.uint16] = field(init=False, repr=False)  # (height, width, views)
+
+    def __post_init__(self) -> None:
+        masks = np.stack([silhouette.mask for silhouette in self.observation.silhouettes], axis=-1)
+        object.__setattr__(self, "backdrop", masks.astype(np.uint16) * np.uint16(OBSERVED))
+
+    @property
+    def picture(self) -> Image:
+        """The picture (height, width, 2 views) before the first proposal."""
+        return np.array(self.backdrop).view(np.uint8)
+
+    def problem(self, space: SearchSpace) -> PoseProblem:
+        """Return the search for the pose in a space."""
+        return PoseProblem(self.task.body, self.task.cameras, self.observation.silhouettes, space, blank=True)
+
+
+@dataclass(frozen=True, eq=False)
 class Instance:
-    """One numbered instance: the truth, and what is seen of it."""
+    """One numbered instance: the truth, and the observations of it."""
 
     number: int
-    task: Task  # whom to fit, as a tracker is told; its body need not be the true one
+    task: Task  # what a tracker is given; its body need not be the true one
     truth: Motion
     observations: Sequence[Observation] = field(repr=False)
     _sceneries: dict[int, Scenery] = field(default_factory=dict, repr=False)
 
     def scenery(self, frame: int) -> Scenery:
-        """Return the scenery of a frame, always the same object: environments that share it share a kernel call."""
+        """Return the scenery of a frame, always the same object."""
         if frame not in self._sceneries:
             self._sceneries[frame] = Scenery(self.task, self.observations[frame])
         return self._sceneries[frame]
@@ -250,22 +272,42 @@ class Instance:
         return self.truth.skeleton.joints(self.truth.poses, self.truth.translations)
 
     def errors(self, frame: int, pose: Array) -> dict[str, float]:
-        """Return by its name in an info the error of a pose (66,) against the truth of a frame."""
+        """Return the error of a pose (66,) against the truth of a frame, by its name in infos."""
         return {"error_degrees": float(pose_error_degrees(self.truth.poses[frame][None], pose[None])[0])}
 
     def space(self, prior: Prior) -> SearchSpace:
-        """Return the box in which the first frame's pose is sought."""
+        """Return the box in which the first frame's pose is searched."""
         task = self.task
         assert task.yaw is not None
         centre = np.array([task.yaw, 0.0, 0.0])
         return SearchSpace(prior, centre, np.radians(ROOT_RANGE_DEGREES), task.anchor, task.translation)
 
 
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """What one environment searches now: a frame of an instance, in a space."""
+
+    instance: Instance
+    frame: int
+    space: SearchSpace
+
+    @property
+    def scenery(self) -> Scenery:
+        """What is observed in the frame."""
+        return self.instance.scenery(self.frame)
+
+
+def first_episode(world: World, number: int, evaluations: int, frames: int = 1) -> Episode:
+    """Return the search for the first frame's pose of an instance."""
+    made = instance(world, number, frames, evaluations)
+    return Episode(made, 0, made.space(world.learned))
+
+
 @lru_cache(maxsize=64)
 def instance(setting: World, number: int, frames: int, evaluations: int) -> Instance:
     """Return an instance: the same person, pose and silhouettes for the same number and arguments, everywhere."""
     truth = _truth(setting.motion, number, frames)
-    rng = np.random.default_rng([SALT, number])  # of noise, yaw and build alone: what is seen is a sweep's instance
+    rng = np.random.default_rng([RNG_STREAM, number])  # of noise, yaw and build alone: motion and views are a sweep's
     body, facing = setting.body, float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
     middle[1] = HEIGHT
@@ -273,14 +315,14 @@ def instance(setting: World, number: int, frames: int, evaluations: int) -> Inst
     azimuths = [facing + np.radians(view) for view in variation(number).views(setting.view_degrees)]
     cameras = [Camera.around(middle, azimuth, reach, setting.size) for azimuth in azimuths]
     noise = dict(setting.noise)
-    seen = []
-    for pose, where in zip(truth.poses, truth.translations, strict=True):
-        masks = [corrupted(project(body, camera, pose, where), noise, rng) for camera in cameras]
-        seen.append(Observation([Silhouette.of(mask) for mask in masks], where.copy()))
+    observations = []
+    for pose, place in zip(truth.poses, truth.translations, strict=True):
+        masks = [corrupted(project(body, camera, pose, place), noise, rng) for camera in cameras]
+        observations.append(Observation([Silhouette.of(mask) for mask in masks], place.copy()))
     yaw = facing + float(np.radians(rng.uniform(-YAW_DEGREES, YAW_DEGREES)))
     fitted = varied(body, setting.mismatch_percent, rng)
     task = Task(fitted, cameras, evaluations, yaw, truth.translations[0].copy(), setting.translation, FPS)
-    return Instance(number, task, truth, seen)
+    return Instance(number, task, truth, observations)
 
 
 def _truth(name: str, number: int, frames: int) -> Motion:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, Bits, jit
-from posefit.fitting.kernels import move_to_borders, unpack_proposals, within
+from posefit.fitting.kernels import move_to_borders, unpack_proposals
 from posefit.geometry.kernels import Chain, empty_frames, place_joints
 from posefit.silhouette.kernels import count, paint_bits
 from posefit.silhouette.rasteriser import View, draw_pose, scratch
@@ -39,13 +39,6 @@ def unpack_scenes(proposals, centres, halves, anchors, first, poses, translation
             proposals[i], centres[i], halves[i], anchors[i], first, poses[i], translations[i], latents[i]
         )
     return finite
-
-
-@jit
-def within_scenes(proposals, centres, halves, inside, latents):
-    """Write which proposals (n, k, d) lie in their boxes, and the latents of all."""
-    for i in range(proposals.shape[0]):
-        within(proposals[i], centres[i], halves[i], inside[i], latents[i])
 
 
 @jit

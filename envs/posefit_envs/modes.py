@@ -11,22 +11,30 @@ from posefit.fitting.check import whole
 from posefit.niching import LEVELS_MM, MIN_PROBABILITY, SIZE, niche_instance, niche_space, scored
 from posefit.silhouette.cost import project
 from posefit.uncertainty.modes import Posterior
-from posefit_envs.base import SearchEnv
-from posefit_envs.drawing import Picture, portray
-from posefit_envs.instance import RESERVED, ArgumentError, Selection, World, approved, instance_number
-from posefit_envs.search import Image, Scenery
+from posefit_envs.base import ActionValidator, RenderedEnv
+from posefit_envs.instance import (
+    SPLITS,
+    ArgumentError,
+    Image,
+    Scenery,
+    Selection,
+    World,
+    checked,
+    instance_number,
+)
+from posefit_envs.rendering import Picture, render_frame
 
 MAX_EVALUATIONS = 2000
 MAX_REPORTS = 10
-NOTHING = 2.0  # the Brier score of a report of nothing: as of one whose weight is all in the wrong place
+BRIER_OF_NO_REPORT = 2.0  # as of one whose weight is all in the wrong place
 
 
-class ModesEnv(SearchEnv["Quest"]):
+class ModesEnv(RenderedEnv):
     """
     ## Description
-    A person was seen as a silhouette that two or more known poses have, or nearly have: a stride and the one half a
-    cycle later, somebody who comes and somebody who goes, an arm before the trunk or behind it. The episode is a search
-    for all of them, and for how likely each is. Each step proposes a pose, and may report it.
+    The observed silhouette is that of two or more known poses, exactly or nearly: a stride and the one half a cycle
+    later, a person who comes and one who goes, an arm before the trunk or behind it. The episode is a search for all of
+    them, and for the probability of each. Each step proposes a pose, and may report it.
 
     ## Action Space
     `Box(-1, 1, (9,), float32)`:
@@ -39,7 +47,7 @@ class ModesEnv(SearchEnv["Quest"]):
     | 6, 7 | arms | the range of all recorded motions |
     | 8 | the report: above 0, the pose is reported, with this weight among all that are reported | |
 
-    Actions outside are clipped, with one warning. float64 is taken as it is, and not rounded.
+    Actions outside are clipped, with one warning. float64 is not rounded.
 
     ## Observation Space
     `Box(0, 255, (96, 128, 2), uint8)`:
@@ -50,7 +58,7 @@ class ModesEnv(SearchEnv["Quest"]):
     | 1 | the silhouette of the last proposal; empty before the first |
 
     ## Rewards
-    What a report adds to the peak ratio, which is the share of the known poses that are found, the mean of the levels
+    The increase of the peak ratio by a report: the share of the known poses that are matched, the mean of the levels
     15, 30 and 60 mm. With the last step, minus the Brier score of all reports: 0 where all the weight is near the pose
     whose silhouette it is, 2 where none is or nothing was reported.
 
@@ -68,9 +76,6 @@ class ModesEnv(SearchEnv["Quest"]):
     ## Arguments
     - `instance=None`: 0 to 19,999. `split="train"` draws of 0 to 9,999, `"test"` of the others, which are held out.
     - `max_reports=10`: 1 to 10, `max_evaluations=2000`.
-
-    ## Version History
-    - v0: first version.
     """
 
     def __init__(
@@ -82,16 +87,20 @@ class ModesEnv(SearchEnv["Quest"]):
         max_evaluations: int = MAX_EVALUATIONS,
         render_mode: str | None = None,
     ) -> None:
-        if split not in RESERVED:
-            raise ArgumentError(f"split must be one of {', '.join(RESERVED)}, got {split!r}")
-        if approved(whole, "max_reports", max_reports, 1) > MAX_REPORTS:
+        if split not in SPLITS:
+            raise ArgumentError(f"split must be one of {', '.join(SPLITS)}, got {split!r}")
+        if checked(whole, "max_reports", max_reports, 1) > MAX_REPORTS:
             raise ArgumentError(f"max_reports must be at most {MAX_REPORTS}, got {max_reports}")
-        approved(whole, "max_evaluations", max_evaluations, 2)
+        checked(whole, "max_evaluations", max_evaluations, 2)
         number = None if instance is None else instance_number(instance)
         actions = spaces.Box(-1.0, 1.0, (niche_space().dimensions + 1,), np.float32)
         pictures = spaces.Box(0, 255, (SIZE[1], SIZE[0], 2), np.uint8)
-        super().__init__(Selection(World(), number, split, errors=True), (actions, pictures), render_mode)
-        self._reports, self._most = int(max_reports), int(max_evaluations)
+        super().__init__(render_mode)
+        self.action_space, self.observation_space = actions, pictures
+        self._selection = Selection(World(), number, split, errors=True)
+        self._validator = ActionValidator(niche_space().dimensions + 1)
+        self._episode: ModesEpisode | None = None
+        self._reports, self._budget = int(max_reports), int(max_evaluations)
 
     @property
     def search_space(self) -> SearchSpace:
@@ -102,39 +111,45 @@ class ModesEnv(SearchEnv["Quest"]):
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         number = self._selection.number(options, lambda: self.np_random)
-        quest = self._search = Quest(number)
-        self._show()
-        return quest.scenery.picture, {"instance": number}
+        episode = self._episode = ModesEpisode(number)
+        self._update_window()
+        return episode.scenery.picture, {"instance": number}
 
     def step(self, action: Any) -> tuple[Image, float, bool, bool, dict[str, Any]]:
         """Propose a pose, and report it where the last number is above 0."""
-        quest = self._current()
-        if quest.ended:
+        episode = self._current()
+        if episode.ended:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
-        proposal = self._door.proposals(action, self._shape)
-        before = quest.peak_ratio
-        quest.look(proposal[:-1], float(proposal[-1]))
-        reward = float(np.mean(quest.peak_ratio) - np.mean(before))
-        terminated = len(quest.weights) >= self._reports
-        truncated = not terminated and quest.evaluations >= self._most
-        quest.ended = terminated or truncated
+        proposal = self._validator.check(action, self.action_space.shape or ())
+        before = episode.peak_ratio
+        episode.propose(proposal[:-1], float(proposal[-1]))
+        reward = float(np.mean(episode.peak_ratio) - np.mean(before))
+        terminated = len(episode.weights) >= self._reports
+        truncated = not terminated and episode.evaluations >= self._budget
+        episode.ended = terminated or truncated
         info: dict[str, Any] = {
-            "cost": quest.cost,
-            "evaluations": quest.evaluations,
-            "reports": len(quest.weights),
-            "instance": quest.posed.number,
+            "cost": episode.cost,
+            "evaluations": episode.evaluations,
+            "reports": len(episode.weights),
+            "instance": episode.posed.number,
         }
-        if quest.ended:
-            reward -= quest.brier
-            info |= {"peak_ratio": quest.peak_ratio, "brier": quest.brier, "log_score": quest.log_score}
-        self._show()
-        return quest.picture, reward, terminated, truncated, info
+        if episode.ended:
+            reward -= episode.brier
+            info |= {"peak_ratio": episode.peak_ratio, "brier": episode.brier, "log_score": episode.log_score}
+        self._update_window()
+        return episode.picture, reward, terminated, truncated, info
 
-    def _portrait(self, search: "Quest") -> Picture:
-        return portray(search.scenery, search.pose, search.posed.problem.space.anchor, search.label)
+    def _current(self) -> "ModesEpisode":
+        if self._episode is None:
+            raise error.ResetNeeded("reset must come before anything else")
+        return self._episode
+
+    def _render_frame(self) -> Picture:
+        episode = self._current()
+        return render_frame(episode.scenery, episode.pose, episode.posed.problem.space.anchor, episode.label)
 
 
-class Quest:
+class ModesEpisode:
     """The state of one search for several poses."""
 
     def __init__(self, number: int) -> None:
@@ -148,9 +163,13 @@ class Quest:
         self.pose: Array | None = None
         self.weights: list[float] = []
         self._poses: list[Array] = []
-        self.peak_ratio, self.brier, self.log_score = np.zeros(len(LEVELS_MM)), NOTHING, -float(np.log(MIN_PROBABILITY))
+        self.peak_ratio, self.brier, self.log_score = (
+            np.zeros(len(LEVELS_MM)),
+            BRIER_OF_NO_REPORT,
+            -float(np.log(MIN_PROBABILITY)),
+        )
 
-    def look(self, proposal: Array, weight: float) -> None:
+    def propose(self, proposal: Array, weight: float) -> None:
         """Evaluate a proposal (d,), and report it where its weight is above 0."""
         problem = self.posed.problem
         poses, translations = problem.decode(proposal[None])
@@ -159,19 +178,14 @@ class Quest:
         if weight > 0.0:
             self._poses.append(poses[0])
             self.weights.append(weight)
-            self._report()
-
-    def _report(self) -> None:
-        """Judge all that was reported so far."""
-        if self.weights:
-            places = np.tile(self.posed.problem.space.anchor, (len(self._poses), 1))
-            told = scored(self.posed, Posterior(np.array(self._poses), places, np.array(self.weights)))
-            self.peak_ratio = np.array([told.peak_ratio[level] for level in LEVELS_MM])
-            self.brier, self.log_score = told.brier, told.log_score
+            places = np.tile(problem.space.anchor, (len(self._poses), 1))
+            scores = scored(self.posed, Posterior(np.array(self._poses), places, np.array(self.weights)))
+            self.peak_ratio = np.array([scores.peak_ratio[level] for level in LEVELS_MM])
+            self.brier, self.log_score = scores.brier, scores.log_score
 
     @property
     def picture(self) -> Image:
-        """The picture (height, width, 2): what was observed, and the last proposal."""
+        """The picture (height, width, 2): the observed silhouette, and the last proposal."""
         picture = self.scenery.picture
         if self.pose is not None:
             problem = self.posed.problem

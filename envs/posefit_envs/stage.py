@@ -1,9 +1,9 @@
-"""Proposals become poses, costs and pictures: each in a scene of its own, all scenes in one compiled call."""
+"""Poses, costs and pictures of proposals: each in a scene of its own, all scenes in one compiled call."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +15,16 @@ from posefit.silhouette.cost import mean_cost
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import pack
 from posefit.silhouette.sharing import LEAST_SHARE, work_through
-from posefit_envs.instance import World
-from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes, within_scenes
-from posefit_envs.search import BODY, Image, Scenery
+from posefit_envs.instance import BODY, Image, Scenery, World
+from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes
 
 Rows = NDArray[np.int64]
-_FIXED = ("radii", "rotations", "places", "focals", "centres")  # cannot be written to where they come from
+_READ_ONLY = ("radii", "rotations", "places", "focals", "centres")
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluated:
-    """What proposals came to, a row a scene; rows of scenes that were left out mean nothing."""
+class Evaluation:
+    """Poses, costs and pictures of proposals, a row a scene; rows of scenes that were left out mean nothing."""
 
     poses: Array  # (n, 66)
     translations: Array  # (n, 3)
@@ -36,7 +35,7 @@ class Evaluated:
 
 @final
 class Stage:
-    """Scenes of one world side by side, a row each. Whatever they differ in is stacked, so that one call does all.
+    """Scenes of one world side by side, a row each. What differs between them is stacked, so that one call does all.
 
     A row has the same bits whatever the others hold, whatever number of rows there is, and however many `threads` draw.
     """
@@ -61,14 +60,15 @@ class Stage:
             np.empty((rows, views), dtype=np.int64),
             np.empty((rows, height, width, views), dtype=np.uint16),
         )
+        self._frozen: Scenes | None = None
         self._joint_radii, self._borders = np.empty((rows, len(JOINTS))), np.empty((rows, views, 4))
         self._first = 6 if world.translation == "searched" else 3
         d = self._first + len(self._prior.low)
         self._centres, self._halves, self._anchors = np.empty((rows, d)), np.empty((rows, d)), np.empty((rows, 3))
-        self.everyone: Rows = np.arange(rows)
+        self.all_rows: Rows = np.arange(rows)
 
-    def put(self, row: int, scenery: Scenery, space: SearchSpace) -> None:
-        """Make a row this scene, whose pose is sought in this space."""
+    def set_scene(self, row: int, scenery: Scenery, space: SearchSpace) -> None:
+        """Make a row this scene, whose pose is searched in this space."""
         self._centres[row], self._halves[row], self._anchors[row] = space.centre, space.half, space.anchor
         if self._sceneries[row] is scenery:
             return
@@ -76,54 +76,49 @@ class Stage:
         body, scenes = scenery.task.body, self._scenes
         scenes.offsets[row], scenes.radii[row] = body.skeleton.chain.offsets, body.radii
         scenes.backdrops[row] = scenery.backdrop
-        for view, (camera, seen) in enumerate(zip(scenery.task.cameras, scenery.observation.silhouettes, strict=True)):
+        for view, (camera, silhouette) in enumerate(
+            zip(scenery.task.cameras, scenery.observation.silhouettes, strict=True)
+        ):
             scenes.rotations[row, view], scenes.places[row, view] = camera.rotation, camera.translation
             scenes.focals[row, view], scenes.centres[row, view] = camera.focal, camera.centre
-            scenes.observed[row, view], scenes.valid[row, view] = seen.bits
-            scenes.totals[row, view] = np.count_nonzero(seen.mask)
+            scenes.observed[row, view], scenes.valid[row, view] = silhouette.bits
+            scenes.totals[row, view] = np.count_nonzero(silhouette.mask)
         if self._aligned:
             self._joint_radii[row] = body.joint_radii()
-            self._borders[row] = [seen.extent for seen in scenery.observation.silhouettes]
+            self._borders[row] = [silhouette.extent for silhouette in scenery.observation.silhouettes]
 
     def pictures(self) -> Image:
-        """Return the pictures (n, height, width, 2 views) before anything was proposed."""
+        """Return the pictures (n, height, width, 2 views) before the first proposals."""
         return np.array(self._scenes.backdrops).view(np.uint8)
 
-    def look(self, proposals: Array, rows: Rows) -> Evaluated:
-        """Return what proposals (n, d) come to in some rows; the others' pictures show nothing proposed."""
-        several, whole = proposals[:, None], len(rows) == len(self.everyone)
+    def evaluate(self, proposals: Array, rows: Rows) -> Evaluation:
+        """Return the evaluation of proposals (n, d) in some rows; the others' pictures show no body."""
+        several, whole = proposals[:, None], len(rows) == len(self.all_rows)
         poses, translations = self.decode(several, rows)
         pictures = np.empty_like(self._scenes.backdrops) if whole else np.array(self._scenes.backdrops)
         costs, areas = self._drawn(poses, translations, rows, pictures)
         counts = np.ascontiguousarray(areas[:, :, 0].swapaxes(0, 1))
-        return Evaluated(poses[:, 0], translations[:, 0], costs[:, 0], counts, pictures.view(np.uint8))
+        return Evaluation(poses[:, 0], translations[:, 0], costs[:, 0], counts, pictures.view(np.uint8))
 
     def costs(self, proposals: Array, rows: Rows) -> Array:
         """Return the costs (n, k) of proposals (n, k, d), k in each scene, those of some rows."""
-        nowhere = np.empty((0, self._height, self._width, self._scenes.places.shape[1]), dtype=np.uint16)
-        return self._drawn(*self.decode(proposals, rows), rows, nowhere)[0]
+        no_pictures = np.empty((0, self._height, self._width, self._scenes.places.shape[1]), dtype=np.uint16)
+        return self._drawn(*self.decode(proposals, rows), rows, no_pictures)[0]
 
-    def show(self, poses: Array, translations: Array, rows: Rows, pictures: Image) -> None:
-        """Draw poses (n, 66) that stay where they are in some rows, and write those rows' pictures."""
+    def redraw(self, poses: Array, translations: Array, rows: Rows, pictures: Image) -> None:
+        """Write the pictures of some rows with poses (n, 66) as they are, unaligned."""
         self._drawn(poses[:, None], translations[:, None], rows, pictures.view(np.uint16))
 
     def decode(self, proposals: Array, rows: Rows) -> tuple[Array, Array]:
         """Return the poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d), those of some rows aligned."""
         poses, translations = self._unpacked(proposals)
         if self._aligned:
-            align_scenes(self._chain, self._read(), self._joint_radii, self._borders, rows, poses, translations)
+            align_scenes(self._chain, self._read_only(), self._joint_radii, self._borders, rows, poses, translations)
         return poses, translations
 
     def poses(self, proposals: Array) -> Array:
         """Return the poses (n, 66) of proposals (n, d), wherever they stand."""
         return self._unpacked(proposals[:, None])[0][:, 0]
-
-    def feasible(self, proposals: Array, rows: Rows) -> NDArray[np.bool_]:
-        """Return which proposals (m, k, d), of the scenes in these rows (m,), lie in the box and mean a pose."""
-        m, k, d = proposals.shape
-        inside, latents = np.empty((m, k), dtype=bool), np.empty((m, k, d - self._first))
-        within_scenes(proposals, self._centres[rows], self._halves[rows], inside, latents)
-        return inside & self._prior.feasible(latents.reshape(m * k, -1)).reshape(m, k)
 
     def _unpacked(self, proposals: Array) -> tuple[Array, Array]:
         (n, k, d), first = proposals.shape, self._first
@@ -144,7 +139,7 @@ class Stage:
         views = self._scenes.places.shape[1]
         count_poses(len(rows) * k * views)
         areas = np.zeros((views, n, k, 3), dtype=np.int64)
-        scenes = self._read()
+        scenes = self._read_only()
 
         def draw(part: slice) -> None:
             at = self._chain, scenes, self._width, self._height, rows[part]
@@ -153,13 +148,18 @@ class Stage:
         shares = max(min(self._threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
         cuts = [len(rows) * share // shares for share in range(shares + 1)]
         work_through([slice(a, b) for a, b in pairwise(cuts)], self._threads, lambda _: (), draw)
-        # every pixel of a scene is known, so that the silhouettes of one speak for all
+        # every pixel of a scene is known, so that the silhouettes of one row do for all
         costs = mean_cost(areas.reshape(views, n * k, 3), self._silhouettes)
         return costs.reshape(n, k), areas
 
-    def _read(self) -> Scenes:
-        """Return the scenes as the inner loops were compiled for others; for writeable arrays they would be again."""
-        fixed = {name: getattr(self._scenes, name).view() for name in _FIXED}
-        for array in fixed.values():
-            array.flags.writeable = False
-        return self._scenes._replace(**fixed)
+    def _read_only(self) -> Scenes:
+        """Return the scenes as the inner loops are compiled for elsewhere; for writeable arrays they would be again."""
+        if self._frozen is None:
+            frozen = {name: getattr(self._scenes, name).view() for name in _READ_ONLY}
+            for array in frozen.values():
+                array.flags.writeable = False
+            self._frozen = self._scenes._replace(**frozen)
+        return self._frozen
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_frozen": None}  # views of a copy would not be views of its scenes

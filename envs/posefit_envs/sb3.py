@@ -1,4 +1,4 @@
-"""Hands a vector environment of Gymnasium to Stable-Baselines3, which has its own kind."""
+"""An adapter of Gymnasium's vector environments to those of Stable-Baselines3."""
 
 from collections.abc import Sequence
 from copy import deepcopy
@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import error
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from posefit_envs.vector.checker import part_of
+from posefit_envs.base import row_of
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
@@ -17,9 +17,11 @@ if TYPE_CHECKING:
 def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
     """Return the environment as a `VecEnv` of Stable-Baselines3.
 
-    Stable-Baselines3 wants an environment to reset in the very step that ends its episode, with what was seen last in
-    `info["terminal_observation"]`. So `vector` has to be one that can reset some of its environments, by
-    `options={"reset_mask": ...}`, as those of this package can. Raises gymnasium.error.DependencyNotInstalled without
+    Stable-Baselines3 resets an environment in the step that ends its episode, with the last observation in
+    `info["terminal_observation"]`. So `vector` must be able to reset some of its environments, by
+    `options={"reset_mask": ...}`, as those of this package are. Environments of a vector share their attributes and
+    methods: one that holds or returns a list or tuple with an entry for each gives `indices` theirs, and only all
+    environments together can be set or called. Raises gymnasium.error.DependencyNotInstalled without
     Stable-Baselines3.
     """
     try:
@@ -59,7 +61,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             done = terminated | truncated
             if done.any():
                 for i in np.flatnonzero(done):
-                    rows[i]["terminal_observation"] = deepcopy(part_of(observations, int(i)))
+                    rows[i]["terminal_observation"] = deepcopy(row_of(observations, int(i)))
                     rows[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
                 fresh, fresh_infos = vector.reset(options={"reset_mask": done})
                 observations = _mixed(done, fresh, observations)
@@ -71,31 +73,39 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             vector.close()
 
         def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-            return [getattr(vector, attr_name)] * len(self._chosen(indices))
+            return self._entries(getattr(vector, attr_name), self._get_indices(indices))
 
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+            self._check_all(indices)
             setattr(vector, attr_name, value)
 
         def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **named: Any) -> list[Any]:
-            return [getattr(vector, method_name)(*arguments, **named)] * len(self._chosen(indices))
+            self._check_all(indices)
+            return self._entries(getattr(vector, method_name)(*arguments, **named), self._get_indices(indices))
 
         def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-            return [False] * len(self._chosen(indices))
+            return [False] * len(list(self._get_indices(indices)))
 
         def get_images(self) -> Sequence[Any]:
             return list(vector.render() or [None] * self.num_envs)
 
-        def _chosen(self, indices: Any) -> Sequence[int]:
-            return list(self._get_indices(indices))
+        def _entries(self, value: Any, indices: Any) -> list[Any]:
+            each = isinstance(value, list | tuple) and len(value) == self.num_envs
+            return [value[i] if each else value for i in indices]
+
+        def _check_all(self, indices: Any) -> None:
+            chosen = sorted(set(self._get_indices(indices)))
+            if chosen != list(range(self.num_envs)):
+                raise error.Error(f"indices must be all of the {self.num_envs} environments, got {chosen}")
 
     return Adapted()
 
 
-def _mixed(mask: Any, these: Any, others: Any) -> Any:
-    """Return observations (n, ...), these where the mask (n,) is true and others elsewhere; of a Dict, by name."""
-    if isinstance(these, dict):
-        return {name: _mixed(mask, one, others[name]) for name, one in these.items()}
-    return np.where(mask.reshape(-1, *[1] * (these.ndim - 1)), these, others)
+def _mixed(mask: Any, chosen: Any, others: Any) -> Any:
+    """Return observations (n, ...) or a dict of them: those chosen where the mask (n,) is true, others elsewhere."""
+    if isinstance(chosen, dict):
+        return {name: _mixed(mask, value, others[name]) for name, value in chosen.items()}
+    return np.where(mask.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, others)
 
 
 def _row(infos: dict[str, Any], i: int) -> dict[str, Any]:

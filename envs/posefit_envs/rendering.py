@@ -1,4 +1,4 @@
-"""What an environment looks like: the silhouettes on each other, the body from its side, and the cost in words."""
+"""Pictures of an environment: the silhouettes on each other, the body from its side, and the cost in words."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from posefit.arrays import Array
 from posefit.silhouette.cost import project
 from posefit.tracking.drawing.body import side_view
 from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, SPILLED, TEXT
-from posefit_envs.search import Scenery
+from posefit_envs.instance import Scenery
 
 MODES = ("rgb_array", "human")
 HEIGHT = 240  # pixels
@@ -21,12 +21,12 @@ Picture = NDArray[np.uint8]  # (height, width, 3) red, green, blue
 
 
 def check_mode(mode: str | None) -> None:
-    """Return nothing. Raises gymnasium.error.UnsupportedMode where there is no such render mode."""
+    """Return nothing. Raises gymnasium.error.UnsupportedMode for an unknown render mode."""
     if mode is not None and mode not in MODES:
         raise error.UnsupportedMode(f"render_mode must be one of {', '.join(MODES)}, got {mode!r}")
 
 
-def portray(scenery: Scenery, pose: Array | None, translation: Array | None, label: str) -> Picture:
+def render_frame(scenery: Scenery, pose: Array | None, translation: Array | None, label: str) -> Picture:
     """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side."""
     panels = []
     for camera, silhouette in zip(scenery.task.cameras, scenery.observation.silhouettes, strict=True):
@@ -48,7 +48,7 @@ def portray(scenery: Scenery, pose: Array | None, translation: Array | None, lab
     return np.ascontiguousarray(np.vstack([image, words])[..., ::-1])
 
 
-class Screen:
+class Window:
     """A pygame window, opened when it is first needed."""
 
     def __init__(self, fps: int) -> None:
@@ -80,7 +80,7 @@ class Screen:
         self._clock.tick(self._fps)
 
     def close(self) -> None:
-        """Close the window; again does nothing."""
+        """Close the window, if it is open."""
         if self._window is not None:
             import pygame
 
