@@ -260,21 +260,9 @@ MUTANTS = (
         "tests/plugins/test_priors.py::test_a_loose_angle_reaches_as_far_as_every_training_pose_may_still_go",
     ),
     Mutant(
-        "Configure ignores its kick",
-        "envs/posefit_envs/configure.py",
-        (("if spread > 0.0:", "if spread > 1.0:"),),
-        "tests/envs/test_environments.py::test_the_third_number_of_configure_kicks_every_particle_by_its_deviation",
-    ),
-    Mutant(
-        "Configure's swarm is not SAPSO's: another inertia",
-        "envs/posefit_envs/configure.py",
-        (("flock.move(inertia, ACCELERATION", "flock.move(0.999 * inertia, ACCELERATION"),),
-        "tests/envs/test_environments.py::test_configure_with_sapsos_own_schedule_finds_what_sapso_finds",
-    ),
-    Mutant(
         "Track's next box is not centred on what was committed",
         "envs/posefit_envs/track.py",
-        (("self._follower.commit(proposal)", "self._follower.commit(0.5 * proposal)"),),
+        (("follower.commit(self._best_proposals[i])", "follower.commit(0.5 * self._best_proposals[i])"),),
         "tests/envs/test_environments.py::test_track_proposals_mean_what_the_tracker_makes_of_them",
     ),
     Mutant(

@@ -20,20 +20,19 @@ from posefit.evolution.constants import usual_population
 from posefit.evolution.strategy import Strategy
 from posefit.registry import registry
 from posefit.settings import planned
-from posefit_envs.configure import ITERATIONS, POPULATION_SIZE
-from posefit_envs.configuring.orders import NUMBERS, Order, action_of
-from posefit_envs.configuring.single import EVERY
-from posefit_envs.fit import MAX_EVALUATIONS
+from posefit_envs.configure import EVERY, ITERATIONS, POPULATION_SIZE
+from posefit_envs.fit_image import MAX_EVALUATIONS
 from posefit_envs.instance import instance, select
 from posefit_envs.policies import (
     Policy,
     constant_policy,
     gaussian_policy,
-    played,
     random_search_policy,
+    rollout,
     sapso_policy,
     uniform_policy,
 )
+from posefit_envs.population import ACTION_NUMBERS, ControlAction, action_of
 from posefit_reproduce.grid import Progress, each, earlier, kept
 from table import WORKERS, bar, markdown
 
@@ -58,14 +57,14 @@ class Contested:
 
 
 CONFIGURE = Contested(
-    "posefit/Configure-v1",
+    "posefit/Configure-v0",
     POPULATION_SIZE * (ITERATIONS + 1),
     ITERATIONS // EVERY,
     ("random search", "random actions", "middle", "sapso"),
     ("bandit", "cma over constants", "ppo", "sac"),
 )
 FIT = Contested(
-    "posefit/Fit-v1",
+    "posefit/FitState-v0",
     MAX_EVALUATIONS,
     MAX_EVALUATIONS - 1,
     ("random search", "random actions", "gaussian", "sapso", "cma"),
@@ -101,7 +100,7 @@ def agent_turns(
 
 WIDE = 0.5  # the first step size of CMA-ES, of a box from -1 to 1
 EPISODES = 4  # that a setting of CMA-ES is tried in, the same instances for a whole generation
-SIZES = {"configure": NUMBERS, "fit": 2}  # numbers of a setting
+SIZES = {"configure": ACTION_NUMBERS, "fit": 2}  # numbers of a setting
 CURIOSITY = 0.5  # of the bandit: how many deviations of rewards an arm that was never tried is worth
 
 Look = Callable[[int, Policy], None]
@@ -113,7 +112,7 @@ def arms(task: str) -> list[Array]:
         return [np.full(2, power) for power in np.linspace(-1.0, 1.0, 9)]
     kinds = [tuple(float(k == kind) for k in range(3)) for kind in range(3)]
     return [
-        action_of(Order((one, two, three), population, stride, 0.01))
+        action_of(ControlAction((one, two, three), population, stride, 0.01))
         for one, two, three in kinds
         for population in (1.0, 0.5)
         for stride in (0.3, 0.6, 0.9)
@@ -147,7 +146,7 @@ def bandit(task: str, env: Any, length: int, steps: int, seed: int, look: Look) 
         deviation = np.sqrt(max(squares.sum() / max(episode, 1) - (sums.sum() / max(episode, 1)) ** 2, 0.0))
         bonus = CURIOSITY * deviation * np.sqrt(2.0 * np.log(episode + 1.0) / tried)
         arm = int(np.where(counts > 0, sums / tried + bonus, np.inf).argmax())
-        gain = played(env, policies[arm], int(rng.integers(HELD_OUT)), int(rng.integers(2**31)))["gain"]
+        gain = rollout(env, policies[arm], int(rng.integers(HELD_OUT)), int(rng.integers(2**31)))["gain"]
         sums[arm], squares[arm], counts[arm] = sums[arm] + gain, squares[arm] + gain**2, counts[arm] + 1
         look((episode + 1) * length, shown[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
     return shown[int(np.where(counts > 0, sums / np.maximum(counts, 1.0), -np.inf).argmax())]
@@ -178,7 +177,7 @@ def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look)
         costs = [
             -np.mean(
                 [
-                    played(env, setting_policy(task, setting, rng, d, length), int(number), int(one))["gain"]
+                    rollout(env, setting_policy(task, setting, rng, d, length), int(number), int(one))["gain"]
                     for number, one in zip(numbers, seeds, strict=True)
                 ]
             )
@@ -329,7 +328,7 @@ def _made(task: str) -> gym.Env[Any, Any]:
 
 def _costs(turn: Training, policy: Policy, numbers: range) -> list[float]:
     env = _made(turn.task)
-    return [played(env, policy, number, 1000 * turn.seed + number)["best_cost"] for number in numbers]
+    return [rollout(env, policy, number, 1000 * turn.seed + number)["best_cost"] for number in numbers]
 
 
 def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> list[float]:

@@ -119,7 +119,8 @@ class Population:
         restarted = round(control.restart * self.size)
         if restarted:
             swarm, worst = self.swarm, self.swarm.best_cost.argsort(kind="stable")[self.size - restarted :]
-            swarm.moved[worst] = swarm.position[worst] = swarm.best[worst] = draw_population(self.space, self.rng, restarted)
+            drawn = draw_population(self.space, self.rng, restarted)
+            swarm.moved[worst] = swarm.position[worst] = swarm.best[worst] = drawn
             swarm.velocity[worst], swarm.cost[worst], swarm.best_cost[worst] = 0.0, np.inf, np.inf
 
     def ask(self) -> Array:
@@ -167,7 +168,9 @@ class Population:
             if apart < count:
                 pieces.append(normal(space, self.rng, bests, ranks, count - apart, stride))
             part.moved = np.concatenate(pieces)
-            part.velocity[swarm_count:] = np.clip(displacement(space, part.position, part.moved), *self.limits)[swarm_count:]
+            part.velocity[swarm_count:] = np.clip(displacement(space, part.position, part.moved), *self.limits)[
+                swarm_count:
+            ]
         if any(control.diffusion):
             spread = np.empty(space.dimensions)
             for layer, deviation in zip(self.layers, control.diffusion, strict=True):

@@ -107,11 +107,10 @@ def test_every_angle_is_told(followed: Path) -> None:
 
 def test_every_environment_is_told() -> None:
     assert re.findall(r"^## `(.*)`$", environments.page(), re.MULTILINE) == [
-        "posefit/Fit-v0",
-        "posefit/Fit-v1",
+        "posefit/FitImage-v0",
+        "posefit/FitState-v0",
         "posefit/Track-v0",
         "posefit/Configure-v0",
-        "posefit/Configure-v1",
         "posefit/Modes-v0",
     ]
 

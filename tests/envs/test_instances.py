@@ -7,7 +7,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
-from posefit_envs.instance import RESERVED, instance, select
+from posefit_envs.instance import SPLITS, instance, select
 
 
 def azimuth(camera: Camera) -> float:
@@ -52,6 +52,6 @@ def test_what_is_drawn_besides_changes_neither_the_motion_nor_the_cameras():
 
 
 def test_the_splits_share_no_motion():
-    starts = {split: range(*RESERVED[split]) for split in ("train", "test")}
+    starts = {split: range(*SPLITS[split]) for split in ("train", "test")}
     assert not set(starts["train"]) & set(starts["test"])
     assert 0 in starts["train"]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from posefit.silhouette.cost import project
-from posefit_envs.fit import Episode
-from posefit_envs.instance import select
+from posefit_envs.instance import first_episode, select
 from posefit_envs.stage import Stage
+from tests.cases import each
 
 WORLDS: list[dict[str, Any]] = [
     {},
@@ -17,54 +17,41 @@ WORLDS: list[dict[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize("arguments", WORLDS)
+@each("arguments", WORLDS)
 def test_scenes_together_are_what_the_library_says_of_each_alone(arguments: dict[str, Any]) -> None:
     world = select(**arguments).world
-    episodes = [Episode(world, number, 10) for number in (3, 17, 17, 9_000)]
+    episodes = [first_episode(world, number, 10) for number in (3, 17, 17, 9_000)]
     stage = Stage(world, len(episodes))
     for row, episode in enumerate(episodes):
-        stage.put(row, episode.scenery, episode.space)
+        stage.set_scene(row, episode.scenery, episode.space)
     rng = np.random.default_rng(0)
     proposals = rng.uniform(-1.0, 1.0, (len(episodes), 5, episodes[0].space.dimensions))
-    costs = stage.costs(proposals, stage.everyone)
-    seen = stage.look(proposals[:, 0], stage.everyone)
+    costs = stage.costs(proposals, stage.all_rows)
+    evaluation = stage.evaluate(proposals[:, 0], stage.all_rows)
     for row, episode in enumerate(episodes):
         problem = episode.scenery.problem(episode.space)
         np.testing.assert_array_equal(costs[row], problem.evaluate(proposals[row]))
         poses, places = problem.decode(proposals[row, :1])
-        np.testing.assert_array_equal(seen.poses[row], poses[0])
-        np.testing.assert_array_equal(seen.translations[row], places[0])
-        assert seen.costs[row] == costs[row, 0]
+        np.testing.assert_array_equal(evaluation.poses[row], poses[0])
+        np.testing.assert_array_equal(evaluation.translations[row], places[0])
+        assert evaluation.costs[row] == costs[row, 0]
         for view, camera in enumerate(problem.cameras):
             body, mask = project(problem.body, camera, poses[0], places[0]), problem.silhouettes[view].mask
-            np.testing.assert_array_equal(seen.pictures[row, ..., 2 * view + 1], 255 * body)
-            np.testing.assert_array_equal(seen.pictures[row, ..., 2 * view], 255 * mask)
+            np.testing.assert_array_equal(evaluation.pictures[row, ..., 2 * view + 1], 255 * body)
+            np.testing.assert_array_equal(evaluation.pictures[row, ..., 2 * view], 255 * mask)
             counted = [(mask & ~body).sum(), (body & ~mask).sum(), (body & mask).sum()]
-            np.testing.assert_array_equal(seen.areas[row, view], counted)
+            np.testing.assert_array_equal(evaluation.areas[row, view], counted)
 
 
 @pytest.mark.pure
 def test_rows_that_are_left_out_show_nothing_proposed() -> None:
     world = select().world
-    episodes = [Episode(world, number, 10) for number in (3, 17)]
+    episodes = [first_episode(world, number, 10) for number in (3, 17)]
     stage = Stage(world, 2)
     for row, episode in enumerate(episodes):
-        stage.put(row, episode.scenery, episode.space)
+        stage.set_scene(row, episode.scenery, episode.space)
     for rows in (np.array([1]), np.array([], dtype=np.int64)):
-        seen = stage.look(np.zeros((2, 9)), rows)
-        np.testing.assert_array_equal(seen.pictures[0], episodes[0].scenery.picture)
-        assert not seen.areas[0].any()
-        assert seen.areas[1].any() == bool(len(rows))
-
-
-def test_a_feasible_proposal_is_feasible_in_its_own_space() -> None:
-    world = select(noise=None, prior="loose").world
-    episodes = [Episode(world, number, 10) for number in (3, 17, 40)]
-    stage = Stage(world, 3)
-    for row, episode in enumerate(episodes):
-        stage.put(row, episode.scenery, episode.space)
-    rows = np.array([2, 0, 2, 1])
-    proposals = np.random.default_rng(1).uniform(-1.05, 1.05, (4, 50, episodes[0].space.dimensions))
-    found = stage.feasible(proposals, rows)
-    for k, row in enumerate(rows.tolist()):
-        np.testing.assert_array_equal(found[k], episodes[row].space.feasible(proposals[k]))
+        evaluation = stage.evaluate(np.zeros((2, 9)), rows)
+        np.testing.assert_array_equal(evaluation.pictures[0], episodes[0].scenery.picture)
+        assert not evaluation.areas[0].any()
+        assert evaluation.areas[1].any() == bool(len(rows))

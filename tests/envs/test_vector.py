@@ -11,11 +11,9 @@ from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 
 import posefit_envs
-from posefit import minimise
-from posefit.registry import registry
-from posefit.settings import planned
-from posefit_envs import check_vector_env, drive, to_sb3_vec_env
-from posefit_envs.vector.fit import FitVectorEnv
+from posefit_envs import check_vector_env, to_sb3_vec_env
+from posefit_envs.fit_image import FitImageVectorEnv
+from tests.cases import each
 
 FIT: list[dict[str, Any]] = [
     {},
@@ -38,35 +36,25 @@ TRACK: list[dict[str, Any]] = [
 ]
 
 
-CONFIGURE: list[dict[str, Any]] = [
-    {"population_size": 5, "iterations": 4},
-    {
-        "population_size": 7,
-        "iterations": 6,
-        "translation": "aligned",
-        "view_degrees": [0.0, 70.0],
-        "mismatch_percent": 8.0,
-    },
-    {"population_size": 4, "iterations": 3, "instance": 3, "prior": "full", "translation": "searched", "errors": False},
-    {"population_size": 6, "iterations": 30, "noise": {"shadow": 0.6}, "prior": "loose"},
-]
-FIT_V1: list[dict[str, Any]] = [
+FIT_STATE: list[dict[str, Any]] = [
     {},
     {"max_evaluations": 5, "image": True, "noise": {"holes": 0.4}},
     {"max_evaluations": 4, "errors": False, "translation": "searched", "view_degrees": [0.0, 70.0]},
 ]
-CONFIGURE_V1: list[dict[str, Any]] = [
+CONFIGURE: list[dict[str, Any]] = [
     {"population_size": 8, "iterations": 4, "every": 2},
     {"population_size": 10, "iterations": 9, "every": 3, "translation": "aligned", "mismatch_percent": 8.0},
     {"population_size": 6, "iterations": 3, "every": 1, "prior": "full", "translation": "searched", "errors": False},
 ]
-CASES_V1 = {"posefit/Fit-v1": FIT_V1, "posefit/Configure-v1": CONFIGURE_V1}
-CASES = {"posefit/Fit-v0": FIT, "posefit/Track-v0": TRACK, "posefit/Configure-v0": CONFIGURE}
+CASES = {
+    "posefit/FitImage-v0": FIT,
+    "posefit/FitState-v0": FIT_STATE,
+    "posefit/Track-v0": TRACK,
+    "posefit/Configure-v0": CONFIGURE,
+}
 
 
-@pytest.mark.parametrize(
-    ("name", "arguments"), [(name, one) for name, many in (CASES | CASES_V1).items() for one in many]
-)
+@each(("name", "arguments"), [(name, one) for name, many in CASES.items() for one in many])
 def test_a_vector_environment_equals_single_ones(name: str, arguments: dict[str, Any]) -> None:
     vector = gym.make_vec(name, num_envs=4, **arguments)
     assert type(vector.unwrapped).__module__.startswith("posefit_envs")
@@ -76,31 +64,31 @@ def test_a_vector_environment_equals_single_ones(name: str, arguments: dict[str,
 
 def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
     for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
-        vector = gym.make_vec("posefit/Fit-v0", 3, "sync", {"autoreset_mode": mode}, max_evaluations=4)
-        check_vector_env(vector, lambda: gym.make("posefit/Fit-v0", max_evaluations=4), steps=20)
+        vector = gym.make_vec("posefit/FitImage-v0", 3, "sync", {"autoreset_mode": mode}, max_evaluations=4)
+        check_vector_env(vector, lambda: gym.make("posefit/FitImage-v0", max_evaluations=4), steps=20)
     check_vector_env(gym.make_vec("CartPole-v1", 3, "sync"), lambda: gym.make("CartPole-v1"), steps=60)
 
-    class Shifted(FitVectorEnv):
+    class Shifted(FitImageVectorEnv):
         def step(self, actions: Any) -> Any:
             observations, rewards, *rest = super().step(actions)
             return observations, rewards - 1e-9, *rest
 
-    class Masked(FitVectorEnv):
+    class Masked(FitImageVectorEnv):
         def step(self, actions: Any) -> Any:
             *rest, infos = super().step(actions)
             infos["_cost"][0] = False
             return *rest, infos
 
-    class MaskedTwice(FitVectorEnv):
+    class MaskedTwice(FitImageVectorEnv):
         def step(self, actions: Any) -> Any:
             *rest, infos = super().step(actions)
             return *rest, infos | {"__cost": infos["_cost"]}
 
-    class SameSeed(FitVectorEnv):
+    class SameSeed(FitImageVectorEnv):
         def reset(self, *, seed: Any = None, options: Any = None) -> Any:
             return super().reset(seed=None if seed is None else [seed] * self.num_envs, options=options)
 
-    class Reused(FitVectorEnv):
+    class Reused(FitImageVectorEnv):
         def step(self, actions: Any) -> Any:
             observations, *rest = super().step(actions)
             self.mine = getattr(self, "mine", observations)
@@ -115,19 +103,18 @@ def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
         (Reused, "step 1: the observations before it must be"),
     ):
         with pytest.raises(AssertionError, match=message):
-            check_vector_env(wrong(3), lambda: gym.make("posefit/Fit-v0"), steps=10)
+            check_vector_env(wrong(3), lambda: gym.make("posefit/FitImage-v0"), steps=10)
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "arguments"),
     [
-        ("posefit/Fit-v0", {}),
-        ("posefit/Fit-v0", {"max_evaluations": 3}),
-        ("posefit/Fit-v0", {"target_cost": 99.0}),
+        ("posefit/FitImage-v0", {}),
+        ("posefit/FitImage-v0", {"max_evaluations": 3}),
+        ("posefit/FitImage-v0", {"target_cost": 99.0}),
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
-        ("posefit/Configure-v0", {"population_size": 3, "iterations": 3}),
-        ("posefit/Fit-v1", {}),
-        ("posefit/Configure-v1", {"population_size": 5, "iterations": 5, "every": 1}),
+        ("posefit/FitState-v0", {}),
+        ("posefit/Configure-v0", {"population_size": 5, "iterations": 5, "every": 1}),
     ],
 )
 def test_a_time_limit_truncates_a_vector_environment_too(name: str, arguments: dict[str, Any]) -> None:
@@ -146,7 +133,7 @@ def test_errors_are_told_unless_nobody_asks_for_them() -> None:
             infos = vector.step(vector.action_space.sample())[4]
             assert {key for key in infos if "error" in key and not key.startswith("_")} == told
     with pytest.raises(error.Error, match="errors must be true or false, got 'no'"):
-        gym.make_vec("posefit/Fit-v0", num_envs=2, errors="no")
+        gym.make_vec("posefit/FitImage-v0", num_envs=2, errors="no")
 
 
 def test_threads_change_nothing() -> None:
@@ -158,7 +145,7 @@ def test_threads_change_nothing() -> None:
             for first, other in zip(one.step(actions)[:4], three.step(actions)[:4], strict=True):
                 np.testing.assert_array_equal(first, other)
     with pytest.raises(error.Error, match="threads must be at least 1, got 0"):
-        gym.make_vec("posefit/Fit-v0", num_envs=2, threads=0)
+        gym.make_vec("posefit/FitImage-v0", num_envs=2, threads=0)
 
 
 def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
@@ -184,14 +171,17 @@ def test_some_environments_can_be_reset_alone() -> None:
         _, infos = vector.reset(options={"reset_mask": np.array([False, True, False])})
         assert infos["_instance"].tolist() == [False, True, False]
         _, _, _, _, after = vector.step(vector.action_space.sample())
-        first, second = (8, 12) if "Configure" in name else (1, 2)  # a first population counts, too
+        first, second = {"posefit/Configure-v0": (24, 44), "posefit/FitState-v0": (2, 3)}.get(name, (1, 2))
         assert after["evaluations"].tolist() == [second, first, second]
         with pytest.raises(error.Error, match="reset_mask must be 3 booleans"):
             vector.reset(options={"reset_mask": [1, 0]})
         assert before["evaluations"].tolist() == [first] * 3
 
 
-@pytest.mark.parametrize(("name", "arguments"), [(name, one) for name, many in CASES_V1.items() for one in many])
+@each(
+    ("name", "arguments"),
+    [(name, case) for name in ("posefit/FitState-v0", "posefit/Configure-v0") for case in CASES[name]],
+)
 def test_a_reset_of_some_says_and_shows_what_gymnasiums_own_does(name: str, arguments: dict[str, Any]) -> None:
     native, own = (gym.make_vec(name, 3, kind, **arguments) for kind in (None, "sync"))
     for vector in (native, own):
@@ -209,7 +199,7 @@ def test_a_reset_of_some_says_and_shows_what_gymnasiums_own_does(name: str, argu
             np.testing.assert_array_equal(ours[1][key], value)
 
 
-@pytest.mark.parametrize("name", CASES | CASES_V1)
+@each("name", CASES)
 def test_infos_have_masks_and_no_masks_of_masks(name: str) -> None:
     ends: dict[str, Any] = {"max_evaluations": 2} if "Fit" in name else {}
     vector = gym.make_vec(name, num_envs=3, **ends)
@@ -221,7 +211,7 @@ def test_infos_have_masks_and_no_masks_of_masks(name: str) -> None:
 
 
 def test_the_picture_of_who_goes_on_stays_in_the_window_too() -> None:
-    vector = gym.make_vec("posefit/Fit-v1", num_envs=2, render_mode="rgb_array")
+    vector = gym.make_vec("posefit/FitState-v0", num_envs=2, render_mode="rgb_array")
     vector.reset(seed=0)
     vector.step(vector.action_space.sample())
     before = vector.render()
@@ -233,7 +223,7 @@ def test_the_picture_of_who_goes_on_stays_in_the_window_too() -> None:
     np.testing.assert_array_equal(before[1], after[1])
 
 
-@pytest.mark.parametrize(("name", "d"), [("posefit/Fit-v0", 9), ("posefit/Track-v0", 9), ("posefit/Configure-v0", 3)])
+@each(("name", "d"), [("posefit/FitImage-v0", 9), ("posefit/Track-v0", 9), ("posefit/Configure-v0", 10)])
 def test_mistakes_are_named(name: str, d: int) -> None:
     vector = gym.make_vec(name, num_envs=3)
     with pytest.raises(error.ResetNeeded, match="reset must come before"):
@@ -253,7 +243,7 @@ def test_mistakes_are_named(name: str, d: int) -> None:
         gym.make_vec(name, num_envs=3, colour="red")
 
 
-@pytest.mark.parametrize("name", CASES)
+@each("name", CASES)
 def test_every_environment_has_its_picture(name: str) -> None:
     vector = gym.make_vec(name, num_envs=2, render_mode="rgb_array")
     vector.reset(seed=0)
@@ -269,26 +259,9 @@ def test_every_environment_has_its_picture(name: str) -> None:
 # optimisers
 
 
-@pytest.mark.parametrize(("name", "width"), [("sapso", 40), ("pso", 40), ("cma", 10), ("annealed", 244)])
-def test_an_optimiser_through_the_environment_is_the_optimiser_through_the_library(name: str, width: int) -> None:
-    env = gym.make_vec("posefit/Fit-v0", num_envs=width, instance=3, max_evaluations=10**6, target_cost=-1.0)
-    driven = drive(env, name, seed=5)
-    unwrapped: Any = env.unwrapped
-    episode = unwrapped._searches[0]
-    problem = episode.scenery.problem(episode.space)
-    factory = registry().optimiser(name)
-    alone = minimise(
-        problem.evaluate, factory(episode.space, np.random.default_rng(5), **planned(factory, {}, 2440)), 2440
-    )
-    assert driven.cost == alone.cost
-    assert driven.evaluations == alone.evaluations
-    np.testing.assert_array_equal(driven.history, alone.history)
-    np.testing.assert_array_equal(driven.proposal, alone.proposal)
-
-
 def test_a_rounded_action_is_off_by_no_more_than_a_few_pixels() -> None:
     # float32 has 24 bits: a proposal moves by 6e-8 half-ranges at most, which moves an edge by 1e-5 pixels
-    env = gym.make_vec("posefit/Fit-v0", num_envs=400, instance=3, max_evaluations=10**6, target_cost=-1.0)
+    env = gym.make_vec("posefit/FitImage-v0", num_envs=400, instance=3, max_evaluations=10**6, target_cost=-1.0)
     env.reset(seed=0)
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (400, 9))
     exact, rounded = (env.step(one)[4] for one in (actions, actions.astype(np.float32)))
@@ -297,22 +270,8 @@ def test_a_rounded_action_is_off_by_no_more_than_a_few_pixels() -> None:
     assert np.abs(exact["cost"] - rounded["cost"]).max() < 0.5
 
 
-def test_drive_says_what_does_not_fit() -> None:
-    env = gym.make_vec("posefit/Fit-v0", num_envs=7, instance=3)
-    with pytest.raises(error.Error, match="evaluations must hold one population of 40, got 20"):
-        drive(env, "pso", evaluations=20)
-
-
-def test_a_population_may_take_several_steps() -> None:
-    one, four = (
-        gym.make_vec("posefit/Fit-v0", num_envs=n, instance=3, max_evaluations=10**6, target_cost=-1.0)
-        for n in (40, 10)
-    )
-    assert drive(one, "sapso", evaluations=400).cost == drive(four, "sapso", evaluations=400).cost
-
-
 def test_memory_stays_flat() -> None:
-    env = gym.make_vec("posefit/Fit-v0", num_envs=8, max_evaluations=20)
+    env = gym.make_vec("posefit/FitImage-v0", num_envs=8, max_evaluations=20)
     env.reset(seed=0)
     sizes = []
     tracemalloc.start()
@@ -331,7 +290,7 @@ def test_memory_stays_flat() -> None:
 @pytest.mark.parametrize("policy", ["CnnPolicy", "MlpPolicy"])
 def test_an_agent_trains_on_the_vector_environment(policy: str) -> None:
     sb3 = pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
-    vector = to_sb3_vec_env(gym.make_vec("posefit/Fit-v0", num_envs=8, max_evaluations=30))
+    vector = to_sb3_vec_env(gym.make_vec("posefit/FitImage-v0", num_envs=8, max_evaluations=30))
     model = sb3.PPO(policy, vector, n_steps=64, batch_size=128, n_epochs=2, seed=0, device="cpu")
     model.learn(2000)
     assert model.num_timesteps >= 2000
@@ -341,7 +300,7 @@ def test_an_agent_trains_on_the_vector_environment(policy: str) -> None:
 def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
     pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
     for name, arguments in (
-        ("posefit/Fit-v0", {"max_evaluations": 3}),
+        ("posefit/FitImage-v0", {"max_evaluations": 3}),
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
     ):
         adapted = to_sb3_vec_env(gym.make_vec(name, num_envs=2, **arguments))
@@ -362,8 +321,8 @@ def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
 def test_stable_baselines3_sees_a_dict_past_an_episodes_end() -> None:
     pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
     arguments: dict[str, Any] = {"instance": 3, "image": True, "max_evaluations": 3}
-    adapted = to_sb3_vec_env(gym.make_vec("posefit/Fit-v1", num_envs=2, **arguments))
-    single = gym.make("posefit/Fit-v1", **arguments)
+    adapted = to_sb3_vec_env(gym.make_vec("posefit/FitState-v0", num_envs=2, **arguments))
+    single = gym.make("posefit/FitState-v0", **arguments)
     first = single.reset(seed=4)[0]
     adapted.seed(4)
     adapted.reset()
@@ -381,12 +340,35 @@ def test_stable_baselines3_sees_a_dict_past_an_episodes_end() -> None:
 @pytest.mark.slow
 def test_an_agent_trains_on_a_dict_whose_episodes_are_cut() -> None:
     sb3 = pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
-    made = gym.make_vec("posefit/Fit-v1", num_envs=4, image=True, size=(36, 36), max_episode_steps=10)
+    made = gym.make_vec("posefit/FitState-v0", num_envs=4, image=True, size=(36, 36), max_episode_steps=10)
     vector = to_sb3_vec_env(made)
     model = sb3.PPO("MultiInputPolicy", vector, n_steps=32, batch_size=64, n_epochs=1, seed=0, device="cpu")
     model.learn(200)  # where an episode is cut, PPO asks what its last observation is worth
     assert model.num_timesteps >= 200
     vector.close()
+
+
+def test_stable_baselines3_chooses_environments_by_indices() -> None:
+    pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
+    vector = gym.make_vec("posefit/FitState-v0", num_envs=3, render_mode="rgb_array")
+    adapted = to_sb3_vec_env(vector)
+    adapted.reset()
+    spaces = vector.unwrapped.search_spaces  # type: ignore[attr-defined]
+    assert adapted.get_attr("world", indices=[0, 2]) == [vector.unwrapped.world] * 2  # type: ignore[attr-defined]
+    for given, wanted in ((None, [0, 1, 2]), (1, [1]), ([2, 0], [2, 0])):
+        chosen = adapted.get_attr("search_spaces", given)
+        assert [space.centre.tolist() for space in chosen] == [spaces[i].centre.tolist() for i in wanted]
+    pictures = vector.render()
+    assert pictures is not None
+    for picture, wanted in zip(adapted.env_method("render"), pictures, strict=True):
+        np.testing.assert_array_equal(picture, wanted)
+    adapted.set_attr("note", "common")
+    assert adapted.get_attr("note") == ["common"] * 3
+    with pytest.raises(error.Error, match=r"indices must be all of the 3 environments, got \[1\]"):
+        adapted.set_attr("note", "own", indices=1)
+    with pytest.raises(error.Error, match=r"indices must be all of the 3 environments, got \[0, 2\]"):
+        adapted.env_method("close", indices=[0, 2])
+    adapted.close()
 
 
 def test_another_kind_of_vector_environment_is_refused() -> None:
@@ -398,7 +380,7 @@ def test_another_kind_of_vector_environment_is_refused() -> None:
 
 def test_the_wrapper_chain_of_cleanrl_accepts_it() -> None:
     def make() -> Any:
-        env: Any = gym.make("posefit/Fit-v0", max_evaluations=6)
+        env: Any = gym.make("posefit/FitImage-v0", max_evaluations=6)
         env = wrappers.FlattenObservation(env)
         env = wrappers.RecordEpisodeStatistics(env)
         env = wrappers.ClipAction(env)
@@ -415,7 +397,7 @@ def test_the_wrapper_chain_of_cleanrl_accepts_it() -> None:
         assert np.isfinite(rewards).all()
         finished += int(np.sum(infos.get("_episode", False)))
     assert finished >= 4
-    native = wrappers.vector.RecordEpisodeStatistics(gym.make_vec("posefit/Fit-v0", num_envs=2, max_evaluations=6))
+    native = wrappers.vector.RecordEpisodeStatistics(gym.make_vec("posefit/FitImage-v0", num_envs=2, max_evaluations=6))
     native.reset(seed=0)
     assert any("episode" in native.step(native.action_space.sample())[4] for _ in range(10))
 

@@ -12,8 +12,8 @@ EPISODE = 40  # steps of a learner's episodes
 ENDLESS: dict[str, Any] = {"max_evaluations": 10**9, "target_cost": -1.0}
 # by name: the environment, and its arguments; without an instance each environment has one of its own
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
-    "fit_shared": ("Fit-v0", ENDLESS | {"instance": 3}),
-    "fit_each": ("Fit-v0", ENDLESS),
+    "fit_shared": ("FitImage-v0", ENDLESS | {"instance": 3}),
+    "fit_each": ("FitImage-v0", ENDLESS),
     "track_each": ("Track-v0", {"frames": 2, "evaluations_per_frame": 10**9}),
     "configure_each": ("Configure-v0", {"iterations": 10**9}),
 }
@@ -29,7 +29,7 @@ def vector_env(threads: int) -> dict[str, dict[str, float]]:
     """
     kernel, vectors = _kernel(), {name: _pair(env, arguments) for name, (env, arguments) in CASES.items()}
     vectors["configure_all_threads"] = _pair(*CASES["configure_each"], threads)
-    learning = _pair("Fit-v0", {"max_evaluations": EPISODE, "target_cost": -1.0})
+    learning = _pair("FitImage-v0", {"max_evaluations": EPISODE, "target_cost": -1.0})
     jobs: dict[str, Callable[[], object]] = {"kernel": kernel}
     for name, envs in vectors.items():
         jobs |= {f"{name} {kind}": _steps(env, 1) for kind, env in envs.items()}
@@ -37,7 +37,7 @@ def vector_env(threads: int) -> dict[str, dict[str, float]]:
     seconds = fastest(jobs)
     figures = {}
     for name, envs in vectors.items():
-        proposals = ENVIRONMENTS * getattr(envs["native"].unwrapped, "population_size", 1)
+        proposals = ENVIRONMENTS * _evaluations(envs["native"].unwrapped)
         native, sync = (1e6 * seconds[f"{name} {kind}"] / proposals for kind in envs)
         kernel_us = 1e6 * seconds["kernel"] / ENVIRONMENTS
         figures[name] = {
@@ -87,8 +87,13 @@ def _kernel() -> Callable[[], object]:
     """Return what evaluates as many proposals as there are environments, through the library."""
     import gymnasium
 
-    env: Any = gymnasium.make_vec("posefit_envs:posefit/Fit-v0", 1).unwrapped
+    env: Any = gymnasium.make_vec("posefit_envs:posefit/FitImage-v0", 1).unwrapped
     env.reset(seed=0)
     problem = env.problems[0]
     proposals = np.random.default_rng(0).uniform(-1.0, 1.0, (ENVIRONMENTS, problem.space.dimensions))
     return lambda: problem.evaluate(proposals)
+
+
+def _evaluations(env: Any) -> int:
+    """Return how many proposals one environment evaluates in a step."""
+    return int(getattr(env, "population_size", 1)) * int(getattr(env, "every", 1))

@@ -1,30 +1,19 @@
-"""Fit-v1: its observation says what was proposed and what it cost, and references play it."""
-
-from typing import Any
+"""FitState-v0: its observation holds proposals and their costs, and references search in it."""
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import error
-from gymnasium.utils.env_checker import check_env
 
 import posefit_envs  # noqa: F401, registers it
-from posefit_envs.policies import constant_policy, gaussian_policy, played, random_search_policy, uniform_policy
-from posefit_envs.proposing.memory import ProposalMemory
+from posefit_envs.fit_state import ProposalMemory
+from posefit_envs.policies import constant_policy, gaussian_policy, random_search_policy, rollout, uniform_policy
 
-NAME = "posefit/Fit-v1"
-
-
-@pytest.mark.filterwarnings("ignore:.*pkg_resources.*:UserWarning", "ignore:.*pkg_resources.*:DeprecationWarning")
-@pytest.mark.parametrize("arguments", [{}, {"image": True, "view_degrees": [0.0, 90.0], "max_evaluations": 5}])
-def test_the_checkers_of_gymnasium_and_stable_baselines3_pass_without_a_warning(arguments: dict[str, Any]) -> None:
-    check_env(gym.make(NAME, **arguments).unwrapped)
-    checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs posefit[rl]")
-    checker.check_env(gym.make(NAME, **arguments).unwrapped)
+NAME = "posefit/FitState-v0"
 
 
 def test_its_first_numbers_are_proposed_where_the_last_is_one_bit_for_bit() -> None:
-    new, old = gym.make(NAME, instance=3).unwrapped, gym.make("posefit/Fit-v0", instance=3).unwrapped
+    new, old = gym.make(NAME, instance=3).unwrapped, gym.make("posefit/FitImage-v0", instance=3).unwrapped
     new.reset(seed=0)
     old.reset(seed=0)
     rng = np.random.default_rng(0)
@@ -35,7 +24,7 @@ def test_its_first_numbers_are_proposed_where_the_last_is_one_bit_for_bit() -> N
 
 def test_the_last_number_says_how_much_of_the_way_by_powers_of_ten() -> None:
     memory = ProposalMemory(2, 50.0, 10)
-    memory.take(np.array([0.5, 0.0]), 20.0)
+    memory.add(np.array([0.5, 0.0]), 20.0)
     for power, reach in ((-1.0, 0.01), (0.0, 0.1), (0.5, 10.0**-0.5)):
         # from the best, (0.5, 0), to (0, 1)
         np.testing.assert_allclose(memory.proposal(np.array([0.0, 1.0, power])), [0.5 - 0.5 * reach, reach])
@@ -43,7 +32,7 @@ def test_the_last_number_says_how_much_of_the_way_by_powers_of_ten() -> None:
 
 def test_it_shows_the_best_proposals_and_the_last_ones_with_their_costs() -> None:
     memory = ProposalMemory(1, 50.0, 11)
-    rewards = [memory.take(np.array([place]), cost) for place, cost in ((0.1, 60.0), (0.2, 30.0), (0.3, 40.0))]
+    rewards = [memory.add(np.array([place]), cost) for place, cost in ((0.1, 60.0), (0.2, 30.0), (0.3, 40.0))]
     # by hand: ln(51 / 31) when 30 comes, else nothing
     assert rewards == pytest.approx([0.0, np.log(51.0 / 31.0), 0.0])
     state = memory.state()
@@ -58,7 +47,7 @@ def test_it_shows_the_best_proposals_and_the_last_ones_with_their_costs() -> Non
 def test_what_costs_no_less_than_the_middle_is_never_among_the_best() -> None:
     memory = ProposalMemory(1, 50.0, 11)
     for place, cost in ((0.1, 50.0), (0.2, 70.0), (0.3, 30.0), (0.4, 30.0)):
-        memory.take(np.array([place]), cost)
+        memory.add(np.array([place]), cost)
     np.testing.assert_array_equal(memory.best[:, 0], [0.3, 0.4, 0.0, 0.0])  # of equal ones the earlier first
     np.testing.assert_array_equal(memory.best_costs, [30.0, 30.0, 50.0, 50.0])
     np.testing.assert_array_equal(memory.last[:, 0], [0.4, 0.3, 0.2, 0.1])
@@ -91,12 +80,12 @@ def test_the_picture_comes_beside_the_search_if_asked_for() -> None:
         gym.make(NAME, max_evaluations=1)
 
 
-def test_a_step_from_the_best_so_far_finds_more_than_random_search() -> None:
+def test_a_step_from_the_best_so_far_beats_random_search() -> None:
     env = gym.make(NAME, max_evaluations=100).unwrapped
     costs = {}
     for name, make in (("gaussian", gaussian_policy), ("random", random_search_policy), ("uniform", uniform_policy)):
         policy = make(env, np.random.default_rng(0))
-        costs[name] = np.mean([played(env, policy, 10_000 + k, k)["best_cost"] for k in range(6)])
+        costs[name] = np.mean([rollout(env, policy, 10_000 + k, k)["best_cost"] for k in range(6)])
     assert costs["gaussian"] < costs["random"]
     assert costs["uniform"] < costs["random"]
     with pytest.raises(ValueError, match="spread must be"):
@@ -105,4 +94,4 @@ def test_a_step_from_the_best_so_far_finds_more_than_random_search() -> None:
 
 def test_a_constant_that_stays_earns_nothing_more() -> None:
     env = gym.make(NAME, max_evaluations=10).unwrapped
-    assert played(env, constant_policy(np.zeros(10)), 17, 0)["gain"] == 0.0
+    assert rollout(env, constant_policy(np.zeros(10)), 17, 0)["gain"] == 0.0
