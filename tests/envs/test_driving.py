@@ -130,7 +130,7 @@ def test_a_tracker_learns_from_what_it_is_told_and_has_its_settings(env: gym.Env
 
 def test_mistakes_of_a_reference_are_named(env: gym.Env[np.ndarray, np.ndarray]) -> None:
     env.reset(seed=0)
-    with pytest.raises(ValueError, match="tracker must be one of exemplars, .*did you mean 'exemplars'"):
+    with pytest.raises(ValueError, match="method must be .*one of exemplars, .*did you mean 'exemplars'"):
         track_reference(env, "exemplar")
     with pytest.raises(ValueError, match="a setting of exemplars must be one of .*, got 'lags'"):
         track_reference(env, lags=3)
