@@ -11,10 +11,9 @@ from posefit.arrays import Array
 from posefit.report.columns import COLUMNS, FIGURES
 from posefit.report.runs import Runs
 from posefit.statistics.improvement import improvement_interval, probability_of_improvement
-from posefit.statistics.intervals import LEAST_RESAMPLES, RESAMPLES, TRIMMED, Intervals, iqm_intervals
-from posefit.statistics.letters import compact_letters
-from posefit.statistics.ranks import LEVEL, friedman, wilcoxon
-from posefit.statistics.sharing import Rows, gaps, most_shared
+from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES, TRIMMED, Intervals, iqm_intervals
+from posefit.statistics.pairing import Rows, gaps, most_shared
+from posefit.statistics.ranks import LEVEL, compact_letters, friedman, wilcoxon
 from posefit.tracking.measures import BASELINES
 
 SEED = 2013  # of every bootstrap
@@ -51,7 +50,7 @@ class Contest:
 
         The first seeds are kept, and every so many-th instance.
         """
-        most = int(WORK / (LEAST_RESAMPLES * max(points, 1) * len(self.methods)))  # runs of a method
+        most = int(WORK / (MIN_RESAMPLES * max(points, 1) * len(self.methods)))  # runs of a method
         _, instances, seeds = self.rows.shape
         kept = min(seeds, max(2, most // instances))
         step = -(-instances * kept // most)
@@ -84,7 +83,7 @@ def _rows(runs: Runs) -> Rows:
 
 def resamples(numbers: int) -> int:
     """Return how many bootstrap resamples so many numbers may have."""
-    return int(np.clip(WORK / max(numbers, 1), LEAST_RESAMPLES, RESAMPLES))
+    return int(np.clip(WORK / max(numbers, 1), MIN_RESAMPLES, RESAMPLES))
 
 
 def intervals(values: Array) -> Intervals:
@@ -160,7 +159,7 @@ def paired_tests(contest: Contest) -> dict[str, Any]:
     better = probability_of_improvement(errors)
     compared = wilcoxon(tested)
     count = int(min(WORK / (errors[0].size * errors.shape[2] * len(compared)), RESAMPLES))
-    bounded = errors.shape[2] >= LEAST_SEEDS and count >= LEAST_RESAMPLES
+    bounded = errors.shape[2] >= LEAST_SEEDS and count >= MIN_RESAMPLES
     listed = []
     for one in compared:
         ends = (np.nan, np.nan)

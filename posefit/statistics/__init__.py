@@ -1,4 +1,4 @@
-"""What repeated runs can say: nothing here knows of poses, sweeps or files.
+"""Statistics of repeated runs: nothing here knows of poses, sweeps or files.
 
     import numpy as np
     from posefit.statistics.intervals import iqm_intervals
@@ -11,17 +11,15 @@
     for pair in wilcoxon(errors):
         print(pair.first, pair.second, pair.adjusted)      # signed ranks, p adjusted after Holm
 
-Everything that compares methods takes errors (methods, instances, seeds) in which all of one instance and seed belong
-together. Randomness comes from a numpy Generator alone.
+Everything that compares methods takes errors (methods, instances, seeds), paired by instance and seed. Randomness comes
+from a numpy Generator alone.
 
 | looking for | field's term | file |
 |---|---|---|
-| runs side by side, and what is left of a sweep with gaps | paired, blocked design | pairing.py |
-| which methods share enough runs to be held against each other | | sharing.py |
-| the mean of the middle half, and how sure it is | interquartile mean, studentised bootstrap | intervals.py |
+| paired runs, and what can be compared of a sweep with gaps | paired, blocked design | pairing.py |
+| the mean of the middle half, with its interval | interquartile mean, studentised bootstrap | intervals.py |
 | the mean of runs of which some have a draw in common | stratified cluster sample | means.py |
-| which method is better, judged by order alone | Friedman, Nemenyi, Wilcoxon, Holm | ranks.py |
-| which methods share a letter, as no test tells them apart | compact letter display | letters.py |
-| how probably a run of one beats a run of another | probability of improvement, Mann-Whitney's U | improvement.py |
+| which method is better, by order alone | Friedman, Nemenyi, Wilcoxon, Holm, compact letter display | ranks.py |
+| how likely one method beats another | probability of improvement, Mann-Whitney's U | improvement.py |
 | shares of runs and targets reached in time, or within an error | ECDF, ERT, performance profiles | profiles.py |
 """

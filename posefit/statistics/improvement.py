@@ -1,4 +1,4 @@
-"""How probably a run of one method is better than a run of another on the same instance. Agarwal et al., 2021."""
+"""The probability that a run of one method beats a run of another on the same instance. Agarwal et al., 2021."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,20 +10,20 @@ from posefit.statistics.pairing import finite
 
 
 def probability_of_improvement(errors: ArrayLike) -> Array:
-    """Return in row a, column b how probably method a has the lower error, (methods, methods).
+    """Return in row a, column b the probability that method a has the lower error, (methods, methods).
 
-    `errors` (methods, instances, seeds). On each instance every run of one is held against every run of the other, a
+    `errors` (methods, instances, seeds). On each instance every run of one is compared with every run of the other, a
     tie counting half (Mann and Whitney's U); instances weigh the same. The diagonal is 0.5.
     """
-    found = finite("errors", errors, ("methods", "instances", "seeds"))
-    methods, instances, seeds = found.shape
-    ordered = np.sort(found, axis=2)
+    array = finite("errors", errors, ("methods", "instances", "seeds"))
+    methods, instances, seeds = array.shape
+    ordered = np.sort(array, axis=2)
     wins = np.zeros((methods, methods))
     for a in range(methods):
         for b in range(a + 1, methods):
             for i in range(instances):
-                beaten = np.searchsorted(ordered[b, i], found[a, i], side="right").sum()
-                below = np.searchsorted(ordered[b, i], found[a, i], side="left").sum()
+                beaten = np.searchsorted(ordered[b, i], array[a, i], side="right").sum()
+                below = np.searchsorted(ordered[b, i], array[a, i], side="left").sum()
                 wins[b, a] += (beaten + below) / 2.0
     wins /= instances * seeds * seeds
     np.fill_diagonal(wins, 0.5)
@@ -40,13 +40,12 @@ def improvement_interval(
     resamples: int = RESAMPLES,
     level: float = LEVEL,
 ) -> tuple[float, float, float]:
-    """Return how probably `first` has the lower error than `second`, each (instances, seeds), and its interval's ends.
+    """Return the probability that `first` has a lower error than `second`, each (instances, seeds), and its interval.
 
     Seeds are resampled within each instance, the same for both, as they are paired. The percentiles are those of
     Hesterberg, What teachers should know about the bootstrap, 2015: moved out to the t distribution and by
     sqrt(n / (n - 1)), without which they are too narrow for few seeds n. Where a seed brings both methods the same
-    luck, its own pair is not like the others and shifts the value by the order of 1 / n. One seed gives nan for both
-    ends.
+    luck, its own pair is unlike the others and shifts the value by the order of 1 / n. With one seed both ends are nan.
     """
     one = finite("first", first, ("instances", "seeds"))
     other = finite("second", second, ("instances", "seeds"))

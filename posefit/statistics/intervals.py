@@ -1,6 +1,6 @@
-"""The interquartile mean of many runs, and how sure one can be of it.
+"""The interquartile mean of many runs, with its confidence interval.
 
-The mean of the middle half of all runs: as robust as the median against a run that got lost, and far less noisy.
+It is the mean of the middle half of all runs: as robust as the median against a lost run, and far less noisy.
 Agarwal et al., Deep reinforcement learning at the edge of the statistical precipice, 2021.
 """
 
@@ -16,8 +16,8 @@ from posefit.statistics.pairing import finite
 TRIMMED = 0.25  # share of the runs left out at either end
 LEVEL = 0.95
 RESAMPLES = 2000
-LEAST_RESAMPLES = 100
-LEAST_RUNS = 8  # of a method; the middle half of fewer has hardly any spread of its own
+MIN_RESAMPLES = 100
+MIN_RUNS = 8  # of a method; the middle half of fewer has hardly any spread of its own
 _BLOCK = 1 << 14  # numbers worked on at once, which a core's cache holds
 
 
@@ -35,8 +35,8 @@ def iqm(errors: ArrayLike) -> Array:
 
     Of n runs floor(n / 4) are left out at either end, as `scipy.stats.trim_mean` does.
     """
-    found = finite("errors", errors, ("methods", "instances", "seeds"))
-    return np.asarray(trim_mean(found.reshape(len(found), -1), TRIMMED, axis=1))
+    array = finite("errors", errors, ("methods", "instances", "seeds"))
+    return np.asarray(trim_mean(array.reshape(len(array), -1), TRIMMED, axis=1))
 
 
 def iqm_intervals(
@@ -44,41 +44,41 @@ def iqm_intervals(
 ) -> Intervals:
     """Return the interquartile mean of each method with its interval, of errors (methods, instances, seeds).
 
-    The interval says what other seeds would give on these instances: seeds are resampled within each instance. It is
+    The interval is for other seeds on these instances: seeds are resampled within each instance. It is
     a studentised bootstrap interval (Efron and Tibshirani, An introduction to the bootstrap, 1993, 12.5), for plain
     percentiles are too narrow where seeds are few: they take the spread of n seeds with divisor n, and a 95 %
     interval of 12 instances with 5 seeds holds the truth in only 90 % of studies. The standard error is that of a
     trimmed mean, from the winsorised runs of each instance with divisor n - 1 (Tukey and McLaughlin, 1963). With 12
     instances and 5, 10 or 20 seeds the interval holds the truth in 94 to 96 % of studies, whether errors are normal,
-    skewed, heavy-tailed or those of runs of which some got lost. Fewer than 20 runs make it wide; it never reaches
+    skewed, heavy-tailed or those of runs of which some were lost. Fewer than 20 runs make it wide; it never reaches
     beyond the lowest and the highest run.
 
-    One seed says nothing about others, and fewer than 8 runs too little: low and high are nan. Every method has the
+    With one seed or fewer than 8 runs there is no interval: low and high are nan. Every method has the
     same resamples, so that its interval does not depend on which others there are. Raises ValueError where errors are
     not finite or not of that shape, `resamples` is below 100 or `level` not between 0 and 1.
     """
-    found = finite("errors", errors, ("methods", "instances", "seeds"))
+    array = finite("errors", errors, ("methods", "instances", "seeds"))
     check_bootstrap(resamples, level)
-    values, seeds = iqm(found), found.shape[2]
-    if seeds == 1 or found[0].size < LEAST_RUNS:
-        return Intervals(values, np.full(len(found), np.nan), np.full(len(found), np.nan))
-    pivots = np.empty((len(found), resamples))
-    strata = np.arange(found.shape[1])[:, None]
-    step = max(1, _BLOCK // found[0].size)
+    values, seeds = iqm(array), array.shape[2]
+    if seeds == 1 or array[0].size < MIN_RUNS:
+        return Intervals(values, np.full(len(array), np.nan), np.full(len(array), np.nan))
+    pivots = np.empty((len(array), resamples))
+    strata = np.arange(array.shape[1])[:, None]
+    step = max(1, _BLOCK // array[0].size)
     for start in range(0, resamples, step):
         count = min(step, resamples - start)
-        drawn = rng.integers(seeds, size=(count, found.shape[1], seeds), dtype=np.int32)
-        for m, runs in enumerate(found):
+        drawn = rng.integers(seeds, size=(count, array.shape[1], seeds), dtype=np.int32)
+        for m, runs in enumerate(array):
             means, errors_of_means = _estimate(runs[strata, drawn])
             with np.errstate(divide="ignore", invalid="ignore"):  # a resample may have no spread at all
                 pivots[m, start : start + count] = (means - values[m]) / errors_of_means
     pivots[np.isnan(pivots)] = 0.0
     # Pivots may be infinite, so an end is one of them and never a mean of two.
     upper, lower = np.quantile(pivots, [0.5 + level / 2.0, 0.5 - level / 2.0], axis=1, method="inverted_cdf")
-    spread = _estimate(found)[1]
+    spread = _estimate(array)[1]
     with np.errstate(invalid="ignore"):
         low, high = (np.where(spread > 0.0, values - pivot * spread, values) for pivot in (upper, lower))
-    least, most = found.min(axis=(1, 2)), found.max(axis=(1, 2))
+    least, most = array.min(axis=(1, 2)), array.max(axis=(1, 2))
     return Intervals(values, np.minimum(np.maximum(low, least), values), np.maximum(np.minimum(high, most), values))
 
 
@@ -97,7 +97,7 @@ def _estimate(runs: Array) -> tuple[Array, Array]:
 
 def check_bootstrap(resamples: int, level: float) -> None:
     """Raise ValueError where an interval of that level cannot be read off so many resamples."""
-    if resamples < LEAST_RESAMPLES:
-        raise ValueError(f"resamples must be at least {LEAST_RESAMPLES}, got {resamples}")
+    if resamples < MIN_RESAMPLES:
+        raise ValueError(f"resamples must be at least {MIN_RESAMPLES}, got {resamples}")
     if not 0.0 < level < 1.0:
         raise ValueError(f"level must lie between 0 and 1, got {level}")

@@ -12,7 +12,7 @@ from posefit.statistics.pairing import finite
 
 @dataclass(frozen=True)
 class Mean:
-    """A mean and the ends of its interval, which are nan where nothing can be said of it."""
+    """A mean and the ends of its interval, nan where it is unknown."""
 
     value: float
     low: float
@@ -25,23 +25,23 @@ def mean_interval(values: ArrayLike, strata: ArrayLike, clusters: ArrayLike, *, 
     Each value belongs to a stratum (n,), such as a kind of problem, and in it to a cluster (n,), such as an instance
     that was drawn: values of one cluster need not be independent of each other, clusters are. The variance is that of
     a stratified sample of clusters, by linearisation (Cochran, Sampling techniques, 1977, 5.9 and 11.8), the interval
-    Student's with Satterthwaite's degrees of freedom (1946). A stratum with one cluster says nothing about others:
+    Student's with Satterthwaite's degrees of freedom (1946). A stratum with one cluster gives no interval:
     low and high are nan. Raises ValueError where values are not finite or the three are not equally long.
     """
-    found = finite("values", values, ("n",))
+    array = finite("values", values, ("n",))
     kinds, drawn = np.asarray(strata), np.asarray(clusters)
-    if kinds.shape != found.shape or drawn.shape != found.shape:
-        raise ValueError(f"strata and clusters must have shape {found.shape}, got {kinds.shape} and {drawn.shape}")
-    value = float(found.mean())
+    if kinds.shape != array.shape or drawn.shape != array.shape:
+        raise ValueError(f"strata and clusters must have shape {array.shape}, got {kinds.shape} and {drawn.shape}")
+    value = float(array.mean())
     variances, freedoms = [], []
     for kind in np.unique(kinds):
         mine = kinds == kind
         _, cluster = np.unique(drawn[mine], return_inverse=True)
-        totals = np.bincount(cluster, found[mine] - found[mine].mean())
+        totals = np.bincount(cluster, array[mine] - array[mine].mean())
         count = len(totals)
         if count < 2:
             return Mean(value, np.nan, np.nan)
-        variances.append(count / (count - 1.0) * float((totals**2).sum()) / len(found) ** 2)
+        variances.append(count / (count - 1.0) * float((totals**2).sum()) / len(array) ** 2)
         freedoms.append(count - 1.0)
     variance = sum(variances)
     if variance == 0.0:

@@ -60,9 +60,9 @@ def targets(traces: Iterable[Trace], count: int = TARGETS) -> Array:
     if not len(ends) or count < 1:
         raise ValueError(f"traces and targets must be at least one, got {len(ends)} and {count}")
     high, low = max(ends[:, 0].max(), LEAST_TARGET), max(ends[:, 1].min(), LEAST_TARGET)
-    found = np.geomspace(high, low, count)
-    found[-1] = low if count > 1 else high  # to the last bit, so that the best run reaches the last target
-    return found
+    costs = np.geomspace(high, low, count)
+    costs[-1] = low if count > 1 else high  # to the last bit, so that the best run reaches the last target
+    return costs
 
 
 def hits(run: Trace, targets: ArrayLike) -> Array:
@@ -77,32 +77,31 @@ def attained(hits: ArrayLike, evaluations: ArrayLike) -> Array:
 
     The empirical distribution of running times over runs and targets: Hansen et al., COCO, 2021.
     """
-    found, grid = (
-        np.sort(np.asarray(hits, dtype=np.float64), axis=None),
-        finite("evaluations", evaluations, ("p",)),
-    )
-    if not len(found) or np.isnan(found).any():
-        raise ValueError(f"hits must be numbers or inf, got {np.count_nonzero(np.isnan(found))} nan of {len(found)}")
-    return np.searchsorted(found, grid, side="right") / len(found)
+    times, grid = np.sort(np.asarray(hits, dtype=np.float64), axis=None), finite("evaluations", evaluations, ("p",))
+    if not len(times) or np.isnan(times).any():
+        raise ValueError(f"hits must be numbers or inf, got {np.count_nonzero(np.isnan(times))} nan of {len(times)}")
+    return np.searchsorted(times, grid, side="right") / len(times)
 
 
 def expected_running_time(hits: ArrayLike, evaluations: ArrayLike) -> Array:
-    """Return the expected evaluations (targets,) to a target by a method that starts anew until it gets there.
+    """Return the expected evaluations (targets,) to a target by a method that restarts until it gets there.
 
     `hits` (runs, targets) as of `hits`, `evaluations` (runs,) what each run used in all. It is what all runs used up
     to their hit, or in all, over the number of runs that hit; inf where none did. Auger and Hansen, 2005.
     """
-    found, used = np.asarray(hits, dtype=np.float64), finite("evaluations", evaluations, ("runs",))
-    if found.ndim != 2 or len(found) != len(used):
-        raise ValueError(f"hits must have shape ({len(used)}, targets), got {found.shape}")
-    late = np.isfinite(found) & (found > used[:, None])
-    if np.isnan(found).any() or late.any():
+    times, used = np.asarray(hits, dtype=np.float64), finite("evaluations", evaluations, ("runs",))
+    if times.ndim != 2 or len(times) != len(used):
+        raise ValueError(f"hits must have shape ({len(used)}, targets), got {times.shape}")
+    late = np.isfinite(times) & (times > used[:, None])
+    if np.isnan(times).any() or late.any():
         raise ValueError(
             "hits must be within a run's evaluations or inf, got " + ("a later one" if late.any() else "nan")
         )
-    reached = np.isfinite(found)
-    spent = np.where(reached, found, used[:, None]).sum(axis=0)
-    return np.asarray(np.divide(spent, reached.sum(axis=0), out=np.full(len(spent), np.inf), where=reached.any(axis=0)))
+    reached = np.isfinite(times)
+    used_in_all = np.where(reached, times, used[:, None]).sum(axis=0)
+    return np.asarray(
+        np.divide(used_in_all, reached.sum(axis=0), out=np.full(len(used_in_all), np.inf), where=reached.any(axis=0))
+    )
 
 
 def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:
@@ -111,11 +110,8 @@ def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:
     `errors` (methods, instances, seeds). Of `ratios` it is the profile of Dolan and Moré, 2002; of errors that mean
     the same on every instance, that of Agarwal et al., 2021.
     """
-    found, edges = (
-        finite("errors", errors, ("methods", "instances", "seeds")),
-        finite("levels", levels, ("levels",)),
-    )
-    runs = np.sort(found.reshape(len(found), -1), axis=1)
+    array, edges = finite("errors", errors, ("methods", "instances", "seeds")), finite("levels", levels, ("levels",))
+    runs = np.sort(array.reshape(len(array), -1), axis=1)
     return np.array([np.searchsorted(row, edges, side="right") / len(row) for row in runs])
 
 
@@ -124,10 +120,10 @@ def ratios(errors: ArrayLike) -> Array:
 
     Raises ValueError where an error is not above 0.
     """
-    found = finite("errors", errors, ("methods", "instances", "seeds"))
-    if found.min() <= 0.0:
-        raise ValueError(f"errors must be above 0 to be compared by ratio, got {found.min():g}")
-    return np.asarray(found / found.min(axis=0))
+    array = finite("errors", errors, ("methods", "instances", "seeds"))
+    if array.min() <= 0.0:
+        raise ValueError(f"errors must be above 0 to be compared by ratio, got {array.min():g}")
+    return np.asarray(array / array.min(axis=0))
 
 
 def _listed(values: Sequence[float] | Array) -> str:

@@ -1,14 +1,15 @@
 """Which of several methods is better, judged by the order of paired errors alone.
 
-A block is what methods are ranked on. With errors (methods, instances, seeds) it is an instance with a seed, and what
-is found holds for these instances. For a claim about instances like these, make each instance one block: give
+A block is what methods are ranked on. With errors (methods, instances, seeds) it is an instance with a seed, and a
+result holds for these instances. For a claim about instances like these, make each instance one block: give
 `errors.mean(axis=2, keepdims=True)`, for seeds of one instance are not independent of each other.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from string import ascii_letters
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ from posefit.arrays import Array
 from posefit.statistics.pairing import finite
 
 LEVEL = 0.05  # of significance
+LETTERS = ascii_letters  # of as many groups at most
 _SHAPE = ("methods", "instances", "seeds")
 
 
@@ -27,9 +29,9 @@ class Ranking:
 
     mean_ranks: Array  # (methods,), 1 is best
     statistic: float  # Friedman's, chi-squared with methods - 1 degrees of freedom
-    p_value: float  # that all methods are alike
+    p_value: float  # of the hypothesis that all methods are equal
     critical_difference: float  # of mean ranks; Nemenyi
-    cliques: tuple[tuple[int, ...], ...]  # methods, best first, that are not told apart; each as large as it can be
+    cliques: tuple[tuple[int, ...], ...]  # methods, best first, that do not differ; each as large as it can be
 
 
 @dataclass(frozen=True)
@@ -50,9 +52,9 @@ def friedman(errors: ArrayLike, level: float = LEVEL) -> Ranking:
     of classifiers over multiple data sets, 2006. Cliques mean little where `p_value` is above `level`. Raises
     ValueError for fewer than 2 methods or 2 blocks.
     """
-    found = finite("errors", errors, _SHAPE, (2, 1, 1))
+    array = finite("errors", errors, _SHAPE, (2, 1, 1))
     _check(level)
-    blocks = found.reshape(len(found), -1).T
+    blocks = array.reshape(len(array), -1).T
     n, k = blocks.shape
     if n < 2:
         raise ValueError(f"blocks, instances times seeds, must be at least 2, got {n}")
@@ -66,21 +68,21 @@ def friedman(errors: ArrayLike, level: float = LEVEL) -> Ranking:
 
 
 def nemenyi_difference(methods: int, blocks: int, level: float = LEVEL) -> float:
-    """Return the difference of mean ranks from which on two methods are told apart. Nemenyi; Demšar, 2006."""
+    """Return the difference of mean ranks from which on two methods differ. Nemenyi; Demšar, 2006."""
     quantile = float(stats.studentized_range.ppf(1.0 - level, methods, np.inf))
     return quantile / math.sqrt(2.0) * math.sqrt(methods * (methods + 1) / (6.0 * blocks))
 
 
 def _cliques(mean: Array, difference: float) -> tuple[tuple[int, ...], ...]:
     order = np.argsort(mean, kind="stable")
-    found: list[tuple[int, ...]] = []
+    cliques: list[tuple[int, ...]] = []
     last = 0
     for start in range(len(order)):
         end = int(np.searchsorted(mean[order], mean[order[start]] + difference, side="left"))
         if end > last and end - start > 1:  # else it is part of the clique before
-            found.append(tuple(int(m) for m in order[start:end]))
+            cliques.append(tuple(int(m) for m in order[start:end]))
         last = max(last, end)
-    return tuple(found)
+    return tuple(cliques)
 
 
 def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) -> list[Comparison]:
@@ -89,12 +91,12 @@ def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) 
     Blocks in which both are equal are ranked but count for neither (Pratt, 1959). The p-value is exact for up to 50
     blocks without ties, as in scipy. Holm's adjustment is over the pairs compared: Holm, 1979.
     """
-    found = finite("errors", errors, _SHAPE, (2, 1, 1))
-    chosen = list(combinations(range(len(found)), 2)) if pairs is None else list(pairs)
+    array = finite("errors", errors, _SHAPE, (2, 1, 1))
+    chosen = list(combinations(range(len(array)), 2)) if pairs is None else list(pairs)
     for pair in chosen:
-        if len({*pair}) != 2 or not all(0 <= m < len(found) for m in pair):
-            raise ValueError(f"pairs must be of two different methods of 0 to {len(found) - 1}, got {pair}")
-    differences = [(found[first] - found[second]).ravel() for first, second in chosen]
+        if len({*pair}) != 2 or not all(0 <= m < len(array) for m in pair):
+            raise ValueError(f"pairs must be of two different methods of 0 to {len(array) - 1}, got {pair}")
+    differences = [(array[first] - array[second]).ravel() for first, second in chosen]
     p_values = np.array([_signed_rank(one) for one in differences])
     return [
         Comparison(first, second, float(np.median(one)), float(p), float(adjusted))
@@ -110,12 +112,36 @@ def _signed_rank(differences: Array) -> float:
 
 def holm(p_values: ArrayLike) -> Array:
     """Return p-values (m,) adjusted so that all m may be judged at one level. Holm, 1979."""
-    found = np.asarray(p_values, dtype=np.float64)
-    order = np.argsort(found, kind="stable")
-    factors = np.arange(len(found), 0, -1)
-    adjusted = np.empty_like(found)
-    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(found[order] * factors))
+    p = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(p, kind="stable")
+    factors = np.arange(len(p), 0, -1)
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * factors))
     return adjusted
+
+
+def compact_letters(count: int, apart: Iterable[tuple[int, int]]) -> list[str]:
+    """Return letters for each of `count` methods, such that two share one exactly where they do not differ.
+
+    `apart` names the pairs, of 0 to count - 1, that differ by some test. The letters are given in the order of the
+    methods, so best first makes `a` the best group. All are empty where 52 letters are not enough. The compact letter
+    display by inserting and absorbing: Piepho, An algorithm for a letter-based representation of all-pairwise
+    comparisons, 2004.
+    """
+    groups = [frozenset(range(count))]
+    for first, second in apart:
+        if first == second or not {first, second} <= set(range(count)):
+            raise ValueError(f"apart must be of two different methods of 0 to {count - 1}, got {(first, second)}")
+        split = {
+            part
+            for group in groups
+            for part in ((group - {first}, group - {second}) if {first, second} <= group else (group,))
+        }
+        groups = [one for one in split if not any(one < other for other in split)]
+        if len(groups) > len(LETTERS):
+            return [""] * count
+    named = dict(zip(LETTERS, sorted(groups, key=sorted), strict=False))
+    return ["".join(letter for letter, group in named.items() if method in group) for method in range(count)]
 
 
 def _check(level: float) -> None:

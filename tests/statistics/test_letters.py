@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from posefit.statistics.letters import LETTERS, compact_letters
+from posefit.statistics.ranks import LETTERS, compact_letters
 
 
 def test_methods_that_nothing_tells_apart_share_one_letter() -> None:

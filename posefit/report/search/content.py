@@ -13,8 +13,8 @@ from posefit.report.content import REASONS
 from posefit.report.search.answer import search_sentence
 from posefit.report.search.match import Match, instance_tests, left_out, match_of, random_rows, search_board
 from posefit.report.search.rows import Searches
+from posefit.statistics.pairing import Shared
 from posefit.statistics.profiles import attained
-from posefit.statistics.sharing import Shared
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.tally import SHOWN, suite_scores

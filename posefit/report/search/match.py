@@ -11,10 +11,9 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.report.search.rows import Searches
-from posefit.statistics.letters import compact_letters
 from posefit.statistics.means import Mean, mean_interval
-from posefit.statistics.ranks import LEVEL, wilcoxon
-from posefit.statistics.sharing import Rows, Shared, gaps, most_shared
+from posefit.statistics.pairing import Rows, Shared, gaps, most_shared
+from posefit.statistics.ranks import LEVEL, compact_letters, wilcoxon
 
 ALL = 100.0  # per cent
 RANDOM = "random"  # the method that is the baseline of all others
