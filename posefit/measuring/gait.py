@@ -19,7 +19,7 @@ from posefit.motion.motion import Motion
 STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps a minute
 LEAST_SPEED = 0.2  # metres a second
 LEAST_STEPS = 2  # of a walk
-MIN_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
+LEAST_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
 WIDEST = 0.35  # metres between the lines that the feet of a walk keep to; who dances or dodges goes wider
 RUNS = 0.5  # the Froude number from which people run rather than walk
 STANDS = 0.57  # share of a stride; a runner's foot stands shorter, judged by the rearmost toes
@@ -173,7 +173,7 @@ def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float
     timed = _values(steps, "step_seconds")
     if len(timed) < LEAST_STEPS:
         return "the feet do not strike in turn at the pace of a walk, or too little is known"
-    if sum(timed) < MIN_SHARE * known:
+    if sum(timed) < LEAST_SHARE * known:
         return f"steps of a walk in {sum(timed):.1f} of {known:.1f} s"
     width = _mean(steps, "step_width")
     return f"steps are {width:.2f} m wide" if width is not None and width > WIDEST else ""
