@@ -1,8 +1,8 @@
-"""Draws the house from its imports: `python docs/house.py [FILE.svg]`.
+"""Draw the packages from their imports: `python docs/architecture.py [FILE.svg]`.
 
 Every package and module right below `posefit`, every plugin package and the environments are a box. An arrow says that
 something in the upper box imports something in the lower one, wherever the import stands, but for those that only a
-type checker sees. An arrow that two others say already is left out. Exit status 1 where boxes import each other in a
+type checker sees. An arrow that two others imply is left out. Exit status 1 where boxes import each other in a
 circle.
 """
 
@@ -20,14 +20,20 @@ HERE = Path(__file__).parent
 
 BOX, GAP, ROW, MARGIN, LETTER = 34, 26, 74, 20, 7.4  # pixels: heights, gaps, and the width of a letter
 SWEEPS = 8  # of the ordering, up and down in turn
-COLOURS = {"floor": "#dbe7f3", "plugin": "#e4f0dc", "environment": "#f6e7cf"}
+COLOURS = {"package": "#dbe7f3", "plugin": "#e4f0dc", "environment": "#f6e7cf"}
 
 Graph = dict[str, frozenset[str]]
 
 
 def imports() -> Graph:
     """Return for each box the boxes that it imports."""
-    plugins = sorted({path.name for folder in ("plugins", "envs") for path in (HERE.parent / folder).glob("posefit_*")})
+    plugins = sorted(
+        {
+            path.parent.name
+            for folder in ("plugins", "envs")
+            for path in (HERE.parent / folder).glob("posefit_*/__init__.py")
+        }
+    )
     found = grimp.build_graph(ROOT, *plugins, cache_dir=None, exclude_type_checking_imports=True)
     graph: dict[str, set[str]] = {}
     for module in found.modules:
@@ -66,7 +72,7 @@ def circle(graph: Mapping[str, Iterable[str]]) -> list[str]:
 
 
 def reduced(graph: Graph) -> Graph:
-    """Return the arrows that no way over other boxes says already."""
+    """Return the arrows that no path over other boxes implies."""
 
     def below(box: str) -> set[str]:
         return {one for lower in graph[box] for one in (lower, *below(lower))}
@@ -76,12 +82,12 @@ def reduced(graph: Graph) -> Graph:
 
 def grouped(graph: Graph) -> tuple[Graph, dict[str, str]]:
     """Return the graph with the plugins that import the same as one box, and the text of every box."""
-    alike: dict[frozenset[str], list[str]] = {}
+    groups: dict[frozenset[str], list[str]] = {}
     for box, lower in graph.items():
-        if _guest(box) and box != ENVIRONMENTS:
-            alike.setdefault(lower, []).append(box)
-    leader = {box: boxes[0] for boxes in alike.values() for box in boxes}
-    texts = {boxes[0]: ", ".join(one.removeprefix("posefit_") for one in boxes) for boxes in alike.values()}
+        if _outside(box) and box != ENVIRONMENTS:
+            groups.setdefault(lower, []).append(box)
+    leader = {box: boxes[0] for boxes in groups.values() for box in boxes}
+    texts = {boxes[0]: ", ".join(one.removeprefix("posefit_") for one in boxes) for boxes in groups.values()}
     kept = {
         box: frozenset(leader.get(one, one) for one in lower)
         for box, lower in graph.items()
@@ -99,9 +105,9 @@ def levels(graph: Graph) -> list[list[str]]:
             height[box] = max([least, *(1 + of(one, 0) for one in graph[box])])
         return height[box]
 
-    own = [box for box in graph if not _guest(box)]
+    own = [box for box in graph if not _outside(box)]
     top = max((of(box, 0) for box in own), default=0)
-    for box in sorted(graph, key=lambda box: box == ENVIRONMENTS):  # what stands on the house stands above it
+    for box in sorted(graph, key=lambda box: box == ENVIRONMENTS):  # the environments stand above all
         of(box, top + 1)
     rows: list[list[str]] = [[] for _ in range(1 + max(height.values()))]
     for box in sorted(height):
@@ -110,7 +116,7 @@ def levels(graph: Graph) -> list[list[str]]:
 
 
 def routed(rows: list[list[str]], graph: Graph) -> tuple[list[list[str]], dict[str, list[str]], list[list[str]]]:
-    """Return the rows with a bend in every row that an arrow passes, what is next below each, and the arrows' ways."""
+    """Return the rows with a bend in every row that an arrow passes, what is next below each, and the arrows' paths."""
     height = {box: level for level, row in enumerate(rows) for box in row}
     rows = [list(row) for row in rows]
     below: dict[str, list[str]] = {box: [] for box in graph}
@@ -147,8 +153,8 @@ def _mean(values: list[float], otherwise: float) -> float:
     return sum(values) / len(values) if values else otherwise
 
 
-def _guest(box: str) -> bool:
-    """Return whether a box is a plugin or the environments, which stand on the house and are no floor of it."""
+def _outside(box: str) -> bool:
+    """Return whether a box is a plugin or the environments, which are outside `posefit`."""
     return box.startswith(f"{ROOT}_")
 
 
@@ -186,7 +192,7 @@ def svg(graph: Graph) -> str:
         lines.append(f'<path d="{path}" fill="none" stroke="#7a8794" marker-end="url(#tip)"/>')
     for box in texts:
         x, y = middles[box]
-        kind = "environment" if box == ENVIRONMENTS else "plugin" if _guest(box) else "floor"
+        kind = "environment" if box == ENVIRONMENTS else "plugin" if _outside(box) else "package"
         left, top = x - widths[box] / 2, y - BOX / 2
         lines.append(
             f'<rect x="{left:.1f}" y="{top:.1f}" width="{widths[box]:.1f}" height="{BOX}" rx="5" '
@@ -197,7 +203,7 @@ def svg(graph: Graph) -> str:
 
 
 def drawing() -> str:
-    """Return the drawing of the house as it is. Raises ValueError naming a circle where there is one."""
+    """Return the drawing. Raises ValueError naming a circle where there is one."""
     graph = imports()
     if found := circle(graph):
         raise ValueError(f"boxes must not import each other in a circle, got {' -> '.join(found)}")
@@ -206,7 +212,7 @@ def drawing() -> str:
 
 def main(arguments: list[str]) -> int:
     """Write the drawing and return the exit status."""
-    path = Path(arguments[0]) if arguments else HERE / "generated" / "house.svg"
+    path = Path(arguments[0]) if arguments else HERE / "generated" / "architecture.svg"
     try:
         text = drawing()
     except ValueError as error:

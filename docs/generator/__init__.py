@@ -1,4 +1,4 @@
-"""Writes the pages of the handbook that say what the code says: settings, figures, equations, commands, modules.
+"""Write the pages of the handbook that are made from the code: settings, figures, equations, commands, modules.
 
 `write` is called by docs/conf.py before every build; what it writes stands in docs/generated, which git ignores.
 """
@@ -6,7 +6,7 @@
 import shutil
 from pathlib import Path
 
-import house
+import architecture
 
 from generator import angles, commands, environments, equations, figures, joints, python, settings
 
@@ -15,7 +15,7 @@ GENERATED = DOCS / "generated"
 
 
 def write() -> None:
-    """Write every generated page anew. Raises ValueError where the packages import each other in a circle."""
+    """Write every generated page. Raises ValueError where the packages import each other in a circle."""
     shutil.rmtree(GENERATED, ignore_errors=True)
     pages = {
         "settings.md": settings.page(),
@@ -26,7 +26,7 @@ def write() -> None:
         "joints.md": joints.page(),
         "angles.md": angles.page(),
         **{f"python/{name}.rst": text for name, text in python.pages().items()},
-        "house.svg": house.drawing(),
+        "architecture.svg": architecture.drawing(),
     }
     for name, text in pages.items():
         path = GENERATED / name

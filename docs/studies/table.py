@@ -83,13 +83,15 @@ def _cells(mine: Sequence[Row]) -> list[str]:
 def field_text(row: Row, field: str) -> str:
     """Return a field of a row's cell as a label; what a cell leaves at its default is a dash."""
     value = row["spec"].get(field)
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping) and value:
         return ", ".join(
             f"{name} {one:g}" if isinstance(one, float) else f"{name} {one}" for name, one in value.items()
         )
     if isinstance(value, list | tuple):
         return ", ".join(Path(one).stem if isinstance(one, str) else f"{one:g}" for one in value)
-    return "-" if value in (None, "") else Path(value).stem if isinstance(value, str) else f"{value:g}"
+    if isinstance(value, str) and value:
+        return Path(value).stem
+    return f"{value:g}" if isinstance(value, int | float) else "-"
 
 
 @click.command(help=__doc__)

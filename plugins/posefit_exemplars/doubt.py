@@ -3,7 +3,7 @@
 How far off a pose is hangs on what is to be seen in its frame: what the silhouette costs, how far the ways are from
 each other, and by how many cameras. So a frame has a *doubt*, the error in metres that these let expect; the model's
 error of joints and angles is so many times that.
-`posefit reproduce posterior --store` makes the numbers.
+`docs/studies/posterior.py --store` makes the numbers.
 """
 
 import json

@@ -4,7 +4,7 @@ Two logistic models of one evidence: what the pose costs, how many times as much
 right exchanged, how far the drawn tracks are from it, how many of them have the other side, whether the person goes
 where he faces, from which side he is seen, and by how many cameras. Much of it stands beside its means over a moment
 and over a second: who is lost stays so for a while, and masks that never fit say less than one that fits worse now.
-`posefit reproduce lost` fits the models.
+`docs/studies/lost.py` fits the models.
 """
 
 import json
@@ -28,7 +28,7 @@ from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.sides import second_side
 from posefit_exemplars.doubt import likely
 
-FITTED = Path(__file__).with_name("lost.json")  # made by `posefit reproduce lost --store`
+FITTED = Path(__file__).with_name("lost.json")  # made by `docs/studies/lost.py --store`
 REACHES: Mapping[str, float] = {
     "lately": 0.2,
     "in general": 1.0,

@@ -1,4 +1,4 @@
-"""Arrays and compiled loops, as every floor of the house uses them."""
+"""Arrays and compiled loops, as every package uses them."""
 
 import os
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Is a frame lost? How likely that is where a search found a pose, by the pose's cost alone.
 
 A logistic model of the logarithm of the cost. The spread of what a search leaves open, the weight of its second mode
-and the cost of the frames before told no more of people whom the model had not seen. `posefit reproduce posterior`
+and the cost of the frames before told no more of people whom the model had not seen. `docs/studies/posterior.py`
 fits it.
 """
 

@@ -1,7 +1,7 @@
-"""The handbook's own scripts, docs/house.py and docs/generator, can be imported here."""
+"""The handbook's own scripts in docs/ and docs/studies can be imported here."""
 
 import sys
 
 from tests.docs.pages import DOCS
 
-sys.path.insert(0, str(DOCS))
+sys.path[:0] = [str(DOCS), str(DOCS / "studies")]

@@ -14,18 +14,12 @@ from tests.docs import shell
 from tests.docs.pages import RUN, SHOWN, Block, blocks, pages
 
 BLOCKS = [block for page in pages() for block in blocks(page)]
-KEPT = [block for block in BLOCKS if block.mark]
 SLOW = ("docs/ways/sweep.md",)  # pages that take longer than a minute on a busy machine
 
 
 def _run() -> list[object]:
     names = dict.fromkeys(block.page for block in BLOCKS if block.language in RUN and block.mark != "not run")
     return [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else [], id=name) for name in names]
-
-
-@pytest.mark.parametrize("block", BLOCKS, ids=str)
-def test_a_block_says_what_language_it_is(block: Block) -> None:
-    assert block.language in (*RUN, *SHOWN)
 
 
 @pytest.mark.parametrize("page", _run())
@@ -57,27 +51,26 @@ def _shell(block: Block, folder: Path) -> None:
     assert result.returncode == 0, f"{block}: {result.stderr[-2000:]}"
 
 
-@pytest.mark.parametrize("block", KEPT, ids=lambda block: f"{block}, {block.reason}")
-def test_a_block_that_does_not_run_says_why_and_is_right(block: Block) -> None:
-    assert len(block.reason) > 10
-    if block.language == "python":
-        compile(block.text, str(block), "exec")
-    elif block.language == "toml":
-        tomllib.loads(block.text)
-    else:
-        assert block.language == "sh"
-        found = list(shell.commands(block.text))
-        assert found
-        for words in found:
+def test_blocks_are_of_a_known_language_and_those_that_are_not_run_are_right() -> None:
+    for block in BLOCKS:
+        assert block.language in (*RUN, *SHOWN), block
+        if not block.mark:
+            continue
+        assert len(block.reason) > 10, block
+        if block.language == "python":
+            compile(block.text, str(block), "exec")
+        elif block.language == "toml":
+            tomllib.loads(block.text)
+        else:
+            found = list(shell.commands(block.text))
+            assert found, block
+            for words in found:
+                shell.check(words)
+
+
+def test_the_check_of_commands_notices_wrong_ones() -> None:
+    for line in ["posefit trakc walk", "posefit track --no-such-option 1", "posefit extract video.mp4", "rm -r results",
+                 "python -m posefit_reproduce.nothing", "python -m pip install -e '.[nothing]'"]:  # fmt: skip
+        (words,) = shell.commands(line)
+        with pytest.raises((AssertionError, click.UsageError)):
             shell.check(words)
-
-
-@pytest.mark.parametrize(
-    "line",
-    ["posefit trakc walk", "posefit track --no-such-option 1", "posefit extract video.mp4", "rm -r results",
-     "python -m posefit_reproduce.nothing", "python -m pip install -e '.[nothing]'"],
-)  # fmt: skip
-def test_a_command_that_is_none_is_seen(line: str) -> None:
-    (words,) = shell.commands(line)
-    with pytest.raises((AssertionError, click.UsageError)):
-        shell.check(words)
