@@ -31,7 +31,7 @@ from posefit.tracking.evaluation import LOST
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.run import follow
 from posefit.uncertainty.calibration import auroc, calibration_error, false_alarms, kept_errors
-from posefit_exemplars.lost import NAMES, Detector, Judge, Memory
+from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
 from posefit_reproduce.grid import Progress, each
 from table import WORKERS, bar, markdown, percent
 
@@ -189,7 +189,7 @@ SIDES_SIGNS = (
 )
 
 
-class Said(NamedTuple):
+class Predictions(NamedTuple):
     """What is said of the frames of a row."""
 
     lost: Array  # (T,) how likely each is lost
@@ -199,7 +199,7 @@ class Said(NamedTuple):
 
 def features(row: Row) -> Array:
     """Return the features (T, F) of a track's frames, as the tracker has them."""
-    memory = Memory(row["fps"])
+    memory = EvidenceMeans(row["fps"])
     return np.array([memory.features(told) for told in row["evidence"]])
 
 
@@ -218,7 +218,7 @@ def fit(rows: Sequence[Row]) -> dict[str, Any]:
     return _fitted(rows, [features(row) for row in rows])
 
 
-def judge(rows: Sequence[Row]) -> list[Said]:
+def judge(rows: Sequence[Row]) -> list[Predictions]:
     """Return what is said of each row by models that were fitted to other people.
 
     Raises ValueError where there are fewer than three: of the others, too, each is left out once.
@@ -226,13 +226,13 @@ def judge(rows: Sequence[Row]) -> list[Said]:
     if len(people := dict.fromkeys(row["subject"] for row in rows)) < 3:
         raise ValueError(f"rows must be of three people or more, got those of {', '.join(people)}")
     known = [features(row) for row in rows]
-    found: list[Said] = [Said(np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))] * len(rows)
+    found: list[Predictions] = [Predictions(np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))] * len(rows)
     for his, others in _left_out(rows):
-        models = Judge.from_dict(_fitted([rows[k] for k in others], [known[k] for k in others]))
+        models = FailureClassifier.from_dict(_fitted([rows[k] for k in others], [known[k] for k in others]))
         for k in his:
             exchanged = np.array([models.sides.probability(one) for one in known[k]])
             lost = np.array([models.lost.probability(one) for one in known[k]])
-            found[k] = Said(lost, exchanged, exchanged >= models.unknown)
+            found[k] = Predictions(lost, exchanged, exchanged >= models.unknown)
     return found
 
 
@@ -251,7 +251,7 @@ def _fitted(rows: Sequence[Row], known: Sequence[Array]) -> dict[str, Any]:
     for his, others in _left_out(rows):
         mine = [rows[k] for k in others]
         told = _logistic("swapped", np.concatenate([known[k] for k in others]), swapped_frames(mine), SIDES_SIGNS)
-        detector = Detector.from_dict(told)
+        detector = LogisticModel.from_dict(told)
         exchanged.append(np.array([detector.probability(one) for k in his for one in known[k]]))
         swapped.append(swapped_frames([rows[k] for k in his]))
     return {"lost": lost, "sides": sides, "unknown": _unknown(np.concatenate(exchanged), np.concatenate(swapped))}
@@ -424,13 +424,13 @@ def _errors(rows: Sequence[Row]) -> Array:
     return np.concatenate([np.array(row["mpjpe_mm"]) for row in rows])
 
 
-def sides_table(rows: Sequence[Row], said: Sequence[Said]) -> list[dict[str, Any]]:
+def sides_table(rows: Sequence[Row], said: Sequence[Predictions]) -> list[dict[str, Any]]:
     """Return how often sides are exchanged, called unknown, and both, of all rows and of parts of them."""
     every = list(zip(rows, said, strict=True))
     return [_sides_figures(name, part) for name, part in _parted(every)]
 
 
-def _sides_figures(name: str, found: Sequence[tuple[Row, Said]]) -> dict[str, Any]:
+def _sides_figures(name: str, found: Sequence[tuple[Row, Predictions]]) -> dict[str, Any]:
     swapped = swapped_frames([row for row, _ in found])
     exchanged, unknown = (np.concatenate([getattr(one, key) for _, one in found]) for key in ("exchanged", "unknown"))
 

@@ -40,7 +40,7 @@ from posefit.uncertainty.calibration import (
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import APART, Posterior, modes_of
 from posefit.uncertainty.sides import nearer_mirrored, second_side
-from posefit_exemplars.doubt import Doubt, evidence, none_signs
+from posefit_exemplars.calibration import Calibration, evidence, none_features
 from posefit_reproduce.grid import Progress, each
 from table import WORKERS, bar, markdown
 
@@ -268,7 +268,7 @@ class Kept:
         return cls(track, seen, track.off[:, 1:].mean(axis=1), swapped, second, modes, np.array(nearest))
 
 
-def doubt_of(tracks: Sequence[Kept]) -> Doubt:
+def doubt_of(tracks: Sequence[Kept]) -> Calibration:
     """Return what makes the intervals and the weights of modes of tracks mean what they say."""
     doubt = _doubt(tracks)
     joints, angles = _spreads(doubt, tracks)
@@ -293,9 +293,9 @@ def _sharpness(tracks: Sequence[Kept]) -> float:
     return float(SHARPNESSES[int(np.argmax(likely))])
 
 
-def _none(doubt: Doubt, tracks: Sequence[Kept]) -> Array:
+def _none(doubt: Calibration, tracks: Sequence[Kept]) -> Array:
     """Return the coefficients (3,) of the log-odds that no mode is right: the truth is far from the nearest one."""
-    signs = np.array([none_signs(doubt.log(seen)) for one in tracks for seen in one.seen])
+    signs = np.array([none_features(doubt.log(seen)) for one in tracks for seen in one.seen])
     return logistic(signs, np.concatenate([one.nearest[:, 1] > APART for one in tracks]), frame_weights(tracks))
 
 
@@ -307,7 +307,7 @@ def frame_weights(tracks: Sequence[Kept]) -> Array:
     return np.asarray(np.concatenate(each) / len(frames))
 
 
-def _doubt(tracks: Sequence[Kept]) -> Doubt:
+def _doubt(tracks: Sequence[Kept]) -> Calibration:
     """Return how the logarithm of the error follows from what is seen, by weighted least squares."""
     seen, error = np.concatenate([one.seen for one in tracks]), np.concatenate([one.error for one in tracks])
     weights = frame_weights(tracks)
@@ -316,13 +316,13 @@ def _doubt(tracks: Sequence[Kept]) -> Doubt:
     )
     low, high = np.quantile(seen @ slopes, [0.005, 0.995])
     ones = Recalibration()
-    return Doubt(
+    return Calibration(
         slopes, (float(low), float(high)), ones.joint_spreads, ones.angle_spreads, ones.joint_factors,
         ones.angle_factors, 1.0, np.zeros(3),
     )  # fmt: skip
 
 
-def _spreads(doubt: Doubt, tracks: Sequence[Kept]) -> tuple[Array, Array]:
+def _spreads(doubt: Calibration, tracks: Sequence[Kept]) -> tuple[Array, Array]:
     """Return the spreads of joints (27,) and angles (66,), in doubts, at which the truth is likeliest."""
     joints, angles = np.zeros((len(TRIED), len(JOINTS))), np.zeros((len(TRIED), ANGLES))
     weights, begin = frame_weights(tracks), 0
@@ -347,7 +347,7 @@ def _spreads(doubt: Doubt, tracks: Sequence[Kept]) -> tuple[Array, Array]:
     return found, TRIED[angles.argmax(axis=0)]
 
 
-def _factors(doubt: Doubt, tracks: Sequence[Kept]) -> tuple[Array, Array]:
+def _factors(doubt: Calibration, tracks: Sequence[Kept]) -> tuple[Array, Array]:
     """Return the conformal factors of joints (levels, 27) and angles (levels, 66), each of its group."""
     clips: dict[object, list[tuple[Array, Array]]] = {}
     for one in tracks:
@@ -364,7 +364,7 @@ def _factors(doubt: Doubt, tracks: Sequence[Kept]) -> tuple[Array, Array]:
     return factors[0], factors[1]
 
 
-def scores(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
+def scores(doubt: Calibration, one: Kept, every: int = 1) -> tuple[Array, Array]:
     """Return how far joints (T, levels, 27) and angles (T, levels, 66) are off, in radii of their intervals."""
     track = one.track
     turned = np.abs(wrapped(track.truth - track.told))[::every, None]
@@ -372,13 +372,13 @@ def scores(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
     return track.off[::every, None] / np.maximum(radii, TINY), turned / np.maximum(halves, TINY)
 
 
-def radii_and_angles_held(doubt: Doubt, one: Kept) -> tuple[Array, NDArray[np.bool_]]:
+def radii_and_angles_held(doubt: Calibration, one: Kept) -> tuple[Array, NDArray[np.bool_]]:
     """Return the radii of joints (T, levels, 27), metres, and whether angles (T, levels, 66) are in their intervals."""
     radii, halves = radii_of(doubt, one)
     return radii, np.abs(wrapped(one.track.truth - one.track.told))[:, None] <= halves
 
 
-def radii_of(doubt: Doubt, one: Kept, every: int = 1) -> tuple[Array, Array]:
+def radii_of(doubt: Calibration, one: Kept, every: int = 1) -> tuple[Array, Array]:
     """Return the radii of joints (T, levels, 27) and the half intervals of angles (T, levels, 66)."""
     joints, angles, track = [], [], one.track
     for k in range(0, len(track), every):
@@ -465,7 +465,7 @@ class Judged:
     turned: Array = field(repr=False)  # (levels,) share of angles that are inside
 
 
-def judgement(doubt: Doubt, kept: Kept) -> Judged:
+def judgement(doubt: Calibration, kept: Kept) -> Judged:
     """Return what is said of a track."""
     logs = np.array([doubt.log(seen) for seen in kept.seen])
     radii, angles = radii_and_angles_held(doubt, kept)

@@ -1,6 +1,7 @@
-"""The likeliest ways to where a person may be now: Viterbi's recursion over the states that are worth a look.
+"""The states that a frame may be in, and the costs of steps between them: a beam search.
 
-A state is a pose of the exemplars and a yaw. Its total is what its best way has cost: silhouettes, steps and jumps.
+A state is a pose of the exemplars and a yaw. Its total is the cost of the best path to it: of silhouettes, steps
+and jumps.
 """
 
 from collections.abc import Callable
@@ -11,17 +12,16 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit_exemplars import kernels
-from posefit_exemplars.codes import Codes, Rows
-from posefit_exemplars.exemplars import Exemplars, about_vertical
+from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 
 BINS = 36  # of a full turn: two states of one pose in one bin are one
 SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
 TURN = np.radians(7.0)  # how far a candidate turns away from its clip, to either side, or not at all
-NEAR = 4  # groups of poses that a state goes on to
-SHARES = 20  # of a beam: poses that are alike and face alike have one of them at most
+NEAR_GROUPS = 4  # groups of poses that a state goes on to
+MAX_SHARES = 20  # of a beam: similar poses with similar yaws have at most one of them
 FACINGS = 4  # yaws, of which each may have its share of a beam to itself
-WHIRL = 100.0  # cost of a radian that somebody turns farther than anybody does
-HOPELESS = 8.0  # beyond the cost of a jump; what costs more is not looked at
+SPIN_COST = 100.0  # cost of each radian beyond the fastest possible turn
+MAX_EXCESS_COST = 8.0  # beyond the cost of a jump; steps that cost more are left out
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Steps:
     straying: float  # metres that an aligned root may be off where its clip goes on, across the line of sight
     depth: float  # and along it
     pace: float  # metres that a known root may be off where its clip goes on
-    fastest: float = np.inf  # radians that nobody turns by in a step
+    fastest: float = np.inf  # radians: the fastest possible turn in a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,20 +55,20 @@ class Beam:
         return Beam(self.states[rows], self.yaws[rows], self.parents[rows], self.totals[rows], self.places[rows])
 
 
-def assorted(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> Rows:
-    """Return the states of least `totals` (n,), but of those that are alike and face alike only the best few.
+def diverse_best(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> Rows:
+    """Return the states of least `totals` (n,), but only the best few of those with similar poses and yaws.
 
-    What else somebody may be doing is often behind for a while before silhouettes tell that it is right.
+    The right alternative often costs more for a while, until later silhouettes confirm it.
     """
     kind = exemplars.kinds[beam.states] * BINS + bins_of(beam.yaws)
     order = np.lexsort((totals, kind))
     begins = np.flatnonzero(np.diff(kind[order], prepend=-1))
     rank = np.arange(len(order)) - np.repeat(begins, np.diff(np.append(begins, len(order))))
-    kept = order[rank < max(most // SHARES, 1)]
+    kept = order[rank < max(most // MAX_SHARES, 1)]
     return kept[np.argsort(totals[kept], kind="stable")[:most]]
 
 
-def joined_beams(*beams: Beam) -> Beam:
+def merged(*beams: Beam) -> Beam:
     """Return the states of all beams; of several of one pose in one bin of yaw the one of least total."""
     names = ("states", "yaws", "parents", "totals", "places")
     states, yaws, parents, totals, places = (np.concatenate([getattr(one, name) for one in beams]) for name in names)
@@ -85,7 +85,7 @@ def bins_of(yaws: Array) -> Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Ahead:
+class Continuations:
     """Where the clips of a beam's states go on, at each of the speeds."""
 
     codes: list[Codes]  # (n, D) at a speed
@@ -94,7 +94,7 @@ class Ahead:
     places: Array  # (n, 3) at the clip's own speed
 
     @classmethod
-    def of(cls, exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, root: Array | None) -> "Ahead":
+    def of(cls, exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, root: Array | None) -> "Continuations":
         """Return where clips are so much later, and how far from `root` (3,), where it is known, they put the body."""
         ahead = [exemplars.after(beam.states, seconds * speed) for speed in SPEEDS]
         places = [beam.places + about_vertical(way, beam.yaws) for _, _, way in ahead]
@@ -110,29 +110,29 @@ class Ahead:
         double = 2.0 * steps.spread**2
         each = zip(self.codes, self.ways, strict=True)
         return np.asarray(
-            np.minimum.reduce([squares(code[rows], codes) / double + way[rows, None] for code, way in each])
+            np.minimum.reduce([squared_distances(code[rows], codes) / double + way[rows, None] for code, way in each])
         )
 
 
-def stepped(
+def next_states(
     exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, most: int, root: Array | None = None
 ) -> Beam:
     """Return the states that those of a beam may be in so much later, each by its cheapest step; at most so many.
 
     A pose costs half the square of its distance, over the spread, from what its parent's clip did next at one of the
     speeds; a yaw half the square of its turn away from the clip's own. Where the root is known to be at `root` (3,),
-    its distance d from where the clip's own way leads costs log(1 + d^2 / 2 / pace^2), which bears that somebody is
-    faster or slower than all clips: who walks goes where he faces, and sways to the side of the foot he stands on.
+    its distance d from where the clip's own way leads costs log(1 + d^2 / 2 / pace^2), which allows a
+    person to be faster or slower than all clips.
     """
-    ahead = Ahead.of(exemplars, beam, seconds, steps, root)
+    ahead = Continuations.of(exemplars, beam, seconds, steps, root)
     centres = exemplars.codes[exemplars.centres]
-    near = min(NEAR, len(centres))
-    groups = np.argpartition(squares(ahead.codes[SPEEDS.index(1.0)], centres), near - 1, axis=1)[:, :near]
-    limit = beam.totals.min() + steps.jump + HOPELESS
+    near = min(NEAR_GROUPS, len(centres))
+    groups = np.argpartition(squared_distances(ahead.codes[SPEEDS.index(1.0)], centres), near - 1, axis=1)[:, :near]
+    limit = beam.totals.min() + steps.jump + MAX_EXCESS_COST
     codes, ways = np.stack(ahead.codes), np.stack(ahead.ways)
     least, owners, touched = np.full(len(exemplars), np.inf), *np.empty((2, len(exemplars)), dtype=np.int64)
     bins = bins_of(ahead.yaws)
-    found: list[tuple[Rows, Rows, Array]] = []
+    groups_reached: list[tuple[Rows, Rows, Array]] = []
     for one in np.unique(bins):
         rows = np.flatnonzero(bins == one)
         count = kernels.cheapest_steps(
@@ -154,8 +154,8 @@ def stepped(
         if count > most // FACINGS:
             best = np.argpartition(total, most // FACINGS)[: most // FACINGS]
             reached, total = reached[best], total[best]
-        found.append((exemplars.members[reached], owners[reached], total))
-    states, parents, totals = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        groups_reached.append((exemplars.members[reached], owners[reached], total))
+    states, parents, totals = (np.concatenate(parts) for parts in zip(*groups_reached, strict=True))
     turns = np.repeat([0.0, -TURN, TURN], len(states))
     states, parents, totals = (np.tile(one, 3) for one in (states, parents, totals))
     every = Beam(
@@ -165,11 +165,11 @@ def stepped(
         totals + 0.5 * (turns / steps.turning) ** 2,
         ahead.places[parents],
     )
-    found_all = joined_beams(every)
-    return found_all.chosen(assorted(exemplars, found_all, found_all.totals, most))
+    found_all = merged(every)
+    return found_all.chosen(diverse_best(exemplars, found_all, found_all.totals, most))
 
 
-def jumped(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:
+def jump_states(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:
     """Return states as the best of a beam may jump to them."""
     best = int(beam.totals.argmin())
     many = len(states)
@@ -182,13 +182,13 @@ def jumped(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:
     )
 
 
-def squares(some: Codes, others: Codes) -> Codes:
+def squared_distances(some: Codes, others: Codes) -> Codes:
     """Return the squared distances (n, m) of codes."""
     squares = (some**2).sum(axis=1)[:, None] - 2.0 * (some @ others.T) + (others**2).sum(axis=1)
     return np.asarray(np.maximum(squares, 0.0))
 
 
-def strayed(places: Array, expected: Array, eye: Array | None, steps: Steps) -> Array:
+def root_deviation_costs(places: Array, expected: Array, eye: Array | None, steps: Steps) -> Array:
     """Return what it costs that aligned roots are at `places` (n, 3) where they were `expected` (..., n, 3).
 
     `eye` (3,) is where the only camera stands: a silhouette tells little of how far away from it a body is.
@@ -211,7 +211,7 @@ class Transition:
     before: Beam  # n states of a frame
     beam: Beam  # m states of the next one
     seconds: float  # between them
-    root: Array | None  # (3,) metres: where the root is in the next one, where somebody knows
+    root: Array | None  # (3,) metres: where the root is in the next one, if it is known
     eye: Array | None  # (3,) metres: where the only camera stands; None where there are several
 
 
@@ -221,13 +221,13 @@ Transitions = Callable[[Transition], Array]
 def transition_costs(transition: Transition, *, steps: Steps) -> Array:
     """Return what each step from a state of one frame to one of the next costs (n, m).
 
-    None costs more than a jump, unless it turns farther than anybody does.
+    None costs more than a jump, unless it turns faster than possible.
     """
     exemplars, before, beam, root = transition.exemplars, transition.before, transition.beam, transition.root
-    ahead = Ahead.of(exemplars, before, transition.seconds, steps, root)
+    ahead = Continuations.of(exemplars, before, transition.seconds, steps, root)
     costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)  # TOYAMA2001 (dynamics)
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
-        costs += strayed(beam.places, ahead.places[:, None], transition.eye, steps)
+        costs += root_deviation_costs(beam.places, ahead.places[:, None], transition.eye, steps)
     turned = np.abs(wrapped(beam.yaws - before.yaws[:, None]))
-    return np.asarray(np.minimum(costs, steps.jump) + WHIRL * np.maximum(turned - steps.fastest, 0.0))
+    return np.asarray(np.minimum(costs, steps.jump) + SPIN_COST * np.maximum(turned - steps.fastest, 0.0))

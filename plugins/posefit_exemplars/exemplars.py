@@ -1,20 +1,87 @@
-"""The states of the model: poses of clips, with what came after each of them, and groups of poses that are alike."""
+"""The states of the model: poses of clips, with what came after each of them, and groups of similar poses.
+
+Poses are compared by codes: a few numbers a pose.
+"""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry import alike
-from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.motion.motion import Motion
-from posefit_exemplars.codes import Codes, Coding, Rows, groups, thinned
+
+Codes = NDArray[np.float32]  # (n, D): two of them are as far apart as the joints of their poses, root mean square
+Rows = NDArray[np.int64]
+
+DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
+SAME = 0.02  # metres between the codes of poses that need not both be kept
+
+
+@dataclass(frozen=True, eq=False)
+class Coding:
+    """Principal components of the joints of bodies that are turned to yaw 0."""
+
+    skeleton: Skeleton
+    mean: Array  # (81,) metres
+    axes: Array = field(repr=False)  # (81, D)
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, clips: Iterable[Array]) -> Self:
+        """Return the components of the poses (K, 66) of all clips, one after the other."""
+        count, total, squares = 0, np.zeros(3 * len(JOINTS)), np.zeros((3 * len(JOINTS), 3 * len(JOINTS)))
+        for poses in clips:
+            joints = _facing(skeleton, poses)
+            count, total, squares = count + len(joints), total + joints.sum(axis=0), squares + joints.T @ joints
+        mean = total / count
+        _, axes = np.linalg.eigh(squares - count * np.outer(mean, mean))
+        return cls(skeleton, mean, axes[:, : -DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)))
+
+    def coded(self, poses: Array) -> Codes:
+        """Return the codes (K, D) of poses (K, 66)."""
+        return np.asarray((_facing(self.skeleton, poses) - self.mean) @ self.axes, dtype=np.float32)
+
+
+def _facing(skeleton: Skeleton, poses: Array) -> Array:
+    facing = poses.copy()
+    facing[:, 0] = 0.0
+    return np.asarray(skeleton.joints(facing).reshape(len(poses), -1))
+
+
+def thinned_frames(codes: Codes) -> Rows:
+    """Return which frames of a clip to keep: each two centimetres or more from the last one kept, and both ends."""
+    kept = [0]
+    for k in range(1, len(codes)):
+        if k == len(codes) - 1 or float(((codes[k] - codes[kept[-1]]) ** 2).sum()) > SAME**2:
+            kept.append(k)
+    return np.array(kept)
+
+
+def groups(codes: Codes, most: int) -> tuple[Rows, Rows]:
+    """Return centres (G,), each as far from those before it as any pose, and the group (K,) of each pose's nearest.
+
+    Farthest-first traversal: Gonzalez, Clustering to minimize the maximum intercluster distance, 1985.
+    """
+    squares = (codes**2).sum(axis=1)
+    nearest = np.full(len(codes), np.inf, dtype=np.float32)
+    owners, centres = np.zeros(len(codes), dtype=np.int64), [0]
+    while True:
+        away = squares - 2.0 * (codes @ codes[centres[-1]]) + squares[centres[-1]]
+        closer = away < nearest
+        nearest[closer], owners[closer] = away[closer], len(centres) - 1
+        farthest = int(nearest.argmax())
+        if len(centres) == most or nearest[farthest] <= SAME**2:
+            return np.array(centres), owners
+        centres.append(farthest)  # TOYAMA2001 (exemplars)
+
 
 KINDS = 40  # of poses, as unlike as can be
-GROUPS = 1000  # of poses that are alike; fewer where there are fewer poses
+GROUPS = 1000  # of similar poses; fewer where there are fewer poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +125,7 @@ class Exemplars:
         for source in sources:
             motion = clip(*source)
             codes = coding.coded(motion.poses)
-            rows = thinned(codes)
+            rows = thinned_frames(codes)
             kept.append((motion.poses[rows], codes[rows], motion.translations[rows], rows / motion.fps))
         poses, codes, paths, times = (np.concatenate(parts) for parts in zip(*kept, strict=True))
         clips = np.repeat(np.arange(len(kept)), [len(one[0]) for one in kept])
@@ -111,7 +178,7 @@ class Exemplars:
     def drawn(self, count: int, rng: np.random.Generator) -> Rows:
         """Return poses drawn at random, of a group as often as the root of its size says.
 
-        All poses alike, nearly all would stand; all groups alike, nearly all would be acrobatic.
+        With equal weights of poses nearly all would stand; with equal weights of groups nearly all would be acrobatic.
         """
         sizes = np.diff(self.bounds)
         ends = np.cumsum(np.sqrt(sizes))
@@ -128,19 +195,19 @@ _latest: tuple[bytes, Exemplars] | None = None
 
 
 def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> Exemplars:
-    """Return the states of motions; those of the same motions and skeleton as the last time are not made again."""
+    """Return the states of motions; the latest are kept for the same motions and skeleton."""
     global _latest
-    told = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
+    digest = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
     for array in (
         skeleton.offsets,
         skeleton.axes,
         *(motion.skeleton.axes for motion in motions),
         *(motion.poses for motion in motions),
     ):
-        told.update(np.ascontiguousarray(array).tobytes())
+        digest.update(np.ascontiguousarray(array).tobytes())
     for motion in motions:
-        told.update(motion.translations.tobytes())
-    key = told.digest()
+        digest.update(motion.translations.tobytes())
+    key = digest.digest()
     latest = _latest  # read once: another thread may replace it at any time
     if latest is None or latest[0] != key:
         latest = _latest = key, Exemplars.of(motions, skeleton, mirrored=mirrored)
@@ -148,7 +215,7 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
 
 
 def mirror_image(motion: Motion) -> Motion:
-    """Return what a mirror in the plane x = 0 shows of a motion: whose right is his left."""
+    """Return a motion mirrored in the plane x = 0: left and right are exchanged."""
     poses = alike.mirrored_poses(motion.skeleton, motion.poses)
     poses[:, 0] *= -1.0
     return replace(motion, poses=poses, translations=motion.translations * [-1.0, 1.0, 1.0])

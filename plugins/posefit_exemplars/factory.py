@@ -16,7 +16,7 @@ from posefit_exemplars.exemplars import exemplars_of
 from posefit_exemplars.refinement import Make
 from posefit_exemplars.tracker import REFINED, ExemplarTracker
 
-LEAST = 300  # evaluations that every stage of a frame has something of
+MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
 
 
 def exemplars(
@@ -38,26 +38,26 @@ def exemplars(
     samples: int = 24,
     posterior_temperature: float = 8.0,
 ) -> ExemplarTracker:
-    """Follows the clips that it learned from, by the likeliest way through them (Toyama and Blake, 2001).
+    """The likeliest path through recorded clips (Toyama and Blake, 2001).
 
-    What a person may stray or turn is meant for a thirtieth of a second, whatever the frame rate.
+    Distances and turns in the settings are for a thirtieth of a second, whatever the frame rate.
 
     Settings:
-        spread: metres that joints may be off where a clip goes on, root mean square; above 0.
-        turning_degrees: how far a body may turn away from its clip; above 0.
-        jump: what a step to any other pose costs, in units of cost over the temperature; 0 or more.
-        temperature: what silhouette costs are divided by; above 0. Costs of frames err together, so more than 1.
-        straying: metres that a root that is aligned may be off where its clip goes on, to the side or up; above 0.
-        depth: and towards or away from a single camera; above 0.
-        pace: metres that a root that is known may be off where its clip goes on; above 0.
-        lag: frames that are seen before a pose is told, 0 or more.
+        spread: distance of joints from where a clip goes on, metres, root mean square; above 0.
+        turning_degrees: standard deviation of turns away from the clip; above 0.
+        jump: cost of a step to any other pose, in units of cost over the temperature; 0 or more.
+        temperature: divides silhouette costs; above 0. Errors of successive frames are correlated, so more than 1.
+        straying: distance of an aligned root from where its clip goes on, to the side or up, metres; above 0.
+        depth: the same towards or away from a single camera, metres; above 0.
+        pace: distance of a known root from where its clip goes on, metres; above 0.
+        lag: later frames that are used before a pose is reported, 0 or more.
         mirrored: whether the mirror images of all clips are learned from as well.
         refiner: the optimiser that searches around the path, or "none".
-        pull: what a standard deviation away from the path costs beside a silhouette, 0 or more.
+        pull: cost of a standard deviation away from the path, beside the silhouette, 0 or more.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        transitions: what gives the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
-        samples: tracks that are drawn from the posterior, 0 or more; with 0 no frame says how likely it is lost.
-        posterior_temperature: what silhouette costs are divided by in that posterior; above 0.
+        transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
+        samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
+        posterior_temperature: divides silhouette costs in that posterior; above 0.
     """
     for name, value in (
         ("spread", spread),
@@ -73,8 +73,8 @@ def exemplars(
     for name, value in (("jump", jump), ("pull", pull), ("smoothing", smoothing)):
         if not 0.0 <= value < math.inf:
             raise ValueError(f"{name} must be 0 or more and finite, got {value}")
-    if task.evaluations < LEAST:
-        raise ValueError(f"evaluations must be at least {LEAST} for exemplars, got {task.evaluations}")
+    if task.evaluations < MIN_EVALUATIONS:
+        raise ValueError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
     for name, count in (("lag", lag), ("samples", samples)):
         if count < 0:
             raise ValueError(f"{name} must be 0 or more, got {count}")
@@ -115,7 +115,7 @@ def _named(name: str) -> Transitions:
 
 
 def _checked(transitions: Transitions, transition: Transition) -> Array:
-    """Return what somebody's model says. Raises ValueError where that is no number for every step."""
+    """Return the costs of a model of transitions. Raises ValueError where they are not one finite number a step."""
     costs, shape = np.asarray(transitions(transition), dtype=np.float64), (len(transition.before), len(transition.beam))
     if costs.shape != shape or not np.isfinite(costs).all():
         raise ValueError(f"transitions must return finite costs of shape {shape}, got shape {costs.shape}")

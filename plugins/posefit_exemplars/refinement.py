@@ -11,8 +11,7 @@ from posefit.fitting.box import Space, Start
 from posefit.fitting.optimiser import Optimiser, minimise
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
-from posefit_exemplars.codes import Codes
-from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.exemplars import Codes, Exemplars
 
 LIKE = 600  # poses of the exemplars whose differences are searched
 COMPONENTS = 28  # of them

@@ -1,4 +1,4 @@
-"""A zero-phase filter over what was found: a Gaussian that looks as far ahead as back, so that nothing comes late."""
+"""A zero-phase filter of poses over time: a Gaussian that looks as far ahead as back."""
 
 import time
 from collections import deque
@@ -11,47 +11,47 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.geometry.rotation import wrapped
-from posefit_exemplars.doubt import recalibrated
-from posefit_exemplars.look import Look
-from posefit_exemplars.sampling import Ways
+from posefit_exemplars.calibration import recalibrated
+from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.window import SampledPaths
 
 SMOOTHED = 3.0  # standard deviations that the filter reaches to either side
 
 
 @dataclass(frozen=True, eq=False)
-class Finding:
-    """What was found in a frame."""
+class Estimate:
+    """The pose estimated in a frame, before it is smoothed."""
 
     pose: Array  # (66,)
     place: Array  # (3,)
-    look: Look = field(repr=False)
+    look: FrameCosts = field(repr=False)
     evaluations: float
     seconds: float
     cpu_seconds: float
-    drawn: Ways | None = None  # where ways through the states are
+    drawn: SampledPaths | None = None  # where the sampled paths are
 
 
-def smoothed(frames: Iterable[Finding], spread: float, ahead: int) -> Iterator[Frame]:
+def smoothed(frames: Iterable[Estimate], spread: float, ahead: int) -> Iterator[Frame]:
     """Yield each frame as the weighted mean of those up to `ahead` before and after it, `ahead` frames later.
 
     `spread` is the standard deviation of the weights, in frames; 0 leaves everything as it is.
     """
-    recent: deque[Finding] = deque()
-    here = 0  # where in `recent` the next one to tell is
+    recent: deque[Estimate] = deque()
+    here = 0  # where in `recent` the next frame to yield is
     for one in frames:
         recent.append(one)
         if len(recent) - here > ahead:
-            yield _told(recent, here, spread)
+            yield _frame(recent, here, spread)
             here += 1
             if here > ahead:
                 recent.popleft()
                 here -= 1
     while here < len(recent):
-        yield _told(recent, here, spread)
+        yield _frame(recent, here, spread)
         here += 1
 
 
-def mean_about(poses: Array, places: Array, here: int, spread: float) -> tuple[Array, Array]:
+def smoothed_pose(poses: Array, places: Array, here: int, spread: float) -> tuple[Array, Array]:
     """Return the weighted mean pose (66,) and place (3,) of frames (n, 66), (n, 3) about one of them.
 
     As many frames before as after it count, so that the mean of a steady movement is where it is.
@@ -65,10 +65,10 @@ def mean_about(poses: Array, places: Array, here: int, spread: float) -> tuple[A
     return poses[here] + share @ wrapped(poses[rows] - poses[here]), share @ places[rows]
 
 
-def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
+def _frame(recent: Sequence[Estimate], here: int, spread: float) -> Frame:
     one = recent[here]
     poses, places = (np.array([getattr(each, name) for each in recent]) for name in ("pose", "place"))
-    pose, place = mean_about(poses, places, here, spread)
+    pose, place = smoothed_pose(poses, places, here, spread)
     if one.look.root is not None:
         place = one.place
     cost, areas = one.look.measured(pose, place)
@@ -81,5 +81,5 @@ def _told(recent: Sequence[Finding], here: int, spread: float) -> Frame:
         used += len(details["twins"])
         posterior = recalibrated(one.drawn.about(pose, place), pose, cost, one.look)
         seconds, cpu_seconds = seconds + time.perf_counter() - began, cpu_seconds + time.process_time() - begun
-    told: dict[str, Any] = {"details": details, "cpu_seconds": cpu_seconds, "posterior": posterior}
-    return Frame(pose, place, cost, areas, used, seconds, history, **told)
+    more: dict[str, Any] = {"details": details, "cpu_seconds": cpu_seconds, "posterior": posterior}
+    return Frame(pose, place, cost, areas, used, seconds, history, **more)

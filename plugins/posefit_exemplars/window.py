@@ -1,7 +1,8 @@
-"""The frames that wait to be told: the likeliest way through them, and how likely every state of one is.
+"""The frames of the lag window: the likeliest path through them, weights of states, and paths drawn at random.
 
-A hidden Markov model: the states of a beam, steps between them, and costs of silhouettes over a temperature. The way is
-Viterbi's, the weights are those of the forward-backward algorithm, over the frames that were seen.
+A hidden Markov model: the states of a beam, steps between them, and costs of silhouettes over a temperature. The path
+is Viterbi's, and the weights are those of the forward-backward algorithm over the window. Paths are drawn from the
+posterior of the whole clip: the backward messages of the later frames weigh the states that a step may reach.
 """
 
 from collections.abc import Sequence
@@ -12,19 +13,20 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
+from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.beam import Beam
-from posefit_exemplars.codes import Codes
+from posefit_exemplars.exemplars import Codes, Exemplars, Rows
 
-ALIKE = 0.06  # metres: how near the codes of states are that are averaged, a standard deviation
-ALIKE_YAW = np.radians(20.0)
+SIMILAR = 0.06  # metres: standard deviation of the codes of states that are averaged
+SIMILAR_YAW = np.radians(20.0)
 HIGHEST = 80.0  # cost of a step beyond which its likelihood would be 0, and so the sum of all might be
 
 Kernel = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """The states of a frame, and what they know of the frames before."""
+class FrameStates:
+    """The states of a frame, with their likelihoods by the frames so far."""
 
     beam: Beam  # totals and parents are those of the likeliest ways
     likelihoods: Array = field(repr=False)  # (n,) of the silhouettes, the greatest 1
@@ -32,50 +34,126 @@ class Seen:
     forward: Array = field(repr=False)  # (n,) weights by all frames so far, which sum to 1
 
 
-def seen(beam: Beam, fits: Array, before: Seen | None, steps: Array | None) -> Seen:
+def frame_states(beam: Beam, fits: Array, before: FrameStates | None, steps: Array | None) -> FrameStates:
     """Return a frame whose states have costs of fit (n,), to which steps from the frame before cost (m, n)."""
     likelihoods = np.exp(fits.min() - fits)  # TOYAMA2001 (likelihood)
     if before is None or steps is None:
         totals = fits - fits.min()
         beam = replace(beam, totals=totals, parents=np.full(len(beam), -1))
-        return Seen(beam, likelihoods, None, likelihoods / likelihoods.sum())
+        return FrameStates(beam, likelihoods, None, likelihoods / likelihoods.sum())
     ways = before.beam.totals[:, None] + steps
     parents = ways.argmin(axis=0)
     totals = ways[parents, np.arange(len(beam))] + fits  # RABINER1989 (Viterbi)
     kernel = np.exp(-np.minimum(steps, HIGHEST)).astype(np.float32)
     forward = (before.forward @ kernel) * likelihoods  # RABINER1989 (forward)
     beam = replace(beam, totals=totals - totals.min(), parents=parents)
-    return Seen(beam, likelihoods, kernel, forward / forward.sum())
+    return FrameStates(beam, likelihoods, kernel, forward / forward.sum())
 
 
-def likeliest(window: Sequence[Seen]) -> int:
-    """Return the state of the first frame from which the likeliest way to the last one goes."""
+def viterbi_state(window: Sequence[FrameStates]) -> int:
+    """Return the state of the first frame on the likeliest path to the last one."""
     row = int(window[-1].beam.totals.argmin())
     for one in window[:0:-1]:
         row = int(one.beam.parents[row])
     return row
 
 
-def weights(window: Sequence[Seen]) -> Array:
-    """Return how likely each state of the first frame is (n,), by all frames up to the last; they sum to 1."""
+def state_weights(window: Sequence[FrameStates]) -> Array:
+    """Return the weights (n,) of the states of the first frame, given all frames up to the last; they sum to 1."""
     backward = np.ones(len(window[-1].beam))
     for one in window[:0:-1]:
         assert one.kernel is not None
         backward = one.kernel @ (backward * one.likelihoods)  # RABINER1989 (backward)
         backward /= backward.max()
-    found = window[0].forward * backward
-    return np.asarray(found / found.sum())
+    products = window[0].forward * backward
+    return np.asarray(products / products.sum())
 
 
-def mean_around(row: int, found: Array, codes: Codes, poses: Array, places: Array) -> tuple[Array, Array, Codes]:
-    """Return the mean pose (66,), place (3,) and code (D,) of the states that are like one of them, by weights (n,).
+def mean_near(row: int, weights: Array, codes: Codes, poses: Array, places: Array) -> tuple[Array, Array, Codes]:
+    """Return the mean pose (66,), place (3,) and code (D,) of the states similar to one of them, by weights (n,).
 
     The mean of all would be between a stride and its mirrored half-cycle where both are likely.
     """
-    apart = ((codes - codes[row]) ** 2).sum(axis=1) / ALIKE**2
-    turned = wrapped(poses[:, 0] - poses[row, 0]) / ALIKE_YAW
-    share = found * np.exp(-0.5 * (apart + turned**2))
+    apart = ((codes - codes[row]) ** 2).sum(axis=1) / SIMILAR**2
+    turned = wrapped(poses[:, 0] - poses[row, 0]) / SIMILAR_YAW
+    share = weights * np.exp(-0.5 * (apart + turned**2))
     share[row] += np.finfo(np.float64).tiny
     share /= share.sum()
     pose = poses[row] + share @ wrapped(poses - poses[row])
     return pose, places[row] + share @ (places - places[row]), np.asarray(share @ codes, dtype=np.float32)
+
+
+PATH_REACH = 2.0  # standard deviations within which a state is similar to the one on the path
+
+
+def backward_messages(window: Sequence[FrameStates], power: float) -> Array:
+    """Return the likelihood (n,) of the later frames given each state of the first, up to a factor.
+
+    `power` is what the likelihoods of silhouettes are raised to: below 1, the posterior is wider.
+    """
+    backward = np.ones(len(window[-1].beam), dtype=np.float32)
+    for one in window[:0:-1]:
+        assert one.kernel is not None
+        likely = backward * one.likelihoods**power
+        backward = one.kernel @ (likely / likely.max()).astype(np.float32)  # GODSILL2004 (messages)
+    return np.asarray(backward, dtype=np.float64)
+
+
+def sample_states(
+    window: Sequence[FrameStates], rows: Rows | None, count: int, power: float, rng: np.random.Generator
+) -> Rows:
+    """Return states (count,) of the first frame, drawn given the states `rows` (count,) of the frame before it.
+
+    Without `rows` paths begin there, independently.
+    """
+    first = window[0]
+    likely = np.broadcast_to(first.likelihoods**power * backward_messages(window, power), (count, len(first.beam)))
+    if rows is not None and first.kernel is not None:
+        likely = first.kernel[rows] * likely  # GODSILL2004 (step)
+    ends = likely.cumsum(axis=1)
+    drawn = ends[:, -1:] * rng.random((count, 1))
+    return np.asarray((ends <= drawn).sum(axis=1), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledPaths:
+    """The poses of sampled paths in one frame."""
+
+    poses: Array = field(repr=False)  # (K, 66)
+    places: Array = field(repr=False)  # (K, 3) metres
+    like: NDArray[np.bool_] = field(repr=False)  # (K,) which are similar to the pose on the likeliest path
+
+    def about(self, pose: Array, place: Array) -> Posterior:
+        """Return the posterior in which the mean of the paths similar to the likeliest is the reported pose.
+
+        Refinement is relative to the likeliest path; for other paths it is unknown.
+        """
+        poses, places = self.poses.copy(), self.places.copy()
+        if self.like.any():
+            apart = wrapped(poses[self.like] - pose)
+            poses[self.like] = pose + apart - apart.mean(axis=0)
+            places[self.like] += place - places[self.like].mean(axis=0)
+        return Posterior(poses, places, np.ones(len(poses)), coherent=True)
+
+
+class Sampler:
+    """Draws `count` paths through the frames, one frame after the other."""
+
+    def __init__(self, exemplars: Exemplars, count: int, power: float, rng: np.random.Generator) -> None:
+        self._exemplars, self._count, self._power = exemplars, count, power
+        self._rng = rng.spawn(1)[0]  # of its own: reported poses do not depend on the number of paths
+        self._rows: Rows | None = None
+
+    def drawn(self, window: Sequence[FrameStates], path: int) -> SampledPaths | None:
+        """Return the paths in the first frame of a window, whose likeliest state is `path`; None for no paths."""
+        if not self._count:
+            return None
+        self._rows = sample_states(window, self._rows, self._count, self._power, self._rng)
+        beam = window[0].beam
+        states, yaws = beam.states[self._rows], beam.yaws[self._rows]
+        poses = self._exemplars.poses[states]
+        poses[:, 0] = yaws
+        codes = self._exemplars.codes
+        apart = ((codes[states] - codes[beam.states[path]]) ** 2).sum(axis=1) / SIMILAR**2
+        apart += (wrapped(yaws - beam.yaws[path]) / SIMILAR_YAW) ** 2
+        return SampledPaths(poses, beam.places[self._rows], apart <= PATH_REACH**2)

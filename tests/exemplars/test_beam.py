@@ -11,21 +11,21 @@ from posefit_exemplars import kernels
 from posefit_exemplars.beam import (
     BINS,
     FACINGS,
-    HOPELESS,
-    SHARES,
+    MAX_EXCESS_COST,
+    MAX_SHARES,
     SPEEDS,
+    SPIN_COST,
     TURN,
-    WHIRL,
     Beam,
     Steps,
     Transition,
-    assorted,
     bins_of,
-    joined_beams,
-    jumped,
-    squares,
-    stepped,
-    strayed,
+    diverse_best,
+    jump_states,
+    merged,
+    next_states,
+    root_deviation_costs,
+    squared_distances,
     transition_costs,
 )
 from posefit_exemplars.exemplars import Exemplars, about_vertical
@@ -87,7 +87,7 @@ def test_each_pose_is_reached_by_its_cheapest_step(limit: float) -> None:
 def test_a_step_costs_what_the_slow_twin_says(small: Exemplars, known: bool) -> None:
     root = np.array([0.0, 0.0, 0.05]) if known else None
     before = beam([3, 11, 25], [0.1, 0.1, 2.0], [0.0, 2.5, 1.0])
-    found = stepped(small, before, SECONDS, STEPS, MOST, root)
+    found = next_states(small, before, SECONDS, STEPS, MOST, root)
     steps = costs_of_steps(small, before, root) + before.totals[:, None]
     codes, turned, _ = small.after(before.states, SECONDS)
     twin: dict[tuple[int, int], float] = {}
@@ -104,15 +104,15 @@ def test_a_step_costs_what_the_slow_twin_says(small: Exemplars, known: bool) -> 
         assert cost == pytest.approx(twin[place], rel=1e-4, abs=1e-3)
     assert min(mine.values()) == pytest.approx(min(twin.values()), abs=1e-3)
     for row in range(3):  # what a clip does next is among the found
-        following = int(squares(codes[row : row + 1], small.codes).argmin())
+        following = int(squared_distances(codes[row : row + 1], small.codes).argmin())
         assert following in found.states
-    assert found.totals.max() < before.totals.min() + STEPS.jump + HOPELESS + 0.5 * (TURN / STEPS.turning) ** 2
+    assert found.totals.max() < before.totals.min() + STEPS.jump + MAX_EXCESS_COST + 0.5 * (TURN / STEPS.turning) ** 2
 
 
 def test_a_step_says_where_it_came_from_and_leads(small: Exemplars) -> None:
     places = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 5.0]])
     before = beam([3, 25], [0.0, 3.0], [0.0, 0.0], places)
-    found = stepped(small, before, SECONDS, STEPS, MOST)
+    found = next_states(small, before, SECONDS, STEPS, MOST)
     _, turned, ways = small.after(before.states, SECONDS)
     expected = places + about_vertical(ways, before.yaws)
     np.testing.assert_allclose(found.places, expected[found.parents])
@@ -122,17 +122,17 @@ def test_a_step_says_where_it_came_from_and_leads(small: Exemplars) -> None:
 
 def test_a_known_root_is_borne_to_be_anywhere_at_the_cost_of_a_jump(small: Exemplars) -> None:
     before = beam([3], [0.0], [0.0])
-    near = stepped(small, before, SECONDS, STEPS, MOST, small.after(np.array([3]), SECONDS)[2][0])
-    free = stepped(small, before, SECONDS, STEPS, MOST).totals.min()
+    near = next_states(small, before, SECONDS, STEPS, MOST, small.after(np.array([3]), SECONDS)[2][0])
+    free = next_states(small, before, SECONDS, STEPS, MOST).totals.min()
     assert free <= near.totals.min() < free + 0.2
-    far = stepped(small, before, SECONDS, STEPS, MOST, np.array([1e6, 0.0, 0.0]))
+    far = next_states(small, before, SECONDS, STEPS, MOST, np.array([1e6, 0.0, 0.0]))
     assert far.totals.min() == pytest.approx(STEPS.jump + free, abs=0.2)
 
 
 def test_there_are_at_most_so_many_and_a_yaw_has_its_share_of_them(small: Exemplars) -> None:
     before = beam([3, 3, 3], [0.0, 2.0, 4.0], [0.0, 0.0, 0.0])
-    every = stepped(small, before, SECONDS, STEPS, MOST)
-    few = stepped(small, before, SECONDS, STEPS, 8)
+    every = next_states(small, before, SECONDS, STEPS, MOST)
+    few = next_states(small, before, SECONDS, STEPS, 8)
     assert len(few) <= 8 < len(every)
     for yaw in (0.0, 2.0, 4.0):  # of 8 / FACINGS poses, each with three yaws
         share = int((np.abs(wrapped(few.yaws - yaw)) < 0.5).sum())
@@ -143,8 +143,8 @@ def test_there_are_at_most_so_many_and_a_yaw_has_its_share_of_them(small: Exempl
 def test_of_those_alike_only_the_best_few_are_kept(small: Exemplars) -> None:
     rng = np.random.default_rng(1)
     many = beam(rng.integers(0, len(small), 300).tolist(), rng.uniform(-4.0, 4.0, 300).tolist(), [0.0] * 300)
-    totals, most = rng.random(300), 2 * SHARES
-    kept = assorted(small, many, totals, most)
+    totals, most = rng.random(300), 2 * MAX_SHARES
+    kept = diverse_best(small, many, totals, most)
     kinds = list(zip(small.kinds[many.states].tolist(), bins_of(many.yaws).tolist(), strict=True))
     twin, had = [], dict.fromkeys(kinds, 0)
     for row in np.argsort(totals):
@@ -156,18 +156,18 @@ def test_of_those_alike_only_the_best_few_are_kept(small: Exemplars) -> None:
 
 def test_a_clip_that_goes_on_costs_next_to_nothing(small: Exemplars) -> None:
     # poses are two centimetres apart, and the spread is three
-    assert stepped(small, beam([3], [0.0], [0.0]), SECONDS, STEPS, MOST).totals.min() < 0.5 * (2.0 / 3.0) ** 2
+    assert next_states(small, beam([3], [0.0], [0.0]), SECONDS, STEPS, MOST).totals.min() < 0.5 * (2.0 / 3.0) ** 2
 
 
 def test_one_pose_in_one_bin_is_one_state_the_cheapest() -> None:
     width = 2.0 * np.pi / BINS
-    both = joined_beams(beam([5, 5], [0.0, width], [3.0, 1.0]), beam([5, 6], [0.1 * width, 0.0], [2.0, 7.0]))
+    both = merged(beam([5, 5], [0.0, width], [3.0, 1.0]), beam([5, 6], [0.1 * width, 0.0], [2.0, 7.0]))
     assert sorted(zip(both.states.tolist(), both.totals.tolist(), strict=True)) == [(5, 1.0), (5, 2.0), (6, 7.0)]
 
 
 def test_a_jump_comes_from_the_best_and_costs_the_same_anywhere() -> None:
     before = beam([1, 2], [0.0, 0.0], [4.0, 3.0], np.array([[0.0] * 3, [1.0, 2.0, 3.0]]))
-    found = jumped(np.array([7, 9]), np.array([1.0, 2.0]), before, STEPS)
+    found = jump_states(np.array([7, 9]), np.array([1.0, 2.0]), before, STEPS)
     assert found.parents.tolist() == [1, 1]
     assert found.totals.tolist() == [15.0, 15.0]
     assert found.places.tolist() == [[1.0, 2.0, 3.0]] * 2
@@ -178,11 +178,11 @@ def test_a_root_strays_more_easily_along_the_line_of_sight_than_across_it() -> N
     along, across = np.array([[0.0, 0.0, 5.03]]), np.array([[0.01, 0.0, 5.0]])
     # a standard deviation either way: log(1 + 1 / 2)
     for expected in (along, across):
-        assert strayed(place, expected, eye, STEPS)[0] == pytest.approx(np.log(1.5), rel=1e-6)
+        assert root_deviation_costs(place, expected, eye, STEPS)[0] == pytest.approx(np.log(1.5), rel=1e-6)
     # with cameras on all sides there is no such line: 3 standard deviations
-    assert strayed(place, along, None, STEPS)[0] == pytest.approx(np.log(1.0 + 4.5))
-    assert strayed(place, place, eye, STEPS)[0] == 0.0
-    both = strayed(np.repeat(place, 2, axis=0), np.stack([along, across]).repeat(2, axis=1), eye, STEPS)
+    assert root_deviation_costs(place, along, None, STEPS)[0] == pytest.approx(np.log(1.0 + 4.5))
+    assert root_deviation_costs(place, place, eye, STEPS)[0] == 0.0
+    both = root_deviation_costs(np.repeat(place, 2, axis=0), np.stack([along, across]).repeat(2, axis=1), eye, STEPS)
     np.testing.assert_allclose(both, np.log(1.5), rtol=1e-6)
 
 
@@ -202,7 +202,7 @@ def test_between_two_beams_a_step_costs_what_the_twin_says_and_never_more_than_a
             twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / STEPS.turning) ** 2
             if root is None:
                 went = before.places[i] + about_vertical(ways[i : i + 1], before.yaws[i : i + 1])
-                twin[i, j] += strayed(after.places[j : j + 1], went, eye, STEPS)[0]
+                twin[i, j] += root_deviation_costs(after.places[j : j + 1], went, eye, STEPS)[0]
     np.testing.assert_allclose(found, np.minimum(twin, STEPS.jump), rtol=1e-3, atol=1e-3)
     assert found.max() == STEPS.jump
     assert found[0, 0] < 8.0  # the clip goes on
@@ -229,4 +229,4 @@ def test_a_step_that_turns_farther_than_anybody_does_costs_more_than_a_jump(smal
     steps = replace(STEPS, fastest=0.25)
     costs = transition_costs(Transition(small, before, after, SECONDS, None, None), steps=steps)[0]
     farther = np.array([0.0, 0.0, 0.05, np.pi - 0.35])
-    np.testing.assert_allclose(costs, STEPS.jump + WHIRL * farther, rtol=1e-9)
+    np.testing.assert_allclose(costs, STEPS.jump + SPIN_COST * farther, rtol=1e-9)

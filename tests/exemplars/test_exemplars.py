@@ -13,8 +13,17 @@ from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
 from posefit_exemplars import exemplars
-from posefit_exemplars.codes import DIMENSIONS, SAME, Coding, groups, thinned
-from posefit_exemplars.exemplars import Exemplars, about_vertical, exemplars_of, mirror_image
+from posefit_exemplars.exemplars import (
+    DIMENSIONS,
+    SAME,
+    Coding,
+    Exemplars,
+    about_vertical,
+    exemplars_of,
+    groups,
+    mirror_image,
+    thinned_frames,
+)
 from posefit_exemplars.kernels import STRETCH
 
 SKELETON = average_skeleton()
@@ -50,8 +59,8 @@ def test_a_turn_of_the_whole_body_makes_no_other_code() -> None:
 
 def test_frames_that_are_alike_are_kept_once_but_ends_of_clips_always() -> None:
     codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1], [5.2]], dtype=np.float32) * SAME
-    assert thinned(codes).tolist() == [0, 3, 4, 6]
-    assert thinned(codes[:2]).tolist() == [0, 1]
+    assert thinned_frames(codes).tolist() == [0, 3, 4, 6]
+    assert thinned_frames(codes[:2]).tolist() == [0, 1]
 
 
 def test_codes_are_the_same_however_the_poses_are_divided_into_clips() -> None:

@@ -13,8 +13,7 @@ from posefit.motion.built_in import average_skeleton
 from posefit_exemplars.beam import Beam, Steps, Transition, transition_costs
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.factory import exemplars
-from posefit_exemplars.sampling import Sampler, Ways
-from posefit_exemplars.window import Seen, seen
+from posefit_exemplars.window import FrameStates, SampledPaths, Sampler, frame_states
 from tests.exemplars.conftest import Walk
 
 FRAMES, WAYS, PROBLEMS, NOISE = 6, 9, 600, 0.1  # metres
@@ -54,10 +53,10 @@ def ranks(clips: Exemplars, power: float) -> Array:
     for number in range(PROBLEMS):
         true = drawn_from_the_prior(steps, rng)
         filmed = clips.codes[true] + NOISE * rng.normal(size=(FRAMES, clips.codes.shape[1]))
-        frames: list[Seen] = []
+        frames: list[FrameStates] = []
         for k in range(FRAMES):
             fits = 0.5 * ((clips.codes - filmed[k]) ** 2).sum(axis=1) / NOISE**2
-            frames.append(seen(beam, fits, frames[-1] if k else None, steps if k else None))
+            frames.append(frame_states(beam, fits, frames[-1] if k else None, steps if k else None))
         sampler = Sampler(clips, WAYS, power, rng)
         each = []
         for k in range(FRAMES):
@@ -95,7 +94,7 @@ def test_ways_that_are_like_the_path_are_moved_to_what_was_told_and_others_stay(
     poses, places = np.zeros((3, 66)), np.arange(9.0).reshape(3, 3)
     poses[:, 0] = [0.1, 0.3, 3.0]
     pose, place = np.full(66, 0.5), np.array([1.0, 1.0, 1.0])
-    found = Ways(poses, places, np.array([True, True, False])).about(pose, place)
+    found = SampledPaths(poses, places, np.array([True, True, False])).about(pose, place)
     np.testing.assert_allclose(found.poses[:2].mean(axis=0), pose)
     assert found.poses[1, 0] - found.poses[0, 0] == pytest.approx(0.2)
     np.testing.assert_allclose(found.translations[:2], [[-0.5, -0.5, -0.5], [2.5, 2.5, 2.5]])
@@ -106,7 +105,7 @@ def test_ways_that_are_like_the_path_are_moved_to_what_was_told_and_others_stay(
 
 def test_where_no_way_is_like_the_path_all_stay() -> None:
     poses, places = np.ones((2, 66)), np.zeros((2, 3))
-    found = Ways(poses, places, np.zeros(2, dtype=bool)).about(np.zeros(66), np.ones(3))
+    found = SampledPaths(poses, places, np.zeros(2, dtype=bool)).about(np.zeros(66), np.ones(3))
     np.testing.assert_array_equal(found.poses, poses)
 
 
@@ -149,7 +148,7 @@ def test_ways_are_drawn_through_frames_that_show_nothing(walker: Walk) -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), [("samples", -1), ("posterior_temperature", 0.0)])
-def test_settings_that_cannot_be_are_told(walker: Walk, name: str, value: float) -> None:
+def test_settings_that_cannot_be_are_estimated(walker: Walk, name: str, value: float) -> None:
     expected = "0 or more" if name == "samples" else "above 0 and finite"
     with pytest.raises(ValueError, match=f"{name} must be {expected}, got {value}"):
         exemplars(walker.told(), **{name: value})  # type: ignore[arg-type]

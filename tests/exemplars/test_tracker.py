@@ -12,7 +12,7 @@ from posefit.cli import main
 from posefit.motion import built_in, recorded
 from posefit.testing import run_checks, tracker_checks
 from posefit_exemplars.factory import exemplars
-from posefit_exemplars.tracker import AWAY, turned_away
+from posefit_exemplars.tracker import AWAY, yaw_costs
 from tests.exemplars.conftest import Walk, walk_of
 
 ELSEWHERE = ["library:05,09,16,127"]  # nobody of whom is subject 2
@@ -157,6 +157,6 @@ def test_settings_that_make_no_sense_are_refused_in_one_line(setting: str, messa
 def test_a_state_that_faces_away_from_what_is_said_of_its_frame_costs_more() -> None:
     yaws = np.radians([10.0, 55.0, 77.5, 100.0, -170.0, 370.0])
     np.testing.assert_allclose(
-        turned_away(yaws, np.radians(10.0)), AWAY * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0]), atol=1e-12
+        yaw_costs(yaws, np.radians(10.0)), AWAY * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0]), atol=1e-12
     )
-    np.testing.assert_array_equal(turned_away(yaws, None), np.zeros(6))
+    np.testing.assert_array_equal(yaw_costs(yaws, None), np.zeros(6))

@@ -10,9 +10,8 @@ from posefit.arrays import Array
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit_exemplars.beam import Beam, Steps, Transition, transition_costs
-from posefit_exemplars.codes import groups
-from posefit_exemplars.exemplars import Exemplars
-from posefit_exemplars.window import Seen, likeliest, seen, weights
+from posefit_exemplars.exemplars import Exemplars, groups
+from posefit_exemplars.window import FrameStates, frame_states, state_weights, viterbi_state
 
 SIZES = (3, 4, 2, 3, 4)  # states of each frame: 288 ways
 
@@ -22,18 +21,18 @@ class Model(NamedTuple):
 
     fits: list[Array]
     steps: list[Array]
-    frames: list[Seen]
+    frames: list[FrameStates]
 
 
 def model(seed: int) -> Model:
     rng = np.random.default_rng(seed)
     fits = [rng.uniform(0.0, 3.0, size) for size in SIZES]
     steps = [rng.uniform(0.0, 3.0, sizes) for sizes in pairwise(SIZES)]
-    frames: list[Seen] = []
+    frames: list[FrameStates] = []
     for k, fit in enumerate(fits):
         many = len(fit)
         beam = Beam(np.arange(many), np.zeros(many), np.full(many, -1), np.zeros(many), np.zeros((many, 3)))
-        frames.append(seen(beam, fit, frames[-1] if k else None, steps[k - 1] if k else None))
+        frames.append(frame_states(beam, fit, frames[-1] if k else None, steps[k - 1] if k else None))
     return Model(fits, steps, frames)
 
 
@@ -66,7 +65,9 @@ def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do(seed: int) -> Non
     one = model(seed)
     for first in range(len(SIZES)):
         for count in range(first + 1, len(SIZES) + 1):
-            np.testing.assert_allclose(weights(one.frames[first:count]), shares(ways(one, count), first), rtol=1e-5)
+            np.testing.assert_allclose(
+                state_weights(one.frames[first:count]), shares(ways(one, count), first), rtol=1e-5
+            )
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -75,7 +76,7 @@ def test_the_way_that_is_told_is_the_cheapest_of_all(seed: int) -> None:  # RABI
     for count in range(1, len(SIZES) + 1):
         costs = ways(one, count)
         best = min(costs, key=lambda way: costs[way])
-        assert [likeliest(one.frames[k:count]) for k in range(count)] == list(best)
+        assert [viterbi_state(one.frames[k:count]) for k in range(count)] == list(best)
         each = [min(cost for way, cost in costs.items() if way[-1] == row) for row in range(SIZES[count - 1])]
         np.testing.assert_allclose(one.frames[count - 1].beam.totals, np.array(each) - min(each), atol=1e-12)
 
@@ -95,7 +96,7 @@ def test_exemplars_are_poses_of_the_clips_that_lie_apart() -> None:  # TOYAMA200
 def test_likelihood_is_an_exponential_of_the_distance_over_a_temperature() -> None:  # TOYAMA2001 (likelihood)
     beam = Beam(np.arange(3), np.zeros(3), np.full(3, -1), np.zeros(3), np.zeros((3, 3)))
     # distances of 6, 6 + 2 ln 2 and 6 + 2 ln 4 over a temperature of 2: likelihoods as 4 : 2 : 1
-    found = seen(beam, (6.0 + 2.0 * np.log([1.0, 2.0, 4.0])) / 2.0, None, None)
+    found = frame_states(beam, (6.0 + 2.0 * np.log([1.0, 2.0, 4.0])) / 2.0, None, None)
     np.testing.assert_allclose(found.likelihoods, [1.0, 0.5, 0.25])
     np.testing.assert_allclose(found.forward, [4 / 7, 2 / 7, 1 / 7])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.uncertainty.calibration import calibration_error, conformal_factor
-from posefit_exemplars.sampling import messages, onward
+from posefit_exemplars.window import backward_messages, sample_states
 from tests.sources.test_exemplars_steps import SIZES, Model, model, ways
 
 POWERS = (1.0, 0.4)
@@ -20,7 +20,7 @@ def tempered(one: Model, power: float) -> Model:
 @pytest.mark.parametrize("power", POWERS)
 def test_a_message_is_the_share_of_all_ways_on_from_a_state(power: float) -> None:  # GODSILL2004 (messages)
     one = model(0)
-    found = messages(one.frames[1:], power)
+    found = backward_messages(one.frames[1:], power)
     expected = np.zeros(SIZES[1])
     for way, cost in ways(tempered(one, power), len(SIZES)).items():
         first = power * one.fits[0][way[0]] + one.steps[0][way[0], way[1]] + power * one.fits[1][way[1]]
@@ -33,7 +33,7 @@ def test_ways_are_drawn_as_often_as_they_are_likely(power: float) -> None:  # GO
     one, count, rng = model(1), 40_000, np.random.default_rng(0)
     rows, drawn = None, []
     for k in range(len(SIZES)):
-        rows = onward(one.frames[k:], rows, count, power, rng)
+        rows = sample_states(one.frames[k:], rows, count, power, rng)
         drawn.append(rows)
     costs = ways(tempered(one, power), len(SIZES))
     total = sum(np.exp(-cost) for cost in costs.values())
@@ -47,7 +47,7 @@ def test_ways_are_drawn_as_often_as_they_are_likely(power: float) -> None:  # GO
 
 def test_a_way_begins_anew_where_nothing_came_before() -> None:
     one, rng = model(2), np.random.default_rng(0)
-    first = onward(one.frames[:1], None, 50_000, 1.0, rng)
+    first = sample_states(one.frames[:1], None, 50_000, 1.0, rng)
     np.testing.assert_allclose(np.bincount(first) / 50_000, one.frames[0].forward, atol=0.01)
 
 

@@ -14,26 +14,26 @@ from posefit.geometry.camera import Camera
 from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.sides import unknown_sides
 from posefit_exemplars.factory import exemplars
-from posefit_exemplars.lost import (
+from posefit_exemplars.lost_model import (
     EVIDENCE,
-    FASTEST,
     FITTED,
+    MAX_SPEED,
     NAMES,
     REACHES,
-    Detector,
-    Judge,
-    Memory,
+    EvidenceMeans,
+    FailureClassifier,
+    LogisticModel,
     across,
-    doubted,
     evidence_of,
-    farthest,
-    going,
-    stored_judge,
+    greatest_distance,
+    root_motion,
+    stored_classifier,
+    with_failure_probabilities,
 )
 from tests.exemplars.conftest import EMPTY, Walk
 
-EVEN = Detector([], np.empty(0), 0.0)  # says a half of everything
-WAVERING = Judge(EVEN, EVEN, 0.6)
+EVEN = LogisticModel([], np.empty(0), 0.0)  # says a half of everything
+WAVERING = FailureClassifier(EVEN, EVEN, 0.6)
 
 
 def frame_of(walker: Walk, usable: bool = True, cost: float = 4.0) -> Frame:
@@ -47,7 +47,7 @@ def frame_of(walker: Walk, usable: bool = True, cost: float = 4.0) -> Frame:
 
 
 def test_evidence_is_beside_its_means_and_stays_where_it_is_not_told_again() -> None:
-    memory, at = Memory(30.0), [*EVIDENCE].index("views")
+    memory, at = EvidenceMeans(30.0), [*EVIDENCE].index("views")
     first = memory.features({"views": 1.0})
     assert [first[k * len(EVIDENCE) + at] for k in range(3)] == [1.0, 1.0, 1.0]
     memory.features({"views": 0.0})
@@ -87,16 +87,16 @@ def test_who_is_seen_from_his_side_faces_across_the_only_camera() -> None:
 def test_who_goes_where_he_faces_goes_ahead() -> None:
     places = [np.array([0.0, 0.9, 0.0]), np.array([0.01, 0.9, 0.03]), np.array([0.03, 0.8, 0.04])]
     # 3 and 4 centimetres in two thirtieths of a second
-    assert going(places, 0.0, 30.0) == pytest.approx({"ahead": 0.6, "speed": 0.75})
-    assert going(places, np.pi, 30.0)["ahead"] == pytest.approx(-0.6)
-    assert going(places[::-1], 0.0, 30.0, backwards=True) == pytest.approx({"ahead": 0.6, "speed": 0.75})
-    assert going(places, np.pi / 2.0, 30.0)["ahead"] == pytest.approx(0.45)
-    assert going(places, 0.0, 300.0) == {"ahead": FASTEST, "speed": FASTEST}
-    assert going(places[:1], 0.0, 30.0) == {}
+    assert root_motion(places, 0.0, 30.0) == pytest.approx({"ahead": 0.6, "speed": 0.75})
+    assert root_motion(places, np.pi, 30.0)["ahead"] == pytest.approx(-0.6)
+    assert root_motion(places[::-1], 0.0, 30.0, backwards=True) == pytest.approx({"ahead": 0.6, "speed": 0.75})
+    assert root_motion(places, np.pi / 2.0, 30.0)["ahead"] == pytest.approx(0.45)
+    assert root_motion(places, 0.0, 300.0) == {"ahead": MAX_SPEED, "speed": MAX_SPEED}
+    assert root_motion(places[:1], 0.0, 30.0) == {}
 
 
 def test_a_probability_is_that_of_a_logistic_model() -> None:
-    detector = Detector.from_dict({"weights": {"farthest": 2.0, "cost, lately": -1.0}, "bias": 0.5})
+    detector = LogisticModel.from_dict({"weights": {"farthest": 2.0, "cost, lately": -1.0}, "bias": 0.5})
     features = np.zeros(len(NAMES))
     features[NAMES.index("farthest")], features[NAMES.index("cost, lately")] = 1.0, 1.5
     assert detector.probability(features) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
@@ -104,9 +104,9 @@ def test_a_probability_is_that_of_a_logistic_model() -> None:
     assert detector.probability(features) == pytest.approx(1.0)
 
 
-def test_a_model_of_something_else_is_told() -> None:
+def test_a_model_of_something_else_is_estimated() -> None:
     with pytest.raises(ValueError, match="weights must be of evidence that frames have, got weather"):
-        Detector.from_dict({"weights": {"weather": 1.0}, "bias": 0.0})
+        LogisticModel.from_dict({"weights": {"weather": 1.0}, "bias": 0.0})
 
 
 def test_what_is_stored_is_such_models() -> None:
@@ -114,20 +114,20 @@ def test_what_is_stored_is_such_models() -> None:
     for name in ("lost", "sides"):
         assert set(told[name]["weights"]) <= set(NAMES)
         assert np.isfinite([told[name]["bias"], *told[name]["weights"].values()]).all()
-    assert stored_judge().lost.bias == told["lost"]["bias"]
-    assert 0.0 < stored_judge().unknown < 0.5
+    assert stored_classifier().lost.bias == told["lost"]["bias"]
+    assert 0.0 < stored_classifier().unknown < 0.5
 
 
 def test_the_farthest_track_is_told_in_metres(walker: Walk) -> None:
     skeleton, poses = walker.motion.skeleton, walker.motion.poses[[0, 0, 4, 8]]
     joints = skeleton.joints(poses)
     off = [float(np.linalg.norm((one - one[0]) - (joints[0] - joints[0, 0]), axis=1).mean()) for one in joints]
-    told = farthest(skeleton, Posterior(poses, np.zeros((4, 3)), np.ones(4)), poses[0])
+    told = greatest_distance(skeleton, Posterior(poses, np.zeros((4, 3)), np.ones(4)), poses[0])
     assert told == pytest.approx(max(off)) != 0.0
 
 
 def test_a_frame_in_which_nobody_is_seen_has_no_cost_and_no_twins_of_its_own(walker: Walk) -> None:
-    frames = list(doubted((frame_of(walker, one) for one in (True, False)), walker.task, WAVERING))
+    frames = list(with_failure_probabilities((frame_of(walker, one) for one in (True, False)), walker.task, WAVERING))
     assert frames[0].details["evidence"].keys() == EVIDENCE.keys() - {"ahead", "speed"}
     assert frames[1].details["evidence"].keys() == EVIDENCE.keys() - {"cost", "reflected", "mirrored"}
     assert [frame.lost for frame in frames] == [0.5] * 2
@@ -135,7 +135,7 @@ def test_a_frame_in_which_nobody_is_seen_has_no_cost_and_no_twins_of_its_own(wal
 
 @pytest.mark.parametrize(("least", "unknown"), [(0.4, True), (0.6, False)])
 def test_sides_are_unknown_from_the_probability_on_that_is_held(walker: Walk, least: float, unknown: bool) -> None:
-    frame = next(doubted([frame_of(walker)], walker.task, replace(WAVERING, unknown=least)))
+    frame = next(with_failure_probabilities([frame_of(walker)], walker.task, replace(WAVERING, unknown=least)))
     assert frame.details["exchanged"] == 0.5
     assert frame.posterior is not None
     assert unknown_sides(walker.motion.skeleton, frame.posterior, frame.pose) == unknown

@@ -11,9 +11,9 @@ from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.doubt import evidence, learned, recalibrated
+from posefit_exemplars.calibration import evidence, recalibrated, stored_calibration
 from posefit_exemplars.factory import exemplars
-from posefit_exemplars.look import Look
+from posefit_exemplars.frame_costs import FrameCosts
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
 SKELETON = average_skeleton()
@@ -50,12 +50,12 @@ def test_nobody_is_more_in_doubt_than_where_nothing_is_seen() -> None:
     for cost in (0.0, 5.0):
         told = recalibrated(drawn(0.1), np.zeros(66), cost, blind).recalibration  # type: ignore[arg-type]
         assert told is not None
-        most = math.exp(learned().range[1])
-        np.testing.assert_allclose(told.joint_spreads, most * learned().joint_spreads)
+        most = math.exp(stored_calibration().range[1])
+        np.testing.assert_allclose(told.joint_spreads, most * stored_calibration().joint_spreads)
 
 
 def test_every_level_is_wider_than_the_one_before() -> None:
-    doubt = learned()
+    doubt = stored_calibration()
     assert doubt.joint_factors.shape == (3, 27)
     assert doubt.angle_factors.shape == (3, 66)
     assert (doubt.joint_factors[:, 1:] > 0.0).all()
@@ -68,11 +68,11 @@ def test_frames_are_told_with_their_recalibration(walker: Walk) -> None:
     for frame in tracker.track(walker.seen[:3], np.random.default_rng(0)):
         assert frame.posterior is not None
         assert frame.posterior.recalibration is not None
-        assert frame.posterior.recalibration.sharpness == learned().sharpness
+        assert frame.posterior.recalibration.sharpness == stored_calibration().sharpness
 
 
 def test_the_greater_the_doubt_the_likelier_no_mode_is_right() -> None:
-    none = [learned().none_right(log) for log in np.linspace(learned().range[0], -1.0, 20)]
+    none = [stored_calibration().none_right(log) for log in np.linspace(stored_calibration().range[0], -1.0, 20)]
     assert np.all(np.diff(none) > 0.0)
     assert none[0] < 0.05
     assert none[-1] > 0.5
@@ -82,7 +82,7 @@ def test_the_greater_the_doubt_the_likelier_no_mode_is_right() -> None:
 @pytest.mark.parametrize("views", [(45.0,), (45.0, 135.0)])
 def test_twins_cost_what_the_mirrored_and_each_reflected_pose_costs(views: tuple[float, ...]) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1), views)
-    look, pose, place = Look(walk.task, walk.seen[0]), walk.motion.poses[0], walk.motion.translations[0]
+    look, pose, place = FrameCosts(walk.task, walk.seen[0]), walk.motion.poses[0], walk.motion.translations[0]
     skeleton = walk.motion.skeleton
     turned = [reflected_poses(skeleton, pose[None], facing(camera, place)) for camera in walk.task.cameras]
     for cost, twin in zip(look.twins(pose, place), [mirrored_poses(skeleton, pose[None]), *turned], strict=True):
@@ -95,7 +95,7 @@ def test_twins_of_who_is_seen_from_the_side_cost_little_and_by_a_second_camera_m
     def costs(*views: float) -> tuple[float, float]:
         walk = walk_of(motion, views)
         told = zip(walk.seen, motion.poses, motion.translations, strict=True)
-        twins = np.array([Look(walk.task, seen).twins(pose, place) for seen, pose, place in told])
+        twins = np.array([FrameCosts(walk.task, seen).twins(pose, place) for seen, pose, place in told])
         return float(twins[:, 0].mean()), float(twins[:, 1:].min(axis=1).mean())
 
     aside, oblique, both = costs(90.0), costs(45.0), costs(90.0, 0.0)
@@ -105,7 +105,7 @@ def test_twins_of_who_is_seen_from_the_side_cost_little_and_by_a_second_camera_m
 
 def test_a_twin_of_a_pose_that_is_aligned_is_aligned_as_that_is() -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1))
-    look, pose = Look(walk.told(translation="aligned"), walk.seen[0]), walk.motion.poses[0]
+    look, pose = FrameCosts(walk.told(translation="aligned"), walk.seen[0]), walk.motion.poses[0]
     place = walk.motion.translations[0] + [0.02, -0.01, 0.0]  # where smoothing has moved it
     poses = np.concatenate([pose[None], mirrored_poses(walk.motion.skeleton, pose[None])])
     placed = look.placed(poses, np.repeat(place[None], 2, axis=0))
@@ -121,7 +121,7 @@ def test_frames_say_what_their_twins_cost_and_count_them(walker: Walk) -> None:
     for one, other in zip(told[:2], plain[:2], strict=True):
         np.testing.assert_array_equal(one.pose, other.pose)
         assert one.evaluations == other.evaluations + 2
-        look = Look(walker.told(), seen[told.index(one)])
+        look = FrameCosts(walker.told(), seen[told.index(one)])
         np.testing.assert_allclose(one.details["twins"], look.twins(one.pose, one.translation), atol=1e-9)
         assert "twins" not in other.details
     assert len(told[2].details["twins"]) == 0

@@ -1,4 +1,4 @@
-"""What poses cost in one frame, at full size and in a small picture."""
+"""The costs of poses in one frame, at full size and in a small picture."""
 
 import numpy as np
 
@@ -18,8 +18,8 @@ SMALL = 40  # pixels: no side of a small picture is shorter
 FACTORS = (4, 2, 1)
 
 
-class Look:
-    """One frame as cameras saw it. `small` costs are of a picture with every fourth pixel of every fourth row."""
+class FrameCosts:
+    """The silhouettes of one frame. `small` costs are of a picture with every fourth pixel of every fourth row."""
 
     def __init__(self, task: Task, observation: Observation) -> None:
         self._task, self._observation = task, observation
@@ -33,7 +33,7 @@ class Look:
 
     @property
     def root(self) -> Array | None:
-        """Where the root is known to be (3,), metres; None where nobody knows."""
+        """The known place of the root (3,), metres; None where it is unknown."""
         known = self._observation.translation
         if self._task.translation != "known" or known is None:
             return None
@@ -41,23 +41,23 @@ class Look:
 
     @property
     def eye(self) -> Array | None:
-        """Where the only camera stands that sees the person (3,); None where several do, which tell how far it is."""
+        """The place (3,) of the only camera that shows the person; None with several, which also show the depth."""
         only = only_camera(self._task.cameras, self._observation.silhouettes)
         return None if only is None else only.position
 
     @property
     def yaw(self) -> float | None:
-        """About which way the person is said to face, in radians; None where nobody says."""
+        """About which way the person faces, in radians; None where it is unknown."""
         return self._observation.yaw
 
     @property
     def cameras(self) -> int:
-        """How many see the person."""
+        """The number of cameras."""
         return len(self._task.cameras)
 
     @property
     def usable(self) -> bool:
-        """Whether enough is seen to learn from."""
+        """Whether enough of the person is visible to learn from."""
         return self._observation.usable
 
     @property
@@ -67,7 +67,7 @@ class Look:
 
     @property
     def share(self) -> float:
-        """What a look at the small picture counts, beside one at the full picture."""
+        """The effort of a cost in the small picture, as a share of one at full size."""
         return 1.0 / self.factor**2
 
     def placed(self, poses: Array, places: Array) -> Array:
@@ -95,7 +95,7 @@ class Look:
     def twins(self, pose: Array, place: Array) -> Array:
         """Return the costs of a pose's twins (1 + cameras,): mirrored, and reflected along each camera's line of sight.
 
-        A twin that is aligned stands off the pose, wherever that was told to be, as far as both are off when aligned.
+        Where roots are aligned, a twin stands off the reported place by the difference of both aligned places.
         """
         skeleton, one = self.skeleton, pose[None]
         reflected = [reflected_poses(skeleton, one, facing(camera, place)) for camera in self._task.cameras]

@@ -6,7 +6,7 @@ import numpy as np
 
 from posefit.motion import built_in
 from posefit.silhouette.mask import Silhouette
-from posefit_exemplars.look import Look
+from posefit_exemplars.frame_costs import FrameCosts
 from tests.exemplars.conftest import walk_of
 
 
@@ -15,11 +15,11 @@ def test_a_camera_that_sees_alone_cannot_tell_the_depth_however_many_there_are()
     first, second = walk.task.cameras
     one = walk.seen[0]
     nothing = Silhouette.of(np.zeros((120, 160), dtype=bool), np.zeros((120, 160), dtype=bool))
-    assert Look(walk.task, one).eye is None
-    alone = Look(walk.task, replace(one, silhouettes=[nothing, one.silhouettes[1]])).eye
+    assert FrameCosts(walk.task, one).eye is None
+    alone = FrameCosts(walk.task, replace(one, silhouettes=[nothing, one.silhouettes[1]])).eye
     assert alone is not None
     np.testing.assert_array_equal(alone, second.position)
-    only = Look(walk.told(cameras=[first]), replace(one, silhouettes=one.silhouettes[:1])).eye
+    only = FrameCosts(walk.told(cameras=[first]), replace(one, silhouettes=one.silhouettes[:1])).eye
     assert only is not None
     np.testing.assert_array_equal(only, first.position)
-    assert Look(walk.task, replace(one, silhouettes=[nothing, nothing])).eye is None
+    assert FrameCosts(walk.task, replace(one, silhouettes=[nothing, nothing])).eye is None

@@ -1,0 +1,209 @@
+"""The probabilities that a frame is lost, and that its left and right are exchanged.
+
+Two logistic models of the same evidence: what the pose costs, the cost ratios of its mirrored and reflected poses, the
+spread of the sampled tracks, how many of them have the other side, whether the person moves where they face, the angle
+of view and the number of cameras. Each value stands beside its means over a moment and over a second: a lost track
+stays lost for a while, and masks that never fit mean less than one that fits worse now.
+`docs/studies/lost.py` fits the models.
+"""
+
+import json
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Frame, Task
+from posefit.geometry.alike import facing
+from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import Skeleton
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.sides import second_side
+from posefit_exemplars.calibration import probability_of
+
+FITTED = Path(__file__).with_name("lost_model.json")  # made by `docs/studies/lost.py --store`
+REACHES: Mapping[str, float] = {
+    "lately": 0.2,
+    "in general": 1.0,
+}  # seconds that the means reach back
+
+
+def _log(floor: float) -> Callable[[float], float]:
+    return lambda value: math.log(max(value, 0.0) + floor)
+
+
+def _as_it_is(value: float) -> float:
+    return value
+
+
+# The evidence of a frame, each with the scale on which it enters the models.
+EVIDENCE: Mapping[str, Callable[[float], float]] = {
+    "cost": _log(1.0),  # of the reported pose, where the person is visible
+    "reflected": math.log,  # the least cost of poses reflected along a line of sight, over the cost
+    "mirrored": math.log,  # the cost of the mirror image, over the cost
+    "farthest": _log(0.01),  # metres between the reported pose and the farthest sampled track
+    "second": _as_it_is,  # weight of the tracks that have left and right exchanged
+    "ahead": _as_it_is,  # metres a second by which the root goes where it faces
+    "speed": _as_it_is,  # metres a second by which it goes anywhere
+    "across": _as_it_is,  # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
+    "views": _as_it_is,  # cameras that show something of the person, at most `MAX_VIEWS`
+}
+DEFAULTS = {
+    "reflected": 1.0,
+    "mirrored": 1.0,
+}  # before the first value; else 0
+MAX_VIEWS = 2  # nothing was fitted with more cameras
+TWIN_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
+MOTION_SECONDS = 0.5  # over which the root's motion is measured
+MAX_SPEED = 2.0  # metres a second; a higher speed is no better evidence
+NAMES = (*EVIDENCE, *(f"{name}, {reach}" for reach in REACHES for name in EVIDENCE))  # of features
+
+
+def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> dict[str, float]:
+    """Return the values of `EVIDENCE` that a frame with a posterior has by itself.
+
+    Its `details` hold whether it is `usable` and the costs of its `twins`; see `FrameCosts.twins`.
+    """
+    assert frame.posterior is not None
+    visible = [camera for camera, counts in zip(cameras, frame.areas, strict=True) if counts.any()] or cameras
+    values = {
+        "farthest": greatest_distance(skeleton, frame.posterior, frame.pose),
+        "second": second_side(skeleton, frame.posterior, frame.pose),
+        "across": across(visible, float(frame.pose[0]), frame.translation),
+        "views": float(min(len(visible), MAX_VIEWS)),
+    }
+    if frame.details["usable"]:
+        mirrored, *reflected = (frame.details["twins"] + TWIN_COST_OFFSET) / (frame.cost + TWIN_COST_OFFSET)
+        values |= {"cost": frame.cost, "reflected": float(min(reflected)), "mirrored": float(mirrored)}
+    return values
+
+
+def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: bool = False) -> dict[str, float]:
+    """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places (3,).
+
+    Metres a second, at most `MAX_SPEED`. Empty for a single place. With `backwards` the frames come in reverse.
+    """
+    if len(places) < 2:
+        return {}
+    way = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
+    ahead = float(way @ [math.sin(yaw), math.cos(yaw)])
+    return {"ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED), "speed": min(float(np.linalg.norm(way)), MAX_SPEED)}
+
+
+def across(cameras: Sequence[Camera], yaw: float, place: Array) -> float:
+    """Return how far a person at a place (3,) faces across the only camera's line of sight: 1 in a side view.
+
+    0 with several cameras, as one of them shows what another does not.
+    """
+    return abs(math.sin(yaw - facing(cameras[0], place))) if len(cameras) == 1 else 0.0
+
+
+def greatest_distance(skeleton: Skeleton, posterior: Posterior, pose: Array) -> float:
+    """Return the greatest distance between a pose (66,) and a track of a posterior: metres, the mean over joints.
+
+    Roots are at the same point.
+    """
+    joints, every = skeleton.joints(pose), skeleton.joints(posterior.poses)
+    off = np.linalg.norm((every - every[:, :1]) - (joints - joints[:1]), axis=-1).mean(axis=1)
+    return float(off.max())
+
+
+class EvidenceMeans:
+    """The evidence of the frames so far, and its exponentially weighted means."""
+
+    def __init__(self, fps: float) -> None:
+        self._keep = np.exp([[-1.0 / (seconds * fps)] for seconds in REACHES.values()])
+        self._latest: dict[str, float] = {}
+        self._sums, self._weight = np.zeros((len(REACHES), len(EVIDENCE))), np.zeros((len(REACHES), 1))
+
+    def features(self, values: Mapping[str, float]) -> Array:
+        """Return the evidence of the next frame and its means so far (3 E,), on the scale that was fitted.
+
+        A missing value is that of the frame before, at first that of `DEFAULTS`. In a mean, the weight of a frame
+        falls by a factor e for each reach.
+        """
+        self._latest |= values
+        now = np.array([scale(self._latest.get(name, DEFAULTS.get(name, 0.0))) for name, scale in EVIDENCE.items()])
+        self._sums, self._weight = self._sums * self._keep + now, self._weight * self._keep + 1.0
+        return np.concatenate([now, (self._sums / self._weight).ravel()])
+
+
+@dataclass(frozen=True, eq=False)
+class LogisticModel:
+    """A logistic model of some features of a frame."""
+
+    rows: list[int]  # of the features that it uses
+    weights: Array = field(repr=False)
+    bias: float
+
+    def probability(self, features: Array) -> float:
+        """Return the probability for a frame with these features (3 E,)."""
+        return probability_of(float(features[self.rows] @ self.weights) + self.bias)
+
+    @classmethod
+    def from_dict(cls, held: Mapping[str, Any]) -> Self:
+        """Return the model that JSON holds. Raises ValueError where it uses unknown evidence."""
+        unknown = sorted(set(held["weights"]) - set(NAMES))
+        if unknown:
+            raise ValueError(f"weights must be of evidence that frames have, got {', '.join(unknown)}")
+        rows = [NAMES.index(name) for name in held["weights"]]
+        return cls(rows, np.array(list(held["weights"].values()), dtype=np.float64), float(held["bias"]))
+
+
+@dataclass(frozen=True, eq=False)
+class FailureClassifier:
+    """The models of lost frames and of exchanged sides, and the probability from which sides are unknown."""
+
+    lost: LogisticModel
+    sides: LogisticModel
+    unknown: float  # the probability of exchanged sides from which they are
+
+    @classmethod
+    def from_dict(cls, held: Mapping[str, Any]) -> Self:
+        """Return the models that JSON holds. Raises ValueError where one uses unknown evidence."""
+        models = LogisticModel.from_dict(held["lost"]), LogisticModel.from_dict(held["sides"])
+        return cls(*models, float(held["unknown"]))
+
+
+@cache
+def stored_classifier() -> FailureClassifier:
+    """Return the models that were fitted to people who are not in the library."""
+    return FailureClassifier.from_dict(json.loads(FITTED.read_text(encoding="utf-8")))
+
+
+def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: FailureClassifier) -> Iterator[Frame]:
+    """Yield frames with the probability that each is lost, and whether its left and right are unknown.
+
+    Their `details` hold the evidence and the probability of exchanged sides. Frames without sampled tracks stay as
+    they are.
+    """
+    memory = EvidenceMeans(task.fps)
+    places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
+    for frame in frames:
+        if frame.posterior is None:
+            yield frame
+            continue
+        places.append(frame.translation)
+        evidence = evidence_of(task.body.skeleton, frame, task.cameras)
+        evidence |= root_motion(places, float(frame.pose[0]), task.fps, backwards=task.backwards)
+        features = memory.features(evidence)
+        exchanged = classifier.sides.probability(features)
+        yield replace(
+            frame,
+            lost=classifier.lost.probability(features),
+            posterior=_sided(frame.posterior, exchanged >= classifier.unknown),
+            details={**frame.details, "evidence": evidence, "exchanged": exchanged},
+        )
+
+
+def _sided(posterior: Posterior, unknown: bool) -> Posterior:
+    """Return a posterior whose left and right are unknown, or known unless no sample has them as reported."""
+    model = posterior.recalibration or Recalibration()
+    return replace(posterior, recalibration=replace(model, second_side=float(not unknown)))
