@@ -9,7 +9,7 @@ import pytest
 
 from posefit.motion import built_in
 from posefit.registry import registry
-from posefit_exemplars.factory import LEAST, exemplars
+from posefit_exemplars.factory import MIN_EVALUATIONS, exemplars
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
 
@@ -23,7 +23,7 @@ def test_a_pose_is_told_so_many_frames_later(walker: Walk, lag: int) -> None:
             taken += 1
             yield observation
 
-    tracker = exemplars(walker.told(evaluations=LEAST), lag=lag)
+    tracker = exemplars(walker.told(evaluations=MIN_EVALUATIONS), lag=lag)
     assert tracker.lag == lag
     late = [taken - given for given, _ in enumerate(tracker.track(stream(), np.random.default_rng(0)), 1)]
     count = len(walker.seen)
@@ -76,7 +76,7 @@ def test_a_root_that_is_suddenly_a_thousand_kilometres_away_ends_nothing(walker:
     np.testing.assert_array_equal(frames[1].translation, gone.translation)
 
 
-@pytest.mark.parametrize("budget", [LEAST, 1000, 2440])
+@pytest.mark.parametrize("budget", [MIN_EVALUATIONS, 1000, 2440])
 @pytest.mark.parametrize("first", ["searched", "given"])
 @pytest.mark.parametrize("size", [(160, 120), (60, 45)])
 def test_the_budget_holds_and_small_pictures_count_by_their_pixels(budget: int, first: str, size: Any) -> None:
@@ -93,16 +93,16 @@ def test_the_budget_holds_and_small_pictures_count_by_their_pixels(budget: int, 
 def test_the_budget_holds_for_the_twins_of_several_cameras(views: tuple[float, ...]) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), views)
     for refiner in ("none", "pso", "cma"):
-        tracker = exemplars(walk.told(evaluations=LEAST), refiner=refiner, lag=0)
+        tracker = exemplars(walk.told(evaluations=MIN_EVALUATIONS), refiner=refiner, lag=0)
         frames = list(tracker.track(walk.seen, np.random.default_rng(0)))
-        assert max(frame.evaluations for frame in frames) <= LEAST
+        assert max(frame.evaluations for frame in frames) <= MIN_EVALUATIONS
 
 
 @pytest.mark.parametrize("name", ["none", "pso", "sapso", "annealed", "particle", "scipy"])
 def test_any_optimiser_of_the_registry_searches_within_the_budget(walker: Walk, name: str) -> None:
     if name != "none":
         assert registry().optimiser(name)
-    for budget in (LEAST, 1000):
+    for budget in (MIN_EVALUATIONS, 1000):
         tracker = exemplars(walker.told(evaluations=budget), refiner=name, lag=1)
         frames = list(tracker.track(walker.seen[:2], np.random.default_rng(0)))
         assert max(frame.evaluations for frame in frames) <= budget
