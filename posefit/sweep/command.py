@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from posefit.sweep.cell import run_cell
-from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of, progress_of
+from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of
 from posefit.sweep.driver import Driver
 from posefit.sweep.engines.engine import Engine, Limits, Run
 from posefit.sweep.ledger import INDEX, Ledger
@@ -23,7 +23,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Where:
-    """In which place cells run, and how much each may take: processes of this machine, or Dask workers."""
+    """Where cells run, and how much each may take: in processes of this machine, or on Dask workers."""
 
     workers: int | None = None
     scheduler: str | None = None
@@ -33,13 +33,13 @@ class Where:
 
 
 def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = False, say: Say) -> tuple[Tally, int, str]:
-    """Return how the sweep of a plan to a folder ended, the exit status that says so, and what shows what it found."""
+    """Return how the sweep of a plan to a folder ended, its exit status, and the command that shows its results."""
     cells = Plan.read(plan)
     start = engine(where)
     with closing(start()) as running:  # without an engine there is no folder either
         tally = swept(cells, out, running, say, retry_quarantined)
     status = STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
-    return tally, status, _showing(out)
+    return tally, status, f"posefit report {shlex.quote(out)} --out {shlex.quote(f'{out.rstrip(os.sep)}.html')}"
 
 
 def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quarantined: bool = False) -> Tally:
@@ -48,27 +48,39 @@ def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quaran
 
     with Driver(out, say) as driver:
         if retry_quarantined:
-            lost = driver.ledger.quarantined_keys()
-            again = sum(driver.release_quarantined(key) for key in keys_of(cells) if key in lost)
-            say(f"{again} {'cell is' if again == 1 else 'cells are'} out of quarantine, to be tried again")
+            quarantined = driver.ledger.quarantined_keys()
+            count = sum(driver.release_quarantined(key) for key in keys_of(cells) if key in quarantined)
+            say(f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again")
         if count := driver.ledger.outdated():
             say(f"{count} of the {len(driver.ledger)} rows in {out} are of another version, and do not count here")
         with suppress(OSError, ValueError):  # no room: the sweep will say so, if it needs any
             driver.ledger.begin(keys_of(cells))
         bar = tqdm(total=len(cells), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
+        started = False
 
-        def beside(message: str) -> None:
+        def watch(tally: Tally) -> None:
+            nonlocal started
+            settled = tally.done + tally.quarantined
+            if not started:
+                started, bar.n, bar.initial = True, settled, settled
+                if settled:
+                    say(f"{settled} of {tally.cells} cells are done already")
+            if tally.failed or tally.quarantined:
+                bar.set_postfix(failures=tally.failed, quarantined=tally.quarantined, refresh=False)
+            bar.update(settled - bar.n)
+
+        def say_beside_bar(message: str) -> None:
             bar.clear()
             say(message)
 
         with bar:
-            return drive_cells(cells, driver, running, beside, progress_of(bar, say))
+            return drive_cells(cells, driver, running, say_beside_bar, watch)
 
 
 def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Iterator[str]:
-    """Yield the lines that show the cells of a plan, which are done already, and about how long the others take.
+    """Yield the lines of a preview: the cells of a plan, which are done already, and about how long the others take.
 
-    Or those of one JSON object that says the same. A million cells are never in memory together.
+    Or those of one JSON object with the same content. A million cells are never in memory together.
     """
     from posefit.sweep.estimate import TRIAL_SECONDS, Estimate, Workload, estimate_of
 
@@ -76,7 +88,7 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
     limits = replace(where.limits, seconds=min(where.limits.seconds, TRIAL_SECONDS))
     start = engine(replace(where, limits=limits))
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
-    left, count = Workload(), 0
+    left, workers = Workload(), 0
     if as_json:
         yield '{"cells": ['
     for k, cell in enumerate(cells):
@@ -84,26 +96,27 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
         if not done:
             left.add(cell)
         if as_json:
-            shown = json.dumps({"key": cell.key, "done": done, **cell.spec})
-            yield shown if k == len(cells) - 1 else f"{shown},"
+            line = json.dumps({"key": cell.key, "done": done, **cell.spec})
+            yield line if k == len(cells) - 1 else f"{line},"
         else:
             yield f"{cell.key[:8]}  {cell.summary}{'  done' if done else ''}"
-    found = Estimate(0.0, {})
+    estimate = Estimate(0.0, {})
     if len(left):
         with closing(start()) as running:
-            count = running.window()
-            found = estimate_of(left, running, count)
+            workers = running.window()
+            estimate = estimate_of(left, running, workers)
     if as_json:
-        yield f'], "seconds": {found.seconds!r}, "workers": {count}, "untried": {json.dumps(found.untried)}}}'
+        untried = json.dumps(estimate.untried)
+        yield f'], "seconds": {estimate.seconds!r}, "workers": {workers}, "untried": {untried}}}'
         return
-    for cell_text, reason in found.untried.items():
+    for cell_text, reason in estimate.untried.items():
         yield f"warning: {cell_text}: {reason}; cells of its kind count for no time here, and would be quarantined"
-    takes = f": about {duration_text(found.seconds)} on {count} workers" if len(left) else ""
+    takes = f": about {duration_text(estimate.seconds)} on {workers} workers" if len(left) else ""
     yield f"{len(cells)} cells, {len(left)} of them to run{takes}"
 
 
 def engine(where: Where, run: Run = run_cell) -> Callable[[], Engine]:
-    """Return what starts the engine that was asked for. Raises ValueError where more than one was."""
+    """Return a function that starts the engine asked for. Raises ValueError where more than one is."""
     places = (("workers", where.workers), ("scheduler", where.scheduler), ("dask-local", where.dask_local))
     given = [name for name, value in places if value]
     if len(given) > 1:
@@ -126,25 +139,20 @@ def engine(where: Where, run: Run = run_cell) -> Callable[[], Engine]:
     return start
 
 
-def _showing(out: str) -> str:
-    """Return the command that shows what a sweep found."""
-    return f"posefit report {shlex.quote(out)} --out {shlex.quote(f'{out.rstrip(os.sep)}.html')}"
-
-
-def tally_text(tally: Tally, out: str, shown: str) -> str:
-    """Return how a sweep ended, and the command `shown` that shows what it found."""
+def tally_text(tally: Tally, out: str, report: str) -> str:
+    """Return how a sweep ended, and the command that shows its results."""
     line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
     if tally.quarantined:
         line += f"; {tally.quarantined} quarantined: the reasons are in {Path(out) / 'quarantine'}"
     if tally.stopped:
         line += "; stopped: the same command goes on from there"
     elif tally.done:
-        line += f"\nwhat was found: {shown}"
+        line += f"\nresults: {report}"
     return line
 
 
 def duration_text(seconds: float) -> str:
-    """Return a time as people say it."""
+    """Return a time in words, such as `2.5 minutes`."""
     for name, size in (("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 1.5 * size:
             return f"{seconds / size:.1f} {name}"

@@ -1,12 +1,12 @@
 """A driver: one process that works on a ledger, beside any number of others.
 
-Nobody runs a cell without a lease on it, a file that only one driver can create. A driver's leases hold as long as it
-lives, which its locked log shows; what a dead one had leased is tried again by others, as the next attempt. After
-creating a lease a driver looks whether the row has come meanwhile: it was written before the lease on it was given up.
+A driver runs a cell only under a lease, a file that only one driver can create. Its leases hold as long as it lives,
+which its locked log shows; a dead driver's cells are tried again by others, as the next attempt. After creating a lease
+a driver checks whether the row has come meanwhile: a row is written before the lease on it is given up.
 
-An attempt that failed says whether that was the cell's own fault. `ATTEMPTS` of these put it into quarantine. One that
-something outside ended, a driver that died among them, is no fault of the cell: it is tried again without limit as long
-as other cells get done. Only `LOSSES` of them, with no row between the first and the last, put it into quarantine.
+`ATTEMPTS` attempts that fail by the cell's own fault put it into quarantine. One that was ended from outside, by the
+death of its driver for example, is no fault of the cell: it is tried again without limit as long as other cells get
+done. Only `LOSSES` of them, with no row between the first and the last, put it into quarantine.
 """
 
 import json
@@ -23,14 +23,14 @@ from typing import Any, Self
 from posefit.files import create_once, replaced_file
 from posefit.reading import parsed_json
 from posefit.sweep.cell import Cell, CellResult
-from posefit.sweep.fold import LEFT, fold_logs
+from posefit.sweep.fold import LEFTOVER_SECONDS, fold_logs
 from posefit.sweep.ledger import LEASES, QUARANTINE, ROWS, Ledger, create
 from posefit.sweep.locks import is_locked, on_one_machine
 from posefit.sweep.log import SUFFIX, Writer
 
 ATTEMPTS = 3  # that fail by a cell's own fault
 LOSSES = 50  # attempts that end by no fault of the cell, while no other cell gets done
-SYNC = 1.0  # seconds between two times that rows are brought to the disk
+SYNC_SECONDS = 1.0  # between two times that rows are brought to the disk
 
 
 class State(Enum):
@@ -52,7 +52,7 @@ class Lease:
 class Driver:
     """Opens a ledger for writing, and creates it where there is none. A context; it closes its log at the end.
 
-    Raises ValueError where the folder cannot be a ledger of this version, or cannot be written to.
+    Raises ValueError where the folder cannot be a ledger, or cannot be written to.
     """
 
     def __init__(self, path: str | Path, say: Callable[[str], None] | None = None) -> None:
@@ -128,7 +128,7 @@ class Driver:
 
     def finish(self, lease: Lease, result: CellResult) -> None:
         """Write the row of a leased cell. Raises OSError where there is no room."""
-        if not self._mine(lease):  # somebody has removed the lease, and another driver may have been quicker
+        if not self._mine(lease):  # it was removed, and another driver may have been quicker
             self.ledger.refresh()
         if lease.cell.key not in self.ledger:
             self._log.append(lease.cell.key, result.row, result.joints)
@@ -137,12 +137,12 @@ class Driver:
 
     def fail(self, lease: Lease, reason: str, own: bool = True) -> None:
         """Note why an attempt failed, and whether that was the cell's own fault."""
-        if not self._mine(lease):  # somebody has removed the lease: it is as if it had been released
+        if not self._mine(lease):  # it was removed: it is as if it had been released
             return
         path = self._path(lease.cell.key, lease.attempt)
         with replaced_file(path, self._mark) as building:
-            told = {**self._me, "rows": len(self.ledger), "failed": reason, "own": own}
-            building.write_text(json.dumps(told), encoding="utf-8")
+            content = {**self._me, "rows": len(self.ledger), "failed": reason, "own": own}
+            building.write_text(json.dumps(content), encoding="utf-8")
 
     def release_quarantined(self, key: str) -> bool:
         """Let a cell out of quarantine, and return whether it was there."""
@@ -159,7 +159,7 @@ class Driver:
 
     def sync(self) -> None:
         """Bring rows to the disk, once a second."""
-        self._log.sync(SYNC)
+        self._log.sync(SYNC_SECONDS)
 
     @property
     def _me(self) -> dict[str, Any]:
@@ -198,7 +198,7 @@ class Driver:
         for entry in os.scandir(self._leases):
             if entry.name.startswith("."):
                 with suppress(FileNotFoundError):  # it got its name just now
-                    if self._log.began - entry.stat().st_mtime > LEFT:
+                    if self._log.began - entry.stat().st_mtime > LEFTOVER_SECONDS:
                         os.unlink(entry)
             elif self.state(entry.name.partition(".")[0]):
                 Path(entry).unlink(missing_ok=True)

@@ -5,8 +5,8 @@ rows/NAME.jsonl      finished rows, one log a driver; those of drivers that ende
 rows/NAME.joints     the joints of the rows' frames
 leases/KEY.n         the nth attempt at a cell: who runs it, or why it failed
 quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
-plans/NAME.cells     which cells a plan has that was begun here, when, and how many were done then
-aside/               damaged lines and files that were found; their cells are run again
+plans/NAME.cells     the cells of a plan that was begun here, when, and how many were done then
+aside/               damaged lines and files; their cells are run again
 """
 
 import hashlib
@@ -59,7 +59,7 @@ class Ledger:
 
     def __init__(self, path: str | Path, say: Callable[[str], None] | None = None) -> None:
         self.path = Path(path)
-        self._say = say or _nothing
+        self._say = say or (lambda _: None)
         _check_format(self.path)
         self._ends: dict[str, int] = {}  # how far each log was read
         self._places: dict[str, tuple[str, int]] = {}  # of every finished row: its log, and where in it
@@ -68,7 +68,7 @@ class Ledger:
         self.refresh()  # a log may have been folded into another while the folder was listed
 
     def refresh(self) -> None:
-        """Take note of what was written since."""
+        """Read what was written since."""
         logs = self._logs()
         if any(logs.get(name, -1) < end for name, end in self._ends.items()):
             # folded into another one, which was there before this one went, or cut off: everything is read again
@@ -81,15 +81,15 @@ class Ledger:
                 continue
             for offset, line in lines(self.path / ROWS / name, self._ends.get(name, 0)):
                 self._ends[name] = offset + len(line)
-                found = decoded(line)
-                if found is None:
+                if (entry := decoded(line)) is None:
                     self.set_aside(Damage(self.path / ROWS / name, offset, line))
-                else:
-                    # a row may be there twice: of a log that is folded just now, or of a lock that a file system did
-                    # not keep. The first one counts
-                    self._places[found[0]] = min((name, offset), self._places.get(found[0], (name, offset)))
-                    version = VERSION.search(found[1])
-                    self._versions[found[0]] = sys.intern(version[1].decode()) if version else ""
+                    continue
+                key, row = entry
+                # a row may be there twice: of a log that is folded just now, or of a lock that a file system did
+                # not keep. The first one counts
+                self._places[key] = min((name, offset), self._places.get(key, (name, offset)))
+                version = VERSION.search(row)
+                self._versions[key] = sys.intern(version[1].decode()) if version else ""
 
     def __len__(self) -> int:
         return len(self._places)
@@ -117,10 +117,10 @@ class Ledger:
         return sum(count for version, count in counts.items() if any(map(other_version, version.split(", "))))
 
     def begin(self, keys: Iterable[str]) -> None:
-        """Take note of the cells of a plan that is begun, or gone on with, for whoever wants to know how far it is."""
-        settled, lost, short = 0, self.quarantined_keys(), bytearray()
+        """Write down the cells of a plan that is begun, or gone on with, so that its progress can be read."""
+        settled, quarantined, short = 0, self.quarantined_keys(), bytearray()
         for key in keys:
-            settled += key in self or key in lost
+            settled += key in self or key in quarantined
             short += bytes.fromhex(key[: 2 * SHORT])
         head = {"cells": len(short) // SHORT, "begun": time.time(), "settled": settled}
         path = self.path / PLANS / f"{hashlib.sha256(short).hexdigest()[:16]}.cells"
@@ -129,7 +129,7 @@ class Ledger:
 
     def plans(self) -> list[BegunPlan]:
         """Return the plans that were begun here, the latest first; a damaged one is left out."""
-        found = []
+        plans = []
         for path in (self.path / PLANS).glob("*.cells"):
             try:
                 head, _, short = path.read_bytes().partition(b"\n")
@@ -137,8 +137,8 @@ class Ledger:
             except (OSError, ValueError, TypeError):
                 continue
             if plan.cells == len(plan.keys) // SHORT:
-                found.append(plan)
-        return sorted(found, key=lambda plan: -plan.begun)
+                plans.append(plan)
+        return sorted(plans, key=lambda plan: -plan.begun)
 
     def in_quarantine(self, key: str) -> bool:
         """Return whether a cell is in quarantine."""
@@ -152,19 +152,21 @@ class Ledger:
     def quarantined(self) -> list[dict[str, Any]]:
         """Return the cells in quarantine: key, spec, status, and the reason of each attempt."""
         paths = sorted((self.path / QUARANTINE).glob("*.json"))
-        found = [self._sentence(path) for path in paths if path.stem not in self]
-        return [one for one in found if one is not None]
+        read = [self._read_quarantined(path) for path in paths if path.stem not in self]
+        return [cell for cell in read if cell is not None]
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it."""
-        given: set[str] = set()
+        yielded: set[str] = set()
         while True:
             for name in sorted(self._logs()):
                 for offset, line in lines(self.path / ROWS / name):
-                    found = decoded(line)
-                    if found is not None and self._places.get(found[0]) == (name, offset) and found[0] not in given:
-                        given.add(found[0])
-                        yield json.loads(found[1])
+                    if (entry := decoded(line)) is None:
+                        continue
+                    key, row = entry
+                    if self._places.get(key) == (name, offset) and key not in yielded:
+                        yielded.add(key)
+                        yield json.loads(row)
             if self._ends.keys() <= self._logs().keys():
                 return
             self.refresh()  # a log was folded into another one meanwhile
@@ -175,13 +177,13 @@ class Ledger:
         try:
             with (self.path / ROWS / name).open("rb") as file:
                 file.seek(offset)
-                found = decoded(file.readline())
+                entry = decoded(file.readline())
         except FileNotFoundError:  # folded into another one meanwhile
             self.refresh()
             return self.row(key)
-        if found is None or found[0] != key:
+        if entry is None or entry[0] != key:
             raise ValueError(f"{self.path / ROWS / name}: the row of cell {key[:8]} must be whole, got a damaged one")
-        row: dict[str, Any] = json.loads(found[1])
+        row: dict[str, Any] = json.loads(entry[1])
         return row
 
     def all_rows(self) -> Iterator[dict[str, Any]]:
@@ -201,19 +203,12 @@ class Ledger:
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             return dict(stored)
 
-    def traces(self) -> Iterator[tuple[str, "Array", "Array"]]:
-        """Yield the key of every finished cell with its anytime trace: evaluations of a frame, and the best cost."""
-        import numpy as np
-
-        for row in self.rows():
-            yield row["key"], np.array(row["trace"]["evaluations"]), np.array(row["trace"]["cost"])
-
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
         return dataframe(self.all_rows())
 
     def set_aside(self, damage: Damage) -> bool:
-        """Keep a damaged line for whoever wants to look at it, and return whether it is kept."""
+        """Keep a damaged line for a human to look at, and return whether it is kept."""
         aside = self.path / ASIDE / f"{damage.path.stem}-{damage.offset}.txt"
         if aside.exists():
             return True
@@ -226,20 +221,20 @@ class Ledger:
         return True
 
     def _logs(self) -> dict[str, int]:
-        """Return the logs that there are, with their sizes."""
-        found = {}
+        """Return the logs with their sizes."""
+        sizes = {}
         for entry in os.scandir(self.path / ROWS):
             with suppress(FileNotFoundError):  # an empty one that went away
                 if entry.name.endswith(SUFFIX):
-                    found[entry.name] = entry.stat().st_size
-        return found
+                    sizes[entry.name] = entry.stat().st_size
+        return sizes
 
-    def _sentence(self, path: Path) -> dict[str, Any] | None:
-        """Return what a file of the quarantine says. A damaged one is put aside, and its cell is tried again."""
+    def _read_quarantined(self, path: Path) -> dict[str, Any] | None:
+        """Return the content of a file of the quarantine. A damaged one is put aside, and its cell is tried again."""
         try:
-            found: dict[str, Any] = parsed_json(path.read_bytes())
-            if found["key"] == path.stem and isinstance(found["spec"], dict) and isinstance(found["reasons"], list):
-                return found
+            cell: dict[str, Any] = parsed_json(path.read_bytes())
+            if cell["key"] == path.stem and isinstance(cell["spec"], dict) and isinstance(cell["reasons"], list):
+                return cell
         except (ValueError, KeyError, TypeError):
             pass
         except FileNotFoundError:  # it is tried again just now
@@ -259,9 +254,9 @@ def create(path: Path) -> None:
         if path.exists() and not path.is_dir():
             raise ValueError(f"{path}: expected a folder for the ledger, got a file")
         if not (path / INDEX).exists():
-            found = sorted(entry.name for entry in os.scandir(path)) if path.is_dir() else []
+            names = sorted(entry.name for entry in os.scandir(path)) if path.is_dir() else []
             # another driver may be making the same ledger
-            if strange := [name for name in found if name not in FOLDERS and not name.lstrip(".").startswith(INDEX)]:
+            if strange := [name for name in names if name not in FOLDERS and not name.lstrip(".").startswith(INDEX)]:
                 raise ValueError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
             for name in FOLDERS:
                 (path / name).mkdir(parents=True, exist_ok=True)
@@ -276,15 +271,11 @@ def _check_format(path: Path) -> None:
     if os.path.isfile(path):
         raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got a file")
     try:
-        found = parsed_json(read_text(path / INDEX, MAX_INDEX_BYTES))["format"]
+        form = parsed_json(read_text(path / INDEX, MAX_INDEX_BYTES))["format"]
     except FileNotFoundError:
         raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None
     except (ValueError, KeyError, TypeError) as error:
         reason = str(error).removeprefix(f"{path / INDEX}: ")
         raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {cut(reason)}") from None
-    if found != FORMAT:
-        raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(found)}")
-
-
-def _nothing(_: str) -> None:
-    """Say nothing."""
+    if form != FORMAT:
+        raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")

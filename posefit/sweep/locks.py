@@ -54,25 +54,25 @@ def is_locked(path: Path) -> bool:
 
 
 def on_one_machine(path: Path, mounts: Path = MOUNTS) -> str | None:
-    """Return why locks in a folder hold on this machine alone; None where others see them, or nobody can say."""
+    """Return why locks in a folder hold on this machine alone; None where others see them, or where it is unknown."""
     try:
         lines = mounts.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:  # an operating system that does not say
         return None
-    found, longest = None, -1
+    reason, longest = None, -1
     for line in lines:
         before, _, after = line.partition(" - ")
         words, (kind, _, options) = before.split(), [*after.split(), "", "", ""][:3]
         place = Path(re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), words[4]))
         if path.resolve().is_relative_to(place) and len(place.parts) >= longest:  # a later mount covers an earlier one
-            told = {"", *words[5].split(","), *options.split(",")}
-            found = next((f"{kind} {option}".strip() for option in LOCAL.get(kind, ()) if option in told), None)
+            given = {"", *words[5].split(","), *options.split(",")}
+            reason = next((f"{kind} {option}".strip() for option in LOCAL.get(kind, ()) if option in given), None)
             longest = len(place.parts)
-    return found
+    return reason
 
 
 def _useless(path: Path, what: str) -> ValueError:
     return ValueError(
-        f"{path.parent.parent}: expected a disk that keeps locks (flock), got {what}; without them nobody can see "
+        f"{path.parent.parent}: expected a disk that keeps locks (flock), got {what}; without them it is unknown "
         "which sweep lives"
     )

@@ -44,19 +44,19 @@ def encoded(key: str, row: Mapping[str, Any]) -> bytes:
 
 def decoded(line: bytes) -> tuple[str, bytes] | None:
     """Return the key and the row, as JSON, of a line; None where it is damaged."""
-    found = _LINE.fullmatch(line)
-    if found is None or int(found[2], 16) != zlib.crc32(found[1] + found[3]):
+    match = _LINE.fullmatch(line)
+    if match is None or int(match[2], 16) != zlib.crc32(match[1] + match[3]):
         return None
-    return found[1].decode(), found[3]
+    return match[1].decode(), match[3]
 
 
 class Writer:
-    """Writes one log; as long as it is open, its file is locked, and everybody can see that its driver lives."""
+    """Writes one log; as long as it is open, its file is locked, which shows that its driver lives."""
 
     def __init__(self, folder: Path) -> None:
         self.name = f"{time.strftime('%Y%m%dT%H%M%S', time.gmtime())}-{secrets.token_hex(4)}"
         self._paths = folder / f"{self.name}{SUFFIX}", folder / f"{self.name}{JOINTS}"
-        # a log gets its name when it is locked: without, another driver would take it for that of a dead one
+        # a log gets its name once it is locked: before, another driver would take it for that of a dead one
         unnamed = folder / f"{self.name}{UNNAMED}"
         # opened for this process alone: no worker inherits the lock
         self._rows, self._joints = (
@@ -81,7 +81,7 @@ class Writer:
         self._add(self._joints, joints)
         line = encoded(key, {**row, "joints": place})
         end = os.fstat(self._rows).st_size
-        # where somebody has cut the log off, what is left of a line ends here and takes no other with it
+        # where the log was cut off, the rest of a line ends here and takes no other with it
         cut = end and os.pread(self._rows, 1, end - 1) != b"\n"
         self._add(self._rows, b"\n" + line if cut else line)
 
@@ -109,10 +109,10 @@ class Writer:
                 os.close(file)
 
     def _add(self, file: int, data: bytes) -> None:
-        found = os.fstat(file)
-        if not found.st_nlink:
-            raise FileNotFoundError(errno.ENOENT, "a log that somebody has removed")
-        end, done = found.st_size, 0
+        status = os.fstat(file)
+        if not status.st_nlink:
+            raise FileNotFoundError(errno.ENOENT, "a log that was removed")
+        end, done = status.st_size, 0
         try:
             while done < len(data):
                 done += os.pwrite(file, data[done:], end + done)

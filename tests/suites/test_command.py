@@ -230,9 +230,7 @@ def test_a_sweep_runs_a_plan_of_searches_and_goes_on(tmp_path: Path) -> None:
     words = ("sweep", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", 1)
     done = run(*words)
     assert done.exit_code == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == (
-        f"what was found: posefit report {tmp_path / 'out'} --out {tmp_path / 'out'}.html"
-    )
+    assert done.stdout.splitlines()[-1] == (f"results: posefit report {tmp_path / 'out'} --out {tmp_path / 'out'}.html")
     assert "4 of 4 cells done, 0 of them now" in run(*words).stdout
 
 

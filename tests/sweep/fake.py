@@ -104,7 +104,7 @@ def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
     from posefit.sweep.driver import Driver
 
     with Driver(out) as driver:
-        return drive_cells(chosen, driver, engine, print, lambda _: None)
+        return drive_cells(chosen, driver, engine, print)
 
 
 def starts(path: Path) -> list[tuple[str, int]]:

@@ -41,7 +41,7 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(pla
     assert first.exit_code == 0, first.stderr
     assert first.stdout.splitlines() == [
         f"8 of 8 cells done, 8 of them now, written to {out}",
-        f"what was found: posefit report {out} --out {out}.html",
+        f"results: posefit report {out} --out {out}.html",
     ]
     assert "8/8" in first.stderr
     again = run("sweep", plan, "--out", out, "--workers", 2, "--json")

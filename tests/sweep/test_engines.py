@@ -272,7 +272,7 @@ def timed(count: int, engine: Engine, folder: Path) -> float:
         while warm < engine.window():
             warm += len(engine.wait(1.0))
         began = time.perf_counter()
-        tally = drive_cells(cells(count, fake.SECOND), driver, Unclosed(engine), print, lambda _: None)
+        tally = drive_cells(cells(count, fake.SECOND), driver, Unclosed(engine), print)
         taken = time.perf_counter() - began
     engine.close()
     assert tally.done == count

@@ -57,7 +57,7 @@ for last in range(1, kills + 1):
     for name in real:
         setattr(os, name, faulty(name))
     with Driver(folder) as driver:
-        drive_cells(cells(1 + last // 4), driver, Here(), lambda _: None, lambda _: None)
+        drive_cells(cells(1 + last // 4), driver, Here(), lambda _: None)
     os._exit(0)
 """
 
@@ -118,7 +118,7 @@ def test_a_log_that_lives_and_one_that_is_large_are_not_folded(tmp_path: Path, m
         living.finish(lease, result(cells(1)[0]))
         filled(folder, 3)
         assert len(list((folder / "rows").glob("*.jsonl"))) == 2
-    monkeypatch.setattr(fold, "LARGE", 1)
+    monkeypatch.setattr(fold, "MAX_FOLDED_BYTES", 1)
     filled(folder, 4)
     assert len(list((folder / "rows").glob("*.jsonl"))) == 3
 
@@ -140,12 +140,12 @@ def test_a_log_that_is_cut_off_behind_its_driver_takes_no_later_row_with_it(tmp_
 
 
 def test_a_log_that_somebody_removes_ends_the_sweep_in_one_line(tmp_path: Path) -> None:
-    expected = "got a log that somebody has removed; 0 of 2 cells are done and safe"
+    expected = "got a log that was removed; 0 of 2 cells are done and safe"
     with Driver(tmp_path / "ledger") as driver:
         for path in (tmp_path / "ledger" / "rows").iterdir():
             path.unlink()
         with pytest.raises(ValueError, match=expected):
-            drive_cells(cells(2), driver, Here(), print, lambda _: None)
+            drive_cells(cells(2), driver, Here(), print)
 
 
 @pytest.mark.parametrize("content", [b'{"key"', DEEP, b"\xff"])
@@ -271,7 +271,7 @@ folder = Path({folder!r}) / "ledger"
 said = ""
 try:
     with Driver(folder) as driver:
-        drive_cells(cells(200), driver, Here(), print, lambda _: None)
+        drive_cells(cells(200), driver, Here(), print)
 except ValueError as error:
     said = str(error)
 damaged = []

@@ -43,7 +43,7 @@ class Here:
 def filled(folder: Path, count: int = 5, start: int = 0) -> Path:
     """Return a ledger with the rows of so many cells."""
     with Driver(folder) as driver:
-        assert drive_cells(cells(start + count)[start:], driver, Here(), print, lambda _: None).done == count
+        assert drive_cells(cells(start + count)[start:], driver, Here(), print).done == count
     return folder
 
 
@@ -63,10 +63,6 @@ def test_rows_and_joints_come_back_as_they_were_written(tmp_path: Path) -> None:
         joints = ledger.joints(cell.key)
         assert joints["estimate"].dtype == np.float32
         np.testing.assert_array_equal(joints["truth"], np.full((1, 27, 3), cell.seed))
-    key, evaluations, cost = next(ledger.traces())
-    assert key in ledger
-    assert evaluations.tolist() == [40, 80]
-    assert cost.tolist() == [2.0, 1.0]
 
 
 def test_a_frame_has_a_row_a_cell_whose_order_does_not_follow_from_when_it_was_run(tmp_path: Path) -> None:
@@ -128,7 +124,7 @@ def test_a_damaged_row_is_named_put_aside_and_run_again(harm: Any, tmp_path: Pat
     assert aside.read_bytes() == lines[2]
 
     with Driver(folder, said.append) as driver:
-        assert drive_cells(cells(5), driver, Here(), print, lambda _: None).ran == 1
+        assert drive_cells(cells(5), driver, Here(), print).ran == 1
     assert len(said) == 1
     assert sorted(row["key"] for row in Ledger(folder).rows()) == sorted(cell.key for cell in cells(5))
 
@@ -191,10 +187,10 @@ def test_damaged_joints_are_named(tmp_path: Path) -> None:
 def test_rows_of_another_version_are_read_and_counted_and_their_cells_are_run_again(tmp_path: Path) -> None:
     folder, old = tmp_path / "ledger", [replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)]
     with Driver(folder) as driver:
-        drive_cells(old, driver, Here(), print, lambda _: None)
+        drive_cells(old, driver, Here(), print)
         assert driver.ledger.version == "0.0.9 a1"
         assert driver.ledger.outdated() == 2
-        assert drive_cells(cells(3), driver, Here(), print, lambda _: None).ran == 3
+        assert drive_cells(cells(3), driver, Here(), print).ran == 3
     ledger = Ledger(folder)
     assert (len(ledger), ledger.outdated()) == (5, 2)
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
@@ -267,7 +263,7 @@ def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
             ValueError, match=r"expected room to write to, got No space left on device; \d of 9 cells are done"
         ),
     ):
-        drive_cells(cells(9), driver, Here(), print, lambda _: None)
+        drive_cells(cells(9), driver, Here(), print)
     monkeypatch.undo()
     said: list[str] = []
     assert 3 <= len(Ledger(folder, said.append)) < 9

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from posefit.sweep.cell import TrackCell
-from posefit.sweep.drive import NEAR, interleaved
+from posefit.sweep.drive import LOOKAHEAD, interleaved
 
 METHODS = ("sapso@pca", "cma@pca", "vsmm")
 
@@ -42,13 +42,13 @@ def test_a_long_plan_is_not_gone_through_before_it_begins() -> None:
     asked: list[int] = []
 
     def coming() -> Iterator[TrackCell]:
-        for cell in cells("ab", 2 * NEAR):
+        for cell in cells("ab", 2 * LOOKAHEAD):
             asked.append(cell.seed)
             yield cell
 
     begun = next(interleaved(coming(), lambda: 2))
     assert begun == cells("a", 1)[0]
-    assert len(asked) == NEAR
+    assert len(asked) == LOOKAHEAD
 
 
 def test_no_cell_is_lost_or_run_twice() -> None:

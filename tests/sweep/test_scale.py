@@ -25,7 +25,7 @@ began = time.perf_counter()
 ledger = Ledger(sys.argv[1])
 opened = time.perf_counter() - began
 table = ledger.frame()
-traces = sum(len(cost) for _, _, cost in ledger.traces())
+traces = sum(len(row["trace"]["cost"]) for row in ledger.rows())
 taken = time.perf_counter() - began
 status = dict(line.split(":", 1) for line in open("/proc/self/status"))  # a child's ru_maxrss is its parent's at least
 print(json.dumps([len(table), traces, opened, taken, 1024 * int(status["VmHWM"].split()[0])]))
