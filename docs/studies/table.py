@@ -67,13 +67,14 @@ def grouped(found: Sequence[Row], labels: Callable[[Row], Sequence[str]], names:
 def _cells(mine: Sequence[Row]) -> list[str]:
     errors = np.array([row["error_degrees"]["mean"] for row in mine])
     distances = np.array([row["mpjpe_mm"] for row in mine])
-    low, high = interval(distances, [row["spec"]["motion"] for row in mine])
+    motions = [row["spec"]["motion"] for row in mine]
+    low, high = interval(distances, motions)
     return [
         str(len(mine)),
         number("error_degrees", float(np.median(errors))),
         f"{errors.min():.1f} to {errors.max():.1f}",
         number("mpjpe_mm", float(np.median(distances))),
-        f"{number('mpjpe_mm', low)} to {number('mpjpe_mm', high)}",
+        f"{number('mpjpe_mm', low)} to {number('mpjpe_mm', high)}" if len(set(motions)) > 1 else "",
         *(percent(float(np.mean([row[name] for row in mine]))) for name in SHARES),
         *(f"{np.median([row['baselines_degrees'][name] for row in mine]):.1f}" for name in TRIVIAL),
         MEASURES["seconds_per_frame"].number(float(np.median([row["seconds_per_frame"] for row in mine]))),
