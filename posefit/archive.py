@@ -1,4 +1,4 @@
-"""Arrays out of an .npz file of a stranger: how large each of them is, is known before it is unpacked.
+"""Arrays of an .npz file that may be hostile: the size of each is checked before it is unpacked.
 
 `numpy.load` unpacks whatever a file asks for. Here the archive's directory and the header of each array are read first:
 nothing is unpacked that has another size than they say, or more bytes than the caller allows.
@@ -19,6 +19,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.errors import InputError
 from posefit.reading import check_size, cut, quoted
 
 MEMBERS = 1_000  # arrays of a file
@@ -46,7 +47,7 @@ _DAMAGE = (
 
 
 class _RefusedError(ValueError):
-    """Says what came that is not read."""
+    """The file holds what is not read; the message says what."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Stored:
         """Yield one row after the other, so that only one of them is in memory."""
         if self.fortran:
             if self.size > TURNED:
-                raise ValueError(f"{self._path}: expected {self.name} row by row, got it column by column")
+                raise InputError(f"{self._path}: expected {self.name} row by row, got it column by column")
             yield from self.read()
             return
         size = math.prod(self.shape[1:]) * self.dtype.itemsize
@@ -90,40 +91,40 @@ class Stored:
 
     @contextmanager
     def _opened(self) -> Iterator[IO[bytes]]:
-        with _told(self._path, self._what), self._archive.open(f"{self.name}.npy") as member:
+        with _as_input_error(self._path, self._what), self._archive.open(f"{self.name}.npy") as member:
             _exactly(member, self._start)
             yield member
 
 
 @contextmanager
 def archived(path: Path, names: Sequence[str], what: str, most: int, packed: int) -> Iterator[dict[str, Stored]]:
-    """Give those of `names` that an .npz file of at most `packed` bytes has; together they unpack to `most` at most.
+    """Yield those of `names` that an .npz file of at most `packed` bytes has; together they unpack to `most` at most.
 
-    Raises ValueError, also while they are read, where the file is damaged or asks for more; `what` it says of the
-    arrays that were expected.
+    Raises InputError, also while they are read, where the file is damaged or larger; `what` describes the expected
+    arrays in messages.
     """
     check_size(path, packed)
     with ExitStack() as stack:
-        with _told(path, what):
+        with _as_input_error(path, what):
             file = stack.enter_context(path.open("rb"))
             _check_directory(file)
             archive = stack.enter_context(zipfile.ZipFile(file))
             there = set(archive.namelist())
-            found = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in there}
-            asked = sum(one.size for one in found.values())
-            if asked > most:
-                raise _RefusedError(f"{asked / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most")
-        yield found
+            arrays = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in there}
+            size = sum(one.size for one in arrays.values())
+            if size > most:
+                raise _RefusedError(f"{size / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most")
+        yield arrays
 
 
 def read_arrays(path: Path, names: Sequence[str], what: str, most: int) -> Mapping[str, NDArray[Any]]:
-    """Return those of `names` that an .npz file has, of `most` bytes together. Raises ValueError as `archived` does."""
-    with archived(path, names, what, most, most) as found:
-        return {name: one.read() for name, one in found.items()}
+    """Return those of `names` that an .npz file has, of `most` bytes together. Raises InputError as `archived` does."""
+    with archived(path, names, what, most, most) as arrays:
+        return {name: one.read() for name, one in arrays.items()}
 
 
 def _check_directory(file: IO[bytes]) -> None:
-    """Return nothing. Raises ValueError where an archive's directory, which is read whole, has too many entries.
+    """Return nothing. Raises InputError where an archive's directory, which is read whole, has too many entries.
 
     The record that says so is looked for as zipfile does it.
     """
@@ -141,14 +142,14 @@ def _check_directory(file: IO[bytes]) -> None:
 
 
 @contextmanager
-def _told(path: Path, what: str) -> Iterator[None]:
-    """Tell whatever an archive or an array is damaged by as a mistake in the file."""
+def _as_input_error(path: Path, what: str) -> Iterator[None]:
+    """Raise whatever a damaged archive or array raises as an InputError that names the file."""
     try:
         yield
     except _DAMAGE as error:
         text = " ".join(str(error).split()) or type(error).__name__
         came = text if isinstance(error, _RefusedError) else f"a damaged one: {cut(text)}"
-        raise ValueError(f"{path}: expected an .npz file with {what}, got {came}") from None
+        raise InputError(f"{path}: expected an .npz file with {what}, got {came}") from None
 
 
 def _stored(path: Path, what: str, archive: zipfile.ZipFile, name: str) -> Stored:

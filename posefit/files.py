@@ -22,6 +22,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
+from posefit.errors import InputError
 from posefit.reading import cut, parsed_json, read_text
 
 MARK = "unfinished.json"  # in a folder that is being written
@@ -30,26 +31,26 @@ _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # errors of a rename to
 
 
 def check_new(path: str | Path) -> None:
-    """Return nothing. Raises ValueError where `path` exists, be it a link that leads nowhere."""
+    """Return nothing. Raises InputError where `path` exists, be it a link that leads nowhere."""
     if os.path.lexists(path):
         raise _exists(path)
 
 
 def check_place(path: str | Path) -> None:
-    """Return nothing. Raises ValueError where `path` is in no folder, or in one that cannot be written to."""
+    """Return nothing. Raises InputError where `path` is in no folder, or in one that cannot be written to."""
     parent = Path(path).resolve().parent
     if not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise ValueError(f"{path}: expected a place to write to, got one in {parent}, which is none")
+        raise InputError(f"{path}: expected a place to write to, got one in {parent}, which is none")
 
 
 @contextmanager
 def new_folder(path: str | Path) -> Iterator[Path]:
     """Yield an empty folder to write to, which takes the name `path` where nothing fails; else nothing is left.
 
-    Raises ValueError where `path` exists or cannot be written, a full disk included.
+    Raises InputError where `path` exists or cannot be written, a full disk included.
     """
     target = Path(path)
-    with _as_value_error(target):
+    with _as_input_error(target):
         check_new(target)
         building = _beside(target)
         building.mkdir()
@@ -67,10 +68,10 @@ def new_folder(path: str | Path) -> Iterator[Path]:
 def new_file(path: str | Path) -> Iterator[Path]:
     """Yield an empty file to write, which becomes `path` where nothing fails; else nothing is left.
 
-    It has the suffix of `path`. Raises ValueError where `path` exists or cannot be written, a full disk included.
+    It has the suffix of `path`. Raises InputError where `path` exists or cannot be written, a full disk included.
     """
     target = Path(path)
-    with _as_value_error(target):
+    with _as_input_error(target):
         check_new(target)
         building = _created(target)
         with _undone(building.unlink):
@@ -85,13 +86,13 @@ def new_file(path: str | Path) -> Iterator[Path]:
 def replaced_file(path: str | Path, mark: bytes) -> Iterator[Path]:
     """Yield an empty file to write, which takes the place of an earlier one where nothing fails; else that one stays.
 
-    Only a file that begins with `mark` is replaced, and no link. Raises ValueError where something else has the name,
+    Only a file that begins with `mark` is replaced, and no link. Raises InputError where something else has the name,
     or it cannot be written, a full disk included.
     """
     target = Path(path)
-    with _as_value_error(target):
+    with _as_input_error(target):
         if not replaceable(target, mark):
-            raise ValueError(f"{target}: expected a new name or an earlier file of this kind, got something else")
+            raise InputError(f"{target}: expected a new name or an earlier file of this kind, got something else")
         building = _created(target)
         with _undone(building.unlink):
             yield building
@@ -136,7 +137,7 @@ class Unfinished:
     @classmethod
     def interrupted(cls, target: Path) -> list[Self]:
         """Return the folders of a target that carry a mark and are not in use, the latest first."""
-        found = []
+        folders = []
         for entry in sorted(target.parent.glob(f".{glob.escape(target.name)}.*/{MARK}"), key=_age):
             if entry.is_symlink() or entry.parent.is_symlink():
                 continue
@@ -144,10 +145,10 @@ class Unfinished:
                 file = os.open(entry, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
                 mark = parsed_json(read_text(entry, MAX_MARK_BYTES)) if _locked(file) else None
                 if mark is not None and mark["target"] == target.name and isinstance(mark["info"], dict):
-                    found.append(cls(target, entry.parent, file, mark["info"]))
+                    folders.append(cls(target, entry.parent, file, mark["info"]))
                 else:
                     os.close(file)
-        return found[::-1]
+        return folders[::-1]
 
     def close(self) -> None:
         """Release the folder, so that it can be continued; a second call does nothing."""
@@ -244,12 +245,12 @@ def create_once(path: Path, content: object) -> bool:
 
 
 @contextmanager
-def _as_value_error(target: Path) -> Iterator[None]:
-    """Raise an error of the operating system as a ValueError, as the user's mistake."""
+def _as_input_error(target: Path) -> Iterator[None]:
+    """Raise an error of the operating system as an InputError."""
     try:
         yield
     except OSError as error:
-        raise ValueError(f"{target}: expected a place to write to, got {error.strerror or error}") from error
+        raise InputError(f"{target}: expected a place to write to, got {error.strerror or error}") from error
 
 
 @contextmanager
@@ -263,8 +264,8 @@ def _undone(remove: Callable[[], None]) -> Iterator[None]:
         raise
 
 
-def _exists(target: str | Path) -> ValueError:
-    return ValueError(f"{target}: expected a new name to write to, got one that exists")
+def _exists(target: str | Path) -> InputError:
+    return InputError(f"{target}: expected a new name to write to, got one that exists")
 
 
 def _beside(target: Path) -> Path:

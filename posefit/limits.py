@@ -87,10 +87,10 @@ def allowed_bytes() -> int:
 @lru_cache(maxsize=1)
 def _machine_bytes() -> int:
     """Return the memory of this machine, or of the container that this process is in."""
-    found = [sys.maxsize]
+    limits = [sys.maxsize]
     with suppress(AttributeError, ValueError, OSError):
-        found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+        limits.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     for path in _CONTAINER:
         with suppress(OSError, ValueError):  # "max" is no number
-            found.append(int(path.read_text()))
-    return min(found)
+            limits.append(int(path.read_text()))
+    return min(limits)

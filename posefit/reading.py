@@ -1,7 +1,7 @@
 """What a stranger's file says, read so that it can neither fill the memory nor end in a traceback.
 
 - `read_text`: a file that may have so many bytes, in UTF-8.
-- `parsed_toml`, `parsed_json`: the values of a text. Whatever is wrong with it raises ValueError.
+- `parsed_toml`, `parsed_json`: the values of a text. Whatever is wrong with it raises InputError.
 - `quoted`: a value as messages quote it.
 
 Archives of arrays have `posefit.archive`, pictures `posefit.footage.images`.
@@ -12,6 +12,8 @@ import re
 import tomllib
 from pathlib import Path
 from typing import Any
+
+from posefit.errors import InputError
 
 SHOWN = 80  # characters of a name or value in a message
 DOTS = 1_000  # in a line of TOML, those of decimal numbers aside
@@ -38,18 +40,18 @@ def cut(text: str, most: int = SHOWN) -> str:
 
 
 def check_size(path: Path, most: int) -> None:
-    """Return nothing. Raises ValueError where a file is too large to be read."""
+    """Return nothing. Raises InputError where a file is too large to be read."""
     size = path.stat().st_size
     if size > most:
         allowed = f"{most / 1e6:g} MB" if most < 1_000_000_000 else f"{most / 1e9:g} GB"
         came = f"{size / 1e6:.1f} MB" if most < 1_000_000_000 else f"{size / 1e9:.1f} GB"
-        raise ValueError(f"{path}: expected at most {allowed}, got {came}")
+        raise InputError(f"{path}: expected at most {allowed}, got {came}")
 
 
 def read_text(path: str | Path, most: int, what: str = "text") -> str:
     """Return the text of a file of at most so many bytes, without a byte-order mark.
 
-    Raises ValueError naming the file where it is larger, is no UTF-8 or cannot be read, and FileNotFoundError.
+    Raises InputError naming the file where it is larger, is no UTF-8 or cannot be read, and FileNotFoundError.
     """
     path = Path(path)
     try:
@@ -57,36 +59,36 @@ def read_text(path: str | Path, most: int, what: str = "text") -> str:
         with path.open("rb") as file:
             content = file.read(most + 1)  # what is no plain file does not know its size
         if len(content) > most:
-            raise ValueError(f"{path}: expected at most {most / 1e6:g} MB, got more")
+            raise InputError(f"{path}: expected at most {most / 1e6:g} MB, got more")
         return content.decode("utf-8-sig")
     except FileNotFoundError:
         raise
     except OSError as error:
-        raise ValueError(f"{path}: expected a file that can be read, got {error.strerror or error}") from None
+        raise InputError(f"{path}: expected a file that can be read, got {error.strerror or error}") from None
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: expected {what} in UTF-8, got byte 0x{content[error.start]:02x}") from None
+        raise InputError(f"{path}: expected {what} in UTF-8, got byte 0x{content[error.start]:02x}") from None
 
 
 def parsed_toml(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text. Raises ValueError where it is none, or nested so deeply that it is hostile."""
+    """Return the tables of a TOML text. Raises InputError where it is none, or nested so deeply that it is hostile."""
     weight = 0
     for number, line in enumerate(text.splitlines(), 1):
         dots = _DECIMAL.sub("", line).count(".") if line.count(".") > 1 else 0
         weight += dots * dots
         if dots > DOTS or weight > NESTING:
-            raise ValueError(f"expected keys that are not nested so deeply, got {dots} dots in line {number}")
+            raise InputError(f"expected keys that are not nested so deeply, got {dots} dots in line {number}")
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ValueError("expected values that are not nested so deeply, got too many brackets") from None
+        raise InputError("expected values that are not nested so deeply, got too many brackets") from None
 
 
 def parsed_json(text: str | bytes) -> Any:
     """Return the value of a JSON text, or of its bytes.
 
-    Raises ValueError where it is none, or nested so deeply that it is hostile.
+    Raises InputError where it is none, or nested so deeply that it is hostile.
     """
     try:
         return json.loads(text)
     except RecursionError:
-        raise ValueError("expected values that are not nested so deeply, got too many brackets") from None
+        raise InputError("expected values that are not nested so deeply, got too many brackets") from None

@@ -1,7 +1,7 @@
-"""Segmenters that hold each frame against a still background: `mixture`, `median` and `mean`; and `masks`.
+"""Segmenters that compare each frame with a still background: `mixture`, `median` and `mean`; and `masks`.
 
-They know nothing of people. Whoever is in the picture all the time is learned into a background that is learned from
-the video; `mean` is told what the picture looks like without him.
+They have no model of people. A person who is in the picture all the time becomes part of a background that is learned
+from the video; `mean` gets the picture of the empty scene instead.
 
 >>> import numpy as np
 >>> from posefit_background import given_masks
@@ -43,7 +43,7 @@ def learned_median(film: Footage, *, samples: int = SAMPLES) -> Still:
     """Each pixel's background is its median over some frames of the whole video, before which a person may walk.
 
     Settings:
-        samples: frames that are looked at, spread over the video, 1 or more; all are in memory at once.
+        samples: frames, spread over the video, 1 or more; all are in memory at once.
     """
     at_least("samples", samples, 1)
     step = max(1, len(film) // samples)

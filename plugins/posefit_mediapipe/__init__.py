@@ -1,8 +1,8 @@
-"""The segmenter `mediapipe`: the person as MediaPipe's pose model sees him in each frame, moving or not.
+"""The segmenter `mediapipe`: the person by MediaPipe's pose model in each frame, moving or not.
 
 C. Lugaresi et al., MediaPipe: a framework for building perception pipelines, 2019; V. Bazarevsky et al., BlazePose:
 on-device real-time body pose tracking, 2020. Version 0.10.14 carries the weights, so nothing is downloaded.
-`pip install 'posefit[mediapipe]'`; how to install it without what posefit does not need is told in the handbook,
+`pip install 'posefit[mediapipe]'`; the handbook shows how to install it without what posefit does not need,
 "How do I follow a video?".
 
 >>> from posefit.registry import registry
@@ -32,13 +32,13 @@ SIDES = (1.0, 1.0, -1.0, -1.0)
 
 
 class MediaPipe:
-    """One person by MediaPipe's pose model: found in the picture, then followed from frame to frame.
+    """One person by MediaPipe's pose model: detected in the picture, then followed from frame to frame.
 
-    Of several people it takes the one that is found most surely, and stays with him; a roi says whom. It needs no still
-    background and no still camera.
+    Of several people it takes the one detected most surely, and stays with them; a roi chooses another. It needs no
+    still background and no still camera.
 
     Settings:
-        confidence: how sure it has to be that somebody is there, 0 to 1; lower finds people who are small or far away.
+        confidence: how sure it has to be that a person is there, 0 to 1; lower detects small or distant people.
         threshold: of the soft mask, from which on a pixel is the person's, between 0 and 1.
     """
 
@@ -46,25 +46,25 @@ class MediaPipe:
         between("confidence", confidence, 0.0, 1.0)
         between("threshold", threshold, 0.0, 1.0, ends=False)
         self._threshold = threshold
-        self.facing = math.nan  # in the latest picture: by his shoulders and hips, as the model sees them
+        self.facing = math.nan  # in the latest picture: by the model's shoulders and hips
         self._model = _model(confidence)
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
         """Return where the soft mask of the person is above the threshold, and that nothing is a shadow."""
-        nobody = np.zeros(image.shape[:2], dtype=bool)
+        empty = np.zeros(image.shape[:2], dtype=bool)
         with warnings.catch_warnings():  # of its own use of protobuf
             warnings.simplefilter("ignore")
-            found = self._model.process(np.ascontiguousarray(image[..., ::-1]))
-        soft, self.facing = found.segmentation_mask, _facing(found.pose_world_landmarks)
-        return (nobody if soft is None else np.asarray(soft > self._threshold)), nobody.copy()
+            result = self._model.process(np.ascontiguousarray(image[..., ::-1]))
+        soft, self.facing = result.segmentation_mask, _facing(result.pose_world_landmarks)
+        return (empty if soft is None else np.asarray(soft > self._threshold)), empty.copy()
 
 
 def _facing(landmarks: Any) -> float:
-    """Return which way somebody faces, as `Segmenter.facing`, by the model's joints in metres; nan for nobody."""
+    """Return which way the person faces, as `Segmenter.facing`, by the model's joints in metres; NaN without one."""
     if landmarks is None:
         return math.nan
     points = [landmarks.landmark[k] for k in (*LEFT, *RIGHT)]
-    across, away = (sum(getattr(one, axis) * sign for one, sign in zip(points, SIDES, strict=True)) for axis in "xz")
+    across, away = (sum(getattr(p, axis) * sign for p, sign in zip(points, SIDES, strict=True)) for axis in "xz")
     return math.atan2(away, across)
 
 
@@ -83,13 +83,13 @@ def _model(confidence: float) -> Any:
             min_detection_confidence=confidence,
             min_tracking_confidence=confidence,
         )
-        model.process(np.zeros((64, 64, 3), dtype=np.uint8))  # what it has to say, it says of its first picture
+        model.process(np.zeros((64, 64, 3), dtype=np.uint8))  # its log messages come with its first picture
     return model
 
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep what is written to stderr from users: the model's libraries greet their own developers there."""
+    """Discard what is written to stderr: the model's libraries log for their own developers there."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)

@@ -1,4 +1,4 @@
-"""Arrays and compiled loops, as every package uses them."""
+"""Array types, and the compilation of plain functions of arrays, for every layer."""
 
 import os
 from collections.abc import Callable
@@ -38,10 +38,10 @@ def _compiled(function: Callable[..., Any], inline: str) -> Any:
     import numba
 
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}, "inline": inline}
-    # nobody calls these functions from C; a door for it would take one part in twelve of the time to compile
+    # these functions are not called from C; wrappers for it would take a twelfth of the time to compile
     options["no_cfunc_wrapper"] = True
     compiled: Any = numba.njit(**options)(function)
-    return compiled if compiled is function else compiled_once(compiled)  # numba may be told to compile nothing
+    return compiled if compiled is function else compiled_once(compiled)  # NUMBA_DISABLE_JIT: nothing is compiled
 
 
 def writeable(values: ArrayLike) -> Array:

@@ -28,7 +28,7 @@ class Cache(FunctionCache):  # type: ignore[misc]
 
 
 def cached(dispatcher: Any) -> Path | None:
-    """Return the folder that a dispatcher's compiled functions are kept in from now on, None where there is none.
+    """Return the folder of a dispatcher's cache, which is used from now on; None where there is none.
 
     To be called when the function is compiled or looked for: earlier, what it calls may not be defined yet.
     """
@@ -42,18 +42,18 @@ def made_of(dispatcher: Any) -> str:
     """Return a digest of all that a dispatcher's machine code depends on, as it stands in this process.
 
     These are the functions that it calls, directly or not, how numba is to compile each, and the values of the
-    constants that they name. A plain function among them stands for one that numba is told of in the same module, by
+    constants that they name. A plain function among them stands for one that is registered in the same module, by
     `overload`: all functions of that module count. So do the fields of the named tuples that a module knows, which
     come as arguments and are read by their place.
     """
     digest = hashlib.sha256()
-    waiting, seen = [dispatcher], {id(dispatcher)}
+    waiting, visited = [dispatcher], {id(dispatcher)}
     while waiting:
         for part in _parts(waiting.pop()):
-            digest.update(_told(part).encode() + b"\n")
+            digest.update(_described(part).encode() + b"\n")
             called = part[-1] if isinstance(part, tuple) else part
-            if isinstance(called, Dispatcher | FunctionType) and id(called) not in seen:
-                seen.add(id(called))
+            if isinstance(called, Dispatcher | FunctionType) and id(called) not in visited:
+                visited.add(id(called))
                 waiting.append(called)
     return digest.hexdigest()
 
@@ -64,7 +64,7 @@ def _parts(one: Any) -> Iterator[Any]:
     known, names = function.__globals__, set(_names(function.__code__))
     yield one, function.__code__, function.__defaults__
     if isinstance(one, Dispatcher):
-        yield sorted((name, _told(value)) for name, value in one.targetoptions.items())
+        yield sorted((name, _described(value)) for name, value in one.targetoptions.items())
     else:
         beside = vars(sys.modules[function.__module__]).values()
         for other in map(inspect.unwrap, filter(callable, beside)):
@@ -98,18 +98,18 @@ def _bare(value: Any) -> Any:
     return value if isinstance(value, Dispatcher) or not callable(value) else inspect.unwrap(value)
 
 
-def _told(value: Any) -> str:
-    """Return a value in words that are the same in every process; of what is no plain value, its name."""
+def _described(value: Any) -> str:
+    """Return a text of a value that is the same in every process; of what is no plain value, its name."""
     if value is None or isinstance(value, bool | int | float | complex | str | bytes):
         return repr(value)
     if isinstance(value, tuple | list):
-        return f"({', '.join(map(_told, value))})"
+        return f"({', '.join(map(_described, value))})"
     if isinstance(value, set | frozenset):
-        return f"{{{', '.join(sorted(map(_told, value)))}}}"
+        return f"{{{', '.join(sorted(map(_described, value)))}}}"
     if isinstance(value, np.ndarray | np.generic):
         return f"{value.dtype.str} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, CodeType):
         names = value.co_names, value.co_varnames, value.co_freevars, value.co_cellvars
-        return _told((value.co_name, value.co_argcount, value.co_flags, value.co_code, value.co_consts, *names))
+        return _described((value.co_name, value.co_argcount, value.co_flags, value.co_code, value.co_consts, *names))
     named = value if hasattr(value, "__qualname__") else type(value)
     return f"{named.__module__}.{named.__qualname__}"

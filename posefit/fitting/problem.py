@@ -1,4 +1,4 @@
-"""The problem an optimiser solves: which proposal's body has the observed silhouettes?"""
+"""The problem that an optimiser solves: the proposal whose body has the observed silhouettes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -29,7 +29,7 @@ from posefit.silhouette.sharing import parts_of, work_through
 
 @dataclass(frozen=True, eq=False)
 class PoseProblem:
-    """One observation, from one camera or several, and the space in which its pose is sought. SAPSO (5).
+    """One observation, from one camera or several, and the space in which its pose is searched. SAPSO (5).
 
     `evaluate` is pure: a proposal's cost has the same bits whatever stands beside it and however many threads work.
     """
@@ -40,7 +40,7 @@ class PoseProblem:
     space: SearchSpace
     beta: float = BETA
     threads: int = 1
-    blank: bool = False  # whether nobody may be seen at all, as it happens in the middle of a track
+    blank: bool = False  # whether silhouettes may be empty, as they may be in the middle of a track
     _coarser: dict[int, "PoseProblem"] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -61,7 +61,7 @@ class PoseProblem:
         """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4)."""
         proposals = writeable(proposals)
         if proposals.shape[1:] != (self.space.dimensions,):
-            self.space.decode(proposals)  # says what is wrong
+            self.space.decode(proposals)  # raises
         if self.on_device:
             return self._cost_on_device(proposals)
         parts = parts_of(len(proposals), self.threads)
@@ -76,7 +76,7 @@ class PoseProblem:
         return costs
 
     def coarser(self, factor: int) -> "PoseProblem":
-        """Return the problem as it is seen through every `factor`th pixel of every `factor`th row; made once.
+        """Return the same problem on every `factor`th pixel of every `factor`th row; made once.
 
         It has the same space, and a proposal means the same pose. See `posefit.silhouette.pyramid`.
         """

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.footage.cleaning import cleaned
 from posefit.footage.extract import segmented
 from posefit.footage.facing import yaws_of
@@ -42,17 +43,17 @@ class CameraView:
 def masks_of(path: Path, frames: Range, label: int | None, holes: float | None) -> CameraView:
     """Return what a folder or an .npz of masks shows of one person.
 
-    `label` is the person's value, and `holes` the largest that is filled. Raises ValueError where no frame shows one.
+    `label` is the person's value, and `holes` the largest that is filled. Raises InputError where no frame shows one.
     """
     masks, warnings = cleaned(read_masks(path, frames, label), path, holes)
     return CameraView(masks, str(path), warnings=warnings)
 
 
 def video_of(video: Video, segmentation: Segmentation, listener: Listener) -> CameraView:
-    """Return what a video shows. Raises ValueError where its masks cannot be those of a person."""
+    """Return what a video shows. Raises InputError where its masks cannot be those of a person."""
     masks = segmented(segmentation, listener.progress)
     if segmentation.verdict and segmentation.verdict.refused:
-        raise ValueError(segmentation.verdict.text)
+        raise InputError(segmentation.verdict.text)
     pictures = partial(video.frames, segmentation.start, segmentation.stop, segmentation.size)
     return CameraView(masks, str(video.path), video.size, pictures, segmentation.warnings, segmentation.facings)
 
@@ -60,20 +61,20 @@ def video_of(video: Video, segmentation: Segmentation, listener: Listener) -> Ca
 def _rate(views: Sequence[CameraView], fps: float | None) -> float:
     """Return the frame rate of views: `fps`, or else what their files state, or 30.
 
-    Raises ValueError where views of masks differ in their rates, or in how many frames they have.
+    Raises InputError where views of masks differ in their rates, or in how many frames they have.
     """
     first = views[0]
     for view in views[1:]:
         if view.filmed is None and len(view.masks) != len(first.masks):
             came = f"{len(first.masks)} of {first.name} and {len(view.masks)} of {view.name}"
-            raise ValueError(f"views must have the same frames, got {came}")
+            raise InputError(f"views must have the same frames, got {came}")
     if fps is not None:
         return fps
     stated = [view for view in views if view.masks.fps is not None]
     for view in stated[1:]:
         if view.filmed is None and view.masks.fps != stated[0].masks.fps:
             came = " and ".join(f"{one.masks.fps:g} of {one.name}" for one in (stated[0], view))
-            raise ValueError(f"views must have one frame rate, frames a second, got {came}")
+            raise InputError(f"views must have one frame rate, frames a second, got {came}")
     return (stated[0].masks.fps if stated else None) or FPS
 
 
@@ -89,7 +90,7 @@ def combined(
     """Return the scene of what cameras saw at the same times.
 
     A file with several cameras serves for several views, in its order. One view without a camera gets a guess: level,
-    40 degrees across. Raises ValueError where cameras and views do not fit each other.
+    40 degrees across. Raises InputError where cameras and views do not fit each other.
     """
     rate, size = _rate(views, fps), views[0].masks.size
     known = calibrated(cameras, [view.filmed for view in views]) or [Camera.around(np.zeros(3), 0.0, 0.0, size)]
@@ -128,7 +129,7 @@ def calibrated(
 ) -> list[Camera | Calibration]:
     """Return the cameras of as many views, none for a single view without one; `filmed` are the sizes of videos.
 
-    Raises ValueError where cameras and views do not fit each other.
+    Raises InputError where cameras and views do not fit each other.
     """
     known: list[Camera | Calibration] = []
     for camera in cameras:
@@ -138,11 +139,11 @@ def calibrated(
             known += read_calibrations(camera)
     views = len(filmed)
     if not known and views > 1:
-        raise ValueError(f"camera must be given for each of several views, {views}, got none")
+        raise InputError(f"camera must be given for each of several views, {views}, got none")
     if known and len(known) != views:
-        raise ValueError(f"camera must be given for each view, {views}, got {len(known)}")
+        raise InputError(f"camera must be given for each view, {views}, got {len(known)}")
     if views > 1 and any(isinstance(one, Calibration) and one.rotation is None for one in known):
-        raise ValueError("camera must say where each of several cameras stands, got a file without rotation")
+        raise InputError("camera must say where each of several cameras stands, got a file without rotation")
     for k, (one, size) in enumerate(zip(known, filmed, strict=False)):
         if isinstance(one, Calibration) and size is not None:
             fitting = one.padded(size)
@@ -159,6 +160,6 @@ def _check_shape(calibration: Calibration, size: tuple[int, int]) -> None:
         raise _other_size(calibration, size)
 
 
-def _other_size(calibration: Calibration, size: tuple[int, int]) -> ValueError:
+def _other_size(calibration: Calibration, size: tuple[int, int]) -> InputError:
     width, height = calibration.size
-    return ValueError(f"camera {calibration.name!r} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}")
+    return InputError(f"camera {calibration.name!r} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}")

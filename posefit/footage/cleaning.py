@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.footage.masks import PackedMasks
 from posefit.silhouette.foreground import HOLE, NEAR, PIECE, without_holes
 from posefit.silhouette.mask import Mask, Silhouette
@@ -26,7 +27,7 @@ def cleaned(masks: PackedMasks, name: object, holes: float | None = None) -> tup
 
     The largest person of the first frame that shows one is followed, then the nearest to their last place. Frames that
     show no person before a background are not usable. Holes of at most the share `holes` of the person are filled.
-    Raises ValueError naming the first mask where no frame shows a person.
+    Raises InputError naming the first mask where no frame shows a person.
     """
     warnings = []
     inverted = _is_inverted(masks)
@@ -50,7 +51,7 @@ def cleaned(masks: PackedMasks, name: object, holes: float | None = None) -> tup
     if not usable.any():
         came = "one without background" if masks.silhouette(0).mask.any() else "an empty one"
         rest = f" first, and no other in {len(masks)}" if len(masks) > 1 else ""
-        raise ValueError(f"{masks.names[0]}: expected a mask with a person before a background, got {came}{rest}")
+        raise InputError(f"{masks.names[0]}: expected a mask with a person before a background, got {came}{rest}")
     if crowded:
         leaps = f", which leaps at {follower.leap}: look there" if follower.leap else ""
         warnings.append(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.footage.masks import PackedMasks, Range, empty_planes
 from posefit.footage.segmentation import Extraction, Segmentation
@@ -31,11 +32,11 @@ def extract(
     """Return a summary of a video's masks, and write them, a preview and a report to a new folder.
 
     masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,) and `fps`. The folder appears whole or not at
-    all. Raises ValueError for every mistake in arguments or files, where no frame shows a person, and on a full disk.
+    all. Raises InputError for every mistake in arguments or files, where no frame shows a person, and on a full disk.
     """
     how, target = how or Extraction(), Path(out)
     if os.path.lexists(target):
-        raise ValueError(f"{target}: expected a new folder, got one that exists")
+        raise InputError(f"{target}: expected a new folder, got one that exists")
     video, how = Video.of(source), how or Extraction()
     segmentation = Segmentation(video, how, frames)
     with suppress(OSError):  # reported where the folder is made

@@ -1,4 +1,4 @@
-"""Pictures of strangers: how many pixels one has, is read from its first bytes before OpenCV makes an array of it."""
+"""Images that may be hostile: the size is read from the first bytes, and checked, before OpenCV decodes one."""
 
 import struct
 from pathlib import Path
@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.errors import InputError
 from posefit.reading import check_size, cut
 
 PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
 LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
 FORMATS = "PNG, JPEG, BMP, TIFF or PGM"
 INDEXED = 3  # PNG's type of colour for a palette
-COLOURFUL, OFTEN = 32, 0.02  # of 255, and the share of a picture's pixels: with more it is no mask
+COLOUR_RANGE, COLOUR_SHARE = 32, 0.02  # of 255, and the share of an image's pixels: with more it is no mask
 _FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # of JPEG: markers before a frame's height and width
 _WIDTH, _HEIGHT, _SAMPLES = 256, 257, 277  # tags of TIFF
 
@@ -21,7 +22,7 @@ _WIDTH, _HEIGHT, _SAMPLES = 256, 257, 277  # tags of TIFF
 def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
     """Return a picture (height, width) in grey, or (height, width, 3) in colours; None where the file is no picture.
 
-    Raises ValueError where it has more than `PIXELS` or `LARGEST_FILE`.
+    Raises InputError where it has more than `PIXELS` or `LARGEST_FILE`.
     """
     import cv2
 
@@ -33,8 +34,8 @@ def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
 def read_values(path: Path, labelled: bool = False) -> tuple[NDArray[Any], bool] | None:
     """Return the values (height, width) by which an image marks a person, and whether they are degrees; None for none.
 
-    They are its alpha channel, where it has one that says anything and no labels are asked for; else the indices of a
-    palette of colours, or colours as 0xRRGGBB, or grey levels, of 8 or 16 bits. Raises ValueError as `read_image` does.
+    They are its alpha channel, where it has one that is not all opaque and no label is wanted; else the indices of a
+    palette of colours, or colours as 0xRRGGBB, or grey levels, of 8 or 16 bits. Raises InputError as `read_image` does.
     """
     import cv2
 
@@ -60,14 +61,14 @@ def read_values(path: Path, labelled: bool = False) -> tuple[NDArray[Any], bool]
 
 
 def is_colourful(path: Path) -> bool:
-    """Return whether a JPEG has colours, which no mask has; other pictures say by their values what they are."""
+    """Return whether a JPEG has colours, which no mask has; the values of other images show what they are."""
     if path.suffix.lower() not in (".jpg", ".jpeg") or (image := read_image(path, grey=False)) is None:
         return False
-    return bool((np.ptp(image, axis=2) > COLOURFUL).mean() > OFTEN)
+    return bool((np.ptp(image, axis=2) > COLOUR_RANGE).mean() > COLOUR_SHARE)
 
 
 def _content(path: Path) -> bytes | None:
-    """Return what is in the file of a picture; None where it is none. Raises ValueError where that is too much."""
+    """Return what is in the file of a picture; None where it is none. Raises InputError where that is too much."""
     if not path.is_file():
         return None
     check_size(path, LARGEST_FILE)
@@ -76,7 +77,7 @@ def _content(path: Path) -> bytes | None:
     if size is None:
         return None
     if size[0] * size[1] > PIXELS:
-        raise ValueError(
+        raise InputError(
             f"{path}: expected at most {PIXELS // 10**6} million pixels, got {cut(f'{size[0]}x{size[1]}')}"
         )
     return content
@@ -127,7 +128,7 @@ def size_of(content: bytes) -> tuple[int, int] | None:
 
 
 def _whole_chunks(content: bytes) -> bool:
-    """Return whether a PNG file holds each chunk that it states: OpenCV makes room for as much as one says it has."""
+    """Return whether a PNG file holds each chunk that it states: OpenCV allocates what one states."""
     place = 8
     while place + 8 <= len(content):
         length = int.from_bytes(content[place : place + 4], "big")
@@ -141,10 +142,10 @@ def _whole_chunks(content: bytes) -> bool:
 
 def _jpeg(content: bytes) -> tuple[int, int] | None:
     """Return the largest size of the frames that a JPEG file states."""
-    place, found = 2, None
+    place, stated = 2, None
     while place + 4 <= len(content):
         if content[place] != 0xFF:
-            place += 1  # OpenCV looks for the next marker, too
+            place += 1  # as OpenCV does, search the next marker
             continue
         marker = content[place + 1]
         if marker in (0x00, 0x01, 0xFF) or 0xD0 <= marker <= 0xD8:
@@ -152,12 +153,12 @@ def _jpeg(content: bytes) -> tuple[int, int] | None:
             continue
         if marker in _FRAMES:
             tall, wide = struct.unpack(">HH", content[place + 5 : place + 9])
-            if found is None or wide * tall > found[0] * found[1]:
-                found = wide, tall
+            if stated is None or wide * tall > stated[0] * stated[1]:
+                stated = wide, tall
         if marker == 0xDA:  # what follows are pixels
-            return found
+            return stated
         place += 2 + int.from_bytes(content[place + 2 : place + 4], "big")
-    return found
+    return stated
 
 
 def _bmp(content: bytes) -> tuple[int, int]:
@@ -171,15 +172,17 @@ def _tiff(content: bytes) -> tuple[int, int] | None:
     order = "<" if content[:2] == b"II" else ">"
     (place,) = struct.unpack(f"{order}I", content[4:8])
     (count,) = struct.unpack(f"{order}H", content[place : place + 2])
-    found: dict[int, int] = {}
+    stated: dict[int, int] = {}
     for k in range(count):
         entry = content[place + 2 + 12 * k : place + 14 + 12 * k]
         tag, kind = struct.unpack(f"{order}HH", entry[:4])
         if tag in (_WIDTH, _HEIGHT, _SAMPLES):
-            found[tag] = struct.unpack(f"{order}H" if kind == 3 else f"{order}I", entry[8 : 10 if kind == 3 else 12])[0]
-    if not {_WIDTH, _HEIGHT} <= found.keys():
+            stated[tag] = struct.unpack(f"{order}H" if kind == 3 else f"{order}I", entry[8 : 10 if kind == 3 else 12])[
+                0
+            ]
+    if not {_WIDTH, _HEIGHT} <= stated.keys():
         return None
-    return found[_WIDTH] * max(1, -(-found.get(_SAMPLES, 1) // 4)), found[_HEIGHT]
+    return stated[_WIDTH] * max(1, -(-stated.get(_SAMPLES, 1) // 4)), stated[_HEIGHT]
 
 
 def _pnm(content: bytes) -> tuple[int, int]:

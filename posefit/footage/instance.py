@@ -1,8 +1,8 @@
 """Instances of a motion, numbered as in other benchmarks: sweeps and environments mean the same by a number.
 
 Instance 0 is the motion as it is. Any other number changes the phase and the speed of a built-in motion a little, or
-where in a file the frames begin, and turns the cameras by a few degrees. What else somebody draws for an instance, such
-as noise, comes from a generator of its own, so that it changes none of this.
+where in a file the frames begin, and turns the cameras by a few degrees. Other random choices for an instance,
+such as noise, come from a generator of their own, so that they change none of this.
 """
 
 from collections.abc import Sequence
@@ -11,11 +11,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.footage.source import motion_of
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 
-SALT = 2013  # part of the seed of every instance
+RNG_STREAM_INSTANCE = 2013
 SPEED = 0.15  # how far the cadence of a built-in motion's instance is from its own at most
 VIEW_DEGREES = 10.0  # how far the cameras of an instance are turned at most
 
@@ -30,7 +31,7 @@ class Variation:
     start: float  # where in a file the frames begin, as a share of what is possible
 
     def views(self, view_degrees: Sequence[float]) -> list[float]:
-        """Return from where the instance is seen, in degrees, where the motion as it is would be from these."""
+        """Return the view angles of the instance, in degrees, from those of the motion as it is."""
         return [view + self.turn_degrees for view in view_degrees]
 
 
@@ -39,7 +40,7 @@ def variation(number: int) -> Variation:
     """Return how an instance differs from the motion as it is, whatever the motion."""
     if number == 0:
         return Variation(speed=1.0, phase=0.0, turn_degrees=0.0, start=0.0)
-    rng = np.random.default_rng([SALT, number])
+    rng = np.random.default_rng([RNG_STREAM_INSTANCE, number])
     return Variation(
         speed=1.0 + SPEED * rng.uniform(-1.0, 1.0),
         phase=rng.uniform(),
@@ -49,9 +50,9 @@ def variation(number: int) -> Variation:
 
 
 def motion_of_instance(source: str | Motion, number: int, *, frames: int, fps: float) -> Motion:
-    """Return so many frames of an instance of a motion, which is a built-in motion's name, a file or what was read.
+    """Return so many frames of an instance of a motion: a built-in motion's name, a file or a motion.
 
-    Raises ValueError where a file has fewer frames.
+    Raises InputError where a file has fewer frames.
     """
     varied = variation(number)
     if isinstance(source, str) and source in built_in.names():
@@ -59,6 +60,6 @@ def motion_of_instance(source: str | Motion, number: int, *, frames: int, fps: f
     motion = motion_of(source, None, fps)
     if frames > len(motion):
         name = source if isinstance(source, str) else source.name
-        raise ValueError(f"frames must be at most {len(motion)}, the length of {name}, got {frames}")
+        raise InputError(f"frames must be at most {len(motion)}, the length of {name}, got {frames}")
     first = int(varied.start * (len(motion) - frames + 1))
     return motion.frames(first, first + frames)

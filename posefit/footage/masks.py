@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.tracker import Observation
 from posefit.limits import allowed_bytes
 from posefit.silhouette.mask import Silhouette
@@ -44,10 +45,10 @@ class PackedMasks:
 
 
 def empty_planes(count: int, size: tuple[int, int]) -> Planes:
-    """Return room for so many masks. Raises ValueError where that is more memory than this process may have."""
+    """Return room for so many masks. Raises InputError where that is more memory than this process may have."""
     octets, most = (size[0] * size[1] + 7) // 8, allowed_bytes()
     if count * octets > most:
-        raise ValueError(
+        raise InputError(
             f"frames must be so few that their masks fit in {most / 1e9:.1f} GB of memory, "
             f"got {count} of {size[0]}x{size[1]} pixels"
         )
@@ -55,7 +56,7 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
 
 
 def undistorted(masks: PackedMasks, maps: tuple[Any, Any]) -> PackedMasks:
-    """Return masks as a pinhole camera would have seen them; what the lens did not see is unknown."""
+    """Return masks as of a pinhole camera; pixels that the lens did not cover are unknown."""
     straight, valid = empty_planes(len(masks), masks.size), empty_planes(len(masks), masks.size)
     for k in range(len(masks)):
         bent = masks.silhouette(k)
@@ -94,12 +95,12 @@ class Views(Sequence[Observation]):
 
     @cached_property
     def first(self) -> int:
-        """The first frame usable in all cameras, or else in one. Raises ValueError where there is none."""
+        """The first frame usable in all cameras, or else in one. Raises InputError where there is none."""
         for enough in (all, any):
             for k in range(len(self)):
                 if enough(masks.usable[k] for masks in self.masks):
                     return k
-        raise ValueError(f"{self.masks[0].names[0]}: expected a frame that is usable, got none from there on")
+        raise InputError(f"{self.masks[0].names[0]}: expected a frame that is usable, got none from there on")
 
     def _silhouette(self, masks: PackedMasks, k: int) -> Silhouette:
         silhouette = masks.silhouette(k)
@@ -109,19 +110,19 @@ class Views(Sequence[Observation]):
 
 
 def span(frames: Range, count: int) -> tuple[int, int]:
-    """Return start and stop of a range of `count` frames. Raises ValueError where it holds none."""
+    """Return start and stop of a range of `count` frames. Raises InputError where it holds none."""
     start, stop, _ = slice(*frames).indices(count)
     if start >= stop:
         low, high = ("" if value is None else value for value in frames)
-        raise ValueError(f"frames must choose some of the {count} frames, got {low}:{high}")
+        raise InputError(f"frames must choose some of the {count} frames, got {low}:{high}")
     return start, stop
 
 
 def existing(path: Path) -> Path:
-    """Return a path. Raises ValueError where there is nothing, or an empty file."""
+    """Return a path. Raises InputError where there is nothing, or an empty file."""
     if not path.exists():
         expected = "a file" if path.suffix else "a file or a folder"
-        raise ValueError(f"{path}: expected {expected}, got nothing of that name")
+        raise InputError(f"{path}: expected {expected}, got nothing of that name")
     if path.is_file() and not path.stat().st_size:
-        raise ValueError(f"{path}: expected a file with content, got an empty one")
+        raise InputError(f"{path}: expected a file with content, got an empty one")
     return path

@@ -23,8 +23,8 @@ from posefit.silhouette.mask import Mask, Silhouette
 # of a frame
 AREA_FRAMES = 15  # latest frames that a frame's area is compared with
 AREA_CHANGE = 0.5  # a frame whose area differs by more than this share from the latest is not usable
-# the area of a person's silhouette over the square of its longer side: 0.08 to 0.47 in 1,296 poses of the library seen
-# from anywhere
+# the area of a person's silhouette over the square of its longer side: 0.08 to 0.47 in 1,296 poses of the library,
+# from any side
 FILL = (0.07, 0.5)
 MIN_SIDE = 12  # pixels of the longer side below which a person cannot be distinguished from noise
 LAG = 0.1  # seconds between two pictures that are compared for motion
@@ -243,8 +243,8 @@ def disagreement(views: Views, cameras: Sequence[Camera], stature: float) -> str
         place, away = meeting(cameras, [middle for middle, _ in extents])
         depths = [float((camera.rotation @ place + camera.translation)[2]) for camera in cameras]
         misses.append(2.0 * away.max())
-        seen = zip(cameras, extents, depths, strict=True)
-        heights.append([tall * depth / camera.focal[1] for camera, (_, tall), depth in seen])
+        per_view = zip(cameras, extents, depths, strict=True)
+        heights.append([tall * depth / camera.focal[1] for camera, (_, tall), depth in per_view])
     miss, tall = float(np.median(misses)), np.median(heights, axis=0)
     reasons = "the masks show only parts of the person, or another one, or the calibrations are in another order"
     if miss > APART * stature:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived
+from posefit.errors import InputError
 from posefit.footage.images import FORMATS, is_colourful, read_values
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, existing, span
 from posefit.reading import quoted
@@ -44,7 +45,7 @@ Classifier = Callable[[Values], Mask]  # values to the mask (height, width) of t
 def read_masks(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
     """Return the masks of a folder of images, or of an .npz file with `masks`, cut to `frames`.
 
-    `label` is the person's value, where masks hold several. Raises ValueError naming the file.
+    `label` is the person's value, where masks hold several. Raises InputError naming the file.
     """
     return read_folder(path, frames, label) if path.is_dir() else read_npz(path, frames, label)
 
@@ -52,14 +53,14 @@ def read_masks(path: Path, frames: Range, label: int | None = None) -> PackedMas
 def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
     """Return the masks of a folder of images in the natural order of their names: 2 comes before 10.
 
-    Raises ValueError naming the file where one is no image, or of another size than the first.
+    Raises InputError naming the file where one is no image, or of another size than the first.
     """
     # hidden files are ignored: some systems put one beside each image that they copy
     files = (file for file in path.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
-    found = sorted(files, key=_natural)
-    if not found:
-        raise ValueError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
-    chosen = found[slice(*span(frames, len(found)))]
+    images = sorted(files, key=_natural)
+    if not images:
+        raise InputError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
+    chosen = images[slice(*span(frames, len(images)))]
     if is_colourful(chosen[0]):
         raise _many_colours(path)
     counts, shape = ValueCounts(), (0, 0)
@@ -68,11 +69,11 @@ def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMa
         for file in chosen:
             read = read_values(file, label is not None)
             if read is None:
-                raise ValueError(f"{file}: expected an image ({FORMATS}), got a file that is none")
+                raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
             values, soft = read
             shape = shape if stored else values.shape
             if values.shape != shape:
-                raise ValueError(f"{file}: mask must have shape {shape}, got {values.shape}")
+                raise InputError(f"{file}: mask must have shape {shape}, got {values.shape}")
             counts.add(values, soft)
             stored.append((spool.write(zlib.compress(np.ascontiguousarray(values), 1)), values.dtype))
         is_person, size = counts.classifier(label, path), (shape[1], shape[0])
@@ -91,17 +92,17 @@ def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
 
 
 def read_npz(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
-    """Return the masks of an .npz file. Raises ValueError naming the file where it holds none."""
+    """Return the masks of an .npz file. Raises InputError naming the file where it holds none."""
     existing(path)
-    with archived(path, NAMES, "the key masks", UNPACKED, PACKED) as found:
-        if "masks" not in found:
-            raise ValueError(f"{path}: expected an .npz file with the key masks, got none")
-        stack, known = found["masks"], found.get("valid")
+    with archived(path, NAMES, "the key masks", UNPACKED, PACKED) as arrays:
+        if "masks" not in arrays:
+            raise InputError(f"{path}: expected an .npz file with the key masks, got none")
+        stack, known = arrays["masks"], arrays.get("valid")
         _check_shapes(path, stack, known)
-        usable, fps = _usable(path, found.get("usable"), stack.shape[0]), _fps(path, found.get("fps"))
+        usable, fps = _usable(path, arrays.get("usable"), stack.shape[0]), _fps(path, arrays.get("fps"))
         start, stop = span(frames, stack.shape[0])
         if not usable[start:stop].any():
-            raise ValueError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
+            raise InputError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
         masks = _pack(stack, start, stop, _npz_classifier(path, stack, start, stop, label))
         valid = None if known is None else _pack(known, start, stop, _above(0.0))
     names = [f"{path}[{k}]" for k in range(start, stop)]
@@ -110,10 +111,10 @@ def read_npz(path: Path, frames: Range, label: int | None = None) -> PackedMasks
 
 def _check_shapes(path: Path, stack: Stored, known: Stored | None) -> None:
     if len(stack.shape) != 3 or 0 in stack.shape or stack.dtype.kind not in "buif":
-        raise ValueError(f"{path}: masks must have shape (frames, height, width), got {_described(stack)}")
+        raise InputError(f"{path}: masks must have shape (frames, height, width), got {_described(stack)}")
     if known is not None and (known.shape != stack.shape or known.dtype.kind not in "bui"):
         shape = quoted(tuple(stack.shape))
-        raise ValueError(f"{path}: valid must have the masks' shape {shape}, got {_described(known)}")
+        raise InputError(f"{path}: valid must have the masks' shape {shape}, got {_described(known)}")
 
 
 def _described(stored: Stored) -> str:
@@ -127,7 +128,7 @@ def _npz_classifier(path: Path, stored: Stored, start: int, stop: int, label: in
     counts = ValueCounts()
     for k, frame in enumerate(stored.rows()):
         if frame.dtype.kind == "f" and not np.isfinite(frame).all():
-            raise ValueError(f"{path}: masks must be finite, got nan or infinity in frame {k}")
+            raise InputError(f"{path}: masks must be finite, got nan or infinity in frame {k}")
         if start <= k < stop:
             counts.add(frame, soft=False)
     return counts.classifier(label, path)
@@ -146,7 +147,7 @@ def _usable(path: Path, stored: Stored | None, count: int) -> NDArray[np.bool_]:
     if stored is None:
         return np.ones(count, dtype=bool)
     if stored.shape != (count,) or stored.dtype != np.bool_:
-        raise ValueError(f"{path}: usable must be {count} booleans, got {_described(stored)}")
+        raise InputError(f"{path}: usable must be {count} booleans, got {_described(stored)}")
     return np.asarray(stored.read(), dtype=np.bool_)
 
 
@@ -156,7 +157,7 @@ def _fps(path: Path, stored: Stored | None) -> float | None:
     number: Any = stored.read() if stored.shape == () and stored.dtype.kind in "iuf" else None
     if number is None or not 0.0 < number <= MAX_FPS:
         came = number.tolist() if number is not None else _described(stored)
-        raise ValueError(f"{path}: fps must be a number up to {MAX_FPS:g}, got {came}")
+        raise InputError(f"{path}: fps must be a number up to {MAX_FPS:g}, got {came}")
     return float(number)
 
 
@@ -184,7 +185,7 @@ class ValueCounts:
             self.solid.update(_solid(values, unique))
 
     def classifier(self, label: int | None, name: object) -> Classifier:
-        """Return how these values become masks. Raises ValueError where it is open which label is the person."""
+        """Return how these values become masks. Raises InputError where it is open which label is the person."""
         if label is not None:
             self._check_label(label, name)
             return lambda values: np.asarray(values == label)
@@ -197,7 +198,7 @@ class ValueCounts:
             return _above(float(values[0] if len(values) == 2 else min(values[0], 0)) if values else 0.0)
         labels = [value for value, _ in self.solid.most_common() if value]
         if len(labels) > 1:
-            raise ValueError(
+            raise InputError(
                 f"{name}: expected masks of one person, got the labels {self._listed(labels)}; --label N chooses one"
             )
         return _above(float(labels[0] // 2) if labels else self._half)
@@ -210,12 +211,12 @@ class ValueCounts:
 
     def _check_label(self, label: int, name: object) -> None:
         if self.soft:
-            raise ValueError(
+            raise InputError(
                 f"{name}: label must be given for masks whose values are labels, PNG or whole numbers, got soft ones"
             )
         if label not in self.pixels:
             there = self._listed([value for value, _ in self.pixels.most_common()])
-            raise ValueError(f"{name}: label must be one of those that are there, {there}, got {label}")
+            raise InputError(f"{name}: label must be one of those that are there, {there}, got {label}")
 
     def _listed(self, labels: list[int]) -> str:
         """Return some labels, the commonest first; colours as hexadecimal numbers."""
@@ -228,8 +229,8 @@ def _above(threshold: float) -> Classifier:
     return lambda values: np.asarray(values > threshold)
 
 
-def _many_colours(name: object) -> ValueError:
-    return ValueError(f"{name}: expected masks, got pictures in many colours; a person cut out needs an alpha channel")
+def _many_colours(name: object) -> InputError:
+    return InputError(f"{name}: expected masks, got pictures in many colours; a person cut out needs an alpha channel")
 
 
 def _binary(values: Values) -> tuple[NDArray[Any], NDArray[Any]]:

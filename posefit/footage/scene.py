@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.tracker import Observation
 from posefit.footage.masks import Range, Views, span
 from posefit.footage.quality import disagreement, extent_of, meeting
@@ -66,7 +67,7 @@ def synthetic(
     observations = Rendered(motion, body, cameras)
     for k in (0, len(motion) - 1):
         if not all(silhouette.mask.any() for silhouette in observations[k].silhouettes):
-            raise ValueError(f"camera must see the person, got an empty mask in frame {k}")
+            raise InputError(f"camera must see the person, got an empty mask in frame {k}")
     return Scene(
         motion.name,
         body,
@@ -117,7 +118,7 @@ class DeviceObservations(Sequence[Observation]):
 
 
 def on_device(scene: Scene, device: str) -> Scene:
-    """Return a scene whose poses are drawn on a device, "cpu" or "cuda". Raises ValueError where there is none."""
+    """Return a scene whose poses are drawn on a device, "cpu" or "cuda". Raises InputError where there is none."""
     check_device(device)
     return scene if device == "cpu" else replace(scene, observations=DeviceObservations(scene.observations, device))
 
@@ -156,10 +157,10 @@ def observed(
     placing: Placing = "given",
     warnings: Sequence[str] = (),
 ) -> Scene:
-    """Return the scene of masks seen by cameras, whose true poses are unknown.
+    """Return the scene of masks, whose true poses are unknown.
 
     The person is first searched where the rays through the middles of the masks meet; with a single camera, as far away
-    as their size in the image implies. Raises ValueError where several cameras cannot see one person of this size.
+    as their size in the image implies. Raises InputError where several cameras cannot see one person of this size.
     """
     boxes = [extent_of(silhouette) for silhouette in views[views.first].silhouettes]
     if len(cameras) == 1:
@@ -169,7 +170,7 @@ def observed(
         anchor = camera.rotation.T @ (place - camera.translation)
     else:
         if wrong := disagreement(views, cameras, body.stature):
-            raise ValueError(f"{name}: {wrong}")
+            raise InputError(f"{name}: {wrong}")
         anchor = meeting(cameras, [middle for middle, _ in boxes])[0]
     to_camera = -cameras[0].rotation[2]
     yaw = views.yaw(views.first)

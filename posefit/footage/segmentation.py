@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.facing import facings_on_the_spot
 from posefit.footage.images import read_image
@@ -65,7 +66,7 @@ class Extraction:
 
     def __post_init__(self) -> None:
         if not 36 <= self.width <= 8192:
-            raise ValueError(f"width must lie in 36 to 8192 pixels, got {self.width}")
+            raise InputError(f"width must lie in 36 to 8192 pixels, got {self.width}")
         object.__setattr__(self, "method", segmenter_name(self.method, self.background))
         offer = registry().offer("segmenter", self.name)
         needed = {setting.name: setting.default is Parameter.empty for setting in offer.settings}
@@ -76,13 +77,13 @@ class Extraction:
                     other.name for other in offers if any(setting.name == "background" for setting in other.settings)
                 ]
                 came = f"{self.background!r} with {self.name}"
-                raise ValueError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
+                raise InputError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
             object.__setattr__(self, "settings", {**self.settings, "background": self.background})
         check(self.name, offer.factory, self.settings)
         for name, must in needed.items():
             if must and name not in self.settings:
                 given = "frames A:B or an image" if name == "background" else "given"
-                raise ValueError(f"{name} must be {given} for the method {self.name}, got none")
+                raise InputError(f"{name} must be {given} for the method {self.name}, got none")
 
     @property
     def name(self) -> str:
@@ -91,7 +92,7 @@ class Extraction:
         return self.method
 
     def segmenter(self, film: Footage) -> Segmenter:
-        """Return the segmenter, trained on a film. Raises ValueError where a setting does not fit it."""
+        """Return the segmenter, trained on a film. Raises InputError where a setting does not fit it."""
         offer = registry().offer("segmenter", self.name)
         with plugin_errors(offer.label, "it", passed=(ValueError, ImportError)):
             return cast(Segmenter, offer.factory(film, **self.settings))
@@ -122,13 +123,13 @@ class VideoFootage:
         return map(self.cut, self.video.frames(start, stop, self.size, step))
 
     def picture(self, path: str) -> Image:
-        """Return a picture of the video's size as the video shows it. Raises ValueError where there is none."""
+        """Return a picture of the video's size as the video shows it. Raises InputError where there is none."""
         image = read_image(path, grey=False)
         if image is None:
-            raise ValueError(f"background must be frames A:B or an image, got {path!r}")
+            raise InputError(f"background must be frames A:B or an image, got {path!r}")
         came, wanted = (image.shape[1], image.shape[0]), self.video.size
         if came != wanted:
-            raise ValueError(
+            raise InputError(
                 f"{path}: background must have the video's size {wanted[0]}x{wanted[1]}, got {came[0]}x{came[1]}"
             )
         return self.cut(np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8))
@@ -143,7 +144,7 @@ class Segmentation:
     """One pass through a video; its rows, verdict and warnings are complete when it has ended."""
 
     def __init__(self, video: Video, how: Extraction, frames: Range) -> None:
-        """Check that the extraction fits the video. Raises ValueError where it does not."""
+        """Check that the extraction fits the video. Raises InputError where it does not."""
         count = video.count()
         self.start, self.stop = span(frames, count)
         self._missing = max(0, video.claimed - count)
@@ -171,18 +172,20 @@ class Segmentation:
         for k, image in enumerate(self._video.frames(self.start, self.stop, self.size)):
             if k % PERIOD == 0:
                 self._shifts.append(motion.shift(image))
-            found = person(*self._segmented(segmenter, image), self._roi, self._ignored)
+            result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
             self._facings.append(float(getattr(segmenter, "facing", math.nan)))
-            self._middles.append(float((np.flatnonzero(found.mask) % self.size[0]).mean()) if found.area else math.nan)
-            part = replace(found, mask=self._film.cut(found.mask), valid=self._film.cut(found.valid))
+            self._middles.append(
+                float((np.flatnonzero(result.mask) % self.size[0]).mean()) if result.area else math.nan
+            )
+            part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
             self.rows.append(quality.row(self._film.cut(image), part, self.start + k))
             if not self._video.is_filmed(self.start + k):
                 self.rows[-1]["usable"] = 0
-            yield image, found
+            yield image, result
         if not any(row["area"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
             none = "expected a person who moves before a still background, got none in any frame"
-            raise ValueError(f"{self.name}: {none}{damage or advice(self.method, learned=not self._given)}")
+            raise InputError(f"{self.name}: {none}{damage or advice(self.method, learned=not self._given)}")
 
     def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
         """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""
@@ -298,7 +301,7 @@ def _scaled_roi(roi: Box | None, video: Video, scale: float) -> Box | None:
         return None
     x, y, wide, tall = roi
     if min(x, y) < 0 or min(wide, tall) < 1 or x + wide > video.size[0] or y + tall > video.size[1]:
-        raise ValueError(f"roi must lie within the video's {video.size[0]}x{video.size[1]} pixels, got {roi}")
+        raise InputError(f"roi must lie within the video's {video.size[0]}x{video.size[1]} pixels, got {roi}")
     left, top = round(x * scale), round(y * scale)
     return left, top, max(1, round((x + wide) * scale) - left), max(1, round((y + tall) * scale) - top)
 
@@ -308,5 +311,5 @@ def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
         return None
     image = read_image(path, grey=True)
     if image is None:
-        raise ValueError(f"{path}: expected an image of what to ignore, got a file that is none")
+        raise InputError(f"{path}: expected an image of what to ignore, got a file that is none")
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > 127)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from posefit.errors import InputError
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, Source, SourceClip, clip_of
 from posefit.limits import allowed_bytes
@@ -18,9 +19,9 @@ def training_clips(
     """Return the clips that sources name, each of which gives its motion at any rate.
 
     A source is what `clip_of` takes; a folder of .amc files with their .asf, or of .bvh files; or `library`,
-    `library:02,16` and `library:-16`: all recorded motions, some people's, all but some people's. Nobody learns from
-    the clip that is `followed`: a folder and the library are taken without it. Raises ValueError where there is no such
-    motion, where nothing is left, and where they would take more memory than this process may have.
+    `library:02,16` and `library:-16`: all recorded motions, some people's, all but some people's. The clip that is
+    `followed` is left out of a folder and the library. Raises InputError where there is no such motion, where none is
+    left, and where they would take more memory than this process may have.
     """
     clips, poses = [], 0
     for source in sources:
@@ -32,35 +33,35 @@ def training_clips(
 
 
 def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
-    """Return the motions of clips at a rate. Raises ValueError where they would take more memory than there may be."""
+    """Return the motions of clips at a rate. Raises InputError where they would take more memory than there may be."""
     _check_memory(sum(clip.count(fps) for clip in clips), fps)
     return [clip(fps) for clip in clips]
 
 
 def _check_memory(poses: int, fps: float) -> None:
-    """Return nothing. Raises ValueError where learning from poses would take more memory than this process may have."""
+    """Return nothing. Raises InputError where learning from poses would take more memory than this process may have."""
     most = allowed_bytes()
     if poses * POSE_BYTES > most:
         took = f"{poses * POSE_BYTES / 1e9:.1f} GB for {poses:,} poses at {fps:g} frames a second"
-        raise ValueError(f"train must take at most the {most / 1e9:.1f} GB of memory that there may be, got {took}")
+        raise InputError(f"train must take at most the {most / 1e9:.1f} GB of memory that there may be, got {took}")
 
 
 def _clips(source: Source, asf: str | Path | None, followed: Source | None) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
-        found = [one for one in recorded.named(source) if one.name != _stem(followed)]
-        if not found:
-            raise ValueError(f"train must hold another clip than the source, got {source} for {followed}")
-        yield from (SourceClip.of_recorded(one) for one in found)
+        others = [one for one in recorded.named(source) if one.name != _stem(followed)]
+        if not others:
+            raise InputError(f"train must hold another clip than the source, got {source} for {followed}")
+        yield from (SourceClip.of_recorded(one) for one in others)
     elif not isinstance(source, Motion) and Path(source).is_dir():
         paths = sorted(path for path in Path(source).iterdir() if path.suffix.lower() in MOTIONS and path.is_file())
         if not paths:
-            raise ValueError(f"{source}: expected a folder of {' or '.join(MOTIONS)} files, got none in it")
+            raise InputError(f"{source}: expected a folder of {' or '.join(MOTIONS)} files, got none in it")
         others = [path for path in paths if not _same(path, followed)]
         if not others:
-            raise ValueError(f"{source}: expected a folder with another clip than the source, got that one alone")
+            raise InputError(f"{source}: expected a folder with another clip than the source, got that one alone")
         yield from (clip_of(path, asf) for path in others)
     elif _same(source, followed):
-        raise ValueError(f"train must not contain the source itself, got {source}")
+        raise InputError(f"train must not contain the source itself, got {source}")
     else:
         yield clip_of(source, asf)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.footage.images import PIXELS
 from posefit.silhouette.foreground import Image
 
@@ -24,7 +25,7 @@ os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 @dataclass(frozen=True)
 class Video:
-    """A video file, opened anew each time its frames are asked for."""
+    """A video file, opened again for each pass through its frames."""
 
     path: Path
     fps: float
@@ -35,20 +36,20 @@ class Video:
 
     @classmethod
     def of(cls, path: str | Path) -> "Video":
-        """Return a video. Raises ValueError where the file is missing, cannot be read or has no frame."""
+        """Return a video. Raises InputError where the file is missing, cannot be read or has no frame."""
         path = Path(path)
         if not path.is_file():
             came = "a folder" if path.is_dir() else "nothing of that name"
-            raise ValueError(f"{path}: expected a video file, got {came}")
+            raise InputError(f"{path}: expected a video file, got {came}")
         capture = cv2.VideoCapture(str(path))
         try:
             wide, tall = (capture.get(one) for one in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
             if wide * tall > PIXELS:
                 most = f"{PIXELS // 10**6} million pixels"
-                raise ValueError(f"{path}: expected frames of at most {most}, got {wide:.0f}x{tall:.0f}")
+                raise InputError(f"{path}: expected frames of at most {most}, got {wide:.0f}x{tall:.0f}")
             read, image = capture.read()
             if not read:
-                raise ValueError(f"{path}: expected a video that OpenCV can read, got none or one without frames")
+                raise InputError(f"{path}: expected a video that OpenCV can read, got none or one without frames")
             fps = float(capture.get(cv2.CAP_PROP_FPS))
             claimed = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
         finally:
@@ -63,7 +64,7 @@ class Video:
     def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop, scaled to `size`.
 
-        Raises ValueError where a frame has another size than the first.
+        Raises InputError where a frame has another size than the first.
         """
         wanted = self._order[start:stop:step]
         capture = cv2.VideoCapture(str(self.path))
@@ -79,7 +80,7 @@ class Video:
                     k += 1
                     if (filmed.shape[1], filmed.shape[0]) != self.size:
                         came = f"{filmed.shape[1]}x{filmed.shape[0]} in frame {k}"
-                        raise ValueError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
+                        raise InputError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
                     image = np.asarray(cv2.resize(filmed, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
                 assert image is not None
                 yield image
@@ -101,8 +102,8 @@ class Video:
             return []
         held = np.count_nonzero(~self._filmed)
         return [
-            f"{self.path}: its frames come at uneven times; it is looked at {self.fps:.3g} times a second, so that "
-            f"{held} of {self.count()} frames stand for moments that nobody filmed, and are held"
+            f"{self.path}: its frames come at uneven times; it is sampled {self.fps:.3g} times a second, so that "
+            f"{held} of {self.count()} frames stand for moments without a filmed one, and are held"
         ]
 
     @property
@@ -151,7 +152,7 @@ class VideoWriter:
         self._path, self._count = path, 0
         self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*CODE), fps, size)
         if not self._writer.isOpened():
-            raise ValueError(f"{path}: expected OpenCV to write {CODE} video, got a build or a disk that cannot")
+            raise InputError(f"{path}: expected OpenCV to write {CODE} video, got a build or a disk that cannot")
 
     def write(self, image: Image) -> None:
         """Add a frame."""

@@ -10,6 +10,6 @@
 | thousands of poses in parts, shared by threads; how many were drawn | sharing.py, drawn.py |
 | a body drawn as spans of bits, compiled | rasteriser.py, lanes.py |
 | its pixels counted against silhouettes, compiled | kernels.py, popcount.py |
-| a person told from a background, pixel by pixel | foreground.py |
+| a person separated from a background, pixel by pixel | foreground.py |
 | what goes wrong with a mask on its way from a camera, made on purpose | corruption.py |
 """

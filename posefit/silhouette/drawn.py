@@ -1,4 +1,4 @@
-"""How many poses are drawn, and for whom: what somebody says of his evaluations can be held against it."""
+"""Counts of drawn poses, by which the evaluations that a plugin reports are checked."""
 
 import threading
 from collections.abc import Iterator, Sequence
@@ -13,8 +13,8 @@ from posefit.silhouette.mask import Silhouette
 class PoseCount:
     """Counts the poses that are drawn within `counting`, and in any thread those compared with its `own` silhouettes.
 
-    Several count at once and each its own, in one thread or in many. A thread that others start is known by the
-    silhouettes alone; what calls the compiled loops itself, or draws in another process, is not counted.
+    Several may count at once, in one thread or in many. In threads started by a plugin, poses are counted by their
+    silhouettes alone; direct calls of the compiled loops, and other processes, are not counted.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class PoseCount:
                 outer.add(self.poses - before)
 
     def own(self, silhouettes: Sequence[Silhouette]) -> list[Silhouette]:
-        """Return the same silhouettes, as objects that only this count knows."""
+        """Return the same silhouettes, as new objects whose poses this count gets."""
         mine = [copy(one) for one in silhouettes]
         for one in mine:
             _owners[one] = self
@@ -47,7 +47,7 @@ class PoseCount:
 
 
 def belongs(silhouette: Silhouette, origin: Silhouette) -> Silhouette:
-    """Return a silhouette, known from now on to whoever knows the one that it was made of."""
+    """Return a silhouette, counted from now on by the count that owns the one it was made of."""
     if _owners and (owner := _owners.get(origin)) is not None:
         _owners[silhouette] = owner
     return silhouette
@@ -68,7 +68,7 @@ def uncounted() -> Iterator[None]:
 
 
 def count_poses(poses: int, silhouette: Silhouette | None = None) -> None:
-    """Count poses that are drawn now, for whoever counts them; in a smaller picture by its share of the pixels."""
+    """Add poses that are drawn now to the current count; in a smaller picture by its share of the pixels."""
     counted = _current.get()
     if counted is None and _owners and silhouette is not None:
         counted = _owners.get(silhouette)

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.errors import InputError
 from posefit.silhouette.mask import Mask
 
 Image = NDArray[np.uint8]  # (height, width, 3)
@@ -32,7 +33,7 @@ THRESHOLD = 25.0  # squared standard deviations from its nearest Gaussian, from 
 
 
 class Footage(Protocol):
-    """What a segmenter may look at before the first frame: a video at its working size, as far as the roi goes."""
+    """What a segmenter gets before the first frame: a video at its working size, cut to the roi."""
 
     def __len__(self) -> int:
         """How many frames the video has."""
@@ -43,20 +44,20 @@ class Footage(Protocol):
         ...
 
     def picture(self, path: str) -> Image:
-        """Return a picture of the video's size as the video shows it. Raises ValueError where there is none."""
+        """Return a picture of the video's size as the video shows it. Raises InputError where there is none."""
         ...
 
 
 class Segmenter(Protocol):
-    """Tells a person from the rest of a picture. Frames come in their order, each once.
+    """Separates a person from the rest of a picture. Frames come in their order, each once.
 
-    One that holds each frame against a still background may show that picture as `background` (height, width, 3), and
-    is then watched for a person who was learned into it. One that knows people may say which way the person in the
-    latest picture faces as `facing`: radians, 0 towards the camera and growing to the picture's right, nan for nobody.
+    One that compares each frame with a still background may have that picture as `background` (height, width, 3), and
+    is then checked for a person who was learned into it. One with a model of people may have, as `facing`, which way
+    the person in the latest picture faces: radians, 0 towards the camera, growing to the picture's right, NaN for none.
     """
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
-        """Return where the person is in an image, and where his shadow may be, both (height, width)."""
+        """Return where the person is in an image, and where their shadow may be, both (height, width)."""
         ...
 
 
@@ -89,13 +90,13 @@ class Still:
 
 
 def mean_background(images: Iterable[Image]) -> Still:
-    """Return the background that is the mean of images without a person. Raises ValueError where there is none."""
+    """Return the background that is the mean of images without a person. Raises InputError where there is none."""
     count, total, squares = 0, np.zeros(()), np.zeros(())
     for image in images:
         values = image.astype(np.float64)
         count, total, squares = count + 1, total + values, squares + values**2
     if not count:
-        raise ValueError("background must hold at least one frame, got none")
+        raise InputError("background must hold at least one frame, got none")
     middle = total / count
     variance = np.maximum(squares / count - middle**2, 0.0).max(axis=-1)
     return Still(middle.astype(np.float32), np.sqrt(variance).astype(np.float32))
@@ -104,18 +105,18 @@ def mean_background(images: Iterable[Image]) -> Still:
 def median_background(images: Iterable[Image]) -> Still:
     """Return the background that is the median of some images, before which a person may walk; at most 40 are kept.
 
-    Raises ValueError where there is none.
+    Raises InputError where there is none.
     """
     kept = np.stack(list(images)) if not isinstance(images, np.ndarray) else images
     if not len(kept):
-        raise ValueError("background must hold at least one frame, got none")
+        raise InputError("background must hold at least one frame, got none")
     middle = np.median(kept, axis=0).astype(np.float32)
     away = np.median(np.abs(kept.astype(np.float32) - middle), axis=0).max(axis=-1)
     return Still(middle, (1.4826 * away).astype(np.float32))
 
 
 class Mixture:
-    """OpenCV's adaptive mixture of Gaussians, learned from all frames first: what the SAPSO paper starts from."""
+    """OpenCV's adaptive mixture of Gaussians, learned from all frames first, as in the SAPSO paper."""
 
     def __init__(self, images: Iterable[Image], history: int = HISTORY, threshold: float = THRESHOLD) -> None:
         self._model: Any = cv2.createBackgroundSubtractorMOG2(history, threshold, True)
@@ -124,7 +125,7 @@ class Mixture:
             self._model.apply(image)
             count += 1
         if not count:
-            raise ValueError("background must hold at least one frame, got none")
+            raise InputError("background must hold at least one frame, got none")
 
     @property
     def background(self) -> Image:
@@ -138,7 +139,7 @@ class Mixture:
 
 
 class Drawn:
-    """What tells the person from the background where the frames are masks themselves: bright is the person."""
+    """A segmenter of frames that are masks themselves: bright is the person."""
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
         """Return which pixels are bright, and that nothing is a shadow."""
@@ -173,13 +174,13 @@ def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None
     if ignore is not None:
         inside &= ~ignore
     known = ~shadow if ignore is None else ~shadow & ~ignore
-    seen = np.asarray(cv2.medianBlur(foreground.astype(np.uint8), NOISE) > 0) & inside
-    mask, pieces, _ = _largest(_cleaned(seen, height) & inside)
+    changed = np.asarray(cv2.medianBlur(foreground.astype(np.uint8), NOISE) > 0) & inside
+    mask, pieces, _ = _largest(_cleaned(changed, height) & inside)
     if not pieces:
         return Person(mask, known, 0, 0, 0.0, False)
     size = int(np.ptp(np.flatnonzero(mask.any(axis=1)))) + 1
     dark = _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
-    mask, pieces, rival = _largest(_cleaned(seen | dark, height) & inside)
+    mask, pieces, rival = _largest(_cleaned(changed | dark, height) & inside)
     mask = without_holes(mask)
     touches = bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
     return Person(mask, known | mask, int(mask.sum()), pieces, rival, touches)

@@ -17,11 +17,11 @@ def count(image, observed, valid, box):
     body, overlap = NONE, NONE
     for strip in range(box[2], box[3] + 1):
         words = image[strip][box[0] : box[1]]
-        seen = observed[strip][box[0] : box[1]]
+        person = observed[strip][box[0] : box[1]]
         known = valid[strip][box[0] : box[1]]
         for i in range(words.size):
             body += popcount(words[i] & known[i])
-            overlap += popcount(words[i] & seen[i])
+            overlap += popcount(words[i] & person[i])
         for i in range(words.size):
             words[i] = NONE
     return body, overlap

@@ -1,4 +1,4 @@
-"""Masks, and the silhouette of one view as the kernel wants it: bits."""
+"""Masks, and the silhouette of one view as the bit images that the kernel takes."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +12,7 @@ from posefit.silhouette.rasteriser import STRIP_PIXELS, strips_and_words
 
 Mask = NDArray[np.bool_]  # (height, width)
 
-PIECE = 0.06  # of the largest piece's pixels, ours: a smaller one has no say in where the person's borders are
+PIECE = 0.06  # of the largest piece's pixels, ours: a smaller one is left out of the person's borders
 
 
 def pack(mask: Mask) -> Bits:
@@ -34,12 +34,12 @@ def unpack(bits: Bits, width: int, height: int) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Silhouette:
-    """What one camera saw: the person's pixels, and which pixels are known at all."""
+    """The person's pixels in one camera's image, and which pixels are known at all."""
 
     mask: Mask = field(repr=False)  # (height, width); unknown pixels are False
     valid: Mask = field(repr=False)  # (height, width)
-    scale: int = 1  # it has every so many pixels of every so many rows of what was seen
-    device: str = "cpu"  # where poses are drawn that are compared with it
+    scale: int = 1  # every so many pixels of every so many rows of the full-size silhouette
+    device: str = "cpu"  # where poses are drawn to be compared with it
 
     @classmethod
     def of(cls, mask: NDArray[np.generic], valid: NDArray[np.generic] | None = None) -> "Silhouette":
@@ -47,13 +47,13 @@ class Silhouette:
 
         Pixels where `valid` is 0 are unknown and count for nothing. Raises ValueError where shapes differ.
         """
-        seen = np.asarray(mask)
-        if seen.ndim != 2 or 0 in seen.shape:
-            raise ValueError(f"mask must have shape (height, width), got {seen.shape}")
-        known = np.ones(seen.shape, dtype=bool) if valid is None else np.asarray(valid) != 0
-        if known.shape != seen.shape:
-            raise ValueError(f"valid must have the mask's shape {seen.shape}, got {known.shape}")
-        return cls((seen != 0) & known, known)
+        values = np.asarray(mask)
+        if values.ndim != 2 or 0 in values.shape:
+            raise ValueError(f"mask must have shape (height, width), got {values.shape}")
+        known = np.ones(values.shape, dtype=bool) if valid is None else np.asarray(valid) != 0
+        if known.shape != values.shape:
+            raise ValueError(f"valid must have the mask's shape {values.shape}, got {known.shape}")
+        return cls((values != 0) & known, known)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -77,9 +77,9 @@ class Silhouette:
 
     @cached_property
     def extent(self) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom border of the person in pixels; nan where nothing or the image's edge is seen.
+        """Left, top, right and bottom border of the person in pixels; NaN at the image's edge, and where none is there.
 
-        Small pieces that lie apart are not the person: a single stray pixel would move him by half of how far it is.
+        Small pieces that lie apart are not the person: a stray pixel would move them by half its distance.
         """
         _, _, pieces, _ = cv2.connectedComponentsWithStats(self.mask.astype(np.uint8), connectivity=8)
         pieces = pieces[1:]  # the first is the background

@@ -30,7 +30,7 @@ def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
     first = _first(factor, silhouette.size)
     mask, valid = (pixels[first::factor, first::factor] for pixels in (silhouette.mask, silhouette.valid))
     coarse = replace(Silhouette.of(mask, valid), scale=silhouette.scale * factor, device=silhouette.device)
-    # given instead of found, so that what is aligned to the borders stands where it stands at full size
+    # the full-size borders, so that poses aligned to them stand where they stand at full size
     vars(coarse)["extent"] = tuple((np.array(silhouette.extent) - first - 0.5) / factor + 0.5)
     return belongs(coarse, silhouette)
 

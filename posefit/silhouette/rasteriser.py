@@ -1,7 +1,7 @@
 """The rasteriser: numba loops over arrays. Shapes are checked by the callers.
 
 A bit image is cut into strips, each 32 pixels wide: it is (strips, words) uint64, and the word image[s, i] holds two
-rows of its strip. Seen as (strips, rows) uint32, bit k of image[s, y] is pixel (32 s + k, y): eight neighbouring rows
+rows of its strip. As (strips, rows) uint32, bit k of image[s, y] is pixel (32 s + k, y): eight neighbouring rows
 are one vector register of AVX2, whose lanes are as wide as those of the float32 numbers that they are made from.
 Strips are even in number, rows a multiple of eight. A cone is the hull of two discs. In one row of pixels it spans
 from the least to the greatest of at most six crossings: two with each disc, one with each of the two tangent
@@ -39,7 +39,7 @@ _SCRATCH_OUTLINE = 16 * LANES
 # A block to fill is one number: its first word as uint32 in the upper half; in the lower its first row, counted from
 # BLOCK rows above the cone's top so that none is negative, and in the lowest bits the cone.
 _NEXT = (BLOCK << 32) + BLOCK * LANES  # from a cone's block to the next
-_NATURAL = 0x7FFFFFFF  # an index that is seen not to be negative needs no look at whether it counts from the end
+_NATURAL = 0x7FFFFFFF  # an index that is provably not negative needs no check whether it counts from the end
 
 
 class View(NamedTuple):
@@ -63,7 +63,7 @@ def strips_and_words(width, height):
 def outline(ends, lines, bounds, strips, width, height):
     """Write each cone's bounds, and the discs and tangent segments that border it, rows counted from its top.
 
-    The bounds are its first block of rows and how many they are, none where it is not seen, and its first and last
+    The bounds are its first block of rows and how many they are, none where it is not visible, and its first and last
     strip. Blocks begin at every eighth row of the image: two cones' blocks are then the same words or none in common,
     and a processor that has just written one can read it again at once.
     """
@@ -249,7 +249,7 @@ def scratch(view, bones, angles):
     kinematics = (np.empty((angles,)), np.empty((angles,)), empty_frames(bones + 1))
     ends = np.empty((_SCRATCH_ENDS,))
     for k in range(_SCRATCH_ENDS):
-        ends[k] = 0.0  # what is no bone's is never seen
+        ends[k] = 0.0  # entries beyond the bones are never visible
     outlines = (
         ends,
         np.empty((_SCRATCH_OUTLINE,), np.float32),

@@ -331,7 +331,7 @@ def test_every_image_is_decoded_once_however_often_its_mask_is_needed(
         real = getattr(cv2, name)
         monkeypatch.setattr(cv2, name, lambda *words, real=real: decoded.append("image") or real(*words))
     path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in walk])
-    track(path, out=tmp_path / "out", prior="loose", evaluations=200, restarts=2, body_frames=2)
+    track(path, out=tmp_path / "out", method="sapso@loose", evaluations=200, restarts=2, body_frames=2)
     assert len(decoded) == len(walk)
 
 

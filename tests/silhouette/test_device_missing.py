@@ -11,6 +11,7 @@ from posefit.motion import built_in
 from posefit.silhouette.cuda.device import check_device
 from posefit.silhouette.cuda.moving import moved_to
 from posefit.silhouette.mask import Silhouette
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.run import follow
 
 NEEDED = "device cuda needs an NVIDIA GPU and posefit[gpu], got no library numba-cuda"
@@ -36,7 +37,7 @@ def test_one_line_says_what_a_gpu_needs() -> None:
         lambda: check_device("cuda"),
         lambda: moved_to(silhouette, "cuda"),
         lambda: on_device(scene, "cuda"),
-        lambda: follow(scene, [], device="cuda"),
+        lambda: follow(scene, [], TrackOptions(device="cuda")),
     ):
         with pytest.raises(ValueError) as error:
             ask()

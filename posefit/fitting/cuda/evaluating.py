@@ -32,28 +32,28 @@ def areas_of_proposals(
     """Return R, B, Y (n, 3) of proposals (n, d) in each view. Raises ValueError where a proposal is not finite."""
     if not np.isfinite(proposals).all():
         raise ValueError("proposals must be finite, got nan or infinity")
-    found = [np.empty((len(proposals), 3), dtype=np.int64) for _ in silhouettes]
+    counts = [np.empty((len(proposals), 3), dtype=np.int64) for _ in silhouettes]
     drawings = [
         drawing_on_device(body, camera, silhouette) for camera, silhouette in zip(cameras, silhouettes, strict=True)
     ]
-    box = [cuda.to_device(one) for one in box_of(space)]
+    box = [cuda.to_device(array) for array in box_of(space)]
     for silhouette in silhouettes:
         count_poses(len(proposals), silhouette)
     for first in range(0, len(proposals), PART):
         part = slice(first, first + PART)
         placed = decoded_on_device(space, box, proposals[part])
-        counts = [launched(drawing, *placed) for drawing in drawings]
-        for out, areas in zip(found, counts, strict=True):
+        launches = [launched(drawing, *placed) for drawing in drawings]
+        for out, areas in zip(counts, launches, strict=True):
             out[part] = areas.copy_to_host()[:, 0]
-    return found
+    return counts
 
 
 def box_of(space: SearchSpace) -> Sequence[Array]:
-    """Return what a device wants to know of a space: middle, half sides, anchor, tilt, slopes, weights and offset."""
+    """Return the arrays that describe a space: middle, half sides, anchor, tilt, slopes, weights and offset."""
     weights, offset = space.prior.affine  # type: ignore[attr-defined]
     tilt = np.zeros((3 + len(weights), 2)) if space.tilt is None else space.tilt.mean
-    given = (space.centre, space.half, space.anchor, tilt[:3], tilt[3:], weights, offset)
-    return [np.array(one, dtype=np.float64, order="C") for one in given]
+    arrays = (space.centre, space.half, space.anchor, tilt[:3], tilt[3:], weights, offset)
+    return [np.array(array, dtype=np.float64, order="C") for array in arrays]
 
 
 def decoded_on_device(space: SearchSpace, box: Sequence[Any], proposals: Array) -> tuple[Any, Any]:

@@ -19,7 +19,7 @@ ROW, STOP, FIRST, LAST, TOP, BOUNDS = range(6)  # rows of `bounds`: those drawn,
 
 @cuda.jit(device=True)
 def project_joint(j, frames, view, ends):
-    """Write where joint j is seen, in pixels, and how many a metre has there: none where it is not to be drawn."""
+    """Write the projection of joint j, in pixels, and the pixels of a metre there: 0 where it is not to be drawn."""
     a, b, c = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
     x = view[0] * a + view[1] * b + view[2] * c + view[9]
     y = view[3] * a + view[4] * b + view[5] * c + view[10]
@@ -46,7 +46,7 @@ def write_segment(k, row, px, py, slope, gap, u0, v0, r0, v1, r1, lines):
 
 @cuda.jit(device=True)
 def write_cone(k, start, radii, ends, strips, width, height, lines, bounds):
-    """Write the bounds of cone k, and the discs and tangent segments that border it; no rows where it is not seen."""
+    """Write the bounds of cone k, and the discs and tangent segments that border it; no rows where it is invisible."""
     bounds[ROW, k] = bounds[STOP, k] = 0
     u0, v0, r0 = ends[U, start], ends[V, start], ends[METRE, start] * radii[k, 0]
     u1, v1, r1 = ends[U, k + 1], ends[V, k + 1], ends[METRE, k + 1] * radii[k, 1]
@@ -114,7 +114,7 @@ def word_of(low, high, strip, first, last, start):
     """Return the bits of a span in one strip, of a cone that has the strips from `first` to `last`.
 
     They are counted, as on a CPU, from the first pixel of the window of two strips that begins at strip `start`: so
-    both round alike.
+    both round the same way.
     """
     if strip < first or strip > last:
         return np.uint32(0)

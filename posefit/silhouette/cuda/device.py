@@ -1,16 +1,18 @@
-"""Whether there is a device, and what is said where there is none."""
+"""Whether a device is available, and the error where it is not."""
 
 from importlib.util import find_spec
+
+from posefit.errors import InputError
 
 DEVICES = ("cpu", "cuda")
 
 
 def check_device(device: str) -> None:
-    """Return nothing. Raises ValueError for a device that nobody knows, and for one that is not there."""
+    """Return nothing. Raises InputError for an unknown device, and for one that is not available."""
     if device not in DEVICES:
-        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
+        raise InputError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
     if device == "cuda" and (missing := _missing()):
-        raise ValueError(f"device cuda needs an NVIDIA GPU and posefit[gpu], got {missing}")
+        raise InputError(f"device cuda needs an NVIDIA GPU and posefit[gpu], got {missing}")
 
 
 def _missing() -> str | None:

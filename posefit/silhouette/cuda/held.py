@@ -18,16 +18,16 @@ _held: WeakKeyDictionary[Any, Sequence[Any]] = WeakKeyDictionary()
 
 def held(owner: T, arrays: Callable[[T], Sequence[NDArray[Any]]]) -> Sequence[Any]:
     """Return the arrays of an owner on the device, given to it at the first call."""
-    found = _held.get(owner)
-    if found is None:
-        found = _held[owner] = tuple(cuda.to_device(np.array(one, order="C")) for one in arrays(owner))
-    return found
+    arrays_there = _held.get(owner)
+    if arrays_there is None:
+        arrays_there = _held[owner] = tuple(cuda.to_device(np.array(one, order="C")) for one in arrays(owner))
+    return arrays_there
 
 
 def drawing_on_device(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
     """Return the arguments of `count_on_device` that come before the poses."""
-    seen = held(silhouette, _silhouette)
-    return *held(body, _body), *held(camera, _camera), camera.width, camera.height, *seen
+    scene = *held(body, _body), *held(camera, _camera), camera.width, camera.height
+    return *scene, *held(silhouette, _silhouette)
 
 
 def _body(body: Body) -> Sequence[NDArray[Any]]:

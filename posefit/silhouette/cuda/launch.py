@@ -86,7 +86,7 @@ def count_on_device(
     """Write the areas (n, silhouettes, 3) R, B, Y of poses (n, 66), one a block, each drawn once.
 
     First come the fields of `Chain`, then radii, then a view (16,): rotation, translation, focal lengths, centre.
-    `observed` and `valid` (silhouettes, strips, rows) are bit images as `rasteriser` makes them, seen as 32-bit words;
+    `observed` and `valid` (silhouettes, strips, rows) are bit images as `rasteriser` makes them, in 32-bit words;
     of each silhouette's pixels there are so many (silhouettes,).
     """
     sines = cuda.shared.array(_ANGLES, float64)
