@@ -87,9 +87,9 @@ def check(
     same cause, the others are not checked.
     """
     with results_alone():
-        from posefit.testing.apart import check_apart
+        from posefit.testing.process import check_in_process
 
-        report = check_apart(kind, name, settings, only)
+        report = check_in_process(kind, name, settings, only)
     if as_json:
         results = [
             {"check": one.name, "outcome": one.outcome, "detail": one.detail, "traceback": one.traceback}

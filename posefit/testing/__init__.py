@@ -13,7 +13,7 @@ or one test a rule:
 
 The same checks run for an installed plugin as `posefit check optimiser NAME`, in a process of its own: there a plugin
 that ends or hangs its process has failed a check, where here it ends or hangs the caller's. A factory with the
-attribute `baseline = True` is chance itself, and is not asked to beat it.
+attribute `baseline = True` is chance itself, and need not beat it.
 """
 
 from collections.abc import Callable
@@ -45,54 +45,50 @@ def optimiser_checks(
     factory: Callable[..., Any], *, next_frame: "NextFrame" = "start", settings: dict[str, Any] | None = None
 ) -> list[Check]:
     """Return the checks of an optimiser's factory; `next_frame` as it is registered."""
-    from posefit.testing import protocol_rules, repeat_rules, search_rules
-    from posefit.testing.case import OptimiserCase, checklist
+    from posefit.testing.optimiser_rules import OptimiserCase, checklist
 
-    del protocol_rules, repeat_rules, search_rules  # importing them has filled the list
     return checklist.of(OptimiserCase(factory, next_frame, settings or {}))
-
-
-def check_optimiser(
-    factory: Callable[..., Any], *, next_frame: "NextFrame" = "start", settings: dict[str, Any] | None = None
-) -> Report:
-    """Return what the checks say of an optimiser's factory: true where none failed."""
-    return run_checks(_name(factory), optimiser_checks(factory, next_frame=next_frame, settings=settings))
 
 
 def prior_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a prior's factory."""
-    from posefit.testing import prior_rules
+    from posefit.testing.prior_rules import PriorCase, checklist
 
-    return prior_rules.checklist.of(prior_rules.PriorCase(factory, settings or {}))
-
-
-def check_prior(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
-    """Return what the checks say of a prior's factory: true where none failed."""
-    return run_checks(_name(factory), prior_checks(factory, settings=settings))
+    return checklist.of(PriorCase(factory, settings or {}))
 
 
 def tracker_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a tracker's factory."""
-    from posefit.testing import tracker_rules
+    from posefit.testing.tracker_rules import TrackerCase, checklist
 
-    return tracker_rules.checklist.of(tracker_rules.TrackerCase(factory, settings or {}))
-
-
-def check_tracker(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
-    """Return what the checks say of a tracker's factory: true where none failed."""
-    return run_checks(_name(factory), tracker_checks(factory, settings=settings))
+    return checklist.of(TrackerCase(factory, settings or {}))
 
 
 def segmenter_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a segmenter's factory."""
-    from posefit.testing import segmenter_rules
+    from posefit.testing.segmenter_rules import SegmenterCase, checklist
 
-    return segmenter_rules.checklist.of(segmenter_rules.SegmenterCase(factory, settings or {}))
+    return checklist.of(SegmenterCase(factory, settings or {}))
 
 
-def check_segmenter(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> Report:
-    """Return what the checks say of a segmenter's factory: true where none failed."""
-    return run_checks(_name(factory), segmenter_checks(factory, settings=settings))
+def check_optimiser(factory: Callable[..., Any], **options: Any) -> Report:
+    """Return the report on an optimiser's factory, true where no check failed; options as for `optimiser_checks`."""
+    return run_checks(_name(factory), optimiser_checks(factory, **options))
+
+
+def check_prior(factory: Callable[..., Any], **options: Any) -> Report:
+    """Return the report on a prior's factory, true where no check failed; options as for `prior_checks`."""
+    return run_checks(_name(factory), prior_checks(factory, **options))
+
+
+def check_tracker(factory: Callable[..., Any], **options: Any) -> Report:
+    """Return the report on a tracker's factory, true where no check failed; options as for `tracker_checks`."""
+    return run_checks(_name(factory), tracker_checks(factory, **options))
+
+
+def check_segmenter(factory: Callable[..., Any], **options: Any) -> Report:
+    """Return the report on a segmenter's factory, true where no check failed; options as for `segmenter_checks`."""
+    return run_checks(_name(factory), segmenter_checks(factory, **options))
 
 
 def _name(factory: Callable[..., Any]) -> str:

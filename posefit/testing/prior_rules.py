@@ -1,7 +1,6 @@
 """Is a prior right: shapes, ranges, the same bits for a row whatever stands beside it, and does it learn anything?"""
 
 import copy
-import inspect
 import pickle
 import tempfile
 import time
@@ -9,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, get_origin
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +17,9 @@ from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
 from posefit.motion import built_in
-from posefit.settings import settings_of
+from posefit.testing.common import check_nonsense, check_signature, global_random_state, left_alone
 from posefit.testing.problem import walking_angles
-from posefit.testing.randomness import left_alone, watched
-from posefit.testing.results import Checklist, SkippedError, expect, refusal
+from posefit.testing.results import BrokenError, Checklist, SkippedError, expect
 
 ROWS = 100
 checklist = Checklist()
@@ -29,12 +27,12 @@ checklist = Checklist()
 
 @dataclass(frozen=True)
 class Fitting:
-    """A prior that has learned, and how."""
+    """A prior that has learned, and whether it left everything else alone."""
 
     prior: Prior
-    given: Prior  # what fit returned
-    inputs_kept: bool
-    random_kept: bool
+    returned: Prior  # what fit returned
+    inputs_unchanged: bool
+    random_unchanged: bool
 
 
 @dataclass(frozen=True)
@@ -46,18 +44,18 @@ class PriorCase:
 
     @cached_property
     def first(self) -> Fitting:
-        """The prior after it has learned the built-in walks, which may take its time: once for all rules that can."""
+        """The prior after it has learned the built-in walks: once for all rules, as that may take minutes."""
         prior: Prior = self.factory(**self.settings)
         angles, skeleton = walking_angles(), built_in.average_skeleton()
         before = angles.copy()
-        with watched() as random:
-            given = prior.fit(angles, skeleton)
-        return Fitting(prior, given, np.array_equal(angles, before), random.kept)
+        with global_random_state() as random:
+            returned = prior.fit(angles, skeleton)
+        return Fitting(prior, returned, np.array_equal(angles, before), random.unchanged)
 
     @property
     def fitted(self) -> Prior:
         """The prior that has learned, as `fit` returned it."""
-        return self.first.given
+        return self.first.returned
 
     def fitted_again(self) -> Prior:
         """Return another prior that has learned the same."""
@@ -73,14 +71,13 @@ class PriorCase:
 @checklist
 def construction(case: PriorCase) -> None:
     """A factory takes keyword-only settings and nothing else."""
-    kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
-    expect(all(kind is inspect.Parameter.KEYWORD_ONLY for kind in kinds), "settings must be named and keyword-only")
+    check_signature(case.factory)
 
 
 @checklist
 def fit(case: PriorCase) -> None:
     """The method fit returns the prior itself."""
-    expect(case.first.given is case.first.prior, "fit must return self, got another object")
+    expect(case.first.returned is case.first.prior, "fit must return self, got another object")
 
 
 @checklist
@@ -99,11 +96,8 @@ def transform(case: PriorCase) -> None:
     """Joint angles (n, 63) become latents (n, m)."""
     prior = case.fitted
     for rows in (1, 7):
-        latents = np.asarray(prior.transform(walking_angles()[:rows]))
-        expect(
-            latents.shape == (rows, len(prior.low)),
-            f"transform must return {(rows, len(prior.low))}, got {latents.shape}",
-        )
+        latents, wanted = np.asarray(prior.transform(walking_angles()[:rows])), (rows, len(prior.low))
+        expect(latents.shape == wanted, f"transform must return {wanted}, got {latents.shape}")
         expect(latents.dtype == np.float64, f"transform must return float64, got {latents.dtype}")
         expect(np.isfinite(latents).all(), "transform must return finite latents, got nan or infinity")
 
@@ -155,7 +149,7 @@ def same_bits(case: PriorCase) -> None:
 
 @checklist
 def same_again(case: PriorCase) -> None:
-    """The same poses teach the same space."""
+    """Learning the same poses again gives the same space."""
     first, second = case.fitted, case.fitted_again()
     latents = case.latents(first)
     same = np.array_equal(first.low, second.low) and np.array_equal(
@@ -166,13 +160,13 @@ def same_again(case: PriorCase) -> None:
 
 @checklist
 def inputs(case: PriorCase) -> None:
-    """What a method gets stays as it was."""
+    """Methods leave their arguments as they were."""
     prior, angles = case.fitted, walking_angles()
     before = angles.copy()
     latents = case.latents(prior)
     kept = latents.copy()
     prior.transform(angles), prior.inverse_transform(latents), prior.feasible(latents)
-    same = case.first.inputs_kept and np.array_equal(angles, before)
+    same = case.first.inputs_unchanged and np.array_equal(angles, before)
     expect(same, "joint angles must stay as they are, got others")
     expect(np.array_equal(latents, kept), "latents must stay as they are, got others")
 
@@ -180,7 +174,7 @@ def inputs(case: PriorCase) -> None:
 @checklist
 def global_randomness(case: PriorCase) -> None:
     """The global random generators are left alone."""
-    if not case.first.random_kept:  # a library that was imported meanwhile may have seeded them
+    if not case.first.random_unchanged:  # a library that was imported meanwhile may have seeded them
         with left_alone():
             case.fitted_again()
     with left_alone():
@@ -200,7 +194,7 @@ def copies(case: PriorCase) -> None:
 
 @checklist
 def file(case: PriorCase) -> None:
-    """What is saved is loaded again, and is the same space."""
+    """The saved file is loaded again as the same space."""
     prior = case.fitted
     load = getattr(type(prior), "load", None)
     with tempfile.TemporaryDirectory() as folder:
@@ -234,33 +228,20 @@ def learns(case: PriorCase) -> str:
 def bad_input(case: PriorCase) -> None:
     """Joint angles of a wrong shape, with nan, or too few are refused."""
     angles = walking_angles()
-    spoilt = angles.copy()
-    spoilt[3, 3] = np.nan
-    for what, value in (("60 columns", angles[:, :60]), ("nan", spoilt), ("no frames", angles[:0])):
-        with refusal(ValueError) as refused:
+    with_nan = angles.copy()
+    with_nan[3, 3] = np.nan
+    for what, value in (("60 columns", angles[:, :60]), ("nan", with_nan), ("no frames", angles[:0])):
+        try:
             case.factory(**case.settings).fit(value, built_in.average_skeleton())
-        expect(refused, f"fit must raise ValueError for {what}, got a prior")
+        except ValueError:
+            continue
+        raise BrokenError(f"fit must raise ValueError for {what}, got a prior")
 
 
 @checklist
 def nonsense_settings(case: PriorCase) -> str:
     """Nonsense in a setting is refused."""
-    refused = []
-    for setting in settings_of(case.factory):
-        kind = setting.annotation if setting.annotation is not inspect.Parameter.empty else type(setting.default)
-        choice = get_origin(kind) is Literal or setting.name == "variant"
-        nonsense: object = (
-            -1 if kind is int else float("nan") if kind is float else "no such choice" if choice else None
-        )
-        if nonsense is None:
-            continue
-        with refusal(ValueError) as refusals:
-            case.factory(**{**case.settings, setting.name: nonsense})
-        expect(refusals, f"{setting.name}={nonsense} must raise ValueError, got a prior")
-        refused.append(setting.name)
-    if not refused:
-        raise SkippedError("it has no settings that could be nonsense")
-    return f"refused: {', '.join(refused)}"
+    return check_nonsense(case.factory, lambda **nonsense: case.factory(**{**case.settings, **nonsense}))
 
 
 @checklist
@@ -279,10 +260,10 @@ def speed(case: PriorCase) -> str:
     """A pose is recovered in less than 5 ms."""
     prior = case.fitted
     latents = case.latents(prior)
-    spent = np.inf
+    seconds = np.inf
     for _ in range(3):
         began = time.perf_counter()
         prior.inverse_transform(latents)
-        spent = min(spent, (time.perf_counter() - began) / ROWS)
-    expect(spent < 5e-3, f"a pose must be recovered in less than 5 ms, got {1e3 * spent:.3g}")
-    return f"{1e6 * spent:.2f} us a pose"
+        seconds = min(seconds, (time.perf_counter() - began) / ROWS)
+    expect(seconds < 5e-3, f"a pose must be recovered in less than 5 ms, got {1e3 * seconds:.3g}")
+    return f"{1e6 * seconds:.2f} us a pose"

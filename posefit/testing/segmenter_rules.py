@@ -1,11 +1,10 @@
-"""Is a segmenter right: two masks of the picture's size, the same again, and do they show the person?"""
+"""Is a segmenter right: two masks of the image's size, the same again, and do they show the person?"""
 
-import inspect
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any, Literal, get_origin
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,15 +13,14 @@ from numpy.typing import NDArray
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit.settings import settings_of
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, Segmenter
 from posefit.silhouette.mask import Mask
-from posefit.testing.randomness import left_alone
-from posefit.testing.results import Checklist, SkippedError, expect, refusal
+from posefit.testing.common import check_nonsense, check_signature, left_alone
+from posefit.testing.results import Checklist, SkippedError, expect
 
 SIZE = (320, 240)
-EMPTY, FRAMES = 8, 40  # frames without anybody, then frames of somebody who walks through
+EMPTY, FRAMES = 8, 40  # frames of an empty scene, then frames of a person who walks through
 OVERLAP = 0.3  # of the person and the mask: half of what a poor background model reaches
 SECONDS = 1.0  # for a picture of that size
 SKIN, SHIRT, TROUSERS = (150.0, 175.0, 225.0), (235.0, 235.0, 235.0), (200.0, 150.0, 130.0)  # blue, green, red
@@ -31,7 +29,7 @@ checklist = Checklist()
 
 @dataclass(frozen=True)
 class PaintedFilm:
-    """A film in memory: somebody in light clothes walks through before a dark wall."""
+    """A film in memory: a person in light clothes walks past a dark wall."""
 
     images: list[Image] = field(repr=False)
 
@@ -43,7 +41,7 @@ class PaintedFilm:
         return (image.copy() for image in self.images[start:stop:step])
 
     def picture(self, _path: str) -> Image:
-        """Return the first frame, where nobody is to be seen yet, whatever the path."""
+        """Return the first frame, which is empty, whatever the path."""
         return self.images[0].copy()
 
 
@@ -58,8 +56,8 @@ def painted() -> tuple[PaintedFilm, list[Mask]]:
     camera, body = Camera.around(np.array([0.0, 0.9, 0.0]), np.pi / 2, 4.0, SIZE), Body.of(motion.skeleton)
     wall = cv2.GaussianBlur(rng.uniform(0.0, 1.0, SIZE[::-1]), (0, 0), 30.0)
     wall = 60.0 + 15.0 * (wall - wall.mean())[..., None] / wall.std()
-    nobody = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
-    masks = [nobody] * EMPTY + [
+    empty = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
+    masks = [empty] * EMPTY + [
         project(body, camera, pose, place) for pose, place in zip(motion.poses, motion.translations, strict=True)
     ]
     images = []
@@ -87,43 +85,40 @@ class SegmenterCase:
         return segmenter
 
     @cached_property
-    def said(self) -> list[tuple[Mask, Mask]]:
-        """What a segmenter says of every fourth frame, in their order."""
+    def masks(self) -> list[tuple[Mask, Mask]]:
+        """The masks and shadows of every fourth frame, in order."""
         segmenter = self.build()
         return [_pair(segmenter.segment(image)) for image in painted()[0].frames(step=4)]
 
 
-def _pair(said: object) -> tuple[NDArray[Any], NDArray[Any]]:
-    expect(isinstance(said, tuple) and len(said) == 2, f"segment must return two masks, got {type(said).__name__}")
-    assert isinstance(said, tuple)
-    return np.asarray(said[0]), np.asarray(said[1])
+def _pair(masks: object) -> tuple[NDArray[Any], NDArray[Any]]:
+    expect(isinstance(masks, tuple) and len(masks) == 2, f"segment must return two masks, got {type(masks).__name__}")
+    assert isinstance(masks, tuple)
+    return np.asarray(masks[0]), np.asarray(masks[1])
 
 
 @checklist
 def construction(case: SegmenterCase) -> None:
     """A factory takes the film and keyword-only settings."""
-    kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
-    plain = [kind for kind in kinds if kind is not inspect.Parameter.KEYWORD_ONLY]
-    expect(len(plain) == 1, f"a factory must take (film) and keyword-only settings, got {len(plain)} others")
-    expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
+    check_signature(case.factory, "film")
     case.build()
 
 
 @checklist
 def masks(case: SegmenterCase) -> None:
     """The method segment returns two boolean masks of the picture's size."""
-    for mask in (mask for pair in case.said for mask in pair):
+    for mask in (mask for pair in case.masks for mask in pair):
         expect(mask.shape == SIZE[::-1], f"a mask must have shape {SIZE[::-1]}, got {mask.shape}")
         expect(mask.dtype == np.bool_, f"a mask must be boolean, got {mask.dtype}")
 
 
 @checklist
-def finds(case: SegmenterCase) -> str:
-    """Somebody who walks through is seen in half of the frames at least."""
+def overlap(case: SegmenterCase) -> str:
+    """The mask shows the person in half of the frames at least."""
     true = painted()[1][::4]
     overlaps = [
-        float((said & mask).sum() / (said | mask).sum())
-        for (said, _), mask in zip(case.said, true, strict=True)
+        float((estimate & mask).sum() / (estimate | mask).sum())
+        for (estimate, _), mask in zip(case.masks, true, strict=True)
         if mask.any()
     ]
     middle = float(np.median(overlaps))
@@ -136,16 +131,16 @@ def same_again(case: SegmenterCase) -> None:
     """The same film gives the same masks."""
     segmenter = case.build()
     again = [_pair(segmenter.segment(image)) for image in painted()[0].frames(step=4)]
-    same = all(np.array_equal(one, two) for one, two in zip(case.said, again, strict=True))
-    expect(same, "two segmenters of one film must say the same, got two answers")
+    same = all(np.array_equal(one, two) for one, two in zip(case.masks, again, strict=True))
+    expect(same, "two segmenters of one film must give the same masks, got others")
 
 
 @checklist
 def inputs(case: SegmenterCase) -> None:
-    """A picture stays as it was."""
+    """The image stays as it was."""
     image = painted()[0].images[20].copy()
     case.build().segment(image)
-    expect(np.array_equal(image, painted()[0].images[20]), "a picture must stay as it is, got another")
+    expect(np.array_equal(image, painted()[0].images[20]), "an image must stay as it is, got another")
 
 
 @checklist
@@ -170,21 +165,8 @@ def global_randomness(case: SegmenterCase) -> None:
 @checklist
 def nonsense_settings(case: SegmenterCase) -> str:
     """Nonsense in a setting is refused."""
-    refused = []
-    for setting in settings_of(case.factory):
-        kind = setting.annotation if setting.annotation is not inspect.Parameter.empty else type(setting.default)
-        choice = get_origin(kind) is Literal or setting.name == "variant"
-        if not (choice or kind in (int, float)):
-            continue
-        nonsense: object = "no such choice" if choice else -1 if kind is int else float("nan")
-        with refusal(ValueError) as refusals:
-            self_made = {**case.settings, setting.name: nonsense}
-            case.factory(painted()[0], **self_made)
-        expect(refusals, f"{setting.name}={nonsense} must raise ValueError, got a segmenter")
-        refused.append(setting.name)
-    if not refused:
-        raise SkippedError("it has no settings that could be nonsense")
-    return f"refused: {', '.join(refused)}"
+    film = painted()[0]
+    return check_nonsense(case.factory, lambda **nonsense: case.factory(film, **{**case.settings, **nonsense}))
 
 
 @checklist
@@ -194,6 +176,6 @@ def speed(case: SegmenterCase) -> str:
     began = time.perf_counter()
     for image in painted()[0].images[16:20]:
         segmenter.segment(image)
-    spent = (time.perf_counter() - began) / 4
-    expect(spent < SECONDS, f"a picture must take less than {SECONDS:g} s, got {spent:.3g}")
-    return f"{1e3 * spent:.1f} ms a picture"
+    seconds = (time.perf_counter() - began) / 4
+    expect(seconds < SECONDS, f"a picture must take less than {SECONDS:g} s, got {seconds:.3g}")
+    return f"{1e3 * seconds:.1f} ms a picture"

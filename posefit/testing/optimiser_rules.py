@@ -1,0 +1,433 @@
+"""Is an optimiser right: the protocol, the box, costs of every kind, repetition, and does it search?"""
+
+import copy
+import multiprocessing
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.box import Space, Start, draw_population
+from posefit.fitting.optimiser import Filter, NextFrame, Niching, Optimiser, populations
+from posefit.settings import planned, settings_of
+from posefit.testing.common import check_nonsense, check_signature, check_unknown_setting, left_alone, seeded
+from posefit.testing.problem import pose_problem
+from posefit.testing.results import BrokenError, Checklist, SkippedError, expect
+from posefit.testing.toy import Toy, ball, shell, sphere
+
+EVALUATIONS = 400  # a search's budget where a check needs no special one
+BUDGET = 800  # of the searches that have to beat chance
+SEEDS = range(5)
+MAX_SHARE_OF_CHANCE = 0.95  # a cost below so much of chance's beats it
+MAX_SECONDS = 0.05  # a proposal: twenty thousand times what a pose costs
+TURNS = 24  # populations after which costs that are right have to show
+SPACE = Toy(5, ball)
+
+Evaluate = Callable[[Array], Array]
+checklist = Checklist()
+
+
+@dataclass(frozen=True)
+class OptimiserCase:
+    """A factory with its settings, and what it is registered to do when the next frame comes."""
+
+    factory: Callable[..., Any]
+    next_frame: NextFrame = "start"
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    def build(self, space: Space, seed: int = 0, evaluations: int = EVALUATIONS, **more: Any) -> Optimiser:
+        """Return a new optimiser of the space."""
+        filled = planned(self.factory, {**self.settings, **more}, evaluations)
+        optimiser: Optimiser = self.factory(space, np.random.default_rng(seed), **filled)
+        return optimiser
+
+    def steps(
+        self, optimiser: Optimiser, space: Space, evaluate: Evaluate, count: int
+    ) -> Iterator[tuple[Array, Array]]:
+        """Yield up to `count` populations with their costs; a filter that has none left goes on to a next frame."""
+        for _ in range(count):
+            proposals = optimiser.ask()
+            if not len(proposals) and self.next_frame == "carry":
+                cast(Filter, optimiser).advance(space)
+                proposals = optimiser.ask()
+            if not len(proposals):
+                return
+            costs = np.asarray(evaluate(proposals), dtype=np.float64)
+            yield proposals.copy(), costs.copy()
+            optimiser.tell(proposals, costs)
+
+    def trace(self, space: Space = SPACE, evaluate: Evaluate = sphere, seed: int = 0, count: int = 6) -> list[Array]:
+        """Return the populations that a new optimiser proposes."""
+        return [proposals for proposals, _ in self.steps(self.build(space, seed), space, evaluate, count)]
+
+    def best(self, space: Space, evaluate: Evaluate, seed: int, evaluations: int) -> float:
+        """Return the lowest cost of a search; of a filter, in the last of ten frames with the same costs."""
+        optimiser = self.build(space, seed, evaluations)
+        lowest = np.inf
+        for frame in range(10 if self.next_frame == "carry" else 1):
+            if frame:
+                cast(Filter, optimiser).advance(space)
+            lowest = min(float(costs.min()) for _, costs in populations(optimiser, evaluate, evaluations))
+        return lowest
+
+    def valid(self, space: Space, evaluate: Evaluate, count: int = 6) -> str:
+        """Check that every proposal of a search is allowed in the space; return how many there were."""
+        total = 0
+        for proposals, _ in self.steps(self.build(space), space, evaluate, count):
+            check_population(proposals, space)
+            total += len(proposals)
+        expect(total, "ask must return a population, got an empty one at once")
+        return f"{total} proposals"
+
+
+def check_population(proposals: Array, space: Space) -> None:
+    """Check that a population consists of finite, allowed proposals in the box."""
+    shape = np.shape(proposals)
+    expect(len(shape) == 2 and shape[1] == space.dimensions, f"ask must return (n, {space.dimensions}), got {shape}")
+    expect(np.isfinite(proposals).all(), "ask must return finite proposals, got nan or infinity")
+    far = float(np.abs(proposals).max(initial=0.0))
+    expect(far <= 1.0, f"ask must stay in [-1, 1], got {far:.6g} from the middle")
+    broken = int(np.count_nonzero(~space.feasible(proposals)))
+    expect(not broken, f"ask must return feasible proposals, got {broken} of {len(proposals)} that are not")
+
+
+def same(first: list[Array], second: list[Array]) -> bool:
+    """Return whether two traces are bit for bit the same."""
+    return len(first) == len(second) and all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
+
+
+@checklist
+def construction(case: OptimiserCase) -> None:
+    """A factory takes the space, the generator and keyword-only settings."""
+    check_signature(case.factory, "space", "rng")
+    case.build(Toy(9))
+
+
+@checklist
+def shape(case: OptimiserCase) -> str:
+    """The method ask returns an array (n, d)."""
+    proposals = case.build(Toy(9)).ask()
+    expect(isinstance(proposals, np.ndarray), f"ask must return an array, got {type(proposals).__name__}")
+    expect(proposals.ndim == 2 and proposals.shape[1] == 9, f"ask must return (n, 9), got {proposals.shape}")
+    expect(len(proposals), "the first population must not be empty, got (0, 9)")
+    return f"{len(proposals)} at a time"
+
+
+@checklist
+def dtype(case: OptimiserCase) -> None:
+    """The method ask returns float64."""
+    for proposals, _ in case.steps(case.build(Toy(9)), Toy(9), sphere, 4):
+        expect(proposals.dtype == np.float64, f"ask must return float64, got {proposals.dtype}")
+
+
+@checklist
+def box(case: OptimiserCase) -> str:
+    """Every proposal lies in [-1, 1]^d, with coordinates that wrap around and from a start on the edge too."""
+    case.valid(Toy(6, wrapping=2), lambda x: 1.0 - np.abs(x[:, 0]), 12)
+    case.valid(Toy(5, start=Start(np.ones(5), np.full(5, 0.5), np.full(5, 0.3))), sphere)
+    return case.valid(Toy(9), lambda x: -np.abs(x).sum(axis=1), 12)
+
+
+@checklist
+def feasible(case: OptimiserCase) -> str:
+    """Every proposal is feasible where a third of the box is."""
+    return case.valid(Toy(4, ball), lambda x: -x.sum(axis=1), 12)
+
+
+@checklist
+def hardly_feasible(case: OptimiserCase) -> str:
+    """Every proposal is feasible, and the search goes on, where a few in a thousand are feasible."""
+    return case.valid(Toy(3, shell), sphere)
+
+
+@checklist
+def dimensions(case: OptimiserCase) -> None:
+    """Spaces of one dimension and of 66 are searched."""
+    for d in (1, 66):
+        try:
+            case.valid(Toy(d), sphere)
+        except Exception as error:
+            raise BrokenError(f"{d} dimensions must be searched, got {type(error).__name__}: {error}") from error
+
+
+@checklist
+def costs(case: OptimiserCase) -> None:
+    """Costs that are nan, infinite, equal or as large as 1e300 do no harm, one or all."""
+    kinds: dict[str, Evaluate] = {
+        "some nan": lambda x: np.where(np.arange(len(x)) % 2, np.nan, sphere(x)),
+        "all nan": lambda x: np.full(len(x), np.nan),
+        "some infinite": lambda x: np.where(np.arange(len(x)) % 3, np.inf, sphere(x)),
+        "all infinite": lambda x: np.full(len(x), np.inf),
+        "all equal": lambda x: np.zeros(len(x)),
+        "up to 1e300": lambda x: 1e300 * sphere(x),
+    }
+    for kind, evaluate in kinds.items():
+        try:
+            case.valid(Toy(9, ball), evaluate)
+        except BrokenError as broken:
+            raise BrokenError(f"costs that are {kind}: {broken}") from None
+
+
+@checklist
+def budget(case: OptimiserCase) -> str:
+    """A search uses its budget, in whole populations."""
+    used, optimiser = 0, case.build(Toy(9))
+    while len(proposals := optimiser.ask()) and used + len(proposals) <= EVALUATIONS:
+        optimiser.tell(proposals, sphere(proposals))
+        used += len(proposals)
+    expect(used >= 0.75 * EVALUATIONS, f"a search must use most of its budget of {EVALUATIONS}, got {used}")
+    return f"{used} of {EVALUATIONS} evaluations"
+
+
+@checklist
+def order(case: OptimiserCase) -> str:
+    """The cost of row i belongs to proposal i."""
+    rng = np.random.default_rng(1)
+
+    def shuffled(x: Array) -> Array:
+        return rng.permutation(sphere(x))
+
+    def last(evaluate: Evaluate, seed: int) -> float:
+        steps = case.steps(case.build(Toy(4), seed), Toy(4), evaluate, TURNS)
+        means = [sphere(proposals).mean() for proposals, _ in steps]
+        return float(np.mean(means[len(means) // 2 :]))
+
+    good, bad = ([last(evaluate, seed) for seed in range(3)] for evaluate in (sphere, shuffled))
+    if good == bad:
+        raise SkippedError("it ignores the costs, or has one proposal at a time")
+    expect(
+        np.median(good) < 0.8 * np.median(bad),
+        f"true costs must help more than shuffled ones, got mean costs {np.median(good):.3g} and {np.median(bad):.3g}",
+    )
+    return f"mean cost {np.median(good):.3g}, shuffled {np.median(bad):.3g}"
+
+
+@checklist
+def out_of_turn(case: OptimiserCase) -> str:
+    """A second ask before the tell, and a tell without an ask, are refused or harmless."""
+    space, refusals = Toy(9), []
+    optimiser = case.build(space)
+    proposals = optimiser.ask()
+    try:
+        proposals = optimiser.ask()
+        check_population(proposals, space)
+        expect(len(proposals), "a second ask must return a population, got an empty one")
+    except (ValueError, RuntimeError):
+        refusals.append("a second ask")
+    optimiser.tell(proposals.copy(), sphere(proposals))
+    try:
+        optimiser.tell(proposals, sphere(proposals))
+    except (ValueError, RuntimeError):
+        refusals.append("a second tell")
+    for more, _ in case.steps(optimiser, space, sphere, 3):
+        check_population(more, space)
+    return f"refused: {' and '.join(refusals) or 'none'}"
+
+
+@checklist
+def unknown_setting(case: OptimiserCase) -> None:
+    """A setting that does not exist is refused."""
+    check_unknown_setting(lambda **more: case.build(Toy(9), **more))
+
+
+@checklist
+def nonsense_settings(case: OptimiserCase) -> str:
+    """Nonsense in a setting is refused or harmless."""
+    if not settings_of(case.factory):
+        raise SkippedError("it has no settings")
+
+    def search(**nonsense: Any) -> None:
+        for proposals, _ in case.steps(case.build(Toy(5), **nonsense), Toy(5), sphere, 3):
+            check_population(proposals, Toy(5))
+
+    return check_nonsense(case.factory, search, harmless=True)
+
+
+@checklist
+def seeds(case: OptimiserCase) -> None:
+    """The same seed gives the same proposals, another seed gives others."""
+    expect(same(case.trace(), case.trace()), "one seed must give one trace, got two")
+    expect(not same(case.trace(), case.trace(seed=1)), "two seeds must give two traces, got the same")
+
+
+@checklist
+def new_process(case: OptimiserCase) -> None:
+    """The same seed gives the same proposals in a new process."""
+    try:
+        payload = pickle.dumps((sys.path, pickle.dumps(case)))
+    except Exception as error:
+        raise SkippedError(f"the factory cannot be sent to another process: {error}") from None
+    ran = subprocess.run([sys.executable, "-m", "posefit.testing.process", "trace"], input=payload, capture_output=True)
+    if ran.returncode == 3:
+        raise SkippedError("the factory cannot be imported in another process")
+    expect(not ran.returncode, f"it must work in a new process, got {ran.stderr.decode()[-300:]}")
+    expect(ran.stdout, "it must work in a new process, got one that ended in the middle")
+    expect(same(case.trace(), pickle.loads(ran.stdout)), "one seed must give one trace in every process, got two")
+
+
+@checklist
+def global_randomness(case: OptimiserCase) -> None:
+    """The global random generators are neither used nor changed."""
+    traces = []
+    for seed in (1, 2):
+        with seeded(seed), left_alone():
+            traces.append(case.trace())
+    expect(same(*traces), "global seeds must not matter, got two traces")
+
+
+@checklist
+def inputs(case: OptimiserCase) -> None:
+    """The method tell leaves its arguments as they were."""
+    optimiser = case.build(SPACE)
+    for _ in range(4):
+        proposals = optimiser.ask()
+        if not len(proposals):
+            break
+        values = sphere(proposals)
+        before = proposals.copy(), values.copy()
+        optimiser.tell(proposals, values)
+        for name, value, was in zip(("proposals", "costs"), (proposals, values), before, strict=True):
+            expect(np.array_equal(value, was), f"tell must not modify its {name}, got others afterwards")
+
+
+@checklist
+def copies(case: OptimiserCase) -> None:
+    """A deep copy, and what comes out of a pickle, go on as the original does, each on its own."""
+
+    def rest(optimiser: Optimiser) -> list[Array]:
+        return [proposals for proposals, _ in case.steps(optimiser, SPACE, sphere, 3)]
+
+    for what, duplicate in (
+        ("a deep copy", copy.deepcopy),
+        ("a pickle", lambda optimiser: pickle.loads(pickle.dumps(optimiser))),
+    ):
+        for count in (0, 2):
+            optimiser = case.build(SPACE)
+            for _ in case.steps(optimiser, SPACE, sphere, count):
+                pass
+            try:
+                twin = duplicate(optimiser)
+            except Exception as error:
+                raise BrokenError(f"{what} of it must be possible, got {type(error).__name__}: {error}") from None
+            expect(same(rest(optimiser), rest(twin)), f"{what} must go on as the original, got another after {count}")
+
+
+@checklist
+def nothing_left(case: OptimiserCase) -> None:
+    """No thread and no process outlives a search."""
+    threads, children = set(threading.enumerate()), set(multiprocessing.active_children())
+    for _ in range(3):
+        case.trace(count=3)
+        case.build(SPACE)
+    for what, left in (
+        ("thread", set(threading.enumerate()) - threads),
+        ("process", set(multiprocessing.active_children()) - children),
+    ):
+        expect(not left, f"no {what} must be left, got {', '.join(one.name for one in left)}")
+
+
+@checklist
+def start(case: OptimiserCase) -> str:
+    """The first population comes from the start that the space gives."""
+    if case.next_frame == "forget":
+        raise SkippedError("it is registered to forget")
+    mean = np.where(np.arange(6) % 2, 0.5, -0.4)
+    first = case.build(Toy(6, start=Start(mean, np.full(6, 0.02), np.zeros(6)))).ask()
+    away = float(np.median(np.abs(first - mean)))
+    expect(away < 0.1, f"the first population must be around the start, spread 0.02, got {away:.3g} away from it")
+    return f"{away:.3g} away, spread 0.02"
+
+
+@checklist
+def next_frame(case: OptimiserCase) -> str:
+    """A filter carries its particles into the next frame."""
+    if case.next_frame != "carry":
+        raise SkippedError(f"it is registered to {case.next_frame}, not to carry")
+    space = Toy(4)
+    optimiser = case.build(space)
+    expect(hasattr(optimiser, "advance"), "what is registered to carry must have advance(space), got none")
+    for _ in range(3):
+        while len(proposals := optimiser.ask()):
+            optimiser.tell(proposals, sphere(proposals))
+        cast(Filter, optimiser).advance(space)
+    proposals = optimiser.ask()
+    expect(len(proposals), "after advance, ask must return a population, got an empty one")
+    check_population(proposals, space)
+    near, chance = sphere(proposals).mean(), sphere(draw_population(space, np.random.default_rng(0), 1000)).mean()
+    expect(
+        near < 0.7 * chance, f"particles must be carried, got a mean cost of {near:.3g} where chance has {chance:.3g}"
+    )
+    return f"mean cost {near:.3g}, by chance {chance:.3g}"
+
+
+@checklist
+def modes(case: OptimiserCase) -> str:
+    """The method modes returns proposals whose costs it was told, the best first."""
+    space = Toy(3, ball)
+    optimiser = case.build(space)
+    if not hasattr(optimiser, "modes"):
+        raise SkippedError("it has no modes")
+    known = np.concatenate([proposals for proposals, _ in case.steps(optimiser, space, sphere, 12)])
+    returned = cast(Niching, optimiser).modes()
+    check_population(returned, space)
+    expect(len(returned), "after twelve populations, modes must return at least one proposal, got (0, 3)")
+    rows = {row.tobytes() for row in known}
+    unknown = sum(row.tobytes() not in rows for row in np.asarray(returned))
+    expect(not unknown, f"modes must return proposals that it was told, got {unknown} others")
+    values = sphere(returned)
+    expect((np.diff(values) >= 0.0).all(), "modes must return the best first, got a dearer one before a cheaper")
+    lowest = float(sphere(known).min())
+    expect(values[0] <= lowest, f"modes must begin with the best there was, cost {lowest:.4g}, got {values[0]:.4g}")
+    return f"{len(returned)} modes"
+
+
+@checklist
+def sphere_problem(case: OptimiserCase) -> str:
+    """A sphere is solved better than by chance."""
+    return _beats_chance(case, Toy(6), sphere)
+
+
+@checklist
+def real_problem(case: OptimiserCase) -> str:
+    """A real pose problem is solved better than by chance."""
+    problem = pose_problem()
+    return _beats_chance(case, problem.space, problem.evaluate)
+
+
+def _beats_chance(case: OptimiserCase, space: Space, evaluate: Evaluate) -> str:
+    if getattr(getattr(case.factory, "func", case.factory), "baseline", False):
+        raise SkippedError("it is the baseline itself")
+    draws = [draw_population(space, np.random.default_rng(seed), BUDGET) for seed in SEEDS]
+    chance = float(np.median([float(evaluate(drawn).min()) for drawn in draws]))
+    lowest: list[float] = []
+    for seed in SEEDS:
+        lowest.append(case.best(space, evaluate, seed, BUDGET))
+        if sum(cost < MAX_SHARE_OF_CHANCE * chance for cost in lowest) > len(SEEDS) // 2:
+            break  # whatever the other seeds give, the median is below, too
+    best = float(np.median(lowest))
+    expect(
+        best < MAX_SHARE_OF_CHANCE * chance,
+        f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {best:.4g}",
+    )
+    return f"cost {best:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
+
+
+@checklist
+def speed(case: OptimiserCase) -> str:
+    """A proposal takes less than 50 ms to make."""
+    space, seconds = Toy(9), np.inf
+    for seed in range(3):
+        optimiser, count = case.build(space, seed), 0
+        began = time.perf_counter()
+        for proposals, _ in case.steps(optimiser, space, sphere, 10):
+            count += len(proposals)
+        seconds = min(seconds, (time.perf_counter() - began) / max(count, 1))
+    expect(seconds < MAX_SECONDS, f"a proposal must take less than {1e3 * MAX_SECONDS:g} ms, got {1e3 * seconds:.3g}")
+    return f"{1e6 * seconds:.1f} us a proposal"
