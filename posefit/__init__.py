@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from posefit.tracking.front import Fit as Fit
     from posefit.tracking.front import fit as fit
     from posefit.tracking.front import track as track
-    from posefit.tracking.run import Track as Track
+    from posefit.tracking.summary import Track as Track
 
 hookimpl = HookimplMarker("posefit")
 
@@ -63,7 +63,7 @@ _HOMES = {
     "suites.front": ("Suite", "suite"),
     "suites.problem": ("Problem",),
     "tracking.front": ("Fit", "fit", "track"),
-    "tracking.run": ("Track",),
+    "tracking.summary": ("Track",),
     "footage.segmentation": ("Extraction",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -64,11 +64,11 @@ SAID = {
     ),
     "unknown_sides": ("", "numbers of the frames whose left and right are called unknown; where a method says"),
     "lost_frames": ("", "numbers of the frames that are called lost; where a method says"),
-    "looked_again": (
+    "relocalised": (
         "",
         "numbers of the frames in which it was looked all around again, after a gap or where costs stayed high",
     ),
-    "followed_anew": (
+    "retracked_from": (
         "",
         "the frame from which footage was followed again, onward and backwards, because the body turned faster than "
         "anybody does; null where it was not",

@@ -19,8 +19,8 @@ from posefit.footage.scene import Rendered, synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
+from posefit.tracking.initialise import BODY_FRAMES, fitted_build, following
 from posefit.tracking.method import prepare
-from posefit.tracking.opening import BODY_FRAMES, built, following
 from posefit.tracking.options import TrackOptions
 from posefit_reproduce.grid import Progress, each
 from posefit_reproduce.known import SIZE, known_task
@@ -95,7 +95,7 @@ def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[floa
     height = true.stature if setup.stature else None
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
     task = known_task(scene, options, start, setup.translation)
-    shape = built(task, scene.observations, following(prepare(options, task)), BODY_FRAMES, height, seed)
+    shape = fitted_build(task, scene.observations, following(prepare(options, task)), BODY_FRAMES, height, seed)
     return _off(shape.body, true), _off(start, true)
 
 

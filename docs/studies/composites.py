@@ -40,7 +40,7 @@ from posefit.settings import parse_texts
 from posefit.silhouette.cost import project
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.front import track
-from posefit.tracking.run import Track
+from posefit.tracking.summary import Track
 from posefit_reproduce.grid import Progress, check_seeds, each, earlier, kept
 from table import WORKERS, bar
 

@@ -22,8 +22,8 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, median_background
 from posefit.silhouette.mask import Mask
-from posefit.steadying.path import SeenFrames, steadied
 from posefit.tracking.front import track
+from posefit.tracking.smoothing.path import SeenFrames, steadied
 from posefit_reproduce.grid import Progress, check_seeds, each
 from table import WORKERS, bar
 

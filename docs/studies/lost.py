@@ -29,7 +29,7 @@ from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.run import follow
+from posefit.tracking.pipeline import track_scene
 from posefit.uncertainty.calibration import auroc, calibration_error, false_alarms, kept_errors
 from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
 from posefit_reproduce.grid import Progress, each
@@ -341,7 +341,7 @@ def _tracked(cell: TrackCell, track: Turn) -> dict[str, Any]:
         translation=cell.translation,  # type: ignore[arg-type]
         seed=cell.seed,
     )
-    told = follow(scene, training, options)
+    told = track_scene(scene, training, options)
     row = {
         "subject": track.clip.subject,
         "group": track.group,

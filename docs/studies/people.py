@@ -30,7 +30,7 @@ from posefit.sweep.cell import ALL_AROUND, TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.run import follow
+from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.grid import Progress, each, rows
 from table import LEDGER, WORKERS, bar, grouped, markdown, percent
 
@@ -270,7 +270,7 @@ def _tried(cell: TrackCell, clip: Piece, views: Views, kind: str, translation: T
     scene, gone, back = returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
     training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
     options = TrackOptions(method=cell.method, evaluations=cell.evaluations, translation=translation)
-    track = follow(scene, training, options)
+    track = track_scene(scene, training, options)
     told = {"clip": clip.name, "views_degrees": list(views), "kind": kind, "translation": translation}
     mpjpe = np.array([row["mpjpe_mm"] for row in track.frames])
     assert track.truth is not None

@@ -24,11 +24,11 @@ from posefit.footage.training import training_clips, training_motions
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.motion import recorded
-from posefit.searching.doubt import LEAST_COST
 from posefit.sweep.cell import cell_scene, settings_text
 from posefit.sweep.check import cell_of
+from posefit.tracking.modes import LEAST_COST
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.run import follow
+from posefit.tracking.pipeline import track_scene
 from posefit.uncertainty.calibration import (
     LEVELS,
     Recalibration,
@@ -173,7 +173,7 @@ def followed(seen: OneTrack) -> Followed:
         evaluations=cell.evaluations,
         translation="known" if cell.translation == "known" else "aligned",
     )
-    track = follow(scene, training, options)
+    track = track_scene(scene, training, options)
     assert track.truth is not None
     posteriors = [one.posterior for one in track.found]
     most = max(len(one) for one in posteriors if one is not None)

@@ -119,7 +119,7 @@ class Prediction:
         modes: searches of a frame that its modes are weighed by, the track's own and others; 0 weighs none. Ours.
         modes_share: what they are found and weighed by, over the evaluations of the track's own search, above 0. Ours.
         posterior_temperature: what costs are divided by where modes are weighed, above 0. Ours.
-        look_again: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
+        relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
     """
 
     spread: float = SPREAD
@@ -134,7 +134,7 @@ class Prediction:
     modes: int = 0
     modes_share: float = 0.2
     posterior_temperature: float = 2.0
-    look_again: int | None = None
+    relocalise_gap: int | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
@@ -142,8 +142,8 @@ class Prediction:
         positive("modes_share", self.modes_share)
         positive("posterior_temperature", self.posterior_temperature)
         whole("modes", self.modes, 0)
-        if self.look_again is not None:
-            whole("look_again", self.look_again, 0)
+        if self.relocalise_gap is not None:
+            whole("relocalise_gap", self.relocalise_gap, 0)
         if not self.spread >= 0.0:
             raise ValueError(f"spread must be 0 or more, got {self.spread}")
         for name in ("root_range_degrees", "translation_range"):

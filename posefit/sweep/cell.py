@@ -97,7 +97,7 @@ class TrackCell(Cell):
     numbers what the cameras see of the motion, see `posefit.footage.instance`. `corruption` gives kinds of
     `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames without masks; the damage
     follows from the instance, so that it is the same for every method and seed. `tracks` is how many times the motion
-    is tracked, see `posefit.tracking.tracks`. `files` holds the SHA-256 of every capture file that is read.
+    is tracked, see `posefit.tracking.restarts`. `files` holds the SHA-256 of every capture file that is read.
 
     Of the person a method knows where they face at first, at most `yaw_off_degrees` off, nothing at 180; and their
     body, each bone's length and radii at most `body_off_percent` off. Both are drawn from the instance and the motion's
@@ -158,7 +158,7 @@ class TrackCell(Cell):
         from posefit.footage.training import training_clips, training_motions
         from posefit.tracking.measures import MEASURES
         from posefit.tracking.options import TrackOptions
-        from posefit.tracking.run import follow
+        from posefit.tracking.pipeline import track_scene
 
         for path, digest in self.files.items():
             if (found := digest_of(path)) != digest:
@@ -167,7 +167,7 @@ class TrackCell(Cell):
         training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
         same = {name: getattr(self, name) for name in ("method", "evaluations", "translation", "first_pose", "seed")}
         options = TrackOptions(settings=settings_text(self.settings), hypotheses=self.tracks, **same)
-        result = follow(scene, training, options)
+        result = track_scene(scene, training, options)
         truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
         errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
         row = {

@@ -8,7 +8,7 @@
     from posefit.footage.source import scene_of
     from posefit.motion import built_in
     from posefit.tracking.options import TrackOptions
-    from posefit.tracking.run import follow
+    from posefit.tracking.pipeline import track_scene
 
     scene = scene_of(["walk"], view_degrees=[90.0])
     training = [built_in.motion(style) for style in built_in.other_styles("walk")]

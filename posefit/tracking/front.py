@@ -23,7 +23,8 @@ from posefit.tracking.identity import Told
 from posefit.tracking.method import resolved
 from posefit.tracking.options import VIEW, TrackOptions, declared
 from posefit.tracking.outputs import Nowhere, OutputFolder
-from posefit.tracking.run import Track, follow
+from posefit.tracking.pipeline import track_scene
+from posefit.tracking.summary import Track
 from posefit.version import __version__
 
 _FILES = ("source", "train", "asf", "camera", "extraction")  # options that may name files, whose content counts
@@ -92,7 +93,7 @@ def track(
             "view_degrees": options.get("view_degrees"),
         }
         training = training_motions(clips, scene.fps)
-        result = follow(scene, training, chosen, output=output, listener=listener, source=names)
+        result = track_scene(scene, training, chosen, output=output, listener=listener, source=names)
         if rerun is not None:
             from posefit.tracking.recording import record
 

@@ -30,8 +30,8 @@ from posefit.fitting.validation import (
 from posefit.footage.source import Source, kind_of
 from posefit.motion import built_in, recorded
 from posefit.registry import Kind, Offer, registry
-from posefit.searching.tracker import WeighingTracker
 from posefit.silhouette.cost import BETA
+from posefit.tracking.modes import WeighingTracker
 from posefit.tracking.options import TrackOptions
 
 DEFAULT_OPTIMISER = "sapso"
@@ -102,7 +102,7 @@ class Method:
     beta: float  # of the silhouette cost
     settings: dict[str, dict[str, Any]]
     audit: Audit  # of what the trackers made of it report
-    look_again: int | None  # frames of a gap after which it relocalises, 0 for never; None for the default
+    relocalise_gap: int | None  # frames of a gap after which it relocalises, 0 for never; None for the default
     _make: Callable[[Task, float], Tracker] = field(repr=False)
 
     def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
@@ -157,7 +157,7 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         return WeighingTracker(tracker) if prediction.modes else tracker
 
     label = f"{optimiser.name}@{name}"
-    return Method(label, learned, prediction.beta, mine, Audit(), prediction.look_again, make)
+    return Method(label, learned, prediction.beta, mine, Audit(), prediction.relocalise_gap, make)
 
 
 def parsed_settings(

@@ -97,7 +97,7 @@ def _shown(summary: Mapping[str, Any], name: str) -> str:
 def _chosen(tracks: Sequence[Mapping[str, Any]]) -> str:
     """Return which of several tracks was kept, and what each costs as a whole."""
     kept = next(k for k, one in enumerate(tracks) if one["kept"])
-    costs = [f"{one['beginning']} {one['cost'] + one['motion']:.2f}" for one in tracks]
+    costs = [f"{one['guess']} {one['cost'] + one['motion']:.2f}" for one in tracks]
     return f"kept track {kept + 1} of {len(tracks)}; whole cost by beginning: {', '.join(costs)}"
 
 

@@ -12,7 +12,7 @@ from posefit.silhouette.cuda.device import check_device
 from posefit.silhouette.cuda.moving import moved_to
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.run import follow
+from posefit.tracking.pipeline import track_scene
 
 NEEDED = "device cuda needs an NVIDIA GPU and posefit[gpu], got no library numba-cuda"
 QUIET = """
@@ -37,7 +37,7 @@ def test_one_line_says_what_a_gpu_needs() -> None:
         lambda: check_device("cuda"),
         lambda: moved_to(silhouette, "cuda"),
         lambda: on_device(scene, "cuda"),
-        lambda: follow(scene, [], TrackOptions(device="cuda")),
+        lambda: track_scene(scene, [], TrackOptions(device="cuda")),
     ):
         with pytest.raises(ValueError) as error:
             ask()

@@ -19,7 +19,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.tracking.evaluation import Evaluation
 from posefit.tracking.outputs import OutputFolder
-from posefit.tracking.run import follow
+from posefit.tracking.pipeline import track_scene
 from posefit.tracking.table import table, undetermined
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
@@ -181,7 +181,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Any:
             return Told(frames, len(task.before))
 
         monkeypatch.setattr(method.Method, "tracker", tracker)
-        return follow(scene, training, **how)
+        return track_scene(scene, training, **how)
 
     return of
 

@@ -13,7 +13,7 @@ from posefit import registry as registry_package
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.scene import synthetic
 from posefit.registry import Offer, Plugin, Registry, registry
-from posefit.tracking import method, opening
+from posefit.tracking import initialise, method
 from posefit.tracking.options import TrackOptions
 from tests.testing import planted
 
@@ -134,7 +134,7 @@ class FailsToBuild(planted.Sound):
 def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
     factory: Any, rule: str | None, installed: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr(opening, "COMPILING", 0.0)
+    monkeypatch.setattr(initialise, "COMPILING", 0.0)
     installed("optimiser", factory)
     settings = {**QUICK, "ask_seconds": 0.3} if factory is NeverReturns else QUICK
     if rule is not None:

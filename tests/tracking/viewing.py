@@ -14,7 +14,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.tracking import method
 from posefit.tracking.outputs import OutputFolder
-from posefit.tracking.run import follow
+from posefit.tracking.pipeline import track_scene
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.tracking.test_evaluation import found
@@ -61,5 +61,5 @@ def viewed(folder: Path, scene: Scene, frames: Sequence[Frame]) -> Path:
     """Return the viewer of a track that finds just these frames."""
     with pytest.MonkeyPatch.context() as patch, OutputFolder(folder, False, False, {}, print) as output:
         patch.setattr(method.Method, "tracker", lambda *_: Said(frames))
-        follow(scene, [built_in.motion("walk-b", frames=20)], output=output)
+        track_scene(scene, [built_in.motion("walk-b", frames=20)], output=output)
     return folder / "track.html"

@@ -10,8 +10,8 @@ from scipy.stats import chisquare
 from posefit.arrays import Array
 from posefit.fitting.optimiser import populations
 from posefit.registry import registry
-from posefit.searching.modes import gathered
 from posefit.testing.toy import Toy
+from posefit.tracking.modes import gathered
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.searches import weighed
 from tests.cases import each

@@ -12,7 +12,7 @@ from posefit.fitting.tracker import Observation
 from posefit.footage.scene import synthetic
 from posefit.motion import recorded
 from posefit.registry import registry
-from posefit.tracking.opening import task_of
+from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
 
 CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes

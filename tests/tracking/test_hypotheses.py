@@ -18,19 +18,14 @@ from posefit.footage.scene import synthetic
 from posefit.geometry.alike import mirrored_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
-from posefit.searching.spent import spent_by_all
 from posefit.silhouette.drawn import PoseCount
-from posefit.tracking.tracks import (
-    ALIKE,
-    ANEW,
-    LEAST,
-    USUAL,
-    Known,
-    beginning,
-    first_seen,
-    generator,
-    usual_speed,
-    whole_cost,
+from posefit.tracking.restarts import SEARCHED_AGAIN, SYMMETRIC_POSES, initial_guess, stream
+from posefit.tracking.trajectory import (
+    MIN_TYPICAL_SPEED,
+    WALKING_SPEED,
+    trajectory_cost,
+    typical_speed,
+    with_total_effort,
 )
 from tests.testing import planted
 
@@ -50,7 +45,7 @@ def frames_of(poses: Array, costs: Sequence[float]) -> list[Frame]:
 
 def cost_of(poses: Array, costs: Sequence[float], fps: float = 30.0) -> float:
     """Return the whole cost of a track."""
-    return whole_cost(frames_of(poses, costs), [True] * len(poses), SKELETON, fps, usual_speed([WALK])).total
+    return trajectory_cost(frames_of(poses, costs), [True] * len(poses), SKELETON, fps, typical_speed([WALK])).total
 
 
 def test_of_two_tracks_that_fit_alike_the_one_that_does_not_jump_is_right() -> None:
@@ -73,7 +68,7 @@ def test_a_whole_cost_by_hand() -> None:
     joints = SKELETON.joints(poses)
     steps = 30.0 * (joints[1] - joints[0])  # metres a second
     change = 4.0 * (steps**2).sum(axis=1).mean()
-    found = whole_cost(frames_of(poses, [1.0, 2.0, 3.0, 6.0]), [True] * 4, SKELETON, 30.0, 0.8)
+    found = trajectory_cost(frames_of(poses, [1.0, 2.0, 3.0, 6.0]), [True] * 4, SKELETON, 30.0, 0.8)
     assert found.cost == 3.0
     assert found.motion == pytest.approx(0.5 * change / (2.0 * 0.8) ** 2)
     assert found.total == found.cost + found.motion
@@ -83,7 +78,7 @@ def test_a_jump_is_a_jump_however_far() -> None:
     def jump(yaw: float, usual: float) -> float:
         poses = np.zeros((9, 66))
         poses[4, 0] = yaw
-        return whole_cost(frames_of(poses, [0.0] * 9), [True] * 9, SKELETON, 30.0, usual).motion
+        return trajectory_cost(frames_of(poses, [0.0] * 9), [True] * 9, SKELETON, 30.0, usual).motion
 
     assert jump(0.1, 1.0) < jump(2.0, 1.0) == jump(3.0, 1.0)
     assert jump(2.0, 1.0) == pytest.approx(3 * 0.5 * (5.0 / 2.0) ** 2 / 7)  # of three changes among seven
@@ -94,7 +89,7 @@ def test_turning_around_at_the_usual_speed_costs_a_half() -> None:
     poses[1, 0] = 0.4
     joints = SKELETON.joints(poses)
     usual = 30.0 * float(np.sqrt(((joints[1] - joints[0]) ** 2).sum(axis=1).mean()))
-    assert whole_cost(frames_of(poses, [0.0] * 3), [True] * 3, SKELETON, 30.0, usual).motion == pytest.approx(0.5)
+    assert trajectory_cost(frames_of(poses, [0.0] * 3), [True] * 3, SKELETON, 30.0, usual).motion == pytest.approx(0.5)
 
 
 def test_constant_speed_costs_nothing_and_a_track_of_two_frames_has_no_motion() -> None:
@@ -110,10 +105,10 @@ def test_frames_that_were_held_count_for_nothing() -> None:
     costs = np.full(30, 2.0)
     costs[12] = 90.0
     seen = np.arange(30) != 12
-    found = whole_cost(frames_of(poses, costs.tolist()), seen.tolist(), SKELETON, 30.0, 1.0)
+    found = trajectory_cost(frames_of(poses, costs.tolist()), seen.tolist(), SKELETON, 30.0, 1.0)
     assert found.cost == 2.0
     assert found.motion < 0.1
-    assert whole_cost(frames_of(poses, costs.tolist()), [False] * 30, SKELETON, 30.0, 1.0).cost == costs.mean()
+    assert trajectory_cost(frames_of(poses, costs.tolist()), [False] * 30, SKELETON, 30.0, 1.0).cost == costs.mean()
 
 
 def test_jitter_counts_alike_at_any_rate() -> None:
@@ -121,7 +116,7 @@ def test_jitter_counts_alike_at_any_rate() -> None:
         motion = built_in.motion("walk", frames=round(8 * fps), fps=fps)
         noise = np.random.default_rng(0).normal(0.0, 0.02, (len(motion), 63))
         poses = motion.poses + np.pad(noise, ((0, 0), (3, 0)))
-        found = whole_cost(frames_of(poses, [0.0] * len(poses)), [True] * len(poses), SKELETON, fps, 1.0)
+        found = trajectory_cost(frames_of(poses, [0.0] * len(poses)), [True] * len(poses), SKELETON, fps, 1.0)
         return found.motion
 
     assert jitter(60.0) == pytest.approx(jitter(30.0), rel=0.15)
@@ -131,67 +126,62 @@ def test_jitter_counts_alike_at_any_rate() -> None:
 def test_the_usual_speed_is_that_of_the_training_motions() -> None:
     joints = SKELETON.joints(WALK.poses)
     steps = 30.0 * np.diff(joints - joints[:, :1], axis=0)
-    assert usual_speed([WALK]) == pytest.approx(np.sqrt((steps**2).sum(axis=2).mean()))
+    assert typical_speed([WALK]) == pytest.approx(np.sqrt((steps**2).sum(axis=2).mean()))
     fast = built_in.motion("walk", frames=120, fps=120.0)
-    assert usual_speed([fast]) == pytest.approx(usual_speed([WALK]), rel=0.1)
+    assert typical_speed([fast]) == pytest.approx(typical_speed([WALK]), rel=0.1)
     still = Motion("still", SKELETON, np.zeros((9, 66)), np.zeros((9, 3)), 30.0)
-    assert usual_speed([still]) == LEAST
-    assert usual_speed([still.frames(0, 1)]) == usual_speed([]) == USUAL
+    assert typical_speed([still]) == MIN_TYPICAL_SPEED
+    assert typical_speed([still.frames(0, 1)]) == typical_speed([]) == WALKING_SPEED
 
 
-def begun(count: int, view_degrees: float, known: Known | None = None) -> tuple[Task, list[tuple[str, Task]]]:
+def begun(
+    count: int, view_degrees: float, yaw: float | None = None, pose_known: bool = False
+) -> tuple[Task, list[tuple[str, Task]]]:
     """Return a task, and how `count` tracks after the first are begun."""
     scene = synthetic(WALK, [view_degrees], (120, 90), [], (None, None))
     task = Task(scene.body, scene.cameras, 400, scene.yaw, scene.anchor)
     (first,) = frames_of(WALK.poses[:1], [1.0])
     first = replace(first, translation=WALK.translations[0])
-    known = Known(scene.yaw, False) if known is None else known
-    return task, [beginning(number, task, known, first) for number in range(1, count + 1)]
+    return task, [initial_guess(number, task, yaw, pose_known, first) for number in range(1, count + 1)]
 
 
 def test_tracks_begin_with_poses_that_look_alike_and_anew() -> None:
-    task, found = begun(8, 90.0, Known(None, False))
-    assert [name for name, _ in found[:3]] == ["mirrored", "reflected", ANEW]
-    assert {name for name, _ in found} == {*ALIKE, ANEW}
+    task, found = begun(8, 90.0)
+    assert [name for name, _ in found[:3]] == ["mirrored", "reflected", SEARCHED_AGAIN]
+    assert {name for name, _ in found} == {*SYMMETRIC_POSES, SEARCHED_AGAIN}
     mirror = mirrored_poses(SKELETON, WALK.poses[:1])[0]
     told = found[0][1]
     assert told.yaw == mirror[0]
     np.testing.assert_array_equal(told.first_pose, mirror[3:])
     np.testing.assert_array_equal(told.anchor, WALK.translations[0])
-    assert [mine is task for name, mine in found] == [name == ANEW for name, _ in found]
+    assert [mine is task for name, mine in found] == [name == SEARCHED_AGAIN for name, _ in found]
 
 
 def test_what_is_known_is_not_contradicted() -> None:
     yaw = float(WALK.poses[0, 0])
-    from_front = [name for name, _ in begun(12, 0.0, Known(yaw, False))[1]]
-    assert {"mirrored", "legs exchanged", "arms exchanged", ANEW} == set(from_front)
-    assert "reflected" in [name for name, _ in begun(12, 90.0, Known(yaw, False))[1]]  # who faces across stays as he is
-    task, given = begun(5, 90.0, Known(yaw, True))
-    assert given == [(ANEW, task)] * 5
+    from_front = [name for name, _ in begun(12, 0.0, yaw)[1]]
+    assert {"mirrored", "legs exchanged", "arms exchanged", SEARCHED_AGAIN} == set(from_front)
+    assert "reflected" in [name for name, _ in begun(12, 90.0, yaw)[1]]  # who faces across stays as he is
+    task, given = begun(5, 90.0, yaw, True)
+    assert given == [(SEARCHED_AGAIN, task)] * 5
 
 
 def test_the_first_track_is_the_only_one_of_a_seed_and_others_are_their_own() -> None:
-    assert generator(3, 0).random() == np.random.default_rng(3).random()
-    assert len({generator(seed, number).random() for seed in range(3) for number in range(3)}) == 9
-
-
-def test_beginnings_are_of_the_first_frame_that_shows_enough() -> None:
-    frames = frames_of(WALK.poses[:3], [1.0, 2.0, 3.0])
-    assert first_seen(frames, [False, True, True]) is frames[1]
-    assert first_seen(frames, [False] * 3) is frames[0]
+    assert stream(3, "hypothesis", 1).random() == np.random.default_rng([3, 2005, 1]).random()
+    assert len({stream(seed, "hypothesis", number).random() for seed in range(3) for number in range(3)}) == 9
 
 
 def test_what_all_tracks_spent_is_said_of_the_one_that_is_kept() -> None:
     one, two = (frames_of(WALK.poses[:2], costs) for costs in ([1.0, 2.0], [3.0, 4.0]))
     two = [replace(frame, evaluations=30, spent=np.array([15, 30])) for frame in two]
-    found = spent_by_all([one, two], 1)
+    found = with_total_effort([one, two], 1)
     assert [(f.cost, f.evaluations, f.seconds, f.cpu_seconds) for f in found] == [
         (3.0, 40, 1.0, 0.5),
         (4.0, 40, 1.0, 0.5),
     ]
     np.testing.assert_array_equal(found[0].spent, [20, 40])
     one[0] = replace(one[0], cpu_seconds=None)
-    assert spent_by_all([one, two], 0)[0].cpu_seconds is None
+    assert with_total_effort([one, two], 0)[0].cpu_seconds is None
 
 
 @pytest.mark.parametrize("method", [{}, {"method": "vsmm"}, {"method": "exemplars"}, {"method": "annealed"}])
@@ -229,7 +219,7 @@ def test_a_tracker_gets_the_beginnings_as_tasks() -> None:
     assert first.first_pose is None
     assert mirror.first_pose is not None
     assert reflection.first_pose is not None
-    assert [one["beginning"] for one in result.summary["hypotheses"]] == ["searched", "mirrored", "reflected"]
+    assert [one["guess"] for one in result.summary["hypotheses"]] == ["searched", "mirrored", "reflected"]
     assert result.summary["hypotheses"][0]["kept"]  # which all cost the same
 
 
@@ -309,7 +299,7 @@ def test_the_command_says_which_track_was_kept(tmp_path: Path) -> None:
     assert "of 2; whole cost by beginning: searched " in line
     assert "800 of 800 evaluations" in shown.stdout
     summary = json.loads((tmp_path / "walk" / "summary.json").read_text("utf-8"))
-    assert [one["beginning"] for one in summary["hypotheses"]] == ["searched", "mirrored"]
+    assert [one["guess"] for one in summary["hypotheses"]] == ["searched", "mirrored"]
     wrong = CliRunner().invoke(main, ["track", "walk", "--hypotheses", "0"])
     assert (wrong.exit_code, wrong.stderr) == (2, "posefit: hypotheses must be at least 1, got 0\n")
 

@@ -1,21 +1,135 @@
-"""The likeliest way of a root and two legs, by least squares over all frames at once.
+"""The likeliest path of a root and two legs, by least squares over all frames at once.
 
-Each frame pulls the root to where it was found, as hard as it could be seen there; nothing accelerates without need;
-and feet that stand do not move. The legs give way a little, so that they do not.
+Each frame pulls the root to where it was estimated, as hard as it could be seen there; accelerations cost; and standing
+feet do not move. The legs give way a little, so that they do not.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
 from posefit.motion.motion import Motion
-from posefit.motion.steadiness import BALLS
-from posefit.steadying.squares import Squares
-from posefit.steadying.stance import stances
+from posefit.motion.steadiness import BALLS, runs
+
+REACH = 2  # frames to either side that a frame meets
+BEND = np.array([1.0, -2.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Squares:
+    """Half the second derivative and half the gradient of a sum of squares, in T frames of n numbers each."""
+
+    curves: Array  # (REACH + 1, T, n, n): a frame with itself, with the next one, and with the one after that
+    slopes: Array  # (T, n)
+
+    @classmethod
+    def of(cls, frames: int, numbers: int) -> Self:
+        """Return the sum of nothing."""
+        return cls(np.zeros((REACH + 1, frames, numbers, numbers)), np.zeros((frames, numbers)))
+
+    def add(self, which: slice, precise: Array, slopes: Array) -> None:
+        """Add squares of some numbers of each frame: their precision (m, m) or (T, m, m), and its product (T, m)."""
+        self.curves[0, :, which, which] += precise
+        self.slopes[:, which] += slopes
+
+    def add_bends(self, which: slice, series: Array, weight: float) -> None:
+        """Add the squares of `weight` times the second differences of some numbers, which are now `series` (T, m)."""
+        bends = weight**2 * np.diff(series, 2, axis=0)
+        count, some = len(series), np.arange(which.start, which.stop)
+        for first in range(3):
+            frames = slice(first, count - 2 + first)
+            self.slopes[frames, which] += BEND[first] * bends
+            for second in range(first, 3):
+                self.curves[second - first, frames, some, some] += weight**2 * BEND[first] * BEND[second]
+
+    def add_steps(self, frames: NDArray[np.int64], series: Array, derivatives: Array, weight: float) -> None:
+        """Add the squares of `weight` times what `series` (T, m) goes from some frames to the next ones.
+
+        `derivatives` (T, m, n) are those of the series, by the numbers of its own frame.
+        """
+        if not len(frames):
+            return
+        steps = weight**2 * (series[frames + 1] - series[frames])
+        here, there = derivatives[frames], derivatives[frames + 1]
+        self.slopes[frames] -= np.einsum("kmn,km->kn", here, steps)
+        self.slopes[frames + 1] += np.einsum("kmn,km->kn", there, steps)
+        self.curves[0, frames] += weight**2 * np.einsum("kmi,kmj->kij", here, here)
+        self.curves[0, frames + 1] += weight**2 * np.einsum("kmi,kmj->kij", there, there)
+        self.curves[1, frames] -= weight**2 * np.einsum("kmi,kmj->kij", here, there)
+
+    def least(self) -> Array:
+        """Return the step (T, n) that is to be taken away from the numbers, so that the sum is least."""
+        return self.steps_for(self.slopes[..., None])[..., 0]
+
+    def steps_for(self, slopes: Array) -> Array:
+        """Return the steps (T, n, m) that would be the least ones, were the slopes each of m others (T, n, m)."""
+        _, count, numbers, _ = self.curves.shape
+        band = (REACH + 1) * numbers
+        lines = np.zeros((band, count * numbers))  # scipy's upper form: lines[band - 1 + row - column, column]
+        for apart in range(REACH + 1):
+            for row in range(numbers):
+                for column in range(numbers):
+                    off = apart * numbers + column - row
+                    if off >= 0:
+                        values = self.curves[apart, : count - apart, row, column]
+                        lines[band - 1 - off, apart * numbers + column :: numbers] = values
+        found = solveh_banded(lines, slopes.reshape(count * numbers, -1), check_finite=False)
+        return np.asarray(found).reshape(slopes.shape)
+
+
+SLOW = 0.25  # metres a second that a standing foot may seem to move
+SHARE = 0.45  # of the root's speed, which it may seem to move where that is more
+LOW = 0.07  # metres above the lowest place of either foot, within `AROUND`, up to which a foot may stand
+AROUND = 1.2  # seconds: a stride
+SHORTEST = 0.12  # seconds that a foot stands at least
+GAP = 0.07  # seconds that it may seem not to, in between
+
+
+def standing_feet(joints: Array, fps: float, eyes: Array) -> NDArray[np.bool_]:
+    """Return whether the left and the right foot stand (T, 2), of joints (T, 27, 3) whose root moves smoothly.
+
+    A foot that stands is low, and slow beside the root: who walks leaves it behind. y is up. A single camera, at
+    `eyes` (T, 3), sees how slow it is across the line of sight alone; these are NaN where several see it.
+    """
+    count = len(joints)
+    if count < 3:
+        return np.zeros((count, 2), dtype=bool)
+    feet, sights = joints[:, BALLS], (joints[:, 0] - eyes)[:, [0, 2]]
+    speed, root = (_speeds(places, sights, fps) for places in (feet, joints[:, :1]))
+    reach = max(round(0.5 * AROUND * fps), 1)
+    heights = feet[..., 1].min(axis=1)
+    lowest = np.array([heights[max(k - reach, 0) : k + reach + 1].min() for k in range(count)])
+    stands = (speed < np.maximum(SLOW, SHARE * root)) & (feet[..., 1] < lowest[:, None] + LOW)
+    for side in range(2):
+        stands[:, side] = _without_short(~_without_short(~stands[:, side], GAP * fps), SHORTEST * fps)
+    return np.asarray(stands)
+
+
+def _speeds(places: Array, sights: Array, fps: float) -> Array:
+    """Return how fast places (T, n, 3) go along the ground (T, n), but for what is along the lines of sight (T, 2).
+
+    A line of NaN takes nothing away.
+    """
+    ways = np.gradient(places[..., [0, 2]], 1.0 / fps, axis=0)
+    sights = np.nan_to_num(sights / np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), 1e-9))
+    ways = ways - np.einsum("tni,ti->tn", ways, sights)[..., None] * sights[:, None]
+    return np.asarray(np.linalg.norm(ways, axis=2))
+
+
+def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
+    """Return flags (T,) of which runs shorter than `least` frames are taken back; those at an end stay."""
+    kept = flags.copy()
+    for start, stop in runs(flags):
+        if stop - start < least and start > 0 and stop < len(flags):
+            kept[start:stop] = False
+    return kept
+
 
 ACROSS = 0.006  # metres that a root may be off where it was found: standard deviation, as all that follow
 DEPTH = 0.004  # of the distance, towards or away from a single camera
@@ -45,7 +159,7 @@ class SeenFrames:
     eyes: Array = field(repr=False)  # (T, 3) metres: where the only camera stands that sees it; NaN where several do
 
 
-def steadied(motion: Motion, seen: SeenFrames) -> Motion:
+def smooth_path(motion: Motion, seen: SeenFrames) -> Motion:
     """Return a motion whose root goes smoothly and whose feet do not slide where they stand.
 
     Only the root's way and the angles of the legs change. A motion of fewer than 3 frames is returned as it is.
@@ -83,9 +197,9 @@ def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
 
 
 def _window(motion: Motion, seen: SeenFrames) -> Motion:
-    """Return a motion steadied: first its root alone, which tells who stands, then the legs as well."""
+    """Return a motion smooth_path: first its root alone, which tells who stands, then the legs as well."""
     smooth = _solved(motion, seen, np.zeros((len(motion), 2), dtype=bool))
-    stands = stances(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, seen.eyes)
+    stands = standing_feet(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, seen.eyes)
     return _solved(motion, seen, stands)
 
 

@@ -13,10 +13,10 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.registry import registry
-from posefit.searching.modes import modes
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import pose_problem, walking_angles
+from posefit.tracking.modes import modes
 from posefit.uncertainty.modes import Posterior, modes_of
 
 FEW = {"evaluations": 400, "population_size": 40, "size": (160, 120)}
@@ -157,7 +157,7 @@ def test_a_frame_in_which_nothing_is_seen_has_no_posterior() -> None:
     masks[[0, 2], 30:100, 70:90] = True
     observations = [posefit.Observation([Silhouette.of(mask)], np.zeros(3), bool(mask.any())) for mask in masks]
     from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
-    from posefit.searching.tracker import WeighingTracker
+    from posefit.tracking.modes import WeighingTracker
 
     motion = built_in.motion("walk", frames=1)
     camera = Camera.around(np.zeros(3), 0.0, 3.5, (160, 120))

@@ -11,9 +11,9 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit.searching.anew import followed_anew, in_reverse
-from posefit.searching.whirls import FASTEST, agreeing, surest, whirling
 from posefit.silhouette.mask import Silhouette
+from posefit.tracking.restarts import in_reverse, retrack_spins
+from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask
 from posefit.uncertainty.modes import Posterior
 
 FPS = 30.0
@@ -37,20 +37,20 @@ def facing(degrees: list[float], **more: Any) -> list[Frame]:
 def agreed(degrees: list[float], usable: Any = None, **more: Any) -> list[bool]:
     frames = facing(degrees, **more)
     seen = np.ones(len(frames), dtype=bool) if usable is None else np.array(usable, dtype=bool)
-    return list(agreeing(frames, [CAMERA, CAMERA], seen, FPS).tolist())
+    return list(facing_consensus(frames, [CAMERA, CAMERA], seen, FPS).tolist())
 
 
 def test_a_body_whirls_where_it_turns_by_more_than_60_degrees_in_a_tenth_of_a_second() -> None:
     every = np.ones(12, dtype=bool)
     jump = np.radians([0.0] * 6 + [70.0] * 6)
-    assert np.flatnonzero(whirling(jump, every, FPS)).tolist() == [3, 4, 5, 6, 7, 8]
-    assert not whirling(np.radians(15.0 * np.arange(12)), every, FPS).any()  # 450 degrees a second
-    assert whirling(np.radians(25.0 * np.arange(12)), every, FPS).all()
-    assert not whirling(np.radians([179.0] * 6 + [-179.0] * 6), every, FPS).any()
+    assert np.flatnonzero(spin_mask(jump, every, FPS)).tolist() == [3, 4, 5, 6, 7, 8]
+    assert not spin_mask(np.radians(15.0 * np.arange(12)), every, FPS).any()  # 450 degrees a second
+    assert spin_mask(np.radians(25.0 * np.arange(12)), every, FPS).all()
+    assert not spin_mask(np.radians([179.0] * 6 + [-179.0] * 6), every, FPS).any()
     unseen = every.copy()
     unseen[6:] = False
-    assert not whirling(jump, unseen, FPS).any()
-    assert np.flatnonzero(whirling(jump, every, 10.0)).tolist() == [5, 6]
+    assert not spin_mask(jump, unseen, FPS).any()
+    assert np.flatnonzero(spin_mask(jump, every, 10.0)).tolist() == [5, 6]
 
 
 def test_most_frames_say_which_way_somebody_faces_all_along() -> None:
@@ -67,23 +67,23 @@ def test_who_really_turns_round_in_his_own_time_agrees_throughout() -> None:
 
 def test_a_frame_has_a_vote_for_each_camera_that_sees_it() -> None:
     few, many = facing([150.0] * 12, cameras=2), facing([30.0] * 18)
-    found = agreeing([*few, *many], [CAMERA, CAMERA], np.ones(30, dtype=bool), FPS)
+    found = facing_consensus([*few, *many], [CAMERA, CAMERA], np.ones(30, dtype=bool), FPS)
     assert found[:9].all()
     assert not found[9:].any()
 
 
 def test_where_nothing_is_seen_nothing_agrees() -> None:
     assert agreed([0.0] * 4, usable=[False] * 4) == [False] * 4
-    assert surest(facing([0.0] * 4), np.zeros(4, dtype=bool)) is None
+    assert anchor_frame(facing([0.0] * 4), np.zeros(4, dtype=bool)) is None
 
 
 def test_the_surest_frame_is_of_the_longest_run_and_seen_by_most_cameras_at_least_cost() -> None:
     frames = [frame(0.0, cost) for cost in (0.1, 0.1, 9.0, 5.0, 2.0, 3.0, 0.1)]
     flags = np.array([True, False, True, True, True, True, True])
-    assert surest(frames, flags) == 4
+    assert anchor_frame(frames, flags) == 4
     frames[5] = frame(0.0, 3.0, cameras=2)
-    assert surest(frames, flags) == 5
-    assert surest(frames[:2], np.array([True, False])) == 0
+    assert anchor_frame(frames, flags) == 5
+    assert anchor_frame(frames[:2], np.array([True, False])) == 0
 
 
 def task() -> Task:
@@ -112,12 +112,12 @@ def test_a_track_that_whirls_is_followed_again_both_ways_from_the_surest_frame()
         for row in rows:
             yield frame(30.0 + 0.1 * row, posterior=posterior(way * 0.2))
 
-    told = followed_anew(task(), seen, found, follow, 0)
+    told = retrack_spins(task(), seen, found, follow, 0)
     assert told.start == 20
     assert [np.degrees(one.pose[0]) for one in told.frames] == pytest.approx([30.0 + 0.1 * k for k in range(28)])
     (onward, ahead), (back, until) = asked
     assert (ahead, until) == (list(range(20, 28)), list(range(20, -1, -1)))
-    assert onward.fastest_turn == back.fastest_turn == FASTEST
+    assert onward.fastest_turn == back.fastest_turn == MAX_TURN_RATE
     assert np.degrees(onward.yaw or 0.0) == pytest.approx(30.0)
     np.testing.assert_array_equal(back.training[0].poses, WALK.poses[::-1])
     assert {one.evaluations for one in told.frames} == {20}
@@ -140,7 +140,7 @@ def test_a_track_that_is_no_better_is_kept_as_it_was(again: list[float], cost: f
         for each in coming:
             yield frame(again[next(k for k, one in enumerate(seen) if one is each)], cost)
 
-    told = followed_anew(task(), seen, found, follow, 0)
+    told = retrack_spins(task(), seen, found, follow, 0)
     assert told.start is None
     assert [one.pose[0] for one in told.frames] == [one.pose[0] for one in found]
     assert {one.evaluations for one in told.frames} == {20}
@@ -151,7 +151,7 @@ def test_a_track_that_does_not_whirl_is_not_followed_again() -> None:
         raise AssertionError
 
     found = facing([30.0] * 10)
-    told = followed_anew(task(), observations(10), found, follow, 0)
+    told = retrack_spins(task(), observations(10), found, follow, 0)
     assert told.start is None
     assert told.frames == found
 

@@ -15,12 +15,12 @@ import posefit
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import synthetic
 from posefit.motion import built_in
-from posefit.searching.starts import begun, best_seen
 from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.opening import built, task_of
+from posefit.tracking.initialise import first_seen_by_most, fitted_build, task_of
 from posefit.tracking.options import TrackOptions
+from posefit.tracking.restarts import best_restart
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
@@ -78,7 +78,7 @@ def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole
             counts = areas(task.body, task.cameras[0], seen.silhouettes[0], pose, where)
             yield Frame(pose[0], where[0], float(mismatch(counts)[0]), counts, 1, 0.0, np.empty(0))
 
-    begin = begun(task, scene.observations, follow, 3, 0)
+    begin = best_restart(task, scene.observations, follow, 3, 0)
     # frames 0 and 3 of each start, and the best one's first once more where they were seen small
     assert looked == [rows] * 6 + ([size[1]] if rows != size[1] else [])
     # a model of motion knows how far apart they are
@@ -122,8 +122,8 @@ def test_a_build_sees_every_third_frame_where_there_are_so_many() -> None:
         pose, place = built_in.motion("walk").poses[0], scene.anchor
         return (Frame(pose, place, 0.0, np.zeros((1, 3), np.int64), 0, 0.0, np.empty(0)) for _ in seen)
 
-    built(task, scene.observations, follow, 10, None, 0)
-    built(task, scene.observations, follow, 11, None, 0)  # of which there are not so many thirds
+    fitted_build(task, scene.observations, follow, 10, None, 0)
+    fitted_build(task, scene.observations, follow, 11, None, 0)  # of which there are not so many thirds
     assert set(looked) == {(10, scene.fps / 3), (11, scene.fps)}
 
 
@@ -141,9 +141,9 @@ def test_a_build_begins_where_most_cameras_see_the_person() -> None:
         pose, place = built_in.motion("walk").poses[0], scene.anchor
         return (Frame(pose, place, 0.0, np.zeros((2, 3), np.int64), 0, 0.0, np.empty(0)) for _ in told)
 
-    built(task, seen, follow, 5, None, 0)
-    built(task, seen, follow, 11, None, 0)  # too many for those that come after
+    fitted_build(task, seen, follow, 5, None, 0)
+    fitted_build(task, seen, follow, 11, None, 0)  # too many for those that come after
     assert looked[0] == [10, 13, 16, 19, 22]
     assert looked[-1] == list(range(11))
-    assert best_seen(seen) == 10
-    assert best_seen([replace(one, silhouettes=one.silhouettes[:1]) for one in seen]) == 0
+    assert first_seen_by_most(seen) == 10
+    assert first_seen_by_most([replace(one, silhouettes=one.silhouettes[:1]) for one in seen]) == 0

@@ -15,13 +15,18 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Silhouette
-from posefit.steadying import kernels, outlines
-from posefit.steadying.borders import Borders, distances_outside
-from posefit.steadying.frames import steadied_frames
-from posefit.steadying.outlines import outlined
-from posefit.steadying.path import SeenFrames
-from posefit.steadying.shown import STARTS, build_slopes, drawn_numbers, drawn_slopes
-from posefit.steadying.squares import Squares
+from posefit.tracking.smoothing import contours, kernels
+from posefit.tracking.smoothing.contours import (
+    STARTS,
+    MaskContours,
+    build_jacobian,
+    distances_outside,
+    fit_contours,
+    pose_jacobian,
+    projected_body,
+)
+from posefit.tracking.smoothing.path import SeenFrames, Squares
+from posefit.tracking.smoothing.smooth import smoothed_frames
 from posefit.uncertainty.modes import Posterior
 
 CAMERA = Camera.around(np.array([0.0, 0.9, 0.0]), 0.4, 4.0, (200, 200))
@@ -97,7 +102,7 @@ def test_the_border_of_a_mask_is_where_it_meets_what_is_known_to_be_empty() -> N
     mask[5, 5] = True  # and a speck is not the person
     some = [Observation([Silhouette.of(mask, valid)]), Observation([Silhouette.of(mask, valid)], usable=False)]
     camera = Camera.around(np.zeros(3), 0.0, 4.0, (60, 60))
-    found = Borders.of(camera, 0, some, np.zeros((2, 3)))
+    found = MaskContours.of(camera, 0, some, np.zeros((2, 3)))
     assert found.starts.tolist() == [0, 60, 60]  # of four sides of 20 pixels three; a frame that shows too little none
     assert (found.points[:, 0].min(), found.points[:, 0].max()) == (20.0, 39.5)
     assert (found.points[:, 1].min(), found.points[:, 1].max()) == (20.0, 40.0)
@@ -108,7 +113,7 @@ def test_of_a_large_mask_every_so_many_pixels_are_looked_at_and_mean_the_same_pl
     mask = np.zeros((800, 800), dtype=bool)
     mask[200:600, 300:500] = True
     camera = Camera.around(np.zeros(3), 0.0, 4.0, (800, 800))
-    found = Borders.of(camera, 0, [Observation([Silhouette.of(mask)])], np.zeros((1, 3)))
+    found = MaskContours.of(camera, 0, [Observation([Silhouette.of(mask)])], np.zeros((1, 3)))
     factor = round(800 / found.camera.width)
     assert factor == int(camera.focal[0] / 4.0 / 80.0) == 3
     point, small = (one.project(np.array([0.3, 0.2, 0.1]))[0] for one in (camera, found.camera))
@@ -120,24 +125,24 @@ def test_what_is_drawn_changes_with_poses_places_and_builds_as_its_slopes_say() 
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(2)
     poses, places = rng.normal(0.0, 0.3, (3, 66)), rng.normal(0.0, 0.2, (3, 3)) + [0.0, 0.9, 0.0]
     angles = [0, 1, 9, 30]
-    here = drawn_numbers(body, CAMERA, poses, places)
+    here = projected_body(body, CAMERA, poses, places)
     np.testing.assert_allclose(here[:, :54].reshape(3, 27, 2), CAMERA.project(body.skeleton.joints(poses, places))[0])
     step = rng.normal(0.0, 1e-3, (3, 7))
     turned = poses.copy()
     turned[:, angles] += step[:, 3:]
-    there = drawn_numbers(body, CAMERA, turned, places + step[:, :3])
-    slopes = drawn_slopes(body, CAMERA, poses, places, angles)
+    there = projected_body(body, CAMERA, turned, places + step[:, :3])
+    slopes = pose_jacobian(body, CAMERA, poses, places, angles)
     np.testing.assert_allclose(there - here, np.einsum("tqn,tn->tq", slopes, step), atol=2e-3)
     growth = rng.normal(0.0, 1e-3, len(NAMES))
-    there = drawn_numbers(shaped(body, np.exp(growth), 1.7), CAMERA, poses, places)
-    here = drawn_numbers(shaped(body, np.ones(len(NAMES)), 1.7), CAMERA, poses, places)
-    slopes = build_slopes(body.scaled(1.7 / body.stature, 1.7 / body.stature), CAMERA, poses, places, 1.7)
+    there = projected_body(shaped(body, np.exp(growth), 1.7), CAMERA, poses, places)
+    here = projected_body(shaped(body, np.ones(len(NAMES)), 1.7), CAMERA, poses, places)
+    slopes = build_jacobian(body.scaled(1.7 / body.stature, 1.7 / body.stature), CAMERA, poses, places, 1.7)
     np.testing.assert_allclose(there - here, slopes @ growth, atol=2e-3)
 
 
 def test_the_gradient_of_the_borders_squares_is_that_of_their_sum() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(3)
-    numbers = drawn_numbers(body, CAMERA, np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]]))
+    numbers = projected_body(body, CAMERA, np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]]))
     points = rng.uniform(40.0, 160.0, (30, 2))
     nothing = np.zeros((1, 1, 1), np.float32), np.zeros((1, 2), np.int64), np.ones((1, 2), np.int64)
 
@@ -242,7 +247,7 @@ def test_steps_for_other_slopes_are_those_that_they_alone_would_ask_for() -> Non
 def test_poses_that_are_off_come_back_to_what_is_seen(views: tuple[float, ...]) -> None:
     scene, truth = footage(views=views)
     found = off(truth)
-    told, shape = outlined(scene, found, seen_by(scene), None)
+    told, shape = fit_contours(scene, found, seen_by(scene), None)
     assert shape is None
     assert away(told, truth) < 0.65 * away(found, truth)
     assert told.skeleton is scene.body.skeleton
@@ -250,7 +255,7 @@ def test_poses_that_are_off_come_back_to_what_is_seen(views: tuple[float, ...]) 
 
 def test_limbs_that_are_thicker_than_the_bodys_become_as_thick() -> None:
     scene, truth = footage(girth=1.25)
-    _, shape = outlined(scene, off(truth, 2.0), seen_by(scene), average_shape(scene))
+    _, shape = fit_contours(scene, off(truth, 2.0), seen_by(scene), average_shape(scene))
     assert shape is not None
     found = dict(zip(NAMES, shape.factors, strict=True))
     assert found["thighs girth"] == pytest.approx(1.25, abs=0.1)
@@ -260,13 +265,13 @@ def test_limbs_that_are_thicker_than_the_bodys_become_as_thick() -> None:
 
 
 def test_a_fit_that_costs_more_than_what_it_began_with_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    def astray(part: outlines._Part, pulled: object, *, build: bool) -> outlines._Part:
+    def astray(part: contours._Part, pulled: object, *, build: bool) -> contours._Part:
         return replace(part, places=part.places + 1.0, body=shaped(part.body, np.full(len(NAMES), 0.9)))
 
     scene, motion = footage(6)
     shape = average_shape(scene)
-    monkeypatch.setattr(outlines, "_stepped", astray)
-    told, found = outlined(scene, motion, seen_by(scene), shape)
+    monkeypatch.setattr(contours, "_stepped", astray)
+    told, found = fit_contours(scene, motion, seen_by(scene), shape)
     assert found is shape
     np.testing.assert_array_equal(told.poses, motion.poses)
     np.testing.assert_array_equal(told.translations, motion.translations)
@@ -274,7 +279,7 @@ def test_a_fit_that_costs_more_than_what_it_began_with_is_not_kept(monkeypatch: 
 
 def test_a_build_stays_within_what_the_opening_searches() -> None:
     scene, motion = footage(6, girth=4.0)  # three spreads of 0.3 make a girth at most 2.46 times as thick
-    _, shape = outlined(scene, motion, seen_by(scene), average_shape(scene))
+    _, shape = fit_contours(scene, motion, seen_by(scene), average_shape(scene))
     assert shape is not None
     assert 1.5 < shape.factors.max() <= np.exp(0.9) + 1e-9
 
@@ -282,7 +287,7 @@ def test_a_build_stays_within_what_the_opening_searches() -> None:
 def test_a_build_as_tall_as_was_said_stays_so_tall() -> None:
     scene, truth = footage(girth=1.25)
     shape = replace(average_shape(scene), height=scene.body.stature)
-    _, fitted = outlined(scene, truth, seen_by(scene), shape)
+    _, fitted = fit_contours(scene, truth, seen_by(scene), shape)
     assert fitted is not None
     assert fitted.body.stature == pytest.approx(scene.body.stature)
 
@@ -290,13 +295,13 @@ def test_a_build_as_tall_as_was_said_stays_so_tall() -> None:
 def test_a_long_track_is_fitted_in_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, truth = footage(20)
     found = off(truth)
-    whole, _ = outlined(scene, found, seen_by(scene), None)
-    monkeypatch.setattr(outlines, "WINDOW", 10)
-    monkeypatch.setattr(outlines, "OVERLAP", 6)
-    parts, _ = outlined(scene, found, seen_by(scene), None)
+    whole, _ = fit_contours(scene, found, seen_by(scene), None)
+    monkeypatch.setattr(contours, "WINDOW", 10)
+    monkeypatch.setattr(contours, "OVERLAP", 6)
+    parts, _ = fit_contours(scene, found, seen_by(scene), None)
     assert away(parts, whole) < 0.1 * away(found, whole)
     tall = replace(average_shape(scene), height=scene.body.stature)
-    again, shape = outlined(scene, found, seen_by(scene), tall)
+    again, shape = fit_contours(scene, found, seen_by(scene), tall)
     assert shape is not None
     assert away(again, whole) < 0.5 * away(found, whole)
     assert again.skeleton is shape.body.skeleton
@@ -309,22 +314,22 @@ def test_frames_that_show_too_little_go_with_those_around_them() -> None:
     empty = replace(scene, observations=[replace(one, usable=False) for one in observations])
     scene = replace(scene, observations=observations)
     found = off(truth)
-    told, _ = outlined(scene, found, seen_by(scene), None)
+    told, _ = fit_contours(scene, found, seen_by(scene), None)
     assert away(told.frames(6, 7), truth.frames(6, 7)) < 0.8 * away(found.frames(6, 7), truth.frames(6, 7))
-    assert outlined(empty, found, seen_by(empty), None)[0] is found
+    assert fit_contours(empty, found, seen_by(empty), None)[0] is found
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
 def test_the_shortest_footage_is_told(frames: int) -> None:
     scene, truth = footage(frames)
-    told, _ = outlined(scene, truth, seen_by(scene), average_shape(scene))
+    told, _ = fit_contours(scene, truth, seen_by(scene), average_shape(scene))
     assert len(told) == frames
     assert np.isfinite(told.poses).all()
 
 
 def test_a_second_time_the_same_comes_out_bit_by_bit() -> None:
     scene, truth = footage(6)
-    one, other = (outlined(scene, off(truth), seen_by(scene), average_shape(scene)) for _ in range(2))
+    one, other = (fit_contours(scene, off(truth), seen_by(scene), average_shape(scene)) for _ in range(2))
     np.testing.assert_array_equal(one[0].poses, other[0].poses)
     assert one[1] is not None
     assert other[1] is not None
@@ -336,8 +341,8 @@ def test_frames_tell_the_cost_of_the_build_that_is_told_and_what_else_they_may_b
     found = off(truth, 3.0)
     posterior = Posterior(found.poses[:2], found.translations[:2], np.ones(2))
     frames = [frame(pose, place, posterior) for pose, place in zip(found.poses, found.translations, strict=True)]
-    alone, none = steadied_frames(scene, frames, 0.5)
-    told, shape = steadied_frames(scene, frames, 0.5, average_shape(scene))
+    alone, none = smoothed_frames(scene, frames, 0.5)
+    told, shape = smoothed_frames(scene, frames, 0.5, average_shape(scene))
     assert none is None
     assert shape is not None
     assert np.mean([one.cost for one in told]) < 0.7 * np.mean([one.cost for one in alone])

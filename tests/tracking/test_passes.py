@@ -14,7 +14,8 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, synthetic
 from posefit.motion import built_in
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.run import Track, follow
+from posefit.tracking.pipeline import track_scene
+from posefit.tracking.summary import Track
 
 WALK = built_in.motion("walk", frames=60).frames(5, 11)
 
@@ -58,7 +59,7 @@ def posefit_areas(task: Task, camera: Any, silhouette: Any, pose: np.ndarray, pl
 
 def followed(passes: int = 2, **off: float) -> Track:
     Walker.off, Walker.told = off, []
-    return follow(
+    return track_scene(
         footage(),
         [WALK],
         TrackOptions(method=Walker, evaluations=300, body_frames=0, passes=passes),

@@ -9,10 +9,8 @@ import posefit
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
-from posefit.steadying import path
-from posefit.steadying.path import SeenFrames, steadied
-from posefit.steadying.squares import Squares
-from posefit.steadying.stance import stances
+from posefit.tracking.smoothing import path
+from posefit.tracking.smoothing.path import SeenFrames, Squares, smooth_path, standing_feet
 
 EYE = np.array([0.0, 1.0, 6.0])
 
@@ -81,18 +79,18 @@ def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
 
 def test_stances_of_a_walk_are_those_of_feet_that_are_low_and_slow() -> None:
     motion = walk()
-    found = stances(joints_of(motion), motion.fps, np.tile(EYE, (len(motion), 1)))
+    found = standing_feet(joints_of(motion), motion.fps, np.tile(EYE, (len(motion), 1)))
     stands = standing(joints_of(motion), motion.fps)
     assert found[stands].mean() > 0.95
     assert found.any(axis=1).mean() > 0.9  # who walks has a foot on the ground,
     assert found.mean() < 0.75  # and the other one in the air for two fifths of the time
-    assert stances(joints_of(motion)[:2], motion.fps, np.tile(EYE, (2, 1))).shape == (2, 2)
+    assert standing_feet(joints_of(motion)[:2], motion.fps, np.tile(EYE, (2, 1))).shape == (2, 2)
 
 
 def test_a_track_that_shakes_becomes_steady_and_its_feet_stand() -> None:
     motion = walk()
     found, stands = shaken(motion), standing(joints_of(motion), motion.fps)
-    told = steadied(found, all_seen(found))
+    told = smooth_path(found, all_seen(found))
     before, after, true = (np.nanmean(acceleration(joints_of(one), 30.0)) for one in (found, told, motion))
     assert before > 5.0 * true
     assert after < 1.3 * true
@@ -110,9 +108,11 @@ def test_depth_is_believed_where_several_cameras_see_and_hardly_where_one_does()
     places = motion.translations.copy()
     places[:alone, 2] -= 0.1
     eyes = np.full((len(motion), 3), np.nan)
-    several = steadied(replace(motion, translations=places), SeenFrames(np.ones(len(motion), dtype=bool), eyes.copy()))
+    several = smooth_path(
+        replace(motion, translations=places), SeenFrames(np.ones(len(motion), dtype=bool), eyes.copy())
+    )
     eyes[:alone] = EYE
-    told = steadied(replace(motion, translations=places), SeenFrames(np.ones(len(motion), dtype=bool), eyes))
+    told = smooth_path(replace(motion, translations=places), SeenFrames(np.ones(len(motion), dtype=bool), eyes))
     off, was = (np.abs(one.translations - motion.translations)[:, 2] for one in (told, several))
     assert off[alone - 5 : alone].mean() < 0.7 * was[alone - 5 : alone].mean()
     assert off[alone + 5 :].max() < 0.02
@@ -125,7 +125,7 @@ def test_frames_that_show_too_little_are_bridged_and_strange_places_are_not_beli
     places = motion.translations.copy()
     places[~usable] += [200.0, 30.0, -500.0]
     places[40, 2] -= 20.0
-    told = steadied(replace(motion, translations=places), SeenFrames(usable, np.tile(EYE, (len(motion), 1))))
+    told = smooth_path(replace(motion, translations=places), SeenFrames(usable, np.tile(EYE, (len(motion), 1))))
     off = np.linalg.norm(told.translations - motion.translations, axis=1)
     assert off[20:25].max() < 0.05
     assert off[40] < 0.1
@@ -134,17 +134,17 @@ def test_frames_that_show_too_little_are_bridged_and_strange_places_are_not_beli
 
 def test_long_tracks_are_steadied_in_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     found = shaken(walk())
-    whole = steadied(found, all_seen(found))
+    whole = smooth_path(found, all_seen(found))
     monkeypatch.setattr(path, "WINDOW", 30)
     monkeypatch.setattr(path, "OVERLAP", 25)
-    parts = steadied(found, all_seen(found))
+    parts = smooth_path(found, all_seen(found))
     assert np.abs(parts.translations - whole.translations).max() < 0.02
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
 def test_the_shortest_tracks_are_told(frames: int) -> None:
     motion = walk().frames(0, frames)
-    assert len(steadied(motion, all_seen(motion))) == frames
+    assert len(smooth_path(motion, all_seen(motion))) == frames
 
 
 def test_a_track_is_steady_where_it_is_asked_for_and_tells_the_cost_of_what_it_tells() -> None:

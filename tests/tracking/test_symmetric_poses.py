@@ -7,9 +7,9 @@ import numpy as np
 from posefit.fitting.prior import Tilt
 from posefit.geometry.alike import facing
 from posefit.motion import built_in
-from posefit.searching.twins import proposals_of, twins
 from posefit.testing.problem import pose_problem
-from tests.searching.test_modes import side_view
+from posefit.tracking.modes import proposals_of, symmetric_proposals
+from tests.tracking.test_modes import side_view
 
 
 def test_proposals_of_decoded_poses_are_those_that_were_decoded() -> None:
@@ -28,7 +28,7 @@ def test_proposals_of_decoded_poses_are_those_that_were_decoded() -> None:
 def test_a_twin_seen_from_the_side_is_the_other_stride_and_fits_as_well() -> None:
     problem, truth, other = side_view()
     mine = proposals_of(problem.space, truth[None], problem.space.anchor[None])
-    found = twins(problem, mine[0])
+    found = symmetric_proposals(problem, mine[0])
     assert len(found) == 1  # whoever is turned faces out of the box
     joints = problem.body.skeleton.joints(np.stack([truth, other, problem.decode(found)[0][0]]))
     joints -= joints[:, :1]
@@ -44,7 +44,7 @@ def test_all_round_somebody_is_turned_and_reflected() -> None:
     space = replace(problem.space, root_range=np.array([np.pi, 0.3, 0.3]))
     yaw = facing(camera, space.anchor) + 0.3
     pose = np.concatenate([[yaw], truth[1:]])
-    found = twins(replace(problem, space=space), proposals_of(space, pose[None], space.anchor[None])[0])
+    found = symmetric_proposals(replace(problem, space=space), proposals_of(space, pose[None], space.anchor[None])[0])
     yaws = space.coordinates(found)[:, 0]
     # who comes, turned by 0.3 to one side, goes by as much to the same side; or has turned round
     expected = np.array([2.0 * facing(camera, space.anchor) + np.pi - yaw, yaw + np.pi])

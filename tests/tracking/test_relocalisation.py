@@ -15,9 +15,9 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit.searching.again import LookingTracker
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
+from posefit.tracking.restarts import RelocalisingTracker
 
 WALKS, GAP = 30, 12  # frames
 AFTER = slice(WALKS + GAP, None)
@@ -64,7 +64,7 @@ def test_who_comes_back_is_told_with_what_it_took(tmp_path: Path, optimiser: str
     track, right = followed(tmp_path, "back", method=optimiser)
     assert right[:WALKS].all()
     assert right[AFTER].mean() > 0.95
-    assert track.summary["looked_again"] == [WALKS + GAP]
+    assert track.summary["relocalised"] == [WALKS + GAP]
     assert track.summary["backwards_share"] == 0.0
     spent = [frame.evaluations for frame in track.found]
     # eight starts and the track as it was, ten frames each, and the frame itself
@@ -73,9 +73,9 @@ def test_who_comes_back_is_told_with_what_it_took(tmp_path: Path, optimiser: str
 
 
 def test_with_0_he_is_followed_backwards_which_is_told(tmp_path: Path) -> None:
-    track, right = followed(tmp_path, "back", settings={"tracker.look_again": 0})
+    track, right = followed(tmp_path, "back", settings={"tracker.relocalise_gap": 0})
     assert not right[AFTER].any()
-    assert track.summary["looked_again"] == []
+    assert track.summary["relocalised"] == []
     assert track.summary["backwards_share"] > 0.1
     (said,) = [warning for warning in track.summary["warnings"] if "backwards" in warning]
     assert said.startswith("the person seems to walk backwards in 14 of 72 frames")
@@ -92,18 +92,18 @@ def test_who_goes_on_after_a_gap_is_followed_on(tmp_path: Path) -> None:
 
 def test_where_the_truth_is_known_nobody_looks_around_unless_he_is_asked_to() -> None:
     given: dict[str, Any] = {"frames": (0, 3), "size": (80, 60), "evaluations": 80}
-    plain, asked = (posefit.track("walk", settings=one, **given) for one in ({}, {"tracker.look_again": 5}))
+    plain, asked = (posefit.track("walk", settings=one, **given) for one in ({}, {"tracker.relocalise_gap": 5}))
     np.testing.assert_array_equal(plain.motion.poses, asked.motion.poses)
-    assert plain.summary["looked_again"] == asked.summary["looked_again"] == []
+    assert plain.summary["relocalised"] == asked.summary["relocalised"] == []
 
 
 @pytest.mark.parametrize(
     ("wrong", "said"),
-    [(-1, "look_again must be 0 or more, got -1"), (2.5, r"tracker.look_again must be int \| none, got 2.5")],
+    [(-1, "relocalise_gap must be 0 or more, got -1"), (2.5, r"tracker.relocalise_gap must be int \| none, got 2.5")],
 )
 def test_a_wrong_number_of_frames_is_one_clear_error(wrong: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        posefit.track("walk", frames=(0, 1), settings={"tracker.look_again": wrong})
+        posefit.track("walk", frames=(0, 1), settings={"tracker.relocalise_gap": wrong})
 
 
 TASK = Task(Body.of(MOTION.skeleton), [SIDE], 10, 0.0, MIDDLE, fps=10.0)
@@ -131,9 +131,9 @@ class Told:
 
 def looked(told: Told, observations: Sequence[Observation], task: Task = TASK) -> list[tuple[int, bool]]:
     """Return in which frames a tracker looked around, and whether it went on with something new."""
-    frames = list(LookingTracker(task, told).track(observations, np.random.default_rng(0)))
+    frames = list(RelocalisingTracker(task, told).track(observations, np.random.default_rng(0)))
     assert len(frames) == len(observations)
-    return [(k, frame.details["looked_again"]) for k, frame in enumerate(frames) if frame.details]
+    return [(k, frame.details["relocalised"]) for k, frame in enumerate(frames) if frame.details]
 
 
 @pytest.mark.parametrize(("gap", "found"), [(4, []), (5, [(8, True)]), (9, [(12, True)])])
@@ -154,7 +154,7 @@ def test_what_is_not_better_changes_nothing() -> None:
     assert looked(told, clip) == [(8, False)]
     assert len(told.begun) == 1 + 8 + 1  # the track itself is not begun anew
     plain = list(Told([1.0] * 30, 20.0)(TASK, clip, np.random.default_rng(0)))
-    again = list(LookingTracker(TASK, Told([1.0] * 30, 20.0)).track(clip, np.random.default_rng(0)))
+    again = list(RelocalisingTracker(TASK, Told([1.0] * 30, 20.0)).track(clip, np.random.default_rng(0)))
     np.testing.assert_array_equal([one.pose for one in again], [one.pose for one in plain])
 
 

@@ -1,0 +1,154 @@
+"""What is estimated before the first frame: its pose, by several restarts, and the person's build."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posefit.fitting.shape import Shape, fit_shape
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.footage.scene import Scene
+from posefit.listening import Listener
+from posefit.motion.motion import Motion
+from posefit.settings import POPULATION_SIZE
+from posefit.tracking.method import Method
+from posefit.tracking.options import TrackOptions
+from posefit.tracking.restarts import RESTARTS, TRIAL_STRIDE, Follow, best_restart, usable_observations
+
+BODY_FRAMES = 12  # to which a build is fitted
+MIN_BODY_FRAMES = 5
+COMPILE_SECONDS = 60.0  # that a plugin's first calls may take longer than its limit
+WARM_UP_POPULATIONS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """Where tracking begins."""
+
+    scene: Scene  # with the person's build
+    task: Task
+    shape: Shape | None  # the build, where it was fitted
+
+
+def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> Task:
+    """Return the task of tracking a scene, as far as it is known before anything is searched."""
+    known = None if scene.truth is None or options.first_pose == "searched" else scene.truth.poses[0, 3:]
+    return Task(
+        scene.body,
+        scene.cameras,
+        options.budget,
+        scene.yaw,
+        scene.anchor,
+        translation=options.translation or ("aligned" if scene.truth is None else "known"),
+        fps=scene.fps,
+        training=training,
+        first_pose=known,
+        threads=options.threads,
+    )
+
+
+def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, listener: Listener) -> Guess:
+    """Return the first pose, where it is searched by restarts, and the person's build, where it is fitted."""
+    began = time.perf_counter()
+    with _compiling_announced(listener.say):
+        looks_ahead = _warm_up(method, task, scene)
+    listener.say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
+
+    follow, footage = following(method), scene.truth is None
+    restarts = (RESTARTS if footage and not looks_ahead else 0) if options.restarts is None else options.restarts
+    body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
+    if restarts:
+        listener.say(f"looking for the first pose, {restarts} times")
+        task = best_restart(task, scene.observations, follow, restarts, options.seed)
+    shape = None
+    if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
+        few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"
+        needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"
+        listener.say(f"no build is fitted to {body_frames} frames: {few}, {needed}")
+    elif body_frames:
+        listener.say(f"fitting the person's build to {body_frames} frames")
+        alone = len(scene.cameras) == 1 and task.translation == "aligned"
+        height = options.height or (task.body.stature if alone else None)
+        shape = fitted_build(task, scene.observations, follow, body_frames, height, options.seed)
+        task = replace(task, body=shape.body)
+    return Guess(replace(scene, body=task.body), task, shape)
+
+
+def following(method: Method) -> Follow:
+    """Return a function that follows observations with a method, as a task asks."""
+
+    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        return method.tracker(task).track(observations, rng)
+
+    return follow
+
+
+def fitted_build(
+    task: Task, observations: Sequence[Observation], follow: Follow, frames: int, height: float | None, seed: int
+) -> Shape:
+    """Return the person's build, from the first usable frames: every third, where there are so many.
+
+    With several cameras it begins with the first frame that most of them see: a person who comes in is seen by one.
+    """
+    stride = TRIAL_STRIDE
+    chosen = usable_observations(observations, frames, stride, first_seen_by_most(observations))
+    if len(chosen) < frames:
+        chosen, stride = usable_observations(observations, frames), 1
+    task = replace(task, fps=task.fps / stride)
+    return fit_shape(
+        task.body,
+        task.cameras,
+        chosen,
+        lambda body: list(follow(replace(task, body=body), chosen, np.random.default_rng(seed))),
+        np.random.default_rng(seed),
+        height=height,
+        aligned=task.translation == "aligned",
+    )
+
+
+def first_seen_by_most(observations: Sequence[Observation]) -> int:
+    """Return the first frame in which no fewer cameras see the person than in any other; 0 for one camera."""
+    best, most = 0, 0
+    for k in range(len(observations)):
+        silhouettes = observations[k].silhouettes
+        if len(silhouettes) == 1:
+            return 0
+        if (seeing := sum(silhouette.known for silhouette in silhouettes)) > most:
+            best, most = k, seeing
+        if most == len(silhouettes):
+            break
+    return best
+
+
+def _warm_up(method: Method, task: Task, scene: Scene) -> bool:
+    """Return whether a method looks ahead, after it searched a few populations of the first frame to be compiled."""
+    population_size = method.settings.get("optimiser", {}).get("population_size", POPULATION_SIZE)
+    few = replace(task, evaluations=min(task.evaluations, WARM_UP_POPULATIONS * population_size))
+    first = next(iter(scene.observations))
+    tracker = None
+    with suppress(ValueError):  # what fails for want of evaluations is reported where it fails with all of them
+        tracker = method.tracker(few, COMPILE_SECONDS)
+        next(tracker.track([first], np.random.default_rng(0)))
+    return getattr(tracker, "lag", None) is not None
+
+
+@contextmanager
+def _compiling_announced(say: Callable[[str], None]) -> Iterator[None]:
+    """Announce once that something is compiled that is not in numba's cache."""
+    from numba.core import event
+
+    class Once(event.Listener):  # type: ignore[misc]
+        announced = False
+
+        def on_start(self, _event: event.Event) -> None:
+            if not self.announced:
+                self.announced = True
+                say("compiling the kernels, once on this machine; this takes ten seconds or more ...")
+
+        def on_end(self, _event: event.Event) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Once()):
+        yield

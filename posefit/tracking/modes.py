@@ -1,0 +1,247 @@
+"""The modes of one problem, by several searches of any optimiser, and a tracker that has them for every frame.
+
+    from posefit.tracking.modes import modes
+
+    posterior = modes(problem, factory, searches=8, evaluations=2440, rng=np.random.default_rng(0))
+
+`factory(space, rng)` builds any optimiser. The result is a `posefit.uncertainty.modes.Posterior`.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Self, cast
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.box import Space
+from posefit.fitting.check import at_least, positive, whole
+from posefit.fitting.optimiser import BudgetError, Filter, Optimiser, populations
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
+from posefit.geometry.alike import facing, reflected_poses, turned_poses
+from posefit.geometry.rotation import wrapped
+from posefit.tracking.restarts import independent
+from posefit.uncertainty.landscape import Landscape
+from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.searches import Searched, boltzmann_weights, weighed
+from posefit.uncertainty.smc import systematic_rows
+
+SEARCHES = 8  # ours
+SHARE = 8.0  # ours: evaluations of all else, over those of the first search
+OTHER_SEARCHES = 0.25  # ours: the share of those that other searches have
+MIN_EVALUATIONS = 200  # ours: of another search; with fewer it is not begun
+TEMPERATURE = 2.0  # ours: divides silhouette costs, whose errors are correlated
+POSTERIOR_POSES = 100  # ours
+EVEN_COST = 5.2  # of a frame, from 0 to 100: here it is as likely lost as not
+LOST_STEEPNESS = 2.5  # by how much the log-odds rise with the logarithm of the cost
+MIN_COST = 0.1  # below it the cost of a pose is no evidence
+
+MakeOptimiser = Callable[[Space, np.random.Generator], Optimiser]
+
+
+def modes(
+    problem: PoseProblem,
+    make: MakeOptimiser,
+    *,
+    evaluations: int,
+    rng: np.random.Generator,
+    searches: int = SEARCHES,
+    share: float = SHARE,
+    temperature: float = TEMPERATURE,
+) -> Posterior:
+    """Return the posterior of the pose: 100 poses of equal weight, distributed as exp(-cost / temperature).
+
+    `make(space, rng)` builds the optimiser of each search. The first one has so many `evaluations`, and starts where
+    the problem's space says; the others start anywhere in it. All else has `share` times as many: a quarter is the
+    other searches', as far as each has 200, and the rest weighs what they evaluated. Raises ValueError where a
+    number makes no sense.
+    """
+    whole("searches", searches, 1)
+    at_least("evaluations", evaluations, 1)
+    positive("temperature", temperature)
+    positive("share", share)
+    first = search(problem, make(problem.space, rng), evaluations)
+    return further(problem, make, first, round(share * evaluations), rng, searches - 1, temperature)[0]
+
+
+def further(
+    problem: PoseProblem,
+    make: MakeOptimiser,
+    first: Searched,
+    evaluations: int,
+    rng: np.random.Generator,
+    searches: int,
+    temperature: float,
+) -> tuple[Posterior, int]:
+    """Return the posterior of a problem after a first search, by so many more, and how many evaluations it took.
+
+    That is about as many as are given.
+    """
+    spared = int(OTHER_SEARCHES * evaluations)
+    others = elsewhere(problem, make, spared, rng, min(searches, spared // MIN_EVALUATIONS))
+    used = sum(len(costs) for _, costs in others)
+    landscape = Landscape(problem.space, problem.evaluate)
+    symmetric = symmetric_proposals(problem, first[0][np.nanargmin(first[1])])
+    searched = [first, *others, *([(symmetric, landscape.costs(symmetric))] if len(symmetric) else [])]
+    left = evaluations - used - landscape.evaluations
+    sample = weighed(landscape, searched, temperature, rng, evaluations=left)
+    return posterior_of(problem, *sample.even(POSTERIOR_POSES, rng)), used + landscape.evaluations
+
+
+def elsewhere(
+    problem: PoseProblem, make: MakeOptimiser, evaluations: int, rng: np.random.Generator, searches: int
+) -> list[Searched]:
+    """Return what several searches evaluated that start anywhere in the problem's space, and share a budget.
+
+    One whose part does not hold a population leaves it to those that come after.
+    """
+    anywhere, searches_done, left = replace(problem.space, start=None), list[Searched](), evaluations
+    for k in range(searches):
+        with suppress(BudgetError):
+            searches_done.append(search(problem, make(anywhere, rng), left // (searches - k)))
+            left -= len(searches_done[-1][1])
+    return searches_done
+
+
+def search(problem: PoseProblem, optimiser: Optimiser, evaluations: int) -> Searched:
+    """Return all proposals (n, d) that an optimiser had evaluated within a budget, and their costs (n,)."""
+    return gathered([(np.array(one), costs) for one, costs in populations(optimiser, problem.evaluate, evaluations)])
+
+
+def gathered(populations: list[Searched]) -> Searched:
+    """Return the populations of a search as one."""
+    return np.concatenate([one for one, _ in populations]), np.concatenate([costs for _, costs in populations])
+
+
+def posterior_of(problem: PoseProblem, proposals: Array, weights: Array) -> Posterior:
+    """Return weighted proposals (n, d) as poses."""
+    return Posterior(*problem.decode(proposals), weights)
+
+
+def symmetric_proposals(problem: PoseProblem, proposal: Array) -> Array:
+    """Return the proposals (k, d) of a pose that is reflected as a camera sees it, or turned.
+
+    They are as near as the prior comes to those. Poses that would face out of the box are left out, so k may be 0.
+    """
+    poses, translations = problem.decode(proposal[None])
+    skeleton, place = problem.body.skeleton, translations[0]
+    reflected = [reflected_poses(skeleton, poses, facing(camera, place)) for camera in problem.cameras]
+    symmetric = np.concatenate([*reflected, turned_poses(poses)])
+    space = problem.space
+    within = np.abs(wrapped(symmetric[:, 0] - space.centre[0])) <= space.half[0]
+    return proposals_of(space, symmetric[within], np.repeat(translations, within.sum(), axis=0))
+
+
+def proposals_of(space: SearchSpace, poses: Array, translations: Array) -> Array:
+    """Return the proposals (n, d) of poses (n, 66), as near as the prior and the box come to them."""
+    latents = np.asarray(space.prior.transform(poses[:, 3:]))
+    root, tilt = poses[:, :3].copy(), space.tilt
+    if tilt is not None:
+        root[:, 1:] -= np.clip(tilt.base + latents @ tilt.slopes, tilt.least, tilt.most)
+    parts = [root, translations, latents] if space.translation == "searched" else [root, latents]
+    return space.proposals(np.concatenate(parts, axis=1))
+
+
+def lost_probability(costs: Array) -> Array:
+    """Return how likely frames are lost whose poses cost so much: 0 to 1, of the same shape.
+
+    A logistic model of the logarithm of the cost; the spread of the posterior, the weight of its second mode and the
+    cost of the frames before added nothing on people whom it was not fitted to. docs/studies/posterior.py fits it.
+    """
+    return np.asarray(1.0 / (1.0 + (EVEN_COST / np.maximum(costs, MIN_COST)) ** LOST_STEEPNESS))
+
+
+@dataclass(frozen=True, eq=False)
+class WeighingTracker:
+    """Follows as the tracker does that it is given, and adds a posterior to every frame that shows the person.
+
+    The track is the same as without. Beside the tracker's own search come others, `prediction.modes` in all, anywhere
+    in the same space; they and the weighing have `prediction.modes_share` of its evaluations. Where `modes` is 1 and
+    the optimiser a filter, its last particles are weighed as they are. A frame's evaluations are all of them, beyond
+    the budget too. Each frame has the probability that it is lost.
+    """
+
+    tracker: SynthesisTracker
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a `Frame` for each observation."""
+        record = _Record(self.tracker.make)
+        following = replace(self.tracker, make=record.begin)
+        for frame in following.track(record.noted(observations), rng):
+            assert record.observation is not None
+            yield self._with_posterior(frame, record, rng) if record.observation.usable else frame
+
+    def _with_posterior(self, frame: Frame, record: "_Record", rng: np.random.Generator) -> Frame:
+        began, begun = time.perf_counter(), time.process_time()
+        posterior, more = self._posterior(record, rng)
+        seconds = frame.seconds + time.perf_counter() - began
+        cpu_seconds = None if frame.cpu_seconds is None else frame.cpu_seconds + time.process_time() - begun
+        return replace(
+            frame,
+            posterior=posterior,
+            lost=float(lost_probability(np.array(frame.cost))),
+            evaluations=frame.evaluations + more,
+            seconds=seconds,
+            cpu_seconds=cpu_seconds,
+        )
+
+    def _posterior(self, record: "_Record", rng: np.random.Generator) -> tuple[Posterior, int]:
+        """Return the posterior of a frame, and how many evaluations it took."""
+        how, evaluations = self.tracker.prediction, self.tracker.task.evaluations
+        assert record.observation is not None
+        problem = self.tracker.problem(cast(SearchSpace, record.space), record.observation)
+        if how.modes == 1 and self.tracker.next_frame == "carry":
+            particles, costs = record.evaluated[-1]
+            weights = boltzmann_weights(costs, how.posterior_temperature)
+            return posterior_of(problem, *_few(particles, weights)), 0
+        own = independent(rng)  # the track is the same as without
+        first, more = gathered(record.evaluated), round(how.modes_share * evaluations)
+        return further(problem, self.tracker.make, first, more, own, how.modes - 1, how.posterior_temperature)
+
+
+def _few(particles: Array, weights: Array) -> tuple[Array, Array]:
+    """Return weighted particles as they are, or where they are many, some of equal weight."""
+    if len(particles) <= POSTERIOR_POSES:
+        return particles, weights
+    return particles[systematic_rows(weights, 0.5, POSTERIOR_POSES)], np.full(POSTERIOR_POSES, 1.0 / POSTERIOR_POSES)
+
+
+class _Record:
+    """An optimiser that records the space of its latest frame, and all that was evaluated there."""
+
+    def __init__(self, make: MakeOptimiser) -> None:
+        self._make = make
+        self.observation: Observation | None = None
+
+    def noted(self, observations: Iterable[Observation]) -> Iterator[Observation]:
+        """Yield the observations, and keep the latest."""
+        for observation in observations:
+            self.observation = observation
+            yield observation
+
+    def begin(self, space: Space, rng: np.random.Generator) -> Self:
+        """Return this record as the optimiser of a search."""
+        self._open(space)
+        self._optimiser: Optimiser = self._make(space, rng)
+        return self
+
+    def advance(self, space: Space) -> None:
+        """Pass the next frame's space on."""
+        self._open(space)
+        cast(Filter, self._optimiser).advance(space)
+
+    def ask(self) -> Array:
+        """Return the optimiser's next population."""
+        return self._optimiser.ask()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Keep the costs, and pass them on."""
+        self.evaluated.append((np.array(proposals), np.array(costs)))
+        self._optimiser.tell(proposals, costs)
+
+    def _open(self, space: Space) -> None:
+        self.space, self.evaluated = space, list[Searched]()

@@ -1,0 +1,387 @@
+"""The one policy of restarts: where a track begins, and when it is begun again from somewhere else.
+
+| when | what is tried | what is kept |
+|---|---|---|
+| before the first frame | `best_restart`: searches of the first frame, followed over a few more | the cheapest |
+| after a gap, or while costs are high | `RelocalisingTracker`: such restarts beside the track as it is | the cheapest |
+| with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
+| where the body spins | `retrack_spins`: all frames again, both ways from the surest | the new one, if about as cheap |
+| with several passes | `smoothing.smooth`: all frames again, their path known | the new one, if about as cheap |
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.fitting.check import whole
+from posefit.fitting.space import ROOT_RANGE_DEGREES
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.geometry.alike import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import Skeleton
+from posefit.motion.motion import Motion
+from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
+from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask
+from posefit.tracking.trajectory import cheaper, mean_cost, with_total_effort
+
+RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "pass": 2026}  # part of the seed of what is tracked again
+RESTARTS = 8  # searches of the first frame
+TRIAL_FRAMES = 10  # by which a restart is judged
+TRIAL_STRIDE = 3  # frames between these, so that they show which way the person walks
+TRIAL_ROWS = 240  # pictures have at least so many in which restarts are compared
+WALKED = 0.3  # metres; a person who goes so far in the trial goes where they face
+BACKWARDS_PENALTY = 1.1  # on the cost of a restart that walks backwards
+GAP = 5  # frames without the person after which a track relocalises: about a sixth of a second
+COST_RISE = 1.5  # times the typical cost of the track: costs above it are high
+TYPICAL_COST_SECONDS = 1.0  # of frames that show the typical cost
+HIGH_COST_SECONDS = 0.5  # for which costs are high before a track relocalises
+RELOCALISED = "relocalised"  # in the details of a frame where it did: whether a restart was better
+SPIN_TOLERANCE = 1.5  # a track without spins that costs more is wrong: the person does turn so fast
+SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
+
+Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
+
+
+def stream(seed: int, kind: Literal["hypothesis", "spin", "pass"], number: int) -> np.random.Generator:
+    """Return the random generator of something that is tracked again; that of the first track is of the seed alone."""
+    return np.random.default_rng([seed, RNG_STREAMS[kind], number])
+
+
+def independent(rng: np.random.Generator) -> np.random.Generator:
+    """Return a generator that is seeded by what another one would draw next, which stays as it is."""
+    bits = type(rng.bit_generator)(0)
+    bits.state = rng.bit_generator.state
+    return np.random.default_rng(np.random.Generator(bits).integers(0, 2**63, 4))
+
+
+# Before the first frame.
+
+
+def usable_observations(
+    observations: Sequence[Observation], count: int, stride: int = 1, start: int = 0
+) -> list[Observation]:
+    """Return the first `count` observations from `start` on, of every `stride`th, that show enough of the person."""
+    usable: list[Observation] = []
+    for k in range(start, len(observations), stride):
+        if len(usable) == count:
+            break
+        if (observation := observations[k]).usable:
+            usable.append(observation)
+    return usable
+
+
+def best_restart(
+    task: Task,
+    observations: Sequence[Observation],
+    follow: Follow,
+    restarts: int,
+    seed: int | Sequence[int],
+    going_on: Task | None = None,
+) -> Task:
+    """Return the task with the best of several restarts as the frame before the first.
+
+    Each searches the first usable frame, at all yaws where none is known, and follows the person through a few more
+    frames. The least mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution,
+    and the first frame is then searched once more in the whole one, around the best. A task that is `going_on` is
+    followed beside the restarts, and is returned where none of them is better.
+    """
+    chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE) or usable_observations(observations, 1)
+    factor = max(min(camera.height for camera in task.cameras) // TRIAL_ROWS, 1)
+    apart = replace(task, fps=task.fps / TRIAL_STRIDE)  # for models of motion
+    trial, shown = _coarser(apart, chosen, factor) if factor > 1 else (apart, chosen)
+    prefix = [seed] if isinstance(seed, int) else [*seed]
+    best, least = None, np.inf
+    if going_on is not None:
+        on = replace(going_on, fps=apart.fps, cameras=trial.cameras)
+        least = _trial_cost(list(follow(on, shown, np.random.default_rng([*prefix, restarts + 1]))))
+    for k in range(restarts):
+        frames = list(follow(trial, shown, np.random.default_rng([*prefix, k])))
+        if cheaper(cost := _trial_cost(frames), least):
+            best, least = frames[0], cost
+    if best is None:
+        return going_on or task
+    if factor == 1:
+        return _after(task, best)
+    rng = np.random.default_rng([*prefix, restarts])
+    return _after(task, next(follow(_after(task, best), chosen[:1], rng)))
+
+
+def _trial_cost(frames: Sequence[Frame]) -> float:
+    """Return the mean cost of frames, penalised where the person walks backwards in them."""
+    path = frames[-1].translation - frames[0].translation
+    yaws = np.array([frame.pose[0] for frame in frames])
+    ahead = np.array([np.sin(yaws).mean(), 0.0, np.cos(yaws).mean()])
+    path[1] = 0.0
+    backwards = np.linalg.norm(path) > WALKED and path @ ahead < 0.0
+    return float(np.mean([frame.cost for frame in frames])) * (BACKWARDS_PENALTY if backwards else 1.0)
+
+
+def _after(task: Task, frame: Frame) -> Task:
+    """Return the task that goes on from a frame."""
+    return replace(task, yaw=float(frame.pose[0]), anchor=frame.translation, first_pose=frame.pose[3:], before=(frame,))
+
+
+def _coarser(task: Task, observations: Sequence[Observation], factor: int) -> tuple[Task, list[Observation]]:
+    """Return a task and its observations through every `factor`th pixel of every `factor`th row."""
+    small = [
+        replace(one, silhouettes=[coarser_silhouette(silhouette, factor) for silhouette in one.silhouettes])
+        for one in observations
+    ]
+    return replace(task, cameras=[coarser_camera(camera, factor) for camera in task.cameras]), small
+
+
+# While a track goes on.
+
+
+@dataclass(frozen=True, eq=False)
+class RelocalisingTracker:
+    """Follows as `follow` does, and searches at all yaws again where the person may have turned unseen.
+
+    That is in the first frame that shows the person after a `gap` of frames that do not, and where for half a second
+    every cost is half as high again as is typical since the last relocalisation. Eight restarts are compared with the
+    track as it is, over about a second of the observations to come; the cheapest goes on. The frame has the evaluations
+    and the time of all of them.
+    """
+
+    task: Task
+    follow: Follow
+    gap: int = GAP
+
+    def __post_init__(self) -> None:
+        whole("gap", self.gap, 1)
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a `Frame` for each observation."""
+        history, coming = _History(self.task, self.gap), _LookAhead(observations)
+        going = self.follow(self.task, coming.rest(), rng)
+        while shown := coming.peek(1):
+            effort: list[Frame] = []
+            relocalised: bool | None = None
+            if shown[0].usable and history.is_lost:
+                window = coming.peek((TRIAL_FRAMES - 1) * TRIAL_STRIDE + 1)
+                task = self._relocalise(history, window, effort, independent(rng))
+                if relocalised := task is not None:
+                    going = self.follow(task, coming.rest(), rng)
+                history.forget()
+            if (frame := next(going, None)) is None:
+                return
+            coming.drop()
+            history.add(frame, shown[0].usable)
+            yield frame if relocalised is None else _with_effort(frame, effort, relocalised)
+        yield from going  # none: the tracker gets to its end
+
+    def _relocalise(
+        self, history: "_History", coming: list[Observation], effort: list[Frame], rng: np.random.Generator
+    ) -> Task | None:
+        """Return the task to go on with; None where the track is best as it is. `effort` gets every frame tried."""
+        latest = history.latest
+        assert latest is not None
+        around = replace(self.task, yaw=None, anchor=latest.translation, first_pose=None, before=())
+        on = replace(around, yaw=float(latest.pose[0]), first_pose=latest.pose[3:], before=(latest,))
+
+        def counted(task: Task, shown: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+            for frame in self.follow(task, shown, rng):
+                effort.append(frame)
+                yield frame
+
+        task = best_restart(around, coming, counted, RESTARTS, rng.integers(0, 2**32, 2).tolist(), on)
+        return None if task is on else task
+
+
+def _with_effort(frame: Frame, effort: Sequence[Frame], relocalised: bool) -> Frame:
+    """Return a frame with the evaluations and times of those that were tried before it."""
+    evaluations = sum(one.evaluations for one in effort)
+    cpu_seconds = (
+        None if frame.cpu_seconds is None else frame.cpu_seconds + sum(one.cpu_seconds or 0.0 for one in effort)
+    )
+    return replace(
+        frame,
+        evaluations=frame.evaluations + evaluations,
+        seconds=frame.seconds + sum(one.seconds for one in effort),
+        cpu_seconds=cpu_seconds,
+        spent=None if frame.spent is None else frame.spent + evaluations,
+        details={**frame.details, RELOCALISED: relocalised},
+    )
+
+
+class _History:
+    """The latest frame of a track that showed the person, and the costs of its frames."""
+
+    def __init__(self, task: Task, gap: int) -> None:
+        self._gap = gap
+        self._typical, self._high = (
+            max(round(seconds * task.fps), 1) for seconds in (TYPICAL_COST_SECONDS, HIGH_COST_SECONDS)
+        )
+        self.latest: Frame | None = None
+        self.forget()
+        if len(task.before) > 1:  # a single one is what the track was begun with
+            for frame in task.before:
+                self.add(frame, frame.evaluations > 0)
+
+    def forget(self) -> None:
+        """Learn the typical cost from the next frames on."""
+        self._unseen, self._costs = 0, list[float]()
+
+    def add(self, frame: Frame, usable: bool) -> None:
+        """Add a frame that was estimated, or held where the observation was not usable."""
+        if RELOCALISED in frame.details:
+            self.forget()
+        self._unseen = 0 if usable else self._unseen + 1
+        if usable:
+            self.latest = frame
+            self._costs.append(frame.cost)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the person was away for the gap, or costs have been high for long enough."""
+        if self.latest is None:
+            return False
+        if self._unseen >= self._gap:
+            return True
+        typical, high = self._costs[: -self._high], self._costs[-self._high :]
+        return len(typical) >= self._typical and min(high) > COST_RISE * float(np.median(typical))
+
+
+class _LookAhead:
+    """Observations that may be read before they are taken."""
+
+    def __init__(self, observations: Iterable[Observation]) -> None:
+        self._rest = iter(observations)
+        self._buffer: deque[Observation] = deque()
+        self._first = 0
+
+    def peek(self, count: int) -> list[Observation]:
+        """Return the next so many, or as many as there are."""
+        while len(self._buffer) < count and (one := next(self._rest, None)) is not None:
+            self._buffer.append(one)
+        return list(self._buffer)[:count]
+
+    def drop(self) -> None:
+        """Take the next one."""
+        self._buffer.popleft()
+        self._first += 1
+
+    def rest(self) -> Iterator[Observation]:
+        """Yield those from here on, whether they are taken meanwhile or not."""
+        number = self._first
+        while len(self.peek(number - self._first + 1)) > number - self._first:
+            yield self._buffer[number - self._first]
+            number += 1
+
+
+# Several hypotheses.
+
+# What becomes of poses (n, 66), given the yaw of a person who faces the first camera.
+Operator = Callable[[Skeleton, Array, float], Array]
+SYMMETRIC_POSES: Mapping[str, Operator] = {
+    "mirrored": lambda skeleton, poses, _: mirrored_poses(skeleton, poses),
+    "reflected": reflected_poses,
+    "legs exchanged": lambda skeleton, poses, _: exchanged_limbs(skeleton, poses, "legs"),
+    "turned": lambda _skeleton, poses, _towards: turned_poses(poses),
+    "arms exchanged": lambda skeleton, poses, _: exchanged_limbs(skeleton, poses, "arms"),
+}
+# The initial guesses of the hypotheses after the first, in turn: those first that are mistaken most often.
+GUESSES = (
+    "mirrored",
+    "reflected",
+    SEARCHED_AGAIN,
+    "legs exchanged",
+    "turned",
+    SEARCHED_AGAIN,
+    "arms exchanged",
+)
+
+
+def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, first: Frame) -> tuple[str, Task]:
+    """Return the name and the task of a hypothesis after the first; `first` is a frame that the first one estimated.
+
+    It starts around a pose whose silhouette is like that of the frame, or searches as the first one did. Poses that
+    face elsewhere than the known `yaw` are left out; where the first pose is known, only seeds differ.
+    """
+    towards = facing(task.cameras[0], first.translation)
+    poses = {name: made(task.body.skeleton, first.pose[None], towards)[0] for name, made in SYMMETRIC_POSES.items()}
+
+    def contradicts(pose: Array) -> bool:
+        if pose_known or yaw is None:
+            return pose_known
+        return bool(abs(wrapped(pose[0] - yaw)) > np.radians(ROOT_RANGE_DEGREES[0]))
+
+    order = [name for name in GUESSES if name == SEARCHED_AGAIN or not contradicts(poses[name])]
+    name = order[(number - 1) % len(order)]
+    if name == SEARCHED_AGAIN:
+        return name, task
+    return name, replace(_after(task, replace(first, pose=poses[name])), before=())
+
+
+# After the last frame.
+
+
+@dataclass(frozen=True, eq=False)
+class Retracked:
+    """A track after its spins were looked at."""
+
+    frames: list[Frame] = field(repr=False)  # with the effort of both tracks
+    start: int | None  # the frame from which it was tracked again; None where it is as it was
+
+
+def retrack_spins(
+    task: Task, observations: Sequence[Observation], frames: Sequence[Frame], follow: Follow, seed: int
+) -> Retracked:
+    """Return a track without spins: where there are some, all frames are tracked again from the surest one.
+
+    Which way the person faces is what most frames agree on, see `spins.facing_consensus`. From that frame they are
+    followed onward, and backwards by training motions in reverse. The old track is kept where the new one spins as
+    often, or costs half as much again.
+    """
+    usable = np.array([observation.usable for observation in observations])
+    before = _spin_count(task, frames, usable)
+    start = anchor_frame(frames, facing_consensus(frames, task.cameras, usable, task.fps)) if before else None
+    if start is None:
+        return Retracked(list(frames), None)
+    sure = replace(_after(task, frames[start]), before=(), fastest_turn=MAX_TURN_RATE)
+    back = replace(sure, training=[in_reverse(motion) for motion in task.training], backwards=True)
+    onward = (observations[k] for k in range(start, len(frames)))
+    ahead = list(follow(sure, onward, stream(seed, "spin", 0)))
+    until = (observations[k] for k in range(start, -1, -1))
+    behind = list(follow(back, until, stream(seed, "spin", 1)))
+    again = [*_joined(task.body.skeleton, behind, ahead[0])[:0:-1], *ahead]
+    better = _spin_count(task, again, usable) < before
+    better = better and cheaper(mean_cost(again, usable), mean_cost(frames, usable), SPIN_TOLERANCE)
+    return Retracked(with_total_effort([frames, again], int(better)), start if better else None)
+
+
+def in_reverse(motion: Motion) -> Motion:
+    """Return a motion that goes backwards in time."""
+    return replace(motion, poses=motion.poses[::-1], translations=motion.translations[::-1])
+
+
+def _spin_count(task: Task, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> int:
+    return int(spin_mask(np.array([frame.pose[0] for frame in frames]), usable, task.fps).sum())
+
+
+def _joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Frame]:
+    """Return frames whose posterior trajectories go on as those of the frame from which both ways were followed.
+
+    Each of its trajectories goes on as the nearest one there.
+    """
+    mine, others = ahead.posterior, behind[0].posterior
+    if mine is None or others is None:
+        return list(behind)
+    joints, near = skeleton.joints(mine.poses), skeleton.joints(others.poses)
+    rows = np.array([int(((near - one) ** 2).sum(axis=(1, 2)).argmin()) for one in joints])
+
+    def picked(frame: Frame) -> Frame:
+        if (posterior := frame.posterior) is None:
+            return frame
+        poses, translations = posterior.poses[rows], posterior.translations[rows]
+        return replace(
+            frame,
+            posterior=replace(posterior, poses=poses, translations=translations, weights=np.ones(len(rows))),
+        )
+
+    return [picked(frame) for frame in behind]

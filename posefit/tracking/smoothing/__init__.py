@@ -1,0 +1,8 @@
+"""A track of footage as a body would walk it: no shaking, feet that stand where they stand, contours as in the masks.
+
+| looking for | file |
+|---|---|
+| the step of the pipeline: path, contours, path; and several passes | smooth.py |
+| the likeliest path of a root and two legs; which foot stands | path.py |
+| poses, path and build fitted to the contours of the masks | contours.py, kernels.py |
+"""

@@ -1,0 +1,112 @@
+"""A track smoothed and fitted to the contours of the masks; and tracked again along its path, in several passes.
+
+In the first pass a body of another build is aligned to each mask alone, so that it comes nearer and goes away without a
+cause, and a tracker cannot tell from that which way the person walks. In the second pass it can.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.fitting.shape import Shape
+from posefit.fitting.tracker import Frame, Observation
+from posefit.footage.scene import Scene
+from posefit.geometry.rotation import wrapped
+from posefit.listening import Listener
+from posefit.motion.motion import Motion
+from posefit.silhouette.cost import only_camera, pose_costs
+from posefit.tracking.follow import tracker_of
+from posefit.tracking.initialise import Guess
+from posefit.tracking.method import Method
+from posefit.tracking.options import TrackOptions
+from posefit.tracking.restarts import stream
+from posefit.tracking.smoothing.contours import fit_contours
+from posefit.tracking.smoothing.path import SeenFrames, smooth_path
+from posefit.tracking.trajectory import cheaper, mean_cost, with_total_effort
+
+PASS_TOLERANCE = 1.125  # times what the pass before costs: a pass that costs more is not kept
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """The result of tracking all frames once."""
+
+    scene: Scene = field(repr=False)  # with the build that fits it
+    frames: list[Frame] = field(repr=False)
+    shape: Shape | None  # the build, where it was fitted
+    number: int  # from 1
+
+    @classmethod
+    def smoothed(cls, scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: float, number: int) -> Self:
+        """Return a pass whose frames were smoothed."""
+        smooth, shape = smoothed_frames(scene, frames, beta, shape)
+        return cls(scene if shape is None else replace(scene, body=shape.body), smooth, shape, number)
+
+    @cached_property
+    def cost(self) -> float:
+        """The mean cost of the frames that show enough of the person."""
+        return mean_cost(self.frames, np.array([observation.usable for observation in self.scene.observations]))
+
+
+def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: TrackOptions, listener: Listener) -> Pass:
+    """Return a track smoothed; of several passes the last that costs not much more than the one kept before it.
+
+    Each pass has the full budget, and follows the path of the one that was kept before it. The frames have the effort
+    of all passes.
+    """
+    passes, kept = [Pass.smoothed(guess.scene, frames, guess.shape, method.beta, 1)], 0
+    for number in range(1, options.passes):
+        before = passes[kept]
+        scene, path = before.scene, [frame.translation for frame in before.frames]
+        task = replace(guess.task, body=scene.body, translation="known", anchor=path[0], before=())
+        known = (replace(one, translation=place) for one, place in zip(scene.observations, path, strict=True))
+        listener.say(f"following once more where it went, pass {number + 1} of {options.passes}")
+        rng = stream(options.seed, "pass", number)
+        tracked = list(listener.progress(tracker_of(method, scene, task).track(known, rng), scene.count))
+        passes.append(Pass.smoothed(scene, tracked, before.shape, method.beta, number + 1))
+        if cheaper(passes[-1].cost, before.cost, PASS_TOLERANCE):
+            kept = number
+    return replace(passes[kept], frames=with_total_effort([one.frames for one in passes], kept))
+
+
+def smoothed_frames(
+    scene: Scene, frames: Sequence[Frame], beta: float, shape: Shape | None = None
+) -> tuple[list[Frame], Shape | None]:
+    """Return the frames of a scene smoothed, and the build fitted with them.
+
+    The build stays the scene's where it was not fitted before (`shape` is None). Costs and areas are those of the
+    smoothed frames, and their posteriors move as far as the pose and the root did.
+    """
+    poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
+    motion = Motion(scene.name, scene.body.skeleton, poses, places, scene.fps)
+    usable = np.array([observation.usable for observation in scene.observations])
+    seen = SeenFrames(usable, np.array([_eye(scene, observation) for observation in scene.observations]))
+    motion, shape = fit_contours(scene, smooth_path(motion, seen), seen, shape, beta)
+    motion = smooth_path(motion, seen)  # contours pull at standing feet
+    scene = scene if shape is None else replace(scene, body=shape.body)
+    smooth = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
+    if shape is not None:
+        shape = replace(shape, cost=mean_cost(smooth, usable))
+    return smooth, shape
+
+
+def _eye(scene: Scene, observation: Observation) -> Array:
+    """Return where the only camera stands (3,) that sees anything; NaN where several do, or none."""
+    only = only_camera(scene.cameras, observation.silhouettes)
+    return np.full(3, np.nan) if only is None else only.position
+
+
+def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:
+    """Return a frame at the pose that a motion has in frame k."""
+    pose, place, silhouettes = motion.poses[k], motion.translations[k], scene.observations[k].silhouettes
+    costs, counts = pose_costs(scene.body, scene.cameras, silhouettes, pose[None], place[None], beta)
+    posterior = frame.posterior
+    if posterior is not None:
+        poses = posterior.poses + wrapped(pose - frame.pose)
+        posterior = replace(posterior, poses=poses, translations=posterior.translations + (place - frame.translation))
+    moved = replace(frame, pose=pose, translation=place, cost=float(costs[0]), areas=counts[:, 0])
+    return replace(moved, coordinates=None, posterior=posterior)

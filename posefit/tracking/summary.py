@@ -1,0 +1,145 @@
+"""The last step: errors or signs of trust of a track, and the summary that is printed and written."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from posefit.fitting.shape import NAMES, Shape
+from posefit.fitting.tracker import Frame, Task
+from posefit.geometry.skeleton import Skeleton
+from posefit.listening import Listener
+from posefit.measuring.gait import gait_of
+from posefit.measuring.heading import backwards, warned
+from posefit.motion.motion import Motion
+from posefit.tracking.evaluation import LOST, Evaluation, unseen
+from posefit.tracking.follow import Tracked
+from posefit.tracking.measures import Measures
+from posefit.tracking.method import Method
+from posefit.tracking.options import TrackOptions
+from posefit.tracking.outputs import Output
+from posefit.tracking.restarts import RELOCALISED
+from posefit.tracking.smoothing.smooth import Pass
+from posefit.tracking.trust.evidence import trust_of
+from posefit.uncertainty.modes import TrackMode, modes_of, track_modes
+from posefit.version import __version__
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A tracked motion with its errors or signs of trust."""
+
+    motion: Motion  # the estimate
+    truth: Motion | None = field(repr=False)
+    measures: Measures
+    frames: list[dict[str, float]] = field(repr=False)  # one row a frame: see posefit.tracking.measures.FRAME
+    summary: dict[str, Any] = field(repr=False)  # what `posefit track --json` prints
+    found: list[Frame] = field(repr=False)  # the tracker's frames, as they are in the end
+    modes: list[TrackMode] = field(default_factory=list, repr=False)  # of the whole track, the likeliest first
+
+
+def evaluate(
+    smoothed: Pass,
+    method: Method,
+    task: Task,
+    tracked: Tracked,
+    options: TrackOptions,
+    output: Output,
+    listener: Listener,
+    source: Mapping[str, Any],
+) -> Track:
+    """Return a track with errors against the truth where it is known, else signs of trust, and write its files."""
+    scene, shape = smoothed.scene, smoothed.shape
+    skeleton = scene.body.skeleton
+    frames = [
+        frame if frame.posterior is None else replace(frame, modes=modes_of(skeleton, frame.posterior))
+        for frame in smoothed.frames
+    ]
+    modes = _trajectory_modes(skeleton, frames)
+    for warning in method.audit.warnings:
+        listener.say(f"warning: {warning}")
+    evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
+    for frame, observation in zip(frames, scene.observations, strict=True):
+        evaluation.add(frame, observation)
+    rows, measures = evaluation.close()
+    estimate = Motion(
+        scene.name,
+        skeleton,
+        np.array([frame.pose for frame in frames]),
+        np.array([frame.translation for frame in frames]),
+        scene.fps,
+    )
+    walks_back = backwards(estimate, unseen(rows))
+    warnings = [*scene.warnings, *method.audit.warnings]
+    if scene.truth is None and (warning := warned(walks_back)):
+        listener.say(f"warning: {warning}")
+        warnings.append(warning)
+    summary = {
+        "motion": scene.name,
+        **source,
+        "method": method.name,
+        "seed": options.seed,
+        "frames": len(frames),
+        **measures.as_dict(),
+        **({"history": frames[0].history.tolist()} if len(frames) == 1 else {}),
+        "evaluations_per_frame": task.evaluations,
+        "dimensions": method.dimensions(task),
+        "hypotheses": tracked.hypotheses,
+        "version": __version__,
+        "train": [motion.name for motion in task.training],
+        "translation": task.translation,
+        "first_pose": options.first_pose,
+        "smooth": options.smooth,
+        "passes": options.passes,
+        "kept_pass": smoothed.number,
+        "views": len(scene.cameras),
+        "camera": scene.placing,
+        "size": [scene.cameras[0].width, scene.cameras[0].height],
+        "fps": scene.fps,
+        "settings": method.settings,
+        "body": None if shape is None else _build(shape),
+        "modes": [round(mode.weight, 6) for mode in modes] or None,
+        "none_of_modes": _no_mode_probability(frames),
+        "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
+        "lost_frames": _numbers(rows, "lost", LOST),
+        "relocalised": [k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
+        "retracked_from": tracked.start,
+        "backwards_share": round(float(walks_back.mean()), 6),
+        "trust": None if scene.truth is not None else trust_of(scene, tracked.frames, frames, rows, measures.iou),
+        "gait": gait_of(estimate, unseen(rows)).as_dict(),
+        "warnings": warnings,
+    }
+    output.finish(scene, estimate, frames, rows, summary)
+    return Track(estimate, scene.truth, measures, rows, summary, frames, modes)
+
+
+def _trajectory_modes(skeleton: Skeleton, frames: Sequence[Frame]) -> list[TrackMode]:
+    """Return the modes of a whole track; none where its frames' posteriors are no trajectories."""
+    each = [frame.posterior for frame in frames if frame.posterior is not None and frame.posterior.coherent]
+    whole = len(each) == len(frames) and len({len(one) for one in each}) == 1
+    return track_modes(skeleton, each) if whole else []
+
+
+def _no_mode_probability(frames: Sequence[Frame]) -> float | None:
+    """Return how likely no mode of a frame is right, the mean over frames; None where it is unknown."""
+    learned = [frame.posterior.recalibration for frame in frames if frame.posterior is not None]
+    known = [one.none for one in learned if one is not None]
+    return round(float(np.mean(known)), 6) if known else None
+
+
+def _numbers(rows: Sequence[Mapping[str, float]], name: str, least: float) -> list[int] | None:
+    """Return the frames that have so much in a column; None where it is blank in all."""
+    if np.isnan([row[name] for row in rows]).all():
+        return None
+    return [int(row["frame"]) for row in rows if row[name] >= least]
+
+
+def _build(shape: Shape) -> dict[str, Any]:
+    """Return a build as the summary holds it."""
+    return {
+        "stature": shape.body.stature,
+        "cost": shape.cost,
+        "factors": dict(zip(NAMES, shape.factors.tolist(), strict=True)),
+        "spread": dict(zip(NAMES, shape.spread.tolist(), strict=True)),
+    }

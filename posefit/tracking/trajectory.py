@@ -1,0 +1,108 @@
+"""What a whole trajectory costs, which of two is kept, and the effort of several together.
+
+A frame does not distinguish a stride from its mirror image, but a clip does: a wrong initial guess fits a little worse
+in most frames, or has to jump. So a trajectory that is judged as a whole is right more often than each of its frames.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Frame
+from posefit.geometry.skeleton import Skeleton
+from posefit.motion.motion import Motion
+
+STEPS_PER_SECOND = 30.0  # how often velocities are compared, so that the jitter of a search counts alike at any rate
+WALKING_SPEED = 1.0  # metres a second, of the joints about the root: the typical speed where nothing is learned from
+MIN_TYPICAL_SPEED = 0.25  # metres a second
+TURNING = 2.0  # typical speeds, which a joint's velocity changes by when it turns around on the spot
+JUMP = 5.0  # typical speeds: where the velocities of all joints change by more, the body is somewhere else
+
+
+@dataclass(frozen=True)
+class TrajectoryCost:
+    """What a whole trajectory costs."""
+
+    cost: float  # mean silhouette mismatch of the frames that show enough, 0 to 100. SAPSO (4)
+    motion: float  # half the mean squared change of velocity, over that of turning around
+
+    @property
+    def total(self) -> float:
+        """By which trajectories are compared: the less the better."""
+        return self.cost + self.motion
+
+
+def cheaper(cost: float, than: float, tolerance: float = 1.0) -> bool:
+    """Return whether a later trajectory replaces an earlier one: it costs less than so many times as much."""
+    return cost < tolerance * than
+
+
+def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
+    """Return the mean cost of the frames that show enough of the person; of all frames where none does."""
+    costs = np.array([frame.cost for frame in frames])
+    return float(costs[usable].mean() if usable.any() else costs.mean())
+
+
+def with_total_effort(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Frame]:
+    """Return the frames of the track that is kept, with the evaluations and the time of all tracks.
+
+    The course of a search is given as if all tracks went on abreast: its evaluations are stretched to those of all.
+    """
+    return [_with_total(together, together[kept]) for together in zip(*tracks, strict=True)]
+
+
+def _with_total(together: Sequence[Frame], frame: Frame) -> Frame:
+    total, cpu_seconds = sum(one.evaluations for one in together), [one.cpu_seconds for one in together]
+    known = [seconds for seconds in cpu_seconds if seconds is not None]
+    return replace(
+        frame,
+        evaluations=total,
+        seconds=sum(one.seconds for one in together),
+        cpu_seconds=sum(known) if len(known) == len(cpu_seconds) else None,
+        spent=None if frame.spent is None else frame.spent * total // max(frame.evaluations, 1),
+    )
+
+
+def typical_speed(training: Sequence[Motion]) -> float:
+    """Return the root mean square speed of joints about the root in some motions, in metres a second."""
+    squares = [_mean_squares(_velocities(motion.skeleton.joints(motion.poses), motion.fps)) for motion in training]
+    each = np.concatenate(squares) if squares else np.empty(0)
+    return max(float(np.sqrt(each.mean())), MIN_TYPICAL_SPEED) if len(each) else WALKING_SPEED
+
+
+def trajectory_cost(
+    frames: Sequence[Frame], usable: Sequence[bool], skeleton: Skeleton, fps: float, speed: float
+) -> TrajectoryCost:
+    """Return what a whole trajectory costs; held frames count for nothing, unless all are held.
+
+    The motion term is half the squared change of a joint's velocity about the root, from one thirtieth of a second to
+    the next, over the square of twice the typical `speed`: a joint that turns around on the spot at that speed costs a
+    half. It is the mean over joints and frames, and is added to the mean silhouette cost as it is. A frame counts for
+    five typical speeds at most: a body that jumped has jumped, however far.
+    """
+    shown = np.asarray(usable, dtype=bool)
+    velocities = _velocities(skeleton.joints(np.array([frame.pose for frame in frames])), fps)
+    step = _step(fps)
+    changes = _mean_squares(velocities[step:] - velocities[:-step])
+    counted = shown[: -2 * step] & shown[step:-step] & shown[2 * step :]  # of each change, its three frames
+    terms = 0.5 * np.minimum(changes[counted], (JUMP * speed) ** 2) / (TURNING * speed) ** 2
+    return TrajectoryCost(mean_cost(frames, shown), float(terms.mean()) if len(terms) else 0.0)
+
+
+def _step(fps: float) -> int:
+    """Return how many frames a thirtieth of a second is, one at least."""
+    return max(round(fps / STEPS_PER_SECOND), 1)
+
+
+def _velocities(joints: Array, fps: float) -> Array:
+    """Return the velocities (T - step, 27, 3) of joints (T, 27, 3) about the root, in metres a second."""
+    step, rooted = _step(fps), joints - joints[:, :1]
+    return np.asarray((rooted[step:] - rooted[:-step]) * (fps / step))
+
+
+def _mean_squares(velocities: Array) -> Array:
+    """Return the mean square (T,) of velocities (T, 27, 3), over the joints."""
+    return np.asarray((velocities**2).sum(axis=2).mean(axis=1))
