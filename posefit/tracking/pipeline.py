@@ -56,7 +56,7 @@ def track_scene(
             listener.say(f"warning: {warning}")
         method = prepare(options, task)
         guess = initialise(scene, method, task, options, listener)
-        method.audit.forget()  # what was tried before the first frame is in no row
+        method.audit.clear()  # what was tried before the first frame is in no row
         hypotheses = follow(guess, method, options, output, listener)
         tracked = retrack(guess, method, hypotheses, options, listener)
         if tracked.start is not None:
