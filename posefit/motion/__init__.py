@@ -5,7 +5,7 @@
 | a clip: poses, translations, frames a second; cutting and resampling it | motion.py |
 | Acclaim skeletons, such as CMU's `02.asf` | asf.py |
 | Acclaim motions, such as CMU's `02_01.amc`; `read_clip` reads both files at once | amc.py |
-| recorded clips of ten people, with the package; the script that made them | recorded.py, make_recorded.py |
+| recorded clips of ten people, with the package | recorded.py |
 | BVH, through the optional library pybvh | bvh.py |
 
 A file is hostile until parsed: what is wrong with it raises ValueError with the file, the line, what was expected

@@ -2,11 +2,11 @@
 
 Every kind has styles, each from another person: `walk-a`, `walk-b`, ... Kinds are `walk`, `run`, `march` (raising the
 knees on the spot), `jacks` (jumping jacks), `squat`, `jump`, `step` (walking on the spot), and `arms-out` and `wave`
-(walking with both arms held out, or with one waving). Without a letter it is the mean of the
-styles, in step. So `walk` is none of the motions that its prior is trained on, but within their reach; a prior trained
-on other people only, as for `walk-a`, is the harder case.
-They were fitted to CMU clips by `fit_built_in.py`; the arms that are held out or wave are drawn by hand. The data used
-in this project was obtained from mocap.cs.cmu.edu. The database was created with funding from NSF EIA-0196217.
+(walking with both arms held out, or with one waving). Without a letter it is the mean of the styles, in step. So `walk`
+is none of the motions that its prior is trained on, but within their reach; a prior trained on other people only, as
+for `walk-a`, is the harder case. They were fitted to CMU clips by `docs/studies/make_motions.py`; arms held out or
+waving are drawn by hand. The data used in this project was obtained from mocap.cs.cmu.edu. The database was created
+with funding from NSF EIA-0196217.
 """
 
 import json

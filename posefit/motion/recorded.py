@@ -1,9 +1,9 @@
 """The library of recorded motions: clips of ten people, so that no motion capture of your own is needed.
 
-They walk, run, jump, turn, dance, fight, sweep the floor, and play animals. `make_recorded.py` made the file from clips
-of the CMU database: a clip keeps the poses between which the others can be interpolated, no joint more than about a
-centimetre off. The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding
-from NSF EIA-0196217.
+They walk, run, jump, turn, dance, fight, sweep the floor, and play animals. `docs/studies/make_library.py` made the
+file from clips of the CMU database: a clip keeps the poses between which the others can be interpolated, no joint more
+than about a centimetre off. The data used in this project was obtained from mocap.cs.cmu.edu. The database was created
+with funding from NSF EIA-0196217.
 
     from posefit.motion import recorded
 

@@ -11,8 +11,6 @@ from click.testing import CliRunner
 
 from posefit.cli import main
 from posefit.motion import recorded
-from posefit.motion.built_in import average_skeleton
-from posefit.motion.make_recorded import LONGEST_GAP, TOLERANCE, kept_frames
 from tests.cases import each
 
 ROUNDED = 1e-3  # metres: what rounding 66 angles to a thousandth of a radian may move a hand by, and more
@@ -40,7 +38,7 @@ def test_a_clip_is_the_recorded_one_to_a_centimetre(cmu30: Path, subject: str) -
                 stored["poses"][part].astype(float), stored["translations"][part].astype(float)
             )
             away = np.linalg.norm(found.skeleton.joints(motion.poses, motion.translations) - true, axis=-1)
-            assert away.max() < TOLERANCE + ROUNDED
+            assert away.max() < 0.01 + ROUNDED
 
 
 def test_the_file_is_small_says_where_it_comes_from_and_opens_without_pickle() -> None:
@@ -62,18 +60,6 @@ def test_between_two_stored_poses_lies_their_mean_and_after_the_last_nothing_mov
     assert translations[0] == pytest.approx(clip.translations[k : k + 2].mean(axis=0), abs=1e-12)
     assert np.array_equal(poses[1], clip.poses[-1])
     assert np.array_equal(translations[1], clip.translations[-1])
-
-
-def test_a_body_at_rest_leaves_few_frames_and_one_that_moves_all() -> None:
-    average = average_skeleton()
-    rest = np.zeros((50, 66))
-    assert kept_frames(average, rest, np.zeros((50, 3))).tolist() == [*range(0, 49, LONGEST_GAP), 49]
-    # the root is thrown to and fro by twice the tolerance: every frame is a corner
-    thrown = np.zeros((50, 3))
-    thrown[::2, 1] = 4.0 * TOLERANCE
-    assert kept_frames(average, rest, thrown).tolist() == list(range(50))
-    # at an even pace, everything lies on a line
-    assert len(kept_frames(average, rest, np.linspace(0.0, 5.0, 50)[:, None] * [1.0, 0.0, 0.0])) == 8
 
 
 def test_people_are_chosen_by_name() -> None:

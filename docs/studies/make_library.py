@@ -1,4 +1,4 @@
-"""Makes the library of recorded motions: `python -m posefit.motion.make_recorded CMU30_DIR`.
+"""Makes the library of recorded motions: `python docs/studies/make_library.py CMU30_DIR`.
 
 CMU30_DIR holds clips at 30 frames a second: one NN.npz a subject with `poses` (T, 66) in radians, `translations` (T, 3)
 in metres, `names` and `lengths` of the clips, and their skeletons in asf/NN.asf. Of each clip those poses are stored
@@ -7,16 +7,17 @@ added; its result, recorded.npz, is what the package carries.
 """
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import joint_angles_from_rotation
 from posefit.geometry.skeleton import Skeleton
+from posefit.motion import recorded
 from posefit.motion.asf import read_asf
 from posefit.motion.recorded import FPS, STEP
 
@@ -51,6 +52,8 @@ def kept_frames(skeleton: Skeleton, poses: Array, translations: Array) -> NDArra
     return np.array(rows)
 
 
+@click.command()
+@click.argument("root", metavar="CMU30_DIR", type=click.Path(path_type=Path))
 def main(root: Path) -> None:
     """Write recorded.npz beside this file. Raises ValueError where CMU30_DIR holds no subject."""
     files = sorted(root.glob("*.npz"), key=lambda path: int(path.stem))
@@ -90,7 +93,7 @@ def main(root: Path) -> None:
             counts.append(len(rows))
             gaps.append(np.diff(rows, prepend=0))
             numbers.append(changes)
-    target = Path(__file__).with_name("recorded.npz")
+    target = Path(recorded.__file__).with_name("recorded.npz")
     np.savez_compressed(
         target,
         origin=np.array(ORIGIN),
@@ -106,9 +109,4 @@ def main(root: Path) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m posefit.motion.make_recorded CMU30_DIR")
-    try:
-        main(Path(sys.argv[1]))
-    except ValueError as error:
-        sys.exit(str(error))
+    main()

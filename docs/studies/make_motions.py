@@ -1,4 +1,4 @@
-"""Fits the built-in motions and the average skeleton to CMU clips: `python -m posefit.motion.fit_built_in CMU_DIR`.
+"""Fits the built-in motions and the average skeleton to CMU clips: `python docs/studies/make_motions.py CMU_DIR`.
 
 A motion is a period and, for each free angle and the root's path, a Fourier series over that period. What is stored
 are these few numbers, no recorded frame. It is run by hand when a motion is added; its result, built_in.json, is
@@ -6,22 +6,68 @@ what the package carries. Without an argument, CMU_DIR is the environment variab
 """
 
 import json
-import os
-import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import click
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
-from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
+from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
+from posefit.motion import built_in
 from posefit.motion.amc import read_clip
 from posefit.motion.asf import read_asf
 from posefit.motion.built_in import activity_of
-from posefit.motion.fit_arms import PHASES, drawn, held_out, waving
+
+PHASES = 48  # of a cycle, at which the arms are drawn
+SWING = np.radians(28.0)  # a waving forearm, to either side of upright
+WAVES = 2  # in a cycle
+BOB = np.radians(5.0)  # arms held out sink and rise once a cycle
+
+
+def held_out(phases: Array, side: float) -> tuple[Array, Array]:
+    """Return where upper arm and forearm point (n, 3) when the arm is held out; `side` is 1 for the left."""
+    lift = -0.05 + np.sin(BOB) * side * np.cos(2.0 * np.pi * phases)
+    flat = np.full(len(phases), side)
+    return np.column_stack([flat, lift, 0.05 + 0.0 * flat]), np.column_stack([flat, lift + 0.1, 0.25 + 0.0 * flat])
+
+
+def waving(phases: Array, side: float) -> tuple[Array, Array]:
+    """Return where upper arm and forearm point (n, 3) when the hand waves beside the head."""
+    swing = SWING * np.sin(2.0 * np.pi * WAVES * phases)
+    flat = np.full(len(phases), side)
+    upper = np.column_stack([flat, -0.15 + 0.0 * flat, 0.2 + 0.0 * flat])
+    return upper, np.column_stack([side * np.sin(swing) + 0.1 * side, np.cos(swing), 0.15 + 0.0 * flat])
+
+
+def drawn(skeleton: Skeleton, side: str, upper: Array, fore: Array) -> tuple[list[int], Array]:
+    """Return the angles' places in a pose, and the angles (n, 4), of an arm that points where it should.
+
+    Each pose starts from the one before, so that the angles go on smoothly.
+    """
+    shoulder, elbow, wrist = (JOINTS.index(side + name) for name in ("clavicle", "humerus", "radius"))
+    first, bend = angle_index(elbow), angle_index(wrist)
+    places = [first, first + 1, first + 2, bend]
+
+    def residual(angles: Array, upper: Array, fore: Array, before: Array) -> Array:
+        pose = np.zeros((1, ANGLES))
+        pose[0, places] = angles
+        joints = skeleton.joints(pose)[0]
+        ways = (joints[elbow] - joints[shoulder], upper), (joints[wrist] - joints[elbow], fore)
+        off = [way / np.linalg.norm(way) - wanted / np.linalg.norm(wanted) for way, wanted in ways]
+        return np.concatenate([*off, 0.02 * (angles - before)])
+
+    solutions = np.zeros((len(upper), 4))
+    guess = np.radians([0.0, 0.0, 0.0, 40.0])
+    for k in range(len(upper)):
+        guess = np.asarray(least_squares(residual, guess, args=(upper[k], fore[k], guess)).x)
+        solutions[k] = guess
+    return places, solutions
+
 
 ORIGIN = (
     "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
@@ -195,6 +241,8 @@ def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
     model["series"][1][0] = round(model["series"][1][0] + 0.03 - float(joints[..., 1].min()), DIGITS)
 
 
+@click.command()
+@click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
 def main(root: Path) -> None:
     """Write built_in.json beside this file. Raises ValueError where a file it needs is missing."""
     needed = [f"{subject}/{subject}.asf" for subject in SUBJECTS] + [f"{clip.path}.amc" for clip in CLIPS.values()]
@@ -214,17 +262,11 @@ def main(root: Path) -> None:
         armed(model, skeleton, activity_of(name))
         grounded(model, skeleton)
         print(f"{name}: period {model['period']} s, {model['speed']} m/s, residual {model['residual_degrees']} degrees")
-    target = Path(__file__).with_name("built_in.json")
+    target = Path(built_in.__file__).with_name("built_in.json")
     text = json.dumps({"origin": ORIGIN, "skeleton": bones, "motions": motions}, separators=(",", ":"))
     target.write_text(text + "\n", encoding="utf-8")
     print(f"{target.name}: {len(text)} bytes")
 
 
 if __name__ == "__main__":
-    folders = sys.argv[1:] or [folder for folder in [os.environ.get("POSEFIT_CMU")] if folder]
-    if len(folders) != 1:
-        sys.exit("usage: python -m posefit.motion.fit_built_in CMU_DIR")
-    try:
-        main(Path(folders[0]))
-    except ValueError as error:
-        sys.exit(str(error))
+    main()
