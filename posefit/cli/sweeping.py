@@ -89,14 +89,14 @@ def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json:
         raise click.UsageError("--port must be given with --serve, got it without")
     from posefit.report.write import leaderboard_lines, write_report
 
-    found = write_report(ledger, out, say=say, **others)
+    found = write_report(ledger, out, warn=say, **others)
     for line in [json_line(found)] if as_json else leaderboard_lines(found):
         click.echo(line)
 
 
 def _serve(ledger: str, port: int) -> None:
     """Show the report of a ledger until somebody presses Ctrl-C."""
-    from posefit.report.live.server import address_of, serving
+    from posefit.report.live import address_of, serving
 
     with suppress(KeyboardInterrupt), serving(ledger, port, say) as server:
         click.echo(f"showing {ledger} at {address_of(server)} until Ctrl-C")

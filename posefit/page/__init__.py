@@ -1,11 +1,12 @@
-"""Pages that hold everything they need and ask nobody for anything: what the report and a track's viewer share.
+"""Pages in one file without network requests: what the report and a track's page share.
 
 | looking for | file |
 |---|---|
-| markup, style, data and scripts as one document; JSON that may stand in it | document.py |
+| markup, style, data and scripts as one document; JSON that is safe in it | document.py |
 | cameras and joints as a page's scripts read them | bodies.py |
-| how pages look: colours for light and dark, type, buttons, tables | base.css |
-| elements, numbers in words, drawings that follow the width of their box | base.js |
+| the head of every page, and its look: colours for light and dark, type, buttons, tables | head.html, base.css |
+| elements, and numbers in words | base.js |
+| charts: axes, curves, bands, texts; drawings that follow the width of their box | chart.js |
 | bodies of tapered cones on a canvas, seen by any camera; a view that can be turned | body.js |
 | a clock that plays frames; mouse, touch and keys that turn a view | play.js |
 

@@ -1,10 +1,10 @@
-// Bodies on a canvas: joints in metres from the scene's origin, seen by a camera of the scene or by one that turns.
+// Bodies on a canvas: joints in metres from the scene's origin, by a camera of the scene or by one that turns.
 const BONES = D.parents.map((parent, joint) => [parent, joint]).slice(1);
-const NEAR = 0.05; // metres before a camera: what is nearer is not drawn
+const NEAR = 0.05; // metres before a camera: nearer parts are not drawn
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const limbs = () => ({ left: ink("--left"), right: ink("--right"), middle: ink("--middle") });
 
-// Numbers of 16 bits in base 64: a function of the place that gives one, null where there is none.
+// Numbers of 16 bits in base 64: a function from the place to the number, null where there is none.
 function unpacked(text) {
   const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
   const view = new DataView(bytes.buffer);
@@ -14,7 +14,7 @@ function unpacked(text) {
   };
 }
 
-// Joints of all frames of a track: a function of the frame that gives 27 points.
+// Joints of all frames of a track: a function from the frame to 27 points.
 function decoded(text) {
   const at = unpacked(text);
   const count = D.joints.length;
@@ -38,8 +38,8 @@ function sheet(canvas, ratio) {
   return { pen, width, height };
 }
 
-// Where a camera sees points: pixels x, y and depth.
-const seen = (camera, points) =>
+// The points that a camera projects: pixels x, y and depth.
+const projected = (camera, points) =>
   points.map((point) => {
     const [x, y, z] = camera.rotation.map(
       (row, k) => row[0] * point[0] + row[1] * point[1] + row[2] * point[2] + camera.translation[k],
@@ -61,38 +61,37 @@ function sticks(pen, pixels, colours, width) {
 }
 
 // Adds a bone's tapered cone to a path: the hull of two discs. All its parts turn the same way, so that they fill as
-// one. Returns whether there is anything to see of it.
-function addCone(path, camera, pixels, radii, bone) {
+// one. Returns whether any of it is visible.
+function addCone(shape, camera, pixels, radii, bone) {
   const [parent, joint] = BONES[bone];
   const [ax, ay, az] = pixels[parent];
   const [bx, by, bz] = pixels[joint];
   if (az <= NEAR || bz <= NEAR) return false;
   const a = (radii[bone][0] * camera.focal[0]) / az;
   const b = (radii[bone][1] * camera.focal[0]) / bz;
-  for (const [x, y, r] of [
-    [ax, ay, a],
-    [bx, by, b],
-  ]) {
-    path.moveTo(x + r, y);
-    path.arc(x, y, r, 0, 2 * Math.PI);
-  }
+  const disc = (x, y, r) => {
+    shape.moveTo(x + r, y);
+    shape.arc(x, y, r, 0, 2 * Math.PI);
+  };
+  disc(ax, ay, a);
+  disc(bx, by, b);
   const length = Math.hypot(bx - ax, by - ay);
   if (length <= Math.abs(a - b)) return true;
   const along = Math.atan2(by - ay, bx - ax);
   const slope = Math.acos((a - b) / length);
   const on = (x, y, r, angle) => [x + r * Math.cos(angle), y + r * Math.sin(angle)];
-  path.moveTo(...on(ax, ay, a, along - slope));
+  shape.moveTo(...on(ax, ay, a, along - slope));
   for (const corner of [on(bx, by, b, along - slope), on(bx, by, b, along + slope), on(ax, ay, a, along + slope)])
-    path.lineTo(...corner);
-  path.closePath();
+    shape.lineTo(...corner);
+  shape.closePath();
   return true;
 }
 
 // The outline of a body of tapered cones.
 function outline(camera, pixels, radii) {
-  const path = new Path2D();
-  BONES.forEach((_, bone) => addCone(path, camera, pixels, radii, bone));
-  return path;
+  const shape = new Path2D();
+  BONES.forEach((_, bone) => addCone(shape, camera, pixels, radii, bone));
+  return shape;
 }
 
 const gaze = { yaw: 0.7, pitch: 0.15, zoom: 1 };
@@ -110,32 +109,28 @@ function turned(target, width, height) {
   return { rotation, translation: back, focal: [1.75 * height, 1.75 * height], centre: [width / 2, height / 2] };
 }
 
-// Clears a canvas, draws the floor about a person in it, and gives the pen with the camera of the gaze.
+// Clears a canvas, draws the floor around a person in it, and gives the pen with the camera of the gaze.
 function stage(canvas, person, floor, ratio) {
   const { pen, width, height } = sheet(canvas, ratio);
   const camera = turned([person[0], floor + 0.9, person[2]], width, height);
   pen.strokeStyle = ink("--line");
   pen.lineWidth = 1;
   const tile = 0.5;
-  const [x0, z0] = [0, 2].map((k) => Math.round(person[k] / tile) * tile);
+  const [x, z] = [0, 2].map((k) => Math.round(person[k] / tile) * tile);
+  const tileLine = (...ends) => {
+    const [a, b] = projected(
+      camera,
+      ends.map(([right, back]) => [x + right, floor, z + back]),
+    );
+    if (a[2] < 0.1 || b[2] < 0.1) return;
+    pen.beginPath();
+    pen.moveTo(a[0], a[1]);
+    pen.lineTo(b[0], b[1]);
+    pen.stroke();
+  };
   for (const k of range(9).map((one) => (one - 4) * tile)) {
-    for (const ends of [
-      [
-        [x0 + k, floor, z0 - 2],
-        [x0 + k, floor, z0 + 2],
-      ],
-      [
-        [x0 - 2, floor, z0 + k],
-        [x0 + 2, floor, z0 + k],
-      ],
-    ]) {
-      const [a, b] = seen(camera, ends);
-      if (a[2] < 0.1 || b[2] < 0.1) continue;
-      pen.beginPath();
-      pen.moveTo(a[0], a[1]);
-      pen.lineTo(b[0], b[1]);
-      pen.stroke();
-    }
+    tileLine([k, -2], [k, 2]);
+    tileLine([-2, k], [2, k]);
   }
   return { pen, camera };
 }

@@ -1,4 +1,4 @@
-"""A document that holds everything it needs, markup, style, scripts and data, and asks nobody for anything."""
+"""A document that holds everything it needs: markup, style, scripts and data. It makes no network request."""
 
 import json
 from collections.abc import Sequence
@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-PART = "<!--part-->"  # in the markup: where style, data and scripts go
-SHARED = ("base", "body", "play")  # scripts of pages with bodies, in this order; of others the first is enough
+PART = "<!--part-->"  # in the markup: the places of style, data and script
+SHARED = ("base", "chart", "body", "play")  # scripts of every page, in this order
 _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
 
@@ -18,27 +18,26 @@ def part(package: str, name: str) -> str:
 
 
 def assembled(mark: str, markup: str, style: str, data: Any, script: str) -> str:
-    """Return a document: its first line, its markup with the three parts in it. `style` comes after the shared one."""
-    before, middle, after, end = markup.split(PART)
-    held = f'<script type="application/json" id="data">{embedded(data)}</script>'
-    look = f"<style>\n{part(__package__, 'base.css')}{style}</style>"
-    return "".join([mark, before, look, middle, held, after, f"<script>\n{script}</script>", end])
+    """Return a document: its first line `mark`, the shared head, and its markup with style, data and script in it."""
+    before, middle, after, end = f"{part(__package__, 'head.html')}{markup}".split(PART)
+    json_element = f'<script type="application/json" id="data">{embedded(data)}</script>'
+    style_element = f"<style>\n{part(__package__, 'base.css')}{style}</style>"
+    return "".join([mark, before, style_element, middle, json_element, after, f"<script>\n{script}</script>", end])
 
 
-def as_one(shared: Sequence[str], *others: tuple[str, Sequence[str]]) -> str:
-    """Return scripts as one, so that no name of theirs reaches beyond it: those shared, then of each other package."""
-    rooms = [(__package__, shared), *others]
-    parts = [part(package, f"{name}.js") for package, names in rooms for name in names]
+def one_script(package: str, names: Sequence[str]) -> str:
+    """Return the shared scripts and those of a package as one whose names are not global."""
+    parts = [part(__package__, f"{name}.js") for name in SHARED] + [part(package, f"{name}.js") for name in names]
     return '"use strict";\n(() => {\n' + "\n".join(parts) + "})();\n"
 
 
 def embedded(value: Any) -> str:
-    """Return JSON that may stand in a script element, whatever texts it holds; nan and infinities are null."""
+    """Return JSON that is safe in a script element, whatever texts it holds; nan and infinities are null."""
     return json.dumps(plain(value), allow_nan=False, separators=(",", ":")).translate(_UNSAFE)
 
 
 def plain(value: Any) -> Any:
-    """Return what JSON can hold: arrays as lists, floats of five digits, nan and infinities as None."""
+    """Return a value that JSON can hold: arrays as lists, floats of five digits, nan and infinities as None."""
     if isinstance(value, dict):
         return {str(name): plain(one) for name, one in value.items()}
     if isinstance(value, np.ndarray):

@@ -1,12 +1,12 @@
-// What moves a page's bodies: a clock, and whoever turns them.
-// A clock that goes on by some frames at a time, and the button that starts and stops it; returns what does that, too.
-// `pace` gives the milliseconds of a frame, and `advance` is told how many are over.
-function clock(button, pace, advance) {
+// What moves a page's bodies: a clock, and turning by mouse, touch and keys.
+// A clock with the button that starts and stops it; returns the function that does, too. `pace` gives the milliseconds
+// of a frame, and `advance` gets the number of frames that are over.
+function clock(control, pace, advance) {
   let handle = null;
   const play = (on) => {
     if (handle) cancelAnimationFrame(handle);
     handle = null;
-    button.textContent = on ? "Pause" : "Play";
+    control.textContent = on ? "Pause" : "Play";
     if (!on) return;
     let last = performance.now();
     const tick = (now) => {
@@ -19,11 +19,11 @@ function clock(button, pace, advance) {
     };
     handle = requestAnimationFrame(tick);
   };
-  button.onclick = () => play(!handle);
+  control.onclick = () => play(!handle);
   return play;
 }
 
-// Lets mouse, touch and keys turn the gaze, and paints again whenever what a canvas shows may look different.
+// Lets mouse, touch and keys turn the gaze, and paints again whenever a canvas may look different.
 function turnable(canvas, repaint) {
   const turn = (yaw, pitch, zoom) => {
     gaze.yaw += yaw;
@@ -58,19 +58,12 @@ function turnable(canvas, repaint) {
     },
     { passive: false },
   );
-  const turns = {
-    ArrowLeft: [0.12, 0, 1],
-    ArrowRight: [-0.12, 0, 1],
-    ArrowUp: [0, 0.12, 1],
-    ArrowDown: [0, -0.12, 1],
-    "+": [0, 0, 1.1],
-    "=": [0, 0, 1.1],
-    "-": [0, 0, 1 / 1.1],
-  };
+  const keys = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "+", "=", "-"];
   canvas.addEventListener("keydown", (event) => {
-    if (!turns[event.key] || event.ctrlKey || event.metaKey) return;
+    const key = keys.indexOf(event.key);
+    if (key < 0 || event.ctrlKey || event.metaKey) return;
     event.preventDefault();
-    turn(...turns[event.key]);
+    turn([0.12, -0.12][key] ?? 0, [0.12, -0.12][key - 2] ?? 0, [1.1, 1.1, 1 / 1.1][key - 4] ?? 1);
   });
   new ResizeObserver(repaint).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);

@@ -1,4 +1,4 @@
-"""Runs for other people's tools: IOHprofiler's folders, and rows as CSV.
+"""Runs for other tools: IOHprofiler's folders, rows as CSV, and tables as LaTeX that needs no package.
 
 IOHprofiler: Doerr et al., IOHprofiler, 2018; the layout is that of IOHexperimenter's Analyzer logger. Readers: the
 library iohinspector, the web page IOHanalyzer.
@@ -6,23 +6,39 @@ library iohinspector, the web page IOHanalyzer.
 
 import csv
 import json
+import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from posefit.files import new_file, new_folder
+from posefit.geometry.skeleton import ANGLES
 from posefit.statistics.profiles import Trace, trace
 from posefit.version import __version__
 
+if TYPE_CHECKING:
+    from posefit.sweep.ledger import Ledger
+
 FORMAT = "0.3.18"  # the IOHexperimenter that the layout is of
 SUITE = "posefit"
-LARGEST = 2**16 - 1  # instance or dimension that iohinspector holds
+MAX_NUMBER = 2**16 - 1  # of an instance or a dimension, as iohinspector holds it
 _HEADER = "evaluations raw_y"
+_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    "[": "{[}",  # else a row's first cell could be read as an argument of the line break before it
+    "]": "{]}",
+    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +55,35 @@ class LoggedRun:
     costs: ArrayLike = field(repr=False)  # (k,), the best so far
 
 
+def logged_runs(ledger: "Ledger") -> Iterator[LoggedRun]:
+    """Yield the runs of a ledger of tracks that have a trace."""
+    for row in ledger.rows():
+        spec, trace = row["spec"], row["trace"]
+        if not trace["evaluations"]:
+            continue
+        views = " ".join(f"{view:g}" for view in spec["view_degrees"])
+        damage = "".join(f" {kind} {share:g}" for kind, share in sorted(spec["corruption"].items()))
+        more = {name: spec[name] for name in ("evaluations", "tracks", "version") if name in spec}
+        yield LoggedRun(
+            spec["method"],
+            {**spec["settings"], **more},
+            f"{spec['motion']} view {views}{damage} frames {spec['frames']} {spec['translation']}",
+            row.get("dimensions") or ANGLES,  # a tracker without a search space has the pose's dimension
+            spec["instance"],
+            spec["seed"],
+            trace["evaluations"],
+            trace["cost"],
+        )
+
+
 def write_iohprofiler(runs: Iterable[LoggedRun], path: str | Path) -> None:
     """Write a new folder `path` with a folder a method and, in it, a .json and a data folder a problem.
 
-    A method with other settings is another algorithm: its settings stand in its `info` and, where one name has several,
-    are numbered in the name. Problems are numbered in the order of their names. A row is written wherever the cost
-    falls, and at a run's end. Readers tell runs apart by evaluation 1: a trace that starts later, as where a whole
-    population was the first thing measured, has `inf` in that row, as nothing was known yet. Raises ValueError where a
-    run is senseless or comes twice, and where the folder exists or cannot be written.
+    A method with other settings is another algorithm: its settings are in its `info`, and numbered in its name if there
+    are several. Problems are numbered in the order of their names. A row is written wherever the cost falls, and at a
+    run's end. Readers separate runs by evaluation 1: a trace that starts later, such as after a whole population, has
+    `inf` in that row. Raises ValueError where a run is invalid or comes twice, and where the folder exists or cannot be
+    written.
     """
     algorithms = _grouped(runs)
     numbers = {
@@ -115,13 +152,13 @@ def _rows(run: Trace) -> tuple[list[int], list[float]]:
 
 def _grouped(runs: Iterable[LoggedRun]) -> dict[tuple[str, str], list[LoggedRun]]:
     """Return the checked runs of each (method, settings as JSON), in the order of both."""
-    found: dict[tuple[str, str], list[LoggedRun]] = {}
-    seen = set()
+    groups: dict[tuple[str, str], list[LoggedRun]] = {}
+    names = set()
     for run in runs:
         named = f"{run.method} on {run.problem}, instance {run.instance}, seed {run.seed}"
         for name, value, least in (("dimension", run.dimension, 1), ("instance", run.instance, 0)):
-            if not least <= value <= LARGEST:
-                raise ValueError(f"{named}: {name} must lie in {least} to {LARGEST}, got {value}")
+            if not least <= value <= MAX_NUMBER:
+                raise ValueError(f"{named}: {name} must lie in {least} to {MAX_NUMBER}, got {value}")
         try:
             used, _ = trace(run.evaluations, run.costs)
         except ValueError as error:
@@ -130,13 +167,13 @@ def _grouped(runs: Iterable[LoggedRun]) -> dict[tuple[str, str], list[LoggedRun]
             raise ValueError(f"{named}: evaluations must be whole numbers, got {used[used % 1.0 > 0.0][0]:g}")
         key = run.method, json.dumps(dict(run.settings), sort_keys=True, default=str)
         one = (*key, run.problem, run.dimension, run.instance, run.seed)
-        if one in seen:
+        if one in names:
             raise ValueError(f"runs must differ in method, settings, problem, instance or seed, got two of {named}")
-        seen.add(one)
-        found.setdefault(key, []).append(run)
-    if not found:
+        names.add(one)
+        groups.setdefault(key, []).append(run)
+    if not groups:
         raise ValueError("runs must be at least one, got none")
-    return dict(sorted(found.items()))
+    return dict(sorted(groups.items()))
 
 
 def _algorithm_names(keys: list[tuple[str, str]]) -> dict[tuple[str, str], str]:
@@ -151,28 +188,59 @@ def _algorithm_names(keys: list[tuple[str, str]]) -> dict[tuple[str, str], str]:
 
 
 def _file_names(names: list[str]) -> list[str]:
-    """Return names that every file system takes, no two alike, even where case does not count."""
-    found: list[str] = []
+    """Return distinct names that every file system accepts, even where case does not count."""
+    unique_names: list[str] = []
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9@+=#_-]+", "-", name).strip("-")[:80] or "unnamed"
-        taken = {one.lower() for one in found}
+        taken = {one.lower() for one in unique_names}
         k, unique = 2, plain
         while unique.lower() in taken:
             k, unique = k + 1, f"{plain}-{k}"
-        found.append(unique)
-    return found
+        unique_names.append(unique)
+    return unique_names
 
 
 def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
-    """Write rows as a new CSV file, in UTF-8; columns are all that any row has, in the order they are first met.
+    """Write rows as a new CSV file, in UTF-8; columns are all that any row has, in the order of their first row.
 
-    What a row lacks is left empty. Raises ValueError where there is no row, and where the file exists or cannot be
+    Missing values are left empty. Raises ValueError where there is no row, and where the file exists or cannot be
     written.
     """
-    found = list(rows)
-    if not found:
+    table = list(rows)
+    if not table:
         raise ValueError("rows must be at least one, got none")
     with new_file(path) as building, building.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in found for name in row)), restval="")
+        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in table for name in row)), restval="")
         writer.writeheader()
-        writer.writerows(found)
+        writer.writerows(table)
+
+
+def latex(text: str) -> str:
+    """Return text that LaTeX sets as it stands, on one line."""
+    return "".join(_SPECIAL.get(letter, letter) for letter in " ".join(text.split()))
+
+
+def latex_table(header: Sequence[str], rows: Iterable[Sequence[str | float | None]], digits: int = 2) -> str:
+    """Return a tabular: text to the left, numbers to the right with that many digits, None and nan as dashes.
+
+    Raises ValueError where a row has more or fewer cells than the header.
+    """
+    table = [list(row) for row in rows]
+    for row in table:
+        if len(row) != len(header):
+            raise ValueError(f"rows must have {len(header)} cells, as the header has, got {len(row)}")
+    numbers = [bool(table) and not any(isinstance(row[k], str) for row in table) for k in range(len(header))]
+    lines = [[latex(name) for name in header], *([_cell(cell, digits) for cell in row] for row in table)]
+    body = [" & ".join(cells) + r" \\" for cells in lines]
+    columns = "".join("r" if number else "l" for number in numbers)
+    return "\n".join(
+        [f"\\begin{{tabular}}{{{columns}}}", r"\hline", body[0], r"\hline", *body[1:], r"\hline", r"\end{tabular}", ""]
+    )
+
+
+def _cell(value: str | float | None, digits: int) -> str:
+    if isinstance(value, str):
+        return latex(value)
+    if value is None or math.isnan(value):
+        return "--"
+    return str(value) if isinstance(value, int) else f"{value:.{digits}f}"

@@ -1,7 +1,6 @@
-"""Figures for papers, drawn by matplotlib (posefit[figures]) from what the statistics return.
+"""Figures for papers, drawn by matplotlib (posefit[figures]), and the folder of a report's figures and tables.
 
-Each function returns a figure; `save` writes it as PNG, PDF or SVG. `methods` (m,) are names, and a method has the same
-colour in every figure that is given the same names.
+`methods` (m,) are names: a method has the same colour in every figure with the same names.
 """
 
 import importlib
@@ -12,17 +11,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.files import new_file
-from posefit.report.colours import METHODS
+from posefit.files import new_file, new_folder
+from posefit.geometry.skeleton import JOINTS
+from posefit.report.columns import COLUMNS
+from posefit.report.contest import contest_of, leaderboard
+from posefit.report.curves import certainty, convergence, grid, joint_errors, reached
+from posefit.report.export import latex_table, write_csv
+from posefit.report.runs import Runs
 from posefit.statistics.intervals import Intervals
-from posefit.statistics.ranks import Ranking
+from posefit.statistics.profiles import performance_profile
+from posefit.statistics.ranks import Ranking, friedman
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-STYLES = ("-", "--", ":", "-.")  # of the first seven methods, the next seven, and so on
+# Okabe and Ito, Color universal design, 2008, without their yellow; lines of the first seven methods, the next, ...
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+STYLES = ("-", "--", ":", "-.")
 FORMATS = (".png", ".pdf", ".svg")
+LEVELS = 200  # of a performance profile
 _SIZE = (6.4, 3.6)  # inches
 # a critical-difference plot: inches a row; rows above the line, and from one bar to the next
 _ROW, _ABOVE, _BAR = 0.24, 3.1, 0.4
@@ -39,50 +47,46 @@ def save(figure: "Figure", path: str | Path) -> None:
     """Write a figure as a new file; the same figure gives the same bytes. Raises as `check_figure` does."""
     check_figure(path)
     kind = Path(path).suffix.lower()
-    # nothing that differs from one run to the next
+    # nothing that differs between runs
     metadata: dict[str, Any] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}[kind]
     with new_file(path) as building, _library("").rc_context({"svg.hashsalt": "posefit"}):
         figure.savefig(building, dpi=200, bbox_inches="tight", metadata=metadata)  # long names too
 
 
-def curves_figure(
-    methods: Sequence[str], evaluations: Array, curves: Sequence[Intervals], label: str = "best cost"
-) -> "Figure":
-    """Return curves over evaluations (p,), each with its band: of each method the intervals of p values."""
+def curves_figure(methods: Sequence[str], evaluations: Array, curves: Sequence[Intervals]) -> "Figure":
+    """Return the best costs over evaluations (p,), each with its band: of each method the intervals of p values."""
     figure, axes = _figure()
     for k, curve in enumerate(curves):
         axes.plot(evaluations, curve.values, label=_plain(methods[k]), **_line(k))
         axes.fill_between(evaluations, curve.low, curve.high, color=_line(k)["color"], alpha=0.18, linewidth=0)
-    _finish(axes, "evaluations", label, methods)
+    _finish(axes, "evaluations", "best cost", methods)
     axes.set_xscale("log")
     return figure
 
 
 def attainment_figure(methods: Sequence[str], evaluations: Array, shares: Array) -> "Figure":
     """Return the shares (methods, p) of runs and targets reached within evaluations (p,)."""
+    figure = _shares_figure(methods, evaluations, shares, "evaluations", "share of runs and targets reached")
+    figure.axes[0].set_xscale("log")
+    return figure
+
+
+def profile_figure(methods: Sequence[str], levels: Array, shares: Array) -> "Figure":
+    """Return the shares (methods, levels) of runs whose error is within each level."""
+    return _shares_figure(methods, levels, shares, "error, degrees", "share of runs within")
+
+
+def _shares_figure(methods: Sequence[str], x: Array, shares: Array, x_label: str, y_label: str) -> "Figure":
     figure, axes = _figure()
     for k, share in enumerate(shares):
-        axes.step(evaluations, share, where="post", label=_plain(methods[k]), **_line(k))
-    _finish(axes, "evaluations", "share of runs and targets reached", methods)
-    axes.set_xscale("log")
+        axes.step(x, share, where="post", label=_plain(methods[k]), **_line(k))
+    _finish(axes, x_label, y_label, methods)
     axes.set_ylim(-0.02, 1.02)
     return figure
 
 
-def profile_figure(methods: Sequence[str], levels: Array, shares: Array, label: str = "error, degrees") -> "Figure":
-    """Return the shares (methods, levels) of runs within each level."""
-    figure, axes = _figure()
-    for k, share in enumerate(shares):
-        axes.step(levels, share, where="post", label=_plain(methods[k]), **_line(k))
-    _finish(axes, label, "share of runs within", methods)
-    axes.set_ylim(-0.02, 1.02)
-    return figure
-
-
-def joint_errors_figure(
-    methods: Sequence[str], joints: Sequence[str], errors: Sequence[Intervals], label: str = "error, mm"
-) -> "Figure":
-    """Return bars, a group a joint and in it one of each method; of each method the intervals of all joints."""
+def joint_errors_figure(methods: Sequence[str], joints: Sequence[str], errors: Sequence[Intervals]) -> "Figure":
+    """Return bars, a group for each joint with one for each method; of each method the intervals of all joints."""
     thick = 0.8 / len(methods)
     figure, axes = _figure((_SIZE[0], 1.1 + len(joints) * max(0.22, 0.09 * len(methods))))
     places = np.arange(len(joints))
@@ -95,29 +99,29 @@ def joint_errors_figure(
             xerr=reach,
             label=_plain(methods[k]),
             color=_line(k)["color"],
-            hatch=(None, "////", "....", "xxxx")[k // len(METHODS) % 4],
+            hatch=(None, "////", "....", "xxxx")[k // len(COLOURS) % 4],
             error_kw={"elinewidth": 0.8, "ecolor": "0.25"},
         )
     axes.set_yticks(places, [_plain(joint) for joint in joints])
     axes.set_ylim(len(joints) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)
-    _finish(axes, label, "", methods)
+    _finish(axes, "error, mm", "", methods)
     axes.set_xlim(left=0.0)
     return figure
 
 
 def reliability_figure(methods: Sequence[str], bins: Sequence[Sequence[Sequence[float]]]) -> "Figure":
-    """Return how often what is said is right, over how probable it is said to be.
+    """Return how often the likeliest mode is right, over its probability: on the diagonal if methods are calibrated.
 
-    Of each method rows of how many, their mean probability, and the share that is right; dots are as large as there are
-    many. Whose probabilities mean what they say has them on the diagonal.
+    Each method has rows of the number of frames, their mean probability, and the share that is right; the area of a dot
+    is the number.
     """
     figure, axes = _figure((5.2, 3.6))
     axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
     for k, one in enumerate(bins):
-        count, told, right = np.array(one, dtype=float).T
-        axes.plot(told, right, label=_plain(methods[k]), **_line(k))
-        axes.scatter(told, right, 8 + 80 * count / count.sum(), color=_line(k)["color"])
+        count, probability, right = np.array(one, dtype=float).T
+        axes.plot(probability, right, label=_plain(methods[k]), **_line(k))
+        axes.scatter(probability, right, 8 + 80 * count / count.sum(), color=_line(k)["color"])
     _finish(axes, "probability of the likeliest mode", "share of frames where it is right", methods)
     axes.set_xlim(-0.02, 1.02)
     axes.set_ylim(-0.02, 1.02)
@@ -130,9 +134,9 @@ def coverage_figure(
     widths: Sequence[Sequence[float]],
     shares: Sequence[Sequence[float]],
 ) -> "Figure":
-    """Return the share of joints within their intervals over how wide these are, a line a method, a dot a level.
+    """Return the share of joints within their intervals over their width: a line for each method, a dot for each level.
 
-    Lines across are what the intervals are to hold; of two methods whose dots are there, the one to the left is better.
+    Horizontal lines are the nominal shares.
     """
     figure, axes = _figure()
     for level in levels:
@@ -147,7 +151,7 @@ def coverage_figure(
 
 
 def critical_difference_figure(methods: Sequence[str], ranking: Ranking) -> "Figure":
-    """Return mean ranks on a line, best to the left; bars join methods that are not told apart. Demšar, 2006."""
+    """Return mean ranks on a line, best to the left; bars join methods that do not differ. Demšar, 2006."""
     count, half = len(methods), (len(methods) + 1) // 2
     names = 0.9 + _BAR * len(ranking.cliques)  # rows from the line to the first name
     rows = names + half
@@ -180,7 +184,7 @@ def critical_difference_figure(methods: Sequence[str], ranking: Ranking) -> "Fig
 
 
 def _ruler(axes: "Axes", difference: float, count: int) -> None:
-    """Draw how long the critical difference is, above the line."""
+    """Draw the critical difference above the line."""
     longer = difference > count - 1.0
     end, y = 1.0 + min(difference, count - 1.0), 0.6 - _ABOVE
     axes.plot([1, end], [y, y], color="black", linewidth=1.5)
@@ -205,11 +209,11 @@ def _figure(size: tuple[float, float] = _SIZE) -> "tuple[Figure, Axes]":
 
 
 def _line(k: int) -> dict[str, Any]:
-    return {"color": METHODS[k % len(METHODS)], "linestyle": STYLES[k // len(METHODS) % len(STYLES)]}
+    return {"color": COLOURS[k % len(COLOURS)], "linestyle": STYLES[k // len(COLOURS) % len(STYLES)]}
 
 
 def _plain(text: str) -> str:
-    """Return text that matplotlib does not read as mathematics."""
+    """Return text that matplotlib does not interpret as mathematics."""
     return text.replace("$", r"\$")
 
 
@@ -217,3 +221,49 @@ def _finish(axes: "Axes", x: str, y: str, methods: Sequence[str]) -> None:
     axes.set_xlabel(_plain(x))
     axes.set_ylabel(_plain(y))
     axes.figure.legend(loc="outside right upper", frameon=False, fontsize=8 if len(methods) < 20 else 6)
+
+
+def write_figures(runs: Runs, path: str | Path) -> None:
+    """Write a new folder of figures, as PNG and PDF, and the leaderboard as LaTeX and CSV.
+
+    Figures are left out where the runs do not have the data. Raises ValueError where no run has an error, or where the
+    folder exists or cannot be written.
+    """
+    contest = contest_of(runs)
+    if contest is None:
+        raise ValueError("figures must be of runs with errors, got none")
+    names = [runs.methods[m] for m in contest.methods]
+    errors, evaluations = contest.of("error"), grid(contest)
+    figures: dict[str, Figure] = {}
+    curves = {name: one for name, one in zip(names, convergence(contest, evaluations), strict=True) if one is not None}
+    if curves:
+        figures["convergence"] = curves_figure(list(curves), evaluations, list(curves.values()))
+        figures["attainment"] = attainment_figure(names, evaluations, reached(contest, evaluations))
+    levels = np.linspace(0.0, float(errors.max()), LEVELS)
+    figures["profile"] = profile_figure(names, levels, performance_profile(errors, levels))
+    if joints := joint_errors(contest):
+        figures["joints"] = joint_errors_figure(names, JOINTS, joints)
+    if contest.testable:
+        figures["critical-difference"] = critical_difference_figure(names, friedman(contest.tested_errors()))
+    if sure := certainty(contest):
+        methods = {name: one for name, one in zip(names, sure["methods"], strict=True) if one}
+        if bins := {name: one["reliability"] for name, one in methods.items() if one["reliability"]}:
+            figures["reliability"] = reliability_figure(list(bins), list(bins.values()))
+        if covered := {name: one for name, one in methods.items() if None not in one["coverage"]}:
+            widths, shares = ([one[kind] for one in covered.values()] for kind in ("width", "coverage"))
+            figures["coverage"] = coverage_figure(list(covered), sure["levels"], widths, shares)
+    error, *others = runs.table_figures
+    table = {"method": "name", COLUMNS[error].heading: error, "low": "low", "high": "high", "group": "letters"}
+    table |= {**{COLUMNS[name].heading: name for name in others}, "runs": "runs"}
+    rows = [{title: _number(row[key]) for title, key in table.items()} for row in leaderboard(contest)]
+    with new_folder(path) as folder:
+        for name, figure in figures.items():
+            for kind in ("png", "pdf"):
+                save(figure, folder / f"{name}.{kind}")
+        latex = latex_table(list(table), [list(row.values()) for row in rows])
+        (folder / "leaderboard.tex").write_text(latex, encoding="utf-8")
+        write_csv(rows, folder / "leaderboard.csv")
+
+
+def _number(value: Any) -> Any:
+    return float(value) if isinstance(value, np.floating) else value

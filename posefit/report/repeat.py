@@ -5,28 +5,17 @@ from typing import Any
 
 from posefit.sweep.cell import setting_text
 from posefit.sweep.check import FIELDS
+from posefit.sweep.table import is_search
 
-LAST = ("instance", "seed")  # what rows of one head differ by
+LAST_FIELDS = ("instance", "seed")  # the fields that rows with the same head differ in
 _BEGIN = "posefit sweep - --out rerun <<'END'\n"
 _ESCAPES = {'"': '\\"', "\\": "\\\\"}
 
 
 def repeat_command(spec: Mapping[str, Any]) -> str:
-    """Return what a shell runs to get the row of a cell's spec again, in the ledger `rerun`."""
-    return command_head(spec) + "".join(f"{name} = {spec[name]}\n" for name in LAST) + "END"
-
-
-def command_head(spec: Mapping[str, Any]) -> str:
-    """Return the command up to the lines for the instance and the seed, and the line END, which follow.
-
-    The shell reads the plan as it is, whatever names it holds: each of its lines begins with a field's name.
-    """
-    lines = [f"{name} = {_toml(_plain(name, spec[name]))}\n" for name in FIELDS if name in spec and name not in LAST]
-    return _BEGIN + "[[cells]]\n" + "".join(lines)
-
-
-def search_command(spec: Mapping[str, Any]) -> str:
-    """Return what a shell runs to get the row of a single search again, in the ledger `rerun`."""
+    """Return the shell command that runs the cell of a spec again, with the ledger `rerun`."""
+    if not is_search(spec):
+        return command_head(spec) + "".join(f"{name} = {spec[name]}\n" for name in LAST_FIELDS) + "END"
     plan = {
         "suite": spec["suite"],
         "methods": [{"method": spec["method"], "settings": spec["settings"]}],
@@ -37,14 +26,20 @@ def search_command(spec: Mapping[str, Any]) -> str:
     return _BEGIN + "".join(f"{name} = {_toml(value)}\n" for name, value in plan.items()) + "END"
 
 
-def _plain(name: str, value: Any) -> Any:
-    """Return a field's value without null, which TOML has not: settings are read from their text again."""
-    return {one: setting_text(what) for one, what in value.items()} if name == "settings" else value
+def command_head(spec: Mapping[str, Any]) -> str:
+    """Return a track's command up to the lines of instance and seed; the line END follows these.
+
+    The shell does not interpret the plan, whatever names it holds: each of its lines begins with a field's name.
+    """
+    fields = {name: spec[name] for name in FIELDS if name in spec and name not in LAST_FIELDS}
+    if "settings" in fields:  # TOML has no null: settings are parsed from their text
+        fields["settings"] = {name: setting_text(value) for name, value in fields["settings"].items()}
+    return _BEGIN + "[[cells]]\n" + "".join(f"{name} = {_toml(value)}\n" for name, value in fields.items())
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_string(name)} = {_toml(one)}" for name, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{_string(name)} = {_toml(item)}" for name, item in value.items()) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, bool):

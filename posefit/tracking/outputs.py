@@ -20,9 +20,9 @@ from posefit.motion.motion import Motion
 from posefit.reading import cut
 from posefit.tracking.formats import FILES, Rows, State, intervals_of, write_formats
 from posefit.tracking.identity import Told, difference
-from posefit.tracking.page.album import Album
+from posefit.tracking.page import track_document
 from posefit.tracking.page.content import track_data
-from posefit.tracking.page.webpage import viewer_document
+from posefit.tracking.page.stills import Stills
 from posefit.tracking.picture import Painter
 from posefit.tracking.table import undetermined
 from posefit.uncertainty.modes import Posterior
@@ -179,7 +179,7 @@ class OutputFolder:
         """Write everything."""
         import cv2
 
-        folder, album = self._building, Album(scene)
+        folder, stills = self._building, Stills(scene)
         painter = Painter(scene, [row["usable"] == 1.0 for row in rows])
         sure = intervals_of(scene.body.skeleton, frames)
         radii = sure.get("joint_radii")
@@ -188,7 +188,7 @@ class OutputFolder:
         writer: VideoWriter | None = None
         told = repeat(None) if radii is None else radii
         for frame, observation, row, picture, one in zip(frames, scene.observations, rows, filmed, told, strict=False):
-            album.add(frame, observation, picture)
+            stills.add(frame, observation, picture)
             image = painter.add(frame, observation, row, picture, one)
             if writer is None:
                 writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))
@@ -198,5 +198,5 @@ class OutputFolder:
         trust = "" if summary["trust"] is None else summary["trust"]["sentence"]
         if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, radii, undetermined(summary), trust)):
             raise OSError("no room for summary.png")
-        page = viewer_document(track_data(scene, estimate, frames, rows, summary, sure, album))
+        page = track_document(track_data(scene, estimate, frames, rows, summary, sure, stills))
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")

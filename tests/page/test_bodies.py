@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.geometry.camera import Camera
-from posefit.page.bodies import camera_seen_from, in_16_bits
+from posefit.page.bodies import camera_from_origin, in_16_bits
 from posefit.page.document import assembled
 
 
@@ -24,7 +24,7 @@ def test_metres_are_whole_millimetres_and_what_is_not_known_has_a_number_of_its_
 def test_a_camera_sees_points_from_the_origin_as_it_sees_them_in_the_world():
     camera = Camera.around(np.array([1.0, 1.0, -2.0]), 0.7, 4.0, (320, 240))
     origin, point = np.array([0.8, 0.9, -1.9]), np.array([1.1, 1.4, -2.2])
-    told = camera_seen_from(camera, origin)
+    told = camera_from_origin(camera, origin)
     place = np.array(told["rotation"]) @ (point - origin) + told["translation"]
     pixel = place[:2] / place[2] * told["focal"] + told["centre"]
     np.testing.assert_allclose(pixel, camera.project(point[None])[0][0], atol=0.01)

@@ -1,4 +1,4 @@
-"""The pages' scripts, style and markup as text: lines that can be read, and a linter's word on each script as a whole."""
+"""The pages' scripts, style and markup: every script is used, the linter accepts them, colours have contrast."""
 
 import re
 import shutil
@@ -8,78 +8,72 @@ from pathlib import Path
 
 import pytest
 
-from posefit.page.document import SHARED
-from posefit.report.page.webpage import COMMON, script
-from posefit.report.page.webpage import SCRIPTS as OF_REPORT
-from posefit.report.search.page.webpage import SCRIPTS as OF_SEARCHES
-from posefit.report.search.page.webpage import search_script
-from posefit.tracking.page.webpage import SCRIPTS as OF_VIEWER
-from posefit.tracking.page.webpage import viewer_script
+from posefit.page.document import SHARED, part
+from posefit.report import page as report_page
+from posefit.report.figures import COLOURS
+from posefit.tracking import page as track_page
 
-LONGEST = 120
 ROOT = Path(__file__).parents[2]
-WHOLE = {"report": script, "searches": search_script, "viewer": viewer_script}
-NAMES = {
-    "posefit.page": SHARED,
-    "posefit.report.page": (*COMMON, *OF_REPORT),
-    "posefit.report.search.page": OF_SEARCHES,
-    "posefit.tracking.page": OF_VIEWER,
-}
-OF_ALL = {"report": SHARED, "searches": SHARED[:1], "viewer": SHARED}  # what of the shared scripts a page has
-PARTS = {name: [one for one in files(name).iterdir() if one.name.endswith((".js", ".css", ".html"))] for name in NAMES}
+MIN_CONTRAST = 4.5  # WCAG 2.2, 1.4.3, of text; here of marks and lines too
 
 
-@pytest.mark.parametrize("package", NAMES)
-def test_lines_are_of_at_most_120_characters(package):
-    parts = PARTS[package]
-    lines = [(one.name, k, line) for one in parts for k, line in enumerate(one.read_text("utf-8").split("\n"), 1)]
-    assert len({name for name, _, _ in lines}) >= 4
-    assert [(name, k, len(line)) for name, k, line in lines if len(line) > LONGEST] == []
+def test_every_script_is_part_of_its_page_once():
+    for page in (report_page, track_page):
+        for package, names in (("posefit.page", SHARED), (page.__name__, page.SCRIPTS)):
+            texts = {one.name: one.read_text("utf-8") for one in files(package).iterdir() if one.name.endswith(".js")}
+            assert sorted(texts) == sorted(f"{name}.js" for name in names)
+            assert all(page.script().count(text) == 1 for text in texts.values())
 
 
-@pytest.mark.parametrize("package", NAMES)
-def test_every_script_is_part_of_its_page(package):
-    names = [one.name for one in PARTS[package] if one.name.endswith(".js")]
-    assert sorted(f"{name}.js" for name in NAMES[package]) == sorted(names)
-
-
-@pytest.mark.parametrize("page", WHOLE)
-def test_what_pages_share_stands_in_each_of_them_once(page):
-    for name in OF_ALL[page]:
-        (part,) = (one for one in PARTS["posefit.page"] if one.name == f"{name}.js")
-        assert WHOLE[page]().count(part.read_text("utf-8")) == 1
-
-
-def linted(path):
-    """Return the exit status and what the linter says of a script that runs as a whole."""
+def linted(path, text):
+    """Return the exit status and the output of the linter for a script that runs as a whole."""
     program = shutil.which("oxlint") or pytest.skip("the linter oxlint is not installed: pip install posefit[dev]")
-    rules = ["no-undef", "no-unused-vars", "no-redeclare"]  # in single files what others declare would be unknown
+    path.write_text(text, encoding="utf-8")
+    rules = ["no-undef", "no-unused-vars", "no-redeclare"]  # single files do not know what others declare
     command = [program, "--config", ROOT / ".oxlintrc.json", "--deny-warnings", *(f"--deny={rule}" for rule in rules)]
     done = subprocess.run([*command, path], capture_output=True, text=True, check=False)
     return done.returncode, done.stdout
 
 
-@pytest.mark.parametrize("page", WHOLE)
-def test_the_linter_finds_nothing_in_the_whole_script(tmp_path, page):
-    (tmp_path / "page.js").write_text(WHOLE[page](), encoding="utf-8")
-    status, said = linted(tmp_path / "page.js")
-    assert status == 0, said
-    assert "on 1 file" in said
+def test_the_linter_accepts_whole_scripts_and_rejects_planted_mistakes(tmp_path):
+    for page in (report_page, track_page):
+        status, output = linted(tmp_path / "page.js", page.script())
+        assert status == 0, output
+        assert "on 1 file" in output
+    mistakes = {"missing(1);": "no-undef", "const unused = 1;": "no-unused-vars", "if (D == null) paint();": "eqeqeq"}
+    for mistake, rule in mistakes.items():
+        planted = re.sub(r"\n\}\)\(\);\n$", f"\n{mistake}\n}})();\n", report_page.script())
+        status, output = linted(tmp_path / "page.js", planted)
+        assert status != 0
+        assert rule in output
 
 
-@pytest.mark.parametrize(
-    ("mistake", "rule"),
-    [
-        ("none_of_ours(1);", "no-undef"),
-        ("const of_no_use = 1;", "no-unused-vars"),
-        ("if (D == null) header();", "eqeqeq"),
-    ],
-)
-@pytest.mark.parametrize("page", WHOLE)
-def test_the_linter_finds_a_mistake_that_was_planted(tmp_path, page, mistake, rule):
-    planted = re.sub(r"\n\}\)\(\);\n$", f"\n{mistake}\n}})();\n", WHOLE[page]())
-    assert planted != WHOLE[page]()
-    (tmp_path / "page.js").write_text(planted, encoding="utf-8")
-    status, said = linted(tmp_path / "page.js")
-    assert status != 0
-    assert rule in said
+def luminance(colour):
+    """Return the relative luminance of WCAG 2.2, of a colour such as #fff or #0063a6."""
+    digits = colour.removeprefix("#")
+    pairs = [one * 2 for one in digits] if len(digits) == 3 else [digits[k : k + 2] for k in (0, 2, 4)]
+    parts = [int(one, 16) / 255.0 for one in pairs]
+    linear = [one / 12.92 if one <= 0.04045 else ((one + 0.055) / 1.055) ** 2.4 for one in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one, other):
+    darker, lighter = sorted((luminance(one), luminance(other)))
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def test_colours_have_contrast_with_their_background_in_light_and_dark():
+    assert contrast("#fff", "#000000") == pytest.approx(21.0)
+    assert contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.005)  # the well-known grey that just fails
+    schemes = re.findall(r":root \{([^}]*--card[^}]*)\}", part("posefit.page", "base.css"))
+    assert set(report_page.LIGHT) == set(report_page.DARK)
+    for scheme, colours in zip(schemes, (report_page.LIGHT, report_page.DARK), strict=False):
+        base = dict(re.findall(r"--(\w+): (#\w+)", scheme))
+        shown = {**colours, **{name: base[name] for name in ("ink", "soft", "accent", "bad")}}
+        for name, colour in shown.items():
+            if colour.startswith("#"):
+                assert min(contrast(colour, base[behind]) for behind in ("back", "card")) >= MIN_CONTRAST, (
+                    name,
+                    colour,
+                )
+        assert len({colours[f"c{k}"] for k in range(report_page.COLOURS)}) == report_page.COLOURS == len(COLOURS)

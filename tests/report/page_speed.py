@@ -19,7 +19,7 @@ TIMES = 3
 MADE = """
 import json, sys, time
 from posefit.report.write import write_report
-write_report(sys.argv[1], sys.argv[2], say=print)
+write_report(sys.argv[1], sys.argv[2], warn=print)
 print(json.dumps([time.process_time(), time.perf_counter()]))
 """
 _LOADED = "performance.getEntriesByType('navigation')[0].loadEventEnd"

@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 
 from posefit.hooks import ClaimedOrder
-from posefit.report.answer.claimed import claim_results
-from posefit.report.answer.lead import lead_sentence, not_told_apart, others_said, three_tracks
-from posefit.report.answer.selection import features_of, selected, selection_of
-from posefit.report.answer.unpaired import unpaired_sentence
 from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard, paired_tests
 from posefit.report.runs import runs_of
+from posefit.report.selection import features_of, selected, selection_of
+from posefit.report.summary import (
+    leader_sentence,
+    not_worse,
+    others_clause,
+    published_claims,
+    three_tracks,
+    unpaired_sentence,
+)
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
 from tests.report.test_contest import FIRST, Errors, contest, full
@@ -23,7 +28,8 @@ ORDER = ClaimedOrder("a paper", "c beats b, and b beats a", ("a", "b", "c"))
 
 def sentence(found: Contest) -> str:
     tests = paired_tests(found) if found.testable else None
-    return lead_sentence(found, leaderboard(found), baseline_rows(found), tests)
+    board = leaderboard(found)
+    return leader_sentence(found, board, baseline_rows(found, board), tests)
 
 
 def test_who_leads_and_who_cannot_be_told_apart_is_one_sentence(tmp_path: Path) -> None:
@@ -41,7 +47,7 @@ def test_who_leads_and_who_cannot_be_told_apart_is_one_sentence(tmp_path: Path) 
 
 def test_where_all_others_are_worse_it_says_so(tmp_path: Path) -> None:
     said = sentence(contest(tmp_path, full({"a": 1.0, "b": 2.0}, instances=6)))
-    assert "; every other method can be told apart and is worse (" in said
+    assert "; every other method is worse (" in said
 
 
 def test_whoever_leads_by_the_middle_may_be_worse_on_most_runs_and_that_is_said(tmp_path: Path) -> None:
@@ -50,7 +56,7 @@ def test_whoever_leads_by_the_middle_may_be_worse_on_most_runs_and_that_is_said(
     errors |= {("b", i, 0): 7.5 if i == 3 else 0.9 + 0.999 * i for i in range(12)}
     said = sentence(contest(tmp_path, errors))
     assert said.startswith("a leads")
-    assert "; every other method can be told apart, and on most runs b is better (Wilcoxon's signed ranks" in said
+    assert "; all others differ, and on most runs b is better (Wilcoxon's signed ranks" in said
 
 
 def test_of_those_that_are_not_alike_it_is_said_how_many_are_worse_and_who_is_better() -> None:
@@ -59,13 +65,13 @@ def test_of_those_that_are_not_alike_it_is_said_how_many_are_worse_and_who_is_be
         "blocks": 9,
         "pairs": [[0, 1, 0.1, 0.2, 0.2], [0, 2, -3.0, 0.01, 0.01], [0, 3, 2.0, 0.01, 0.01], [1, 2, 0.0, 1.0, 1.0]],
     }
-    assert others_said(("a", "b", "c", "d"), 0, tests, "runs") == (
+    assert others_clause(("a", "b", "c", "d"), 0, tests, "runs") == (
         "; b is not shown to be worse, and on most runs d is better, and 1 other is worse (Wilcoxon's signed ranks "
         "over 9 paired runs, after Holm, at 5 %)"
     )
-    assert not_told_apart(tests, 0) == [1]
-    assert not_told_apart(tests, 3) == []
-    assert not_told_apart(None, 0) == []
+    assert not_worse(tests, 0) == [1]
+    assert not_worse(tests, 3) == []
+    assert not_worse(None, 0) == []
 
 
 def test_one_method_alone_and_one_run_alone_are_not_compared(tmp_path: Path) -> None:
@@ -92,21 +98,21 @@ def test_the_best_the_median_and_the_worst_track_of_a_method_are_shown(tmp_path:
 
 def test_a_claimed_order_is_tested_step_by_step(tmp_path: Path) -> None:
     found = contest(tmp_path, full({"a": 3.0, "b": 2.0, "c": 1.0, "d": 0.5}, instances=3, seeds=2))
-    (one,) = claim_results(found, [ORDER])
+    (one,) = published_claims(found, [ORDER])
     assert [step["difference"] for step in one["steps"]] == pytest.approx([1.0, 1.0])
     assert [step["p"] for step in one["steps"]] == pytest.approx([2.0 / 2**6] * 2)
     assert [step["adjusted"] for step in one["steps"]] == pytest.approx([4.0 / 2**6] * 2)  # Holm's, of two
     assert [step["by_instance"] for step in one["steps"]] == pytest.approx([4.0 / 2**3] * 2)
-    assert [step["seen"] for step in one["steps"]] == [False, False]  # 0.0625 is above 5 %
+    assert [step["confirmed"] for step in one["steps"]] == [False, False]  # 0.0625 is above 5 %
     assert one["errors"] == pytest.approx([3.105, 2.105, 1.105])
     assert (one["source"], one["said"]) == ("a paper", "c beats b, and b beats a")
-    assert claim_results(contest(tmp_path / "two", full({"a": 1.0, "b": 2.0})), [ORDER]) == []
+    assert published_claims(contest(tmp_path / "two", full({"a": 1.0, "b": 2.0})), [ORDER]) == []
 
 
 def test_a_step_is_seen_where_it_is_better_and_not_where_it_is_worse(tmp_path: Path) -> None:
     found = contest(tmp_path, full({"a": 2.0, "b": 1.0, "c": 3.0}, instances=6))
-    (one,) = claim_results(found, [ORDER])
-    assert [step["seen"] for step in one["steps"]] == [True, False]
+    (one,) = published_claims(found, [ORDER])
+    assert [step["confirmed"] for step in one["steps"]] == [True, False]
 
 
 def damaged(path: Path, errors: dict[str, tuple[float, float]], seeds: int = 2) -> Contest:
@@ -144,7 +150,7 @@ def test_of_many_instances_a_selector_is_trained_of_some_in_no_order_of_the_plan
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # from each side one instance is damaged and one is not: every other one would be of one kind, its selector nonsense
-    monkeypatch.setattr("posefit.report.answer.selection.MOST", 32)
+    monkeypatch.setattr("posefit.report.selection.MAX_INSTANCES", 32)
     made = [
         result(
             replace(FIRST, method=name, view_degrees=(5.0 * i,), corruption={"holes": 0.3} if bad else {}), both[bad]
@@ -199,7 +205,7 @@ def test_where_the_plan_says_the_same_of_all_there_is_no_selector(tmp_path: Path
     found = selection_of(contest(tmp_path, full({"a": 1.0, "b": 2.0}, instances=9)))
     assert found is not None
     assert (found["selector"], found["closed"]) == (None, None)
-    assert found["why"].startswith("the plan says the same of every instance")
+    assert found["why"].startswith("the plan is the same for every instance")
 
 
 @pytest.mark.parametrize(
@@ -220,8 +226,8 @@ def test_where_no_test_could_see_a_difference_the_runs_are_too_few_and_nobody_is
     # of eight pairs the least p is 2 / 2^8, times ten after Holm; of nine it is half of that, and below 5 %
     errors = full(dict.fromkeys("abcde", 1.0) | {"e": 2.0}, instances=4, seeds=2)
     assert (
-        "; too few runs to tell any methods apart (over 8 paired runs Wilcoxon's p cannot be below 0.078 after Holm over "
-        "10 pairs, and 0.05 is asked for)."
+        "; too few runs to show any difference (over 8 paired runs Wilcoxon's p cannot be below 0.078 after Holm over "
+        "10 pairs, and must be below 0.05)."
     ) in sentence(contest(tmp_path / "eight", errors))
     errors |= full(dict.fromkeys("abcde", 1.0) | {"e": 2.0}, instances=3, seeds=3)
     said = sentence(contest(tmp_path / "eleven", errors))

@@ -1,13 +1,11 @@
 """The report's figures: each has its place in a row, and its words from the one table of a track's figures."""
 
 import math
-import re
 from dataclasses import replace
 
 import pytest
 
-from posefit.report.colours import DARK, LIGHT, METHODS, style
-from posefit.report.columns import COLUMNS, FIGURES, SHOWN
+from posefit.report.columns import COLUMNS, FIGURES, TABLE_FIGURES
 from posefit.sweep.cell import run_cell
 from posefit.tracking.measures import BASELINES, MEASURES
 from tests.sweep.fake import cells
@@ -55,7 +53,7 @@ def test_a_row_says_how_often_the_likeliest_mode_was_right(row):
 
 
 def test_labels_and_meanings_are_those_of_the_measures():
-    about = {name: COLUMNS[name].about() for name in SHOWN}
+    about = {name: COLUMNS[name].as_dict() for name in TABLE_FIGURES}
     for name, measure in {"error": "error_degrees", "lost": "lost_rate", "iou": "iou", "mpjpe": "mpjpe_mm"}.items():
         assert about[name]["label"] == MEASURES[measure].label
         assert about[name]["about"] == MEASURES[measure].meaning
@@ -68,24 +66,14 @@ def test_labels_and_meanings_are_those_of_the_measures():
     for name, label in BASELINES.items():
         assert about[f"skill_{name}"]["title"] == f"skill: {label}"
     assert all(one["about"] for one in about.values())
-    assert COLUMNS["mpjpe"].head == "MPJPE (mm)"
-    assert COLUMNS["lost"].head == "lost"  # a share in files
+    assert COLUMNS["mpjpe"].heading == "MPJPE (mm)"
+    assert COLUMNS["lost"].heading == "lost"  # a share in files
 
 
 def test_a_page_is_given_a_digit_more_than_it_shows():
-    kept = {name: COLUMNS[name].kept for name in SHOWN}
+    kept = {name: COLUMNS[name].stored_digits for name in TABLE_FIGURES}
     assert kept == {
         "error": 3, "skill_mean_pose": 3, "skill_persistence": 3, "skill_nearest": 3, "lost": 4, "swapped": 4,
         "unknown": 4, "coverage_80": 4, "interval_80": 1, "mpjpe": 1, "iou": 4, "ms": 2, "cpu_ms": 2, "evaluations": 1,
     }  # fmt: skip
-    assert set(SHOWN) < set(FIGURES)
-
-
-def test_every_colour_of_the_page_is_there_for_light_and_dark_and_no_two_methods_share_one():
-    assert set(LIGHT) == set(DARK)
-    for palette in (LIGHT, DARK):
-        methods = [palette[f"c{k}"] for k in range(len(METHODS))]
-        assert len(set(methods)) == len(METHODS)
-        assert all(re.fullmatch(r"#[0-9a-f]{3}([0-9a-f]{3})?|var\(--ink\)", colour) for colour in palette.values())
-        assert palette["left"] != palette["right"]
-    assert all(style().count(f"--{name}:") == 2 for name in LIGHT)
+    assert set(TABLE_FIGURES) < set(FIGURES)

@@ -80,7 +80,7 @@ def test_the_leaderboard_has_middles_of_runs_and_baselines_have_skills_too(tmp_p
     assert row["error"] == pytest.approx(2.5)  # of four runs the first and the last are left out
     assert row["skill_mean_pose"] == pytest.approx(1.0 - 2.5 / 4.0)
     assert np.isnan(row["low"])  # one seed says nothing of others
-    for base in baseline_rows(found):
+    for base in baseline_rows(found, []):
         assert base["error"] == 4.0
         assert base["skill_nearest"] == 0.0
 

@@ -61,7 +61,7 @@ def test_every_figure_has_the_colours_of_its_methods(tmp_path):
     for name, figure in every().items():
         figures.save(figure, tmp_path / f"{name}.png")
         image = cv2.imread(str(tmp_path / f"{name}.png"))[:, :, ::-1].reshape(-1, 3).astype(int)
-        for colour in figures.METHODS[:3]:
+        for colour in figures.COLOURS[:3]:
             wanted = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
             assert (np.abs(image - wanted).max(axis=1) < 3).sum() > 50, (name, colour)
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from posefit.report.latex import latex, latex_table, write_latex
+from posefit.report.export import latex, latex_table
 
 
 def test_a_table_by_hand():
@@ -38,10 +38,3 @@ def test_every_sign_that_latex_would_read_is_escaped():
 def test_a_row_of_another_length_is_refused():
     with pytest.raises(ValueError, match="rows must have 2 cells, as the header has, got 1"):
         latex_table(["a", "b"], [["x"]])
-
-
-def test_a_table_is_written_once(tmp_path):
-    write_latex(["a"], [["x"]], tmp_path / "a.tex")
-    assert (tmp_path / "a.tex").read_text() == latex_table(["a"], [["x"]])
-    with pytest.raises(ValueError, match="expected a new name"):
-        write_latex(["a"], [["x"]], tmp_path / "a.tex")

@@ -21,8 +21,7 @@ from typing import Any
 
 import pytest
 
-from posefit.report.live.progress import Progress, progress_so_far
-from posefit.report.live.server import LOOPBACK, Handler, Showing, address_of, serving
+from posefit.report.live import LOOPBACK, Handler, LivePage, Progress, address_of, progress_of, serving
 from posefit.sweep.driver import Driver, Lease
 from posefit.sweep.ledger import PLANS, Ledger
 from tests.cli.test_command_line import fails, run
@@ -68,12 +67,12 @@ def data_in(page: str) -> dict[str, Any]:
 def test_progress_is_of_the_plan_that_was_begun_last(begun: Path) -> None:
     (plan,) = Ledger(begun).plans()
     assert (plan.cells, plan.settled) == (6, 1)
-    found = progress_so_far(Ledger(begun), now=plan.begun + 30.0)
+    found = progress_of(Ledger(begun), now=plan.begun + 30.0)
     assert found == Progress(6, 3, 1, 2, 0, 0, None)  # nobody works on it
     with Driver(begun) as driver:
         assert isinstance(driver.lease(PLAN[4]), Lease)
         # three cells were settled in half a minute, so the two that are left take twenty seconds
-        assert progress_so_far(Ledger(begun), now=plan.begun + 30.0) == Progress(6, 3, 1, 2, 1, 0, 20.0)
+        assert progress_of(Ledger(begun), now=plan.begun + 30.0) == Progress(6, 3, 1, 2, 1, 0, 20.0)
 
 
 def test_attempts_that_failed_are_counted_until_their_cell_is_settled(begun: Path) -> None:
@@ -82,11 +81,11 @@ def test_attempts_that_failed_are_counted_until_their_cell_is_settled(begun: Pat
             lease = driver.lease(PLAN[4])
             assert isinstance(lease, Lease)
             driver.fail(lease, "ValueError: it had to")
-        assert progress_so_far(Ledger(begun)).failed == 2
+        assert progress_of(Ledger(begun)).failed == 2
         again = driver.lease(PLAN[4])
         assert isinstance(again, Lease)
         driver.finish(again, result(PLAN[4], 1.0))
-        assert progress_so_far(Ledger(begun)).failed == 0
+        assert progress_of(Ledger(begun)).failed == 0
 
 
 def test_a_plan_that_is_gone_on_with_is_one_plan_and_a_later_one_comes_first(begun: Path) -> None:
@@ -95,13 +94,13 @@ def test_a_plan_that_is_gone_on_with_is_one_plan_and_a_later_one_comes_first(beg
         assert [(plan.cells, plan.settled) for plan in driver.ledger.plans()] == [(6, 4)]
         driver.ledger.begin(cell.key for cell in PLAN[4:])
     assert [plan.cells for plan in Ledger(begun).plans()] == [2, 6]
-    assert progress_so_far(Ledger(begun)) == Progress(2, 0, 0, 2, 0, 0, None)
+    assert progress_of(Ledger(begun)) == Progress(2, 0, 0, 2, 0, 0, None)
 
 
 def test_a_damaged_plan_is_none(begun: Path) -> None:
     (path,) = (begun / PLANS).iterdir()
     path.write_bytes(path.read_bytes()[:-3])
-    assert progress_so_far(Ledger(begun)) == Progress(None, 3, 1, None, 0, 0, None)
+    assert progress_of(Ledger(begun)) == Progress(None, 3, 1, None, 0, 0, None)
     with Driver(begun) as driver:
         driver.ledger.begin(cell.key for cell in PLAN)
         assert len(driver.ledger.plans()) == 1
@@ -112,8 +111,8 @@ def test_the_page_is_the_report_with_the_progress_and_reasons(begun: Path) -> No
     data = data_in(text)
     assert status == 200
     assert data["live"] == {"cells": 6, "done": 3, "quarantined": 1, "left": 2, "running": 0, "failed": 0, "seconds": None,
-                            "again": data["live"]["again"]}  # fmt: skip
-    assert data["live"]["again"] >= 5.0
+                            "reload": data["live"]["reload"]}  # fmt: skip
+    assert data["live"]["reload"] >= 5.0
     assert data["failures"][0]["reasons"] == ["ValueError: it had to"]
 
 
@@ -147,16 +146,16 @@ def test_whoever_asks_too_early_gets_what_was_made_last_and_a_failure_rests_too(
 ) -> None:
     now, made = [100.0], []
 
-    def takes_two_seconds(self: Showing, began: float) -> str:
+    def takes_two_seconds(self: LivePage, began: float) -> str:
         made.append(began)
         now[0] += 2.0
         if len(made) == 2:
             raise OSError("the disk has gone")
         return f"page {len(made)}"
 
-    monkeypatch.setattr("posefit.report.live.server.monotonic", lambda: now[0])
-    monkeypatch.setattr(Showing, "_page", takes_two_seconds)
-    showing = Showing(begun, lambda _: None)
+    monkeypatch.setattr("posefit.report.live.monotonic", lambda: now[0])
+    monkeypatch.setattr(LivePage, "_make", takes_two_seconds)
+    showing = LivePage(begun, lambda _: None)
     assert [showing.page(), showing.page()] == ["page 1", "page 1"]
     now[0] = 108.0  # of eight seconds two were work
     for _ in range(2):
@@ -173,7 +172,7 @@ def test_a_reader_who_has_gone_away_is_no_fault(capsys: pytest.CaptureFixture[st
             self.path, self.request_version, self.requestline, self.command = "/", "HTTP/1.1", "GET / HTTP/1.1", "GET"
             self.headers = Message()
             self.headers["Host"] = "localhost"
-            self.shown, self.wfile = Showing(begun, lambda _: None), Closed()
+            self.live, self.wfile = LivePage(begun, lambda _: None), Closed()
 
     class Closed(io.BytesIO):
         def write(self, _: object) -> int:
@@ -197,7 +196,7 @@ def test_a_ledger_that_a_sweep_is_about_to_begin_is_waited_for(tmp_path: Path, m
     def begin(seconds: float) -> None:
         ledger(tmp_path / "results", [])
 
-    monkeypatch.setattr("posefit.report.live.server.sleep", begin)
+    monkeypatch.setattr("posefit.report.live.sleep", begin)
     with serving(tmp_path / "results", 0, lambda _: None) as server:
         assert address_of(server).startswith("http://127.0.0.1:")
 
@@ -205,7 +204,7 @@ def test_a_ledger_that_a_sweep_is_about_to_begin_is_waited_for(tmp_path: Path, m
 def test_a_ledger_that_never_comes_is_not_waited_for_without_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("posefit.report.live.server.PATIENCE", 0.0)
+    monkeypatch.setattr("posefit.report.live.LEDGER_TIMEOUT_SECONDS", 0.0)
     with (
         pytest.raises(ValueError, match="expected a ledger, a folder that posefit sweep wrote, got none"),
         serving(tmp_path / "none", 0, lambda _: None),
@@ -247,7 +246,7 @@ def test_ctrl_c_ends_it_with_status_0_before_and_after_it_answers_too(
             yield server
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("posefit.report.live.server.serving", interrupted)
+    monkeypatch.setattr("posefit.report.live.serving", interrupted)
     assert run("report", begun, "--serve").exit_code == 0
 
 
@@ -265,7 +264,7 @@ def test_a_browser_shows_how_far_it_is_and_loads_the_page_anew(begun: Path) -> N
     with browser() as chromium, shown(begun) as address, Driver(begun) as driver:
         driver.lease(PLAN[4])
         with opened(chromium, address, offline=False) as seen:
-            said = seen.page.locator("#live-said")
+            said = seen.page.locator("#live-text")
             assert said.inner_text().startswith("4 of 6 cells: 3 done, 1 quarantined; 1 running, about ")
             assert "ValueError: it had to" in seen.page.inner_text("#trouble")
             lease = driver.lease(PLAN[5])

@@ -1,6 +1,7 @@
-"""The report in a real browser: it loads without a complaint, and what it promises works."""
+"""The report in a real browser: it opens without errors, anyone can read it, and its controls work."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,278 +12,282 @@ from posefit.report.repeat import repeat_command
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import run
 from tests.report.browser import EVIL, ledger, opened, result, sure
+from tests.report.searched import cell, problems, search_result, searched
 from tests.sweep.fake import cells
 
-PLAN = """
-[defaults]
-frames = 6
-size = [80, 60]
-evaluations = 80
-settings.full.limits = "training"
-
-[product]
-methods = ["sapso@pca", "sapso@full", "particle@full", "random@pca"]
-motions = ["walk", { motion = "run", view_degrees = [0, 90] }]
-seeds = 3
-"""
+FIRST = replace(cells(1)[0], frames=4)
+METHODS = 9  # more than there are colours
 
 
-@pytest.fixture(scope="module")
-def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("swept")
-    (folder / "plan.toml").write_text(PLAN)
-    done = run("sweep", folder / "plan.toml", "--out", folder / "results", "--workers", 2)
+def written(made: Path) -> Path:
+    """Return the page of a ledger."""
+    out = made.with_name("report.html")
+    done = run("report", made, "--out", out)
     assert done.exit_code == 0, done.stderr
-    written = run("report", folder / "results", "--out", folder / "report.html")
-    assert written.exit_code == 0, written.stderr
-    return folder
+    return out
 
 
 @pytest.fixture(scope="module")
-def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("hostile")
-    first = replace(cells(1)[0], frames=4)
-    named = [replace(first, method=EVIL, motion=EVIL, settings={EVIL: EVIL}, seed=seed) for seed in (0, 2**60)]
-    plain = [replace(first, motion=EVIL, seed=seed) for seed in (0, 2**60)]
-    found = [result(cell, 1.0 + k) for k, cell in enumerate([*named, *plain])]
-    lost = replace(first, method=EVIL, seed=7)
-    made = ledger(folder / "results", found, [(lost, [f"ValueError: {EVIL}"])])
-    assert run("report", made, "--out", folder / "report.html").exit_code == 0
-    return folder / "report.html"
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a page with every section: failures, gaps, warnings, uncertainty, a selector."""
+    made = []
+    modes = {0: [[8, 0.55, 0.5], [32, 0.98, 0.9]], 1: [[40, 0.7, 0.2]]}
+    for m in range(METHODS):
+        for i in range(9):
+            for s in range(2):
+                views = (0.0, 90.0) if i == 2 else (45.0,)
+                more = {"warnings": ["the search met the border of its box"]} if (m, i) == (2, 3) else {}
+                more |= sure(0.8, 60.0, modes[m], 0.25) if m in modes else {}
+                one = replace(FIRST, method=f"method-{m}@pca", instance=i, seed=s, view_degrees=views)
+                one = replace(one, corruption={"holes": 0.1 * (i % 2)})
+                if (m, i) != (4, 7):
+                    made.append(result(one, 1.0 + 0.3 * m + 0.1 * ((3 * m + i) % 5) + 0.05 * s, **more))
+    lost = [(replace(FIRST, method="method-4@pca", instance=7, seed=s), ["ValueError: it had to"]) for s in range(2)]
+    return written(ledger(tmp_path_factory.mktemp("tracks") / "results", made, lost))
 
 
-def shown(page: Any, table: str, column: int) -> list[str]:
-    """Return the texts of a column of a table, without what stands small below."""
-    texts: list[str] = page.locator(f"{table} tbody tr td:nth-child({column})").all_inner_texts()
-    return [text.split("\n")[0] for text in texts]
+@pytest.fixture(scope="module")
+def searches(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a page of single searches by six methods, with a failure of a hostile name."""
+    methods = {"cma": 14, "pso": 11, "sapso": 10, "annealed": 7, "scipy": 5, "random": 2}
+    lost = [(cell(EVIL, settings={EVIL: EVIL}), [f"ValueError: {EVIL}"])]
+    path = tmp_path_factory.mktemp("searches") / "results"
+    return written(searched(path, methods, problems([1, 5], [9, 24], 3), lost))
 
 
-@pytest.mark.parametrize("width", [320, 390, 1280])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_it_loads_without_a_complaint_and_asks_for_nothing_else(
-    chromium: Any, swept: Path, width: int, scheme: str
+def texts(page: Any, table: str, column: int) -> list[str]:
+    """Return the texts of a column of a table, without the small print below."""
+    found: list[str] = page.locator(f"{table} tbody tr td:nth-child({column})").all_inner_texts()
+    return [text.split("\n")[0] for text in found]
+
+
+BOXES = """id => [...document.querySelectorAll(`#${id} svg text`)].map((one) => {
+  const [own, all] = [one, one.ownerSVGElement].map((node) => node.getBoundingClientRect());
+  return [own.left, own.top, own.right, own.bottom, own.left < all.left - 1 || own.right > all.right + 1, one.textContent];
+})"""
+
+
+def labels_are_apart(page: Any, figure: str) -> None:
+    found = page.evaluate(BOXES, figure)
+    assert len(found) > 3
+    for k, (left, top, right, bottom, outside, text) in enumerate(found):
+        assert not outside, (figure, text)
+        for other in found[:k]:
+            apart = left >= other[2] or right <= other[0] or top >= other[3] - 2 or bottom <= other[1] + 2
+            assert apart, (figure, text, other[5])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [320, 390, 1280, 1920])
+def test_it_opens_without_errors_and_requests_and_everyone_can_read_it(
+    chromium: Any, page: Path, searches: Path, width: int
 ) -> None:
-    with opened(chromium, swept / "report.html", width, color_scheme=scheme) as seen:
-        assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
-        for section in ("leaders", "difference", "pairs", "convergence", "ecdf", "joint-errors", "cards", "all-rows"):
-            assert seen.page.locator(f"#{section} > *").count() > 0, section
-        seen.page.locator(".card").first.click()
-        seen.page.keyboard.press("Escape")
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install posefit[browser]")
+    figures = {
+        page: ("standing", "convergence", "ecdf", "difference", "joint-errors"),
+        searches: ("standing", "chart-0"),
+    }
+    for path, names in figures.items():
+        for scheme in ("light", "dark"):
+            with opened(chromium, path, width, color_scheme=scheme, bypass_csp=True) as seen:
+                assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+                seen.page.locator("#all").click()
+                for name in names:
+                    labels_are_apart(seen.page, name)
+                violations = axe.Axe().run(seen.page).response["violations"]
+                assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in violations] == []
+                assert seen.requests == [path.as_uri()]
+                assert seen.complaints == []
+
+
+def test_the_first_screen_has_the_leader_the_figure_three_tracks_and_failures(chromium: Any, page: Path) -> None:
+    with opened(chromium, page, reduced_motion="reduce") as seen:
+        assert seen.page.inner_text("#headline").startswith("method-0@pca leads with an error of")
+        for part in ("#headline", "#trouble", "#standing", "#three"):
+            assert seen.page.locator(part).bounding_box()["y"] < 900, part
+        assert seen.page.locator("#standing .mark").count() == METHODS
+        assert seen.page.locator("#standing .baseline").count() == 3
+        names = [text.split(" track")[0] for text in seen.page.locator("#three strong").all_inner_texts()]
+        assert names == ["best", "median", "worst"]
+        for text in ("2 × ValueError: it had to", "instance 7: no run of method-4@pca", "2 runs with a warning"):
+            assert text in seen.page.inner_text("#trouble")
+        assert seen.page.inner_text("#moving") == "Play"  # who wants less motion has none
+        links = seen.page.locator("#sections a").all_inner_texts()
+        assert links == ["Leaderboard", "Comparison", "Who wins where", "Curves", "Joints", "Uncertainty", "Gallery",
+                         "One method against all others", "All runs", "Failures"]  # fmt: skip
+        seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        seen.page.emulate_media(media="print")
+        for part in ("#headline", "#standing svg", "#facts", "#trouble", "#leaders table", "#selection-text"):
+            assert seen.page.locator(part).is_visible(), part
+        for part in ("#moving", "nav", "#rows"):
+            assert seen.page.locator(part).is_hidden(), part
         assert seen.complaints == []
-        assert seen.requests == [(swept / "report.html").as_uri()]
 
 
-def test_every_column_of_the_leaderboard_sorts_by_mouse_and_keyboard(chromium: Any, swept: Path) -> None:
-    with opened(chromium, swept / "report.html") as seen:
+def test_tables_sort_and_compare_and_mark_warnings(chromium: Any, page: Path) -> None:
+    with opened(chromium, page) as seen:
         heads = seen.page.locator("#leaders th")
         assert heads.nth(1).get_attribute("aria-sort") == "ascending"
-        errors = [float(text) for text in shown(seen.page, "#leaders", 2)]
+        errors = [float(text) for text in texts(seen.page, "#leaders", 2)]
         assert errors == sorted(errors)
-        assert len(errors) == 4 + 3  # methods and baselines
+        assert len(errors) == METHODS + 3  # and baselines
         heads.nth(1).locator("button").focus()
         seen.page.keyboard.press("Enter")
-        assert heads.nth(1).get_attribute("aria-sort") == "descending"
-        assert [float(text) for text in shown(seen.page, "#leaders", 2)] == errors[::-1]
+        assert [float(text) for text in texts(seen.page, "#leaders", 2)] == errors[::-1]
         for k in range(heads.count()):
             heads.nth(k).locator("button").click()
             assert heads.nth(k).get_attribute("aria-sort") in ("ascending", "descending")
-        assert seen.page.locator("#leaders th[aria-sort=none]").count() == heads.count() - 1
+        seen.page.locator("#of-method").select_option(label="method-2@pca")
+        warned = seen.page.locator("#all-rows [role=img]")
+        assert warned.count() == 2
+        assert warned.first.get_attribute("aria-label") == "warning: the search met the border of its box"
+        seen.page.locator("#against").select_option(label="method-3@pca")
+        assert texts(seen.page, "#pairs", 7).count("better") == METHODS - 4
+        seen.page.locator("#mine").select_option(label="method-8@pca")
+        assert all(re.fullmatch(r"[1-9] of [89]", text) for text in texts(seen.page, "#duels", 4))
+        assert seen.page.inner_text("#verdict").startswith("method-8@pca (default settings; 2,440 evaluations")
+        assert "None of its runs lost a frame" in seen.page.inner_text("#tracks")
+        assert seen.complaints == []
 
 
-def test_toggles_show_and_hide_methods_in_every_chart(chromium: Any, swept: Path) -> None:
-    with opened(chromium, swept / "report.html") as seen:
-        page = seen.page
+def test_buttons_show_and_hide_methods_and_their_intervals_in_every_chart(chromium: Any, page: Path) -> None:
+    charts = ("convergence", "ecdf", "joint-errors", "reliability", "coverage")
+    with opened(chromium, page) as seen:
 
-        def drawn() -> list[int]:
-            return [
-                page.locator(f"#{chart} [data-method='0']").count() for chart in ("convergence", "ecdf", "joint-errors")
-            ]
+        def counts() -> list[int]:
+            return [seen.page.locator(f"#{chart} [data-method='0']").count() for chart in charts]
 
-        button = page.locator("#toggles button[data-method='0']")
-        assert button.get_attribute("aria-pressed") == "true"
-        assert page.locator("#toggles button[aria-pressed=true]").count() == 4
-        assert drawn() == [1, 1, 27]
+        button = seen.page.locator("#toggles button[data-method='0']")
+        assert seen.page.locator("#toggles button[aria-pressed=true]").count() == 4
+        assert counts() == [1, 1, 27, 1, 1]
+        marks = seen.page.locator("#toggles .mark")
+        shape = "one => one.getAttribute('style') + one.getAttribute('points')"
+        assert len({marks.nth(k).evaluate(shape) for k in range(METHODS)}) == METHODS
+        title = " ".join(seen.page.locator("#reliability title").first.text_content().split())
+        assert title == "method-0@pca: 55 % predicted, 50 % right, of 128 frames"
+        assert seen.page.locator("#sure tbody tr").count() == 2
+        band = seen.page.locator("#convergence [data-method='0'] .band")
+        opacity = "one => Number(getComputedStyle(one).opacity)"
+        assert band.evaluate(opacity) == 0.0
+        button.hover()
+        assert band.evaluate(opacity) > 0.1
+        seen.page.locator("h1").hover()
+        seen.page.locator("#bands").check()
+        assert band.evaluate(opacity) > 0.1
         button.click()
         assert button.get_attribute("aria-pressed") == "false"
-        assert drawn() == [0, 0, 0]
-        page.locator("#all").click()
-        assert drawn() == [1, 1, 27]
-        page.locator("#none").click()
-        assert page.locator("#ecdf path").count() == 0
-        page.locator("#all").click()
-        page.locator("#bands").check()
+        assert counts() == [0, 0, 0, 0, 0]
+        seen.page.locator("#none").click()
+        assert seen.page.locator("#ecdf path").count() == 0
+        seen.page.locator("#all").click()
+        assert seen.page.locator("#ecdf .curve").count() == METHODS
         assert seen.complaints == []
 
 
-def test_the_gallery_plays_and_the_skeleton_turns(chromium: Any, swept: Path) -> None:
-    with opened(chromium, swept / "report.html", 390, has_touch=True) as seen:
-        page = seen.page
-        page.locator(".card").nth(0).click()
-        assert page.locator("#viewer-title").inner_text().startswith("run, view 0°, 90°, instance 0")
-        picture = "id => document.getElementById(id).toDataURL()"
+@pytest.mark.slow
+def test_the_gallery_plays_and_the_skeleton_turns(chromium: Any, page: Path) -> None:
+    with opened(chromium, page, 390, has_touch=True) as seen:
+        seen.page.locator(".card", has_text="view 0°, 90°").first.click()
+        assert "view 0°, 90°" in seen.page.inner_text("#viewer-title")
 
-        def changes(canvas: str, act: Any) -> bool:
-            before = page.evaluate(picture, canvas)
+        def changes(canvas: str, act: Callable[[], Any]) -> bool:
+            picture = "id => document.getElementById(id).toDataURL()"
+            before = seen.page.evaluate(picture, canvas)
             act()
-            return bool(page.evaluate(picture, canvas) != before)
+            return bool(seen.page.evaluate(picture, canvas) != before)
 
-        page.locator("#turning").scroll_into_view_if_needed()
-        box = page.locator("#turning").bounding_box()
+        seen.page.locator("#turning").scroll_into_view_if_needed()
+        box = seen.page.locator("#turning").bounding_box()
 
         def drag() -> None:
-            page.mouse.move(box["x"] + 50, box["y"] + 50)
-            page.mouse.down()
-            page.mouse.move(box["x"] + 120, box["y"] + 80, steps=3)
-            page.mouse.up()
+            seen.page.mouse.move(box["x"] + 50, box["y"] + 50)
+            seen.page.mouse.down()
+            seen.page.mouse.move(box["x"] + 120, box["y"] + 80, steps=3)
+            seen.page.mouse.up()
 
         assert changes("turning", drag)
-        page.locator("#turning").focus()
-        assert changes("turning", lambda: page.keyboard.press("ArrowLeft"))
-        assert changes("turning", lambda: page.keyboard.press("+"))
-        assert changes("overlay", lambda: page.locator("#frame").fill("3"))
-        assert "frame 3: MPJPE" in page.locator("#reading").inner_text()
-        assert changes("overlay", lambda: page.locator("#viewer-camera").select_option(index=1))
-        page.locator("#viewer-method").select_option(label="random@pca")
-        page.locator("#play").click()
-        readings = set()
-        for _ in range(3000):  # two minutes at the most
-            page.wait_for_timeout(40)
-            readings.add(page.locator("#reading").inner_text())
-            if len(readings) > 2:
-                break
-        assert len(readings) > 2
-        page.locator("#play").click()
-        assert page.locator("#play").inner_text() == "Play"
+        seen.page.locator("#turning").focus()
+        assert changes("turning", lambda: seen.page.keyboard.press("ArrowLeft"))
+        assert changes("turning", lambda: seen.page.keyboard.press("+"))
+        assert changes("overlay", lambda: seen.page.locator("#frame").fill("3"))
+        assert "frame 3: MPJPE" in seen.page.inner_text("#reading")
+        assert changes("overlay", lambda: seen.page.locator("#viewer-camera").select_option(index=1))
+        seen.page.locator("#viewer-method").select_option(label="method-5@pca")
+        seen.page.locator("#play").click()
+        seen.page.locator("#reading", has_text="frame 1:").wait_for(timeout=60_000)
+        seen.page.locator("#play").click()
+        assert seen.page.inner_text("#play") == "Play"
         assert seen.complaints == []
 
 
-def test_a_row_gives_the_command_that_runs_it_again(chromium: Any, swept: Path) -> None:
-    commands = {repeat_command(row["spec"]) for row in Ledger(swept / "results").rows()}
-    with opened(chromium, swept / "report.html") as seen:
+def test_hostile_names_are_text_and_commands_repeat_their_rows(chromium: Any, tmp_path: Path) -> None:
+    named = [replace(FIRST, method=EVIL, motion=EVIL, settings={EVIL: EVIL}, seed=seed) for seed in (0, 2**60)]
+    plain = [replace(FIRST, motion=EVIL, seed=seed) for seed in (0, 2**60)]
+    rows = [result(one, 1.0 + k) for k, one in enumerate([*named, *plain])]
+    lost = [(replace(FIRST, method=EVIL, seed=7), [f"ValueError: {EVIL}"])]
+    made = ledger(tmp_path / "results", rows, lost)
+    with opened(chromium, written(made)) as seen:
+        for part in ("#facts", "#lost"):
+            assert EVIL in seen.page.locator(part).text_content()
+        assert seen.page.locator("img").count() == 0
+        assert seen.page.locator("script").count() == 2
+        assert seen.page.locator("#certainty, #sections a[href='#certainty']").count() == 0
+        seen.page.locator(".card").first.click()
+        assert seen.page.locator("#overlay").is_hidden()  # there is no such motion, and no camera
+        seen.page.keyboard.press("Escape")
+        commands = set()
         buttons = seen.page.locator("#all-rows button", has_text="command")
-        assert buttons.count() == len(commands) == 24
-        found = set()
         for k in range(buttons.count()):
             buttons.nth(k).click()
-            found.add(seen.page.locator("#command").text_content())
+            commands.add(seen.page.locator("#command").text_content())
             seen.page.locator("#again .close").click()
-        assert found == commands
+        assert commands == {repeat_command(row["spec"]) for row in Ledger(made).rows()}
         buttons.nth(0).click()
         seen.page.locator("#copy").click()
         seen.page.get_by_text("copied").wait_for()
-
-
-def test_a_method_is_held_against_all_others(chromium: Any, swept: Path) -> None:
-    with opened(chromium, swept / "report.html") as seen:
-        seen.page.locator("#mine").select_option(label="random@pca")
-        assert shown(seen.page, "#duels", 1) != []
-        assert len(shown(seen.page, "#duels", 1)) == 2
-        assert all(re.fullmatch(r"[1-4] of 4", text) for text in shown(seen.page, "#duels", 4))
-        assert seen.page.locator("#verdict").inner_text().startswith("random@pca (default settings; 80 evaluations")
-        lost = [row for row in Ledger(swept / "results").rows() if row["spec"]["method"] == "random@pca"]
-        lost = [row for row in lost if row["lost_rate"] > 0.0 or row["swap_rate"] > 0.0]
-        assert seen.page.locator("#tracks tbody tr").count() == len(lost)
-
-
-def test_the_paper_is_tested(chromium: Any, swept: Path) -> None:
-    with opened(chromium, swept / "report.html") as seen:
-        said = seen.page.locator(".claim").inner_text()
-        assert "particle@full" in said
-        assert said.count("paired Wilcoxon, Holm over all steps, 6 pairs: p ") == 2
-
-
-@pytest.fixture(scope="module")
-def certain(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("certain")
-    first = replace(cells(1)[0], frames=4)
-    modes = {"a": [[8, 0.55, 0.5], [32, 0.98, 0.9]], "b": [[40, 0.7, 0.2]]}
-    made = [
-        result(replace(first, method=m, seed=s), 1.0 + s, **(sure(0.8, 60.0, modes[m], 0.25) if m in modes else {}))
-        for m in ("a", "b", "silent")
-        for s in (0, 1, 2)
-    ]
-    assert run("report", ledger(folder / "results", made), "--out", folder / "report.html").exit_code == 0
-    return folder / "report.html"
-
-
-@pytest.mark.parametrize("width", [320, 390, 1280])
-def test_the_page_shows_how_sure_methods_are(chromium: Any, certain: Path, width: int) -> None:
-    with opened(chromium, certain, width) as seen:
-        page = seen.page
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        said = [re.sub(r"\s+", " ", text) for text in page.locator("#reliability title").all_text_contents()]
-        assert said == [
-            "a: 55 % said, 50 % right, of 24 frames",
-            "a: 98 % said, 90 % right, of 96 frames",
-            "b: 70 % said, 20 % right, of 120 frames",
-        ]
-        assert page.locator("#coverage .mark").count() == 6
-        assert page.locator("#sure tbody tr").count() == 2
-        assert shown(page, "#sure", 4) == ["80.0 %"] * 2
-        page.locator("#toggles button[data-method='0']").click()
-        assert [page.locator(f"#{chart} polyline").count() for chart in ("reliability", "coverage")] == [1, 1]
-        heads = [" ".join(text.split()) for text in page.locator("#leaders th").all_inner_texts()]
-        place = next(k for k, head in enumerate(heads, 1) if head.startswith("said unknown"))
-        assert shown(page, "#leaders", place)[:3] == ["25.0", "25.0", "–"]
-        assert heads[place - 2].startswith("left/right swapped")
-        assert seen.complaints == []
-
-
-def test_where_nobody_says_how_sure_he_is_the_page_has_no_such_section(chromium: Any, swept: Path) -> None:
-    with opened(chromium, swept / "report.html") as seen:
-        assert seen.page.locator("#certainty, #to-certainty").count() == 0
-        assert "said unknown" not in seen.page.inner_text("#leaders")
-
-
-def test_hostile_names_are_shown_as_they_are_and_do_nothing(chromium: Any, hostile: Path) -> None:
-    with opened(chromium, hostile) as seen:
-        assert EVIL in seen.page.locator("#facts").text_content()
-        assert EVIL in seen.page.locator("#lost").text_content()
-        assert seen.page.locator("img").count() == 0
-        assert seen.page.locator("script").count() == 2
-        seen.page.locator(".card").first.click()
-        assert seen.page.locator("#overlay").is_hidden()  # no such motion: no camera
-        seen.page.keyboard.press("Escape")
-        seen.page.locator("#all-rows button", has_text="command").nth(1).click()
-        assert f"seed = {2**60}\nEND" in seen.page.locator("#command").text_content()
         assert seen.complaints == []
         assert len(seen.requests) == 1
 
 
-def test_on_paper_there_are_no_controls(chromium: Any, swept: Path) -> None:
-    with opened(chromium, swept / "report.html") as seen:
-        seen.page.emulate_media(media="print")
-        assert seen.page.locator("#leaders table").is_visible()
-        assert seen.page.locator("nav").is_hidden()
-        assert seen.page.locator("#rows").is_hidden()
+def test_single_searches_have_curves_and_running_times(chromium: Any, searches: Path) -> None:
+    with opened(chromium, searches) as seen:
+        assert seen.page.inner_text("#headline").startswith("cma leads with 51.7 % of all targets reached")
+        for part in ("#headline", "#trouble", "#standing"):
+            box = seen.page.locator(part).bounding_box()
+            assert box["y"] + box["height"] < 900, part
+        assert seen.page.locator("#standing .mark").count() == 6
+        assert seen.page.locator("#standing .baseline").count() == 1
+        assert EVIL in seen.page.locator("#trouble").text_content()
+        assert seen.page.locator("#charts figure").count() == 3  # all functions, and each of two
+        assert seen.page.locator("#charts .curve").count() == 4 * 3
+        seen.page.locator("#all").click()
+        assert seen.page.locator("#charts .curve").count() == 6 * 3
+        rows = seen.page.locator("#ert tbody tr")
+        assert rows.count() == 6 * 2 * 3
+        seen.page.locator("#of-function").select_option(label="5 mismatched body")
+        seen.page.locator("#of-dimension").select_option(label="24")
+        assert rows.count() == 6
+        assert "cma" in rows.first.inner_text()
+        assert rows.first.locator("strong").count() == 2  # to 16 and to 4 above, as soon as others
+        assert "–" in rows.last.inner_text()
+        seen.page.locator("#lost button").last.click()
+        assert 'suite = "posefit-2026.1"' in seen.page.inner_text("#command")
+        assert seen.complaints == []
 
 
-def test_a_page_of_failures_alone_loads_and_shows_them(chromium: Any, tmp_path: Path) -> None:
-    lost = replace(cells(1)[0], seed=7)
-    made = ledger(tmp_path / "results", [], [(lost, ["its process died of SIGSEGV"])])
-    assert run("report", made, "--out", tmp_path / "report.html").exit_code == 0
-    with opened(chromium, tmp_path / "report.html") as watched:
-        assert "its process died of SIGSEGV" in watched.page.inner_text("#trouble")
-        assert "random@pca on walk" in watched.page.inner_text("#failures")
-        assert watched.page.locator("#leaderboard").count() == 0
-        assert watched.complaints == []
-
-
-@pytest.mark.parametrize("width", [390, 1280])
-def test_names_fit_into_the_figures_bold_ones_too(chromium: Any, tmp_path: Path, width: int) -> None:
-    first = replace(cells(1)[0], frames=4)
-    names = ["particle@mmmmmmmmmmmmmmmmmmmm", "WWWW@WWWW", "sapso+vsmm", "random@pca"]
-    made = [
-        result(replace(first, method=name, instance=i), 1.0 + 0.1 * i + 0.001 * k)
-        for k, name in enumerate(names)
-        for i in range(2)
-    ]
-    out = tmp_path / "report.html"
-    assert run("report", ledger(tmp_path / "results", made), "--out", out).exit_code == 0
-    outside = """id => [...document.querySelectorAll(`#${id} svg text`)].filter((text) => {
-        const [own, all] = [text, text.ownerSVGElement].map((one) => one.getBoundingClientRect());
-        return own.left < all.left - 1 || own.right > all.right + 1;
-    }).map((text) => text.textContent)"""
-    with opened(chromium, out, width) as seen:
-        for figure in ("standing", "difference", "ecdf"):
-            assert seen.page.evaluate(outside, figure) == []
+def test_pages_of_one_run_or_of_failures_alone_open(chromium: Any, tmp_path: Path) -> None:
+    search = cell("cma")
+    one = written(ledger(tmp_path / "one" / "results", [search_result(search, 5)]))
+    with opened(chromium, one) as seen:
+        note = seen.page.inner_text("#standing-note")
+        assert "there are no intervals" in note
+        assert "no baseline, for the plan has no random search" in note
+        assert seen.complaints == []
+    for k, (lost, name) in enumerate(((replace(FIRST, seed=7), "random@pca on walk"), (search, "cma on f1 in 9D"))):
+        failed = ledger(tmp_path / str(k) / "results", [], [(lost, ["its process died of SIGSEGV"])])
+        with opened(chromium, written(failed), 390) as seen:
+            assert seen.page.inner_text("#headline") == "Every cell failed."
+            assert "its process died of SIGSEGV" in seen.page.inner_text("#trouble")
+            assert name in seen.page.inner_text("#failures")
+            assert seen.page.locator("#sections a").all_inner_texts() == ["Failures"]
+            assert seen.complaints == []

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.report.runs import FIGURES, Runs, runs_of, shown_of
+from posefit.report.columns import FIGURES
+from posefit.report.runs import Runs, runs_of
 from posefit.sweep.cell import TrackCell
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
@@ -94,7 +95,7 @@ def test_what_only_some_methods_say_is_shown_where_one_does(tmp_path: Path) -> N
     silent = result(replace(FIRST, seed=1), 1.0)  # of a ledger from before there were posteriors
     older = runs_of(Ledger(ledger(tmp_path / "older", [silent])))
     newer = runs_of(Ledger(ledger(tmp_path / "newer", [silent, result(FIRST, 1.0, **said)])))
-    assert [name for name in shown_of(newer) if name not in shown_of(older)] == ["unknown", "coverage_80"]
+    assert [name for name in newer.table_figures if name not in older.table_figures] == ["unknown", "coverage_80"]
     assert newer.figures["coverage_80"][newer.seed == 0].tolist() == [0.7]
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from posefit.page.document import embedded, plain
 from posefit.report.content import data_of
-from posefit.report.page.webpage import MARK
+from posefit.report.page import MARK
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import fails, run
@@ -77,7 +77,7 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert not {"link", "img", "iframe", "object"} & set(page.tags)
     assert page.data["header"]["done"] == 8
     assert page.data["failures"][0]["reasons"] == ["its process died"]
-    assert len(page.data["gallery"]["tracks"]) == 8
+    assert len(page.data["animations"]["tracks"]) == 8
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
 
 
@@ -117,7 +117,7 @@ def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_abo
         "2 finished runs are left out of the comparison, as some method has no run to pair them with",
         "left out of the comparison, for every method: 1 instance",
         "  walk, view 45°, instance 1: no run of sapso@pca",
-        f"{'':32} error deg   95 % interval   skill  alike",
+        f"{'':32} error deg   95 % interval   skill  group",
     ]
     header = Page(tmp_path / "report.html").data["header"]
     assert header["failed_by"] == {"sapso@pca": 2}
@@ -221,7 +221,7 @@ def test_a_ledger_from_before_there_were_posteriors_has_no_such_columns(results:
 def test_mistakes_are_one_line_and_write_nothing(
     words: list[str], message: str, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("posefit.report.live.server.PATIENCE", 0.0)
+    monkeypatch.setattr("posefit.report.live.LEDGER_TIMEOUT_SECONDS", 0.0)
     ledger(tmp_path / "EMPTY", [])
     (tmp_path / "OTHER.html").write_text("<p>mine</p>")
     (tmp_path / "DIR.html").mkdir()
@@ -262,9 +262,9 @@ def test_a_damaged_picture_is_left_out_and_said(results: Path) -> None:
     said: list[str] = []
     book = Ledger(results)
     found = data_of(book, runs_of(book), said.append)
-    assert len(found["gallery"]["tracks"]) == 7
+    assert len(found["animations"]["tracks"]) == 7
     assert len(said) == 1
-    assert "must be whole, got damaged ones; this run has no picture" in said[0]
+    assert "must be whole, got damaged ones; this run has no animation" in said[0]
 
 
 @pytest.mark.parametrize("text", ["</script>", "<!--", "]]>", "&lt;", "\u2028\u2029", '"\\', "\U0001f600é"])

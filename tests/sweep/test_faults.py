@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from posefit.report.live.progress import progress_so_far
+from posefit.report.live import progress_of
 from posefit.sweep import fold, locks
 from posefit.sweep.drive import drive_cells
 from posefit.sweep.driver import Driver, Lease
@@ -170,7 +170,7 @@ def test_a_damaged_lease_holds_nothing(content: bytes, tmp_path: Path) -> None:
         found = driver.lease(cell)
     assert isinstance(found, Lease)
     assert found.attempt == 2
-    assert progress_so_far(Ledger(folder)).running == 0
+    assert progress_of(Ledger(folder)).running == 0
 
 
 def test_a_damaged_note_of_a_plan_is_passed_over(tmp_path: Path) -> None:

@@ -205,14 +205,14 @@ def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(chromium: Any, dou
 def test_doubtful_frames_are_marked_and_said(chromium: Any, doubtful: Path) -> None:
     with opened(chromium, doubtful) as seen:
         page = seen.page
-        told = page.locator("#told").inner_text()
+        told = page.locator("#verdict").inner_text()
         assert told == "Not determined: left and right: unknown in 2 of 12 frames; 1 frame lost."
         assert page.locator("#notes").inner_text().startswith("1 of 12 frames shows too little of the person")
         said = page.locator("#marks li").all_inner_texts()
         assert said == [
             "lost: 1 frame",
             "left and right unknown: 2 frames",
-            "pose held: too little is seen: 1 frame",
+            "pose held: too little is visible: 1 frame",
         ]
         chart = page.locator("#sure-chart")
         assert [chart.locator(f".mark.{name}").count() for name in ("lost", "unknown", "held")] == [1, 1, 1]
@@ -278,9 +278,9 @@ def test_names_are_text_and_what_nobody_says_is_not_shown(chromium: Any, filmed:
         page = seen.page
         assert page.locator("#title").text_content() == EVIL
         assert page.locator("#notes").text_content().endswith(EVIL)
-        told = page.locator("#told").inner_text()
+        told = page.locator("#verdict").inner_text()
         assert told.startswith("Trust: ")
-        assert "The method does not say which side is left or which frames are lost: that nothing is" in told
+        assert "The method does not report which side is left or which frames are lost: frames without" in told
         for hidden in ("#sure", "#doubtful", "#truth-label", "#camera-label"):
             assert not page.locator(hidden).is_visible()
         assert "MPJPE" not in page.locator("body").inner_text()

@@ -4,7 +4,6 @@ import base64
 import html.parser
 import json
 import re
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,9 @@ from posefit.footage.scene import Scene
 from posefit.measuring.angles import clinical_angles
 from posefit.page.document import embedded
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.page import album
-from posefit.tracking.page.album import Album, Strip
+from posefit.tracking.page import stills
 from posefit.tracking.page.content import _beside, _marked
+from posefit.tracking.page.stills import Stills, Strip
 from tests.tracking.viewing import SIZE, doubting, right, viewed, walk
 
 
@@ -39,22 +38,20 @@ def image(uri: str) -> Any:
     return cv2.imdecode(np.frombuffer(base64.b64decode(uri.partition(",")[2]), np.uint8), cv2.IMREAD_UNCHANGED)
 
 
-@pytest.mark.parametrize(
-    ("count", "room", "every"), [(7, 70, 1), (8, 70, 2), (14, 70, 2), (15, 70, 4), (100, 10, 128), (3, 0, 4)]
-)
-def test_a_strip_keeps_what_it_has_room_for_evenly(count: int, room: int, every: int) -> None:
-    strip = Strip(room, 1)
-    for k in range(count):
-        strip.add((k, 0, 1, 1), lambda k=k: [f"{k:06d}", "more"])  # type: ignore[misc]
-    assert strip.every == every
-    assert [int(one) for _, (one, _) in strip.pictures] == list(range(0, count, every))
-    assert [box[0] for box, _ in strip.pictures] == list(range(0, count, every))
+def test_a_strip_keeps_what_it_has_room_for_evenly() -> None:
+    for count, room, every in ((7, 70, 1), (8, 70, 2), (14, 70, 2), (15, 70, 4), (100, 10, 128), (3, 0, 4)):
+        strip = Strip(room, 1)
+        for k in range(count):
+            strip.add((k, 0, 1, 1), lambda k=k: [f"{k:06d}", "more"])  # type: ignore[misc]
+        assert strip.every == every
+        assert [int(one) for _, (one, _) in strip.pictures] == list(range(0, count, every))
+        assert [box[0] for box, _ in strip.pictures] == list(range(0, count, every))
 
 
 def test_of_a_long_track_a_picture_is_always_of_a_frame_that_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(album, "FRAMES", 10)
+    monkeypatch.setattr(stills, "MAX_FRAMES", 10)
     scene = replace(walk(2), count=41)
-    pictures, (frame, _) = Album(scene), right(walk(2))
+    pictures, (frame, _) = Stills(scene), right(walk(2))
     assert pictures.step == 8
     for k in range(41):
         mask = np.ones(SIZE[::-1], bool)  # so large that all of it is shown
@@ -73,7 +70,7 @@ def test_a_picture_is_of_the_part_that_mask_and_body_are_in() -> None:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
 
     def about(shown: Any) -> Any:
-        pictures = Album(scene)
+        pictures = Stills(scene)
         pictures.add(frame, Observation([Silhouette.of(shown)]), None)
         ((box, uri),) = pictures.as_dict()["masks"][0]["pictures"]
         left, top, width, high = box
@@ -100,48 +97,18 @@ def filming(count: int, size: tuple[int, int]) -> tuple[Scene, Any]:
     return scene, picture
 
 
-@pytest.mark.parametrize(("count", "every"), [(20, 1), (120, 1), (600, 4)])
+@pytest.mark.parametrize(("count", "every"), [(20, 1), pytest.param(600, 4, marks=pytest.mark.slow)])
 def test_pictures_of_leaves_stay_within_a_few_megabytes(count: int, every: int) -> None:
     scene, picture = filming(count, (960, 540))
-    pictures, (frame, _), seen = Album(scene), right(walk(2)), scene.observations[0]
+    pictures, (frame, _), seen = Stills(scene), right(walk(2)), scene.observations[0]
     for _ in range(count):
         pictures.add(frame, seen, picture)
     strip = pictures.as_dict()["film"]
     assert strip["every"] == every
-    assert sum(len(near) + len(coarse) for _, near, coarse in strip["pictures"]) <= album.FILMED
+    assert sum(len(near) + len(coarse) for _, near, coarse in strip["pictures"]) <= stills.MAX_FILM
     box, near, coarse = strip["pictures"][0]
     assert image(near).shape[1] / image(near).shape[0] == pytest.approx(box[2] / box[3], abs=0.02)
-    assert image(coarse).shape[0] in {height for _, (height, _) in album.FINENESS}
-
-
-def test_a_viewer_of_120_frames_costs_less_than_a_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from posefit.tracking import outputs
-
-    spent: dict[str, float] = {}
-
-    def timed(owner: Any, name: str) -> None:
-        act = getattr(owner, name)
-
-        def instead(*given: Any) -> Any:
-            begun = time.process_time()
-            found = act(*given)
-            spent[name] = spent.get(name, 0.0) + time.process_time() - begun
-            return found
-
-        monkeypatch.setattr(owner, name, instead)
-
-    timed(album.Album, "add")
-    timed(outputs, "track_data")
-    timed(outputs, "viewer_document")
-    scene = walk(120)
-    picture = filming(1, SIZE)[1]
-    path = viewed(
-        tmp_path / "out", replace(scene, pictures=lambda: iter([picture] * 120)), doubting(scene, [0.3] * 120)
-    )
-    assert len(spent) == 3
-    assert sum(spent.values()) < 1.0
-    assert path.stat().st_size < 6_000_000
-    assert held(path)["film"]["every"] == held(path)["masks"][0]["every"] == 1
+    assert image(coarse).shape[0] in {height for _, (height, _) in stills.FINENESS}
 
 
 def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> None:
@@ -170,7 +137,7 @@ def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> N
     assert data["others"]["at"] == [1]
     assert data["others"]["weights"] == pytest.approx([0.3])
     assert data["marks"] == {"held": [], "lost": [], "unknown": [1]}
-    assert data["told"] == "Not determined: left and right: unknown in 1 of 4 frames."
+    assert data["verdict"] == "Not determined: left and right: unknown in 1 of 4 frames."
 
 
 def test_a_frame_that_is_shown_bears_the_marks_of_those_that_it_stands_for() -> None:

@@ -1,199 +1,82 @@
-// The gallery: a card an instance, and the window that plays its tracks.
+// The gallery: a card for each instance, and the window that plays its tracks.
+const CARDS = 60; // that are added at a time
 const show = { row: null, frame: 0, camera: 0 };
-const pictured = Object.keys(D.gallery.tracks).map(Number);
-const watch = (row) =>
-  D.gallery.tracks[row]
-    ? [make("button", { type: "button", title: "Watch this track", on: { click: () => openTrack(row) } }, "watch")]
-    : [];
+const animated = D.animations ? Object.keys(D.animations.tracks).map(Number) : [];
+
+// The scene of a row's instance, and its track; joints are decoded once.
+function sceneOf(row) {
+  const scene = D.animations.scenes[D.rows.instance[row]];
+  scene.joints ??= decoded(scene.truth);
+  return scene;
+}
+
+function trackOf(row) {
+  const track = D.animations.tracks[row];
+  track.joints ??= decoded(track.estimate);
+  return track;
+}
+
+// A small picture of a track that can move: the camera, and the side of the square around the root in its pixels.
+function stillOf(row) {
+  const [scene, track] = [sceneOf(row), trackOf(row)];
+  const camera = scene.cameras[0] ?? turned(scene.joints(0)[0], 400, 400);
+  const far = range(scene.frames).flatMap((k) => {
+    const [truth, estimate] = [scene.joints(k), track.joints(k)].map((points) => projected(camera, points));
+    return [...truth, ...estimate]
+      .filter((point) => point[2] > NEAR)
+      .map((point) => Math.max(...[0, 1].map((axis) => Math.abs(point[axis] - truth[0][axis]))));
+  });
+  return { scene, track, camera, size: 2.08 * Math.max(...far, 1) };
+}
+
+function paintStill(canvas, { scene, track, camera, size }, time) {
+  const frame = time % scene.frames;
+  const { pen, width, height } = sheet(canvas, 1);
+  const scale = width / size;
+  const [truth, estimate] = [scene.joints(frame), track.joints(frame)].map((points) => projected(camera, points));
+  pen.translate(width / 2 - scale * truth[0][0], height / 2 - scale * truth[0][1]);
+  pen.scale(scale, scale);
+  if (scene.radii.length) silhouette(pen, camera, truth, scene.radii, "--truth", 0.35);
+  else sticks(pen, truth, ink("--truth"), 5 / scale);
+  sticks(pen, estimate, limbs(), 2.2 / scale);
+}
+
+function silhouette(pen, camera, pixels, radii, name, opacity) {
+  pen.globalAlpha = opacity;
+  pen.fillStyle = ink(name);
+  pen.fill(outline(camera, pixels, radii));
+  pen.globalAlpha = 1;
+}
 
 function gallery() {
-  const all = D.rows.key.length;
   const R = D.rows;
   const some =
-    `; ${whole(pictured.length)} of ${whole(all)} runs have one, so that this file stays small. ` +
-    "A report of the ledger that a row's command makes shows that row";
-  $("gallery-note").textContent =
-    `Each instance opens an animation and a skeleton that can be turned${pictured.length === all ? "" : some}.`;
-  const cards = new Map();
-  for (const row of pictured) {
-    const best = cards.get(R.instance[row]);
-    if (best === undefined || (R.error[row] ?? Infinity) < (R.error[best] ?? Infinity)) cards.set(R.instance[row], row);
+    animated.length < R.key.length ? `; ${whole(animated.length)} of ${whole(R.key.length)} runs have one` : "";
+  const other = some
+    ? ", so that this file stays small. A report of the ledger that a row's command makes shows that row"
+    : "";
+  $("gallery-note").textContent = `Each instance opens an animation and a skeleton that can be turned${some}${other}.`;
+  const best = new Map();
+  for (const row of animated) {
+    const before = best.get(R.instance[row]);
+    if (before === undefined || (R.error[row] ?? Infinity) < (R.error[before] ?? Infinity))
+      best.set(R.instance[row], row);
   }
-  const shown = [...cards].sort((a, b) => a[0] - b[0]);
-  const add = (from) =>
-    shown
-      .slice(from, from + 60)
-      .forEach(([instance, row]) =>
-        $("cards").append(
-          make(
-            "button",
-            { type: "button", class: "card", on: { click: () => openTrack(row) } },
-            still(sceneOf(instance)),
-            make(
-              "span",
-              {},
-              INSTANCES[instance],
-              make("small", {}, `best: ${METHODS[R.method[row]]}, ${number(R.error[row], 2)}°`),
-            ),
-          ),
-        ),
+  const cards = [...best].sort((a, b) => a[0] - b[0]);
+  const add = () => {
+    for (const [instance, row] of cards.splice(0, CARDS)) {
+      const canvas = make("canvas", { "aria-hidden": "true" });
+      const words = make("small", {}, `best: ${METHODS[R.method[row]]}, ${number(R.error[row], 2)}°`);
+      $("cards").append(
+        button([canvas, make("span", {}, INSTANCES[instance], words)], () => openTrack(row), { class: "card" }),
       );
-  add(0);
-  let next = 60;
-  if (shown.length > next) {
-    const more = make(
-      "button",
-      {
-        type: "button",
-        on: {
-          click: () => {
-            add(next);
-            next += 60;
-            if (next >= shown.length) more.remove();
-          },
-        },
-      },
-      "more instances",
-    );
-    $("cards").after(more);
-  }
-}
-
-function openTrack(row) {
-  choices(row);
-  if (!$("viewer").open) $("viewer").showModal();
-  paint();
-}
-
-function choices(row) {
-  const R = D.rows;
-  const instance = R.instance[row];
-  const here = pictured.filter((one) => R.instance[one] === instance);
-  const scene = sceneOf(instance);
-  show.row = row;
-  show.camera = Math.min(show.camera, Math.max(scene.cameras.length - 1, 0));
-  show.frame = Math.min(show.frame, scene.frames - 1);
-  $("viewer-title").textContent = INSTANCES[instance];
-  const methods = [...new Set(here.map((one) => R.method[one]))].sort((a, b) => a - b);
-  choose(
-    $("viewer-method"),
-    methods.map((m) => [String(m), METHODS[m]]),
-    String(R.method[row]),
-    () => {
-      const same = here.filter((one) => R.method[one] === +$("viewer-method").value);
-      openTrack(same.find((one) => R.seed[one] === R.seed[show.row]) ?? same[0]);
-    },
-  );
-  choose(
-    $("viewer-seed"),
-    here.filter((one) => R.method[one] === R.method[row]).map((one) => [String(one), String(D.seeds[R.seed[one]])]),
-    String(row),
-    () => openTrack(+$("viewer-seed").value),
-  );
-  choose(
-    $("viewer-camera"),
-    scene.cameras.map((_, k) => [String(k), String(k + 1)]),
-    String(show.camera),
-    () => {
-      show.camera = +$("viewer-camera").value;
-      paint();
-    },
-  );
-  $("camera-label").hidden = scene.cameras.length < 2;
-  $("overlay").parentNode.hidden = !scene.cameras.length;
-  $("frame").max = scene.frames - 1;
-  strip();
-}
-
-function paint() {
-  if (!$("viewer").open) return;
-  const instance = D.rows.instance[show.row];
-  const scene = sceneOf(instance);
-  const track = D.gallery.tracks[show.row];
-  track.joints = track.joints || decoded(track.estimate);
-  const truth = scene.joints(show.frame);
-  const estimate = track.joints(show.frame);
-  if (scene.cameras.length) paintOverlay($("overlay"), scene, scene.cameras[show.camera], truth, estimate);
-  scene.floor =
-    scene.floor ?? Math.min(...range(scene.frames).flatMap((k) => scene.joints(k).map((point) => point[1])));
-  paintTurned($("turning"), truth, estimate, scene.floor);
-  $("frame").value = show.frame;
-  const state = [
-    track.lost.includes(show.frame) ? "lost" : "",
-    track.swapped.includes(show.frame) ? "left and right swapped" : "",
-  ].filter(Boolean);
-  const said = [`frame ${show.frame * scene.step}: MPJPE ${track.mpjpe[show.frame]} mm`, ...state].join(", ");
-  $("reading").textContent = said;
-  $("overlay").setAttribute("aria-label", said);
-  const now = $("strip").querySelector(".now");
-  if (now) now.setAttribute("transform", `translate(${now.dataset.step * show.frame},0)`);
-}
-
-// Every frame's error as a bar: lost ones red, a line below those that are swapped.
-function strip() {
-  const track = D.gallery.tracks[show.row];
-  const count = track.mpjpe.length;
-  const height = 46;
-  const step = 600 / count;
-  const most = Math.max(160, ...track.mpjpe);
-  const svg = draw("svg", {
-    viewBox: `0 0 600 ${height}`,
-    width: "100%",
-    height,
-    preserveAspectRatio: "none",
-    "aria-hidden": "true",
-  });
-  track.mpjpe.forEach((value, k) =>
-    svg.append(
-      draw("rect", {
-        x: k * step,
-        width: Math.max(step - 0.6, 0.4),
-        y: 38 * (1 - value / most),
-        height: (38 * value) / most,
-        style: `fill: var(${track.lost.includes(k) ? "--bad" : "--truth"})`,
-      }),
-    ),
-  );
-  track.swapped.forEach((k) =>
-    svg.append(draw("rect", { x: k * step, width: step, y: 41, height: 4, style: "fill: var(--swapped)" })),
-  );
-  svg.append(
-    draw("rect", {
-      class: "now",
-      "data-step": step,
-      x: 0,
-      width: step,
-      y: 0,
-      height,
-      style: "fill: var(--accent)",
-      opacity: 0.35,
-    }),
-  );
-  $("strip").replaceChildren(
-    make(
-      "p",
-      {},
-      `MPJPE frame by frame, up to ${whole(most)} mm`,
-      track.lost.length ? "; red: lost" : "",
-      track.swapped.length ? "; underlined: left and right swapped" : "",
-    ),
-    svg,
-  );
-}
-
-const play = clock(
-  $("play"),
-  () => {
-    const scene = sceneOf(D.rows.instance[show.row]);
-    return (1000 * scene.step) / scene.fps;
-  },
-  (over) => {
-    show.frame = (show.frame + over) % sceneOf(D.rows.instance[show.row]).frames;
-    paint();
-  },
-);
-
-function viewer() {
+      const still = stillOf(row);
+      paintStill(canvas, still, Math.floor(still.scene.frames / 2));
+    }
+    $("more-cards").hidden = !cards.length;
+  };
+  $("more-cards").onclick = add;
+  add();
   turnable($("turning"), paint);
   $("frame").oninput = () => {
     play(false);
@@ -202,3 +85,96 @@ function viewer() {
   };
   $("viewer").addEventListener("close", () => play(false));
 }
+
+function openTrack(row) {
+  const R = D.rows;
+  const here = animated.filter((one) => R.instance[one] === R.instance[row]);
+  const scene = sceneOf(row);
+  Object.assign(show, {
+    row,
+    frame: Math.min(show.frame, scene.frames - 1),
+    camera: Math.min(show.camera, Math.max(scene.cameras.length - 1, 0)),
+  });
+  $("viewer-title").textContent = INSTANCES[R.instance[row]];
+  const methods = [...new Set(here.map((one) => R.method[one]))].sort((a, b) => a - b);
+  const names = methods.map((m) => [String(m), METHODS[m]]);
+  choose($("viewer-method"), names, String(R.method[row]), () => {
+    const same = here.filter((one) => R.method[one] === +$("viewer-method").value);
+    openTrack(same.find((one) => R.seed[one] === R.seed[show.row]) ?? same[0]);
+  });
+  const mine = here.filter((one) => R.method[one] === R.method[row]);
+  const seeds = mine.map((one) => [String(one), String(D.seeds[R.seed[one]])]);
+  choose($("viewer-seed"), seeds, String(row), () => openTrack(+$("viewer-seed").value));
+  const cameras = scene.cameras.map((_, k) => [String(k), String(k + 1)]);
+  choose($("viewer-camera"), cameras, String(show.camera), () => {
+    show.camera = +$("viewer-camera").value;
+    paint();
+  });
+  $("camera-label").hidden = scene.cameras.length < 2;
+  $("overlay").parentNode.hidden = !scene.cameras.length;
+  $("frame").max = scene.frames - 1;
+  strip();
+  if (!$("viewer").open) $("viewer").showModal();
+  paint();
+}
+
+function paint() {
+  if (!$("viewer").open) return;
+  const [scene, track] = [sceneOf(show.row), trackOf(show.row)];
+  const [truth, estimate] = [scene.joints(show.frame), track.joints(show.frame)];
+  const camera = scene.cameras[show.camera];
+  if (camera) paintOverlay(camera, scene.radii, truth, estimate);
+  scene.floor ??= Math.min(...range(scene.frames).flatMap((k) => scene.joints(k).map((point) => point[1])));
+  const turning = stage($("turning"), truth[0], scene.floor, $("turning").clientWidth < 420 ? 1 : 0.75);
+  sticks(turning.pen, projected(turning.camera, truth), ink("--truth"), 6);
+  sticks(turning.pen, projected(turning.camera, estimate), limbs(), 3);
+  $("frame").value = show.frame;
+  const states = [
+    `frame ${show.frame * scene.step}: MPJPE ${track.mpjpe[show.frame]} mm`,
+    track.lost.includes(show.frame) ? "lost" : "",
+    track.swapped.includes(show.frame) ? "left and right swapped" : "",
+  ];
+  $("reading").textContent = states.filter(Boolean).join(", ");
+  $("overlay").setAttribute("aria-label", $("reading").textContent);
+  $("strip").querySelector(".now").setAttribute("x", show.frame);
+}
+
+function paintOverlay(camera, radii, truth, estimate) {
+  const { pen, width } = sheet($("overlay"), camera.size[1] / camera.size[0]);
+  const scale = width / camera.size[0];
+  pen.scale(scale, scale);
+  const [there, here] = [truth, estimate].map((points) => projected(camera, points));
+  silhouette(pen, camera, there, radii, "--truth", 0.38);
+  silhouette(pen, camera, here, radii, "--estimate", 0.38);
+  sticks(pen, there, ink("--truth"), 3 / scale);
+  sticks(pen, here, limbs(), 2 / scale);
+}
+
+// Every frame's error as a bar: lost ones red, a line below the swapped ones.
+function strip() {
+  const { mpjpe, lost, swapped } = trackOf(show.row);
+  const most = Math.max(160, ...mpjpe);
+  const about = { width: "100%", height: 46, viewBox: `0 0 ${mpjpe.length} 46`, preserveAspectRatio: "none" };
+  const bar = (x, y, height, name, more) =>
+    draw("rect", { x, y, width: 0.9, height, style: `fill: var(${name})`, ...more });
+  const svg = draw("svg", { ...about, "aria-hidden": "true" });
+  svg.append(
+    ...mpjpe.map((value, k) =>
+      bar(k, 38 * (1 - value / most), (38 * value) / most, lost.includes(k) ? "--bad" : "--truth"),
+    ),
+    ...swapped.map((k) => bar(k, 41, 4, "--swapped")),
+    bar(0, 0, 46, "--accent", { class: "now", opacity: 0.35 }),
+  );
+  const red = lost.length ? "; red: lost" : "";
+  const below = swapped.length ? "; underlined: left and right swapped" : "";
+  $("strip").replaceChildren(make("p", {}, `MPJPE of each frame, up to ${whole(most)} mm${red}${below}`), svg);
+}
+
+const play = clock(
+  $("play"),
+  () => (1000 * sceneOf(show.row).step) / sceneOf(show.row).fps,
+  (over) => {
+    show.frame = (show.frame + over) % sceneOf(show.row).frames;
+    paint();
+  },
+);

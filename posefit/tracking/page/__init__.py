@@ -1,16 +1,34 @@
-"""The viewer of one track, `track.html`: one file that any browser opens from disk, and that asks nobody for anything.
+"""The page of one track, `track.html`: one file that any browser opens from disk, without any network request.
 
 | looking for | file |
 |---|---|
-| the document, and how it is written | webpage.py |
-| small pictures of what was seen, as many as there is room for | album.py |
-| everything the page shows, as data | content.py |
+| the document | this file |
+| the data of the page | content.py |
+| small pictures of footage and masks, as many as there is room for | stills.py |
 | colours, those of bodies on any page too | colours.py |
-| the places of everything, empty; how it looks | viewer.html, viewer.css |
-| what a camera saw with the body on it; the body in 3D | panels.js |
+| the places of everything, empty; how it looks | track.html, track.css |
+| a camera's picture with the body on it; the body in 3D | panels.js |
 | curves with intervals, and rows of marks | curves.js |
 | the player, the keys, and the words above and below | main.js |
 
-The scripts run as one, after those that all pages share (`posefit.page`). The constant `D` is the data that content.py
-describes.
+The constant `D` is the data that content.py returns; `posefit.page` has what all pages share.
 """
+
+from typing import Any
+
+from posefit.page.document import assembled, colour_style, one_script, part
+from posefit.tracking.page.colours import DARK, LIGHT
+
+SCRIPTS = ("panels", "curves", "main")  # in this order
+_MARK = "<!doctype html>\n<!-- a track of posefit -->\n"
+
+
+def track_document(data: dict[str, Any]) -> str:
+    """Return the page that shows the data of a track."""
+    style = colour_style(LIGHT, DARK) + part(__package__, "track.css")
+    return assembled(_MARK, part(__package__, "track.html"), style, data, script())
+
+
+def script() -> str:
+    """Return the page's script."""
+    return one_script(__package__, SCRIPTS)

@@ -1,8 +1,8 @@
-"""The colours of a track's viewer, for light and for dark screens: those of its pictures, where a screen is dark."""
+"""The colours of a track's page; on dark screens those of its pictures."""
 
 from posefit.tracking.drawing.colours import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
 
-# of tracks, on any page: the limbs of a body, and the truth
+# the limbs of a body, and the truth, on any page
 BODY_LIGHT = {"left": "#b84500", "right": "#0063a6", "truth": "#5d6975"}
 BODY_DARK = {"left": hexadecimal(LEFT), "right": hexadecimal(RIGHT), "truth": "#98a5b3"}
 

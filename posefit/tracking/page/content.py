@@ -1,4 +1,4 @@
-"""What the viewer shows of a track, as data: bodies, figures, intervals, and words."""
+"""The data of a track's page: bodies, figures, intervals, and words."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,11 +12,11 @@ from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
 from posefit.measuring.angles import COLUMNS, clinical_angles
 from posefit.measuring.centres import PLACES
 from posefit.motion.motion import Motion
-from posefit.page.bodies import camera_seen_from, in_16_bits
+from posefit.page.bodies import camera_from_origin, in_16_bits
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.formats import Rows, State
 from posefit.tracking.measures import FRAME
-from posefit.tracking.page.album import Album
+from posefit.tracking.page.stills import Stills
 from posefit.tracking.picture import LIKELY
 from posefit.tracking.table import undetermined
 from posefit.uncertainty.modes import other_mode
@@ -34,24 +34,24 @@ def track_data(
     rows: Rows,
     summary: State,
     sure: Mapping[str, Array],
-    album: Album,
+    stills: Stills,
 ) -> dict[str, Any]:
-    """Return everything that the viewer shows; `sure` is what `posefit.tracking.formats.intervals_of` gave.
+    """Return the data of the page; `sure` comes from `posefit.tracking.formats.intervals_of`.
 
-    Joints are millimetres from the first place of the root and angles tenths of a degree, in 16 bits each. Of a long
-    track every `step`-th frame is there; a frame is marked if one of those that it stands for is.
+    Joints are millimetres from the first position of the root and angles tenths of a degree, in 16 bits each. A long
+    track has every `step`-th frame; a frame is marked if one of those that it stands for is.
     """
-    step, skeleton = album.step, estimate.skeleton
+    step, skeleton = stills.step, estimate.skeleton
     joints = skeleton.joints(estimate.poses, estimate.translations)[::step]
     origin = np.round(joints[0, 0], 3)
     truth, free = scene.truth, skeleton.free
     true = None if truth is None else truth.skeleton.joints(truth.poses, truth.translations)[::step]
     angles = np.unwrap(estimate.poses[::step], axis=0)
-    said = {name: values[::step] for name, values in sure.items() if name != "levels"}
+    intervals = {name: values[::step] for name, values in sure.items() if name != "levels"}
     return {
         "version": __version__,
         "title": str(summary["motion"]),
-        "told": _told(summary),
+        "verdict": _verdict(summary),
         "notes": [*_held(summary), *map(str, summary["warnings"])],
         "facts": _facts(summary),
         "joints": JOINTS,
@@ -62,8 +62,8 @@ def track_data(
         "count": len(frames),
         "step": step,
         "fps": estimate.fps,
-        "cameras": [camera_seen_from(camera, origin) for camera in scene.cameras],
-        **album.as_dict(),
+        "cameras": [camera_from_origin(camera, origin) for camera in scene.cameras],
+        **stills.as_dict(),
         "estimate": in_16_bits(joints - origin),
         "truth": None if true is None else in_16_bits(true - origin),
         "others": _others(scene, frames[::step], origin),
@@ -85,32 +85,32 @@ def track_data(
             "truth": None if truth is None else in_16_bits(_clinical(truth, step), TENTH),
         },
         "intervals": None
-        if not said
+        if not intervals
         else {
             "levels": [round(100 * level) for level in sure["levels"].tolist()],
-            "joints": in_16_bits(said["joint_radii"]),
-            "angles": in_16_bits(said["angle_halves"][..., free], UNIT),
+            "joints": in_16_bits(intervals["joint_radii"]),
+            "angles": in_16_bits(intervals["angle_halves"][..., free], UNIT),
         },
     }
 
 
-def _told(summary: State) -> str:
-    """Return whether the track can be trusted, where nobody knows the truth, and what was not determined."""
+def _verdict(summary: State) -> str:
+    """Return whether the track can be trusted, if the truth is unknown, and what was not determined."""
     trust = summary["trust"]
     return _determined(summary) if trust is None else f"{trust['sentence']} {_determined(summary)}"
 
 
 def _determined(summary: State) -> str:
-    if told := undetermined(summary):
-        return f"Not determined: {told}."
-    silent = [
+    if not_determined := undetermined(summary):
+        return f"Not determined: {not_determined}."
+    unreported = [
         words
         for name, words in (("unknown_sides", "which side is left"), ("lost_frames", "which frames are lost"))
         if summary[name] is None
     ]
-    if silent:
-        return f"The method does not say {' or '.join(silent)}: that nothing is marked does not mean that all is right."
-    return "The method calls left and right known in every frame, and no frame lost."
+    if unreported:
+        return f"The method does not report {' or '.join(unreported)}: frames without a mark may be wrong too."
+    return "The method reports no frame as lost, and left and right as known in every frame."
 
 
 def _held(summary: State) -> list[str]:
@@ -120,7 +120,7 @@ def _held(summary: State) -> list[str]:
 
 
 def _facts(summary: State) -> list[list[str]]:
-    """Return names and values of what the track was made with."""
+    """Return names and values of the track's method and scene."""
     known = [
         ("method", str(summary["method"])),
         ("seed", str(summary["seed"])),
@@ -140,21 +140,21 @@ def _column(name: str) -> dict[str, Any]:
 
 
 def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
-    """Return what else frames may show, where that is likely: their numbers among those shown, weights and joints."""
+    """Return the other likely poses of frames: their numbers among those shown, weights and joints."""
     skeleton = scene.body.skeleton
-    found = [other_mode(skeleton, frame.modes, frame.pose, LIKELY) for frame in frames]
-    there = {k: mode for k, mode in enumerate(found) if mode is not None}
-    joints = [skeleton.joints(mode.pose, mode.translation) - origin for mode in there.values()]
+    modes = [other_mode(skeleton, frame.modes, frame.pose, LIKELY) for frame in frames]
+    likely = {k: mode for k, mode in enumerate(modes) if mode is not None}
+    joints = [skeleton.joints(mode.pose, mode.translation) - origin for mode in likely.values()]
     return {
-        "at": list(there),
-        "weights": [mode.weight for mode in there.values()],
+        "at": list(likely),
+        "weights": [mode.weight for mode in likely.values()],
         "joints": in_16_bits(np.array(joints)),
     }
 
 
-def _marked(said: Sequence[bool], step: int) -> list[int]:
-    """Return the frames shown that stand for one of which it is said."""
-    return sorted({k // step for k, one in enumerate(said) if one})
+def _marked(marks: Sequence[bool], step: int) -> list[int]:
+    """Return the frames shown that stand for a marked one."""
+    return sorted({k // step for k, marked in enumerate(marks) if marked})
 
 
 def _angle_names() -> list[str]:
@@ -168,10 +168,10 @@ def _words(name: str) -> str:
 
 def _clinical(motion: Motion, step: int) -> Array:
     """Return the clinical angles (T, n) in degrees of every `step`-th frame."""
-    found = clinical_angles(motion.skeleton, motion.poses[::step])
-    return np.column_stack([found[name] for name in COLUMNS])
+    angles = clinical_angles(motion.skeleton, motion.poses[::step])
+    return np.column_stack([angles[name] for name in COLUMNS])
 
 
 def _beside(angles: Array, true: Array) -> Array:
-    """Return the same true angles (T, n), by as many whole turns as bring them nearest to others."""
+    """Return true angles (T, n), turned by whole turns to lie nearest to others."""
     return np.asarray(true + 2.0 * np.pi * np.round((angles - true) / (2.0 * np.pi)))

@@ -4,26 +4,28 @@ const marked = [...new Set(MARKS.flatMap(([name]) => D.marks[name]))].sort((a, b
 function header() {
   document.title = `${D.title}: a track of posefit`;
   $("title").textContent = D.title;
-  const time = `${number(D.count / D.fps, 1)} s at ${+D.fps.toPrecision(4)} frames a second`;
-  $("lead").textContent = shown > 1 ? `${counted(D.count, "frame")}, ${time}.` : "A single frame.";
-  $("told").textContent = D.told;
-  $("notes").append(...D.notes.map((text) => make("p", { class: "note warn" }, text)));
-  $("facts").append(...D.facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
+  $("verdict").textContent = D.verdict;
+  details({ facts: D.facts, notes: D.notes, version: D.version });
+  for (const note of $("notes").children) note.classList.add("warn");
   const every = (count) => (count === 1 ? "every frame" : `one frame in ${whole(count)}`);
-  const pictured = D.film ? D.film.every : D.masks[0].every;
+  const pictured = (D.film ?? D.masks[0]).every;
   const thinned = D.step > 1 ? `This track is long, so this page shows ${every(D.step)}. ` : "";
   const fewer = pictured > D.step ? `There is a picture of ${every(pictured)}, so that this file stays small. ` : "";
   $("thinned").textContent =
     `${thinned}${fewer}poses.npz and frames.csv in the same folder have every frame, overlay.mp4 the pictures.`;
-  if (thinned || fewer) $("lead").textContent += ` ${thinned}${fewer}`.trimEnd();
-  $("foot").textContent = `posefit ${D.version}. This file holds everything it shows and asks the network for nothing.`;
+  const time = `${number(D.count / D.fps, 1)} s at ${+D.fps.toPrecision(4)} frames a second`;
+  const length = shown > 1 ? `${counted(D.count, "frame")}, ${time}.` : "A single frame.";
+  $("lead").textContent = `${length} ${thinned}${fewer}`.trimEnd();
 }
 
-// What is to be said of a frame, in words.
-function told(frame) {
-  const figures = Object.entries(D.columns)
-    .filter(([name]) => ["mpjpe_mm", "cost", "iou"].includes(name))
-    .map(([name, { label, unit }]) => `${label} ${shownAs(name, D.rows[name][frame])} ${unit}`.trim());
+// A frame's time, figures and marks in words.
+function frameText(frame) {
+  const figures = ["mpjpe_mm", "iou", "cost"]
+    .filter((name) => D.columns[name])
+    .map((name) => {
+      const { label, unit } = D.columns[name];
+      return `${label} ${shownAs(name, D.rows[name][frame])} ${unit}`.trim();
+    });
   const other = otherOf(frame);
   const states = MARKS.filter(([name]) => D.marks[name].includes(frame)).map(([, , words]) => words);
   if (other) states.push(`may be the thin bones: ${whole(100 * other.weight)} %`);
@@ -35,14 +37,14 @@ function paint() {
   const pictured = paintPicture();
   paintBody();
   cursors.forEach((move) => move(show.frame));
-  const said = told(show.frame);
-  if (last === `${show.camera} ${said}`) return;
-  last = `${show.camera} ${said}`;
+  const text = frameText(show.frame);
+  if (last === `${show.camera} ${text}`) return;
+  last = `${show.camera} ${text}`;
   $("frame").value = show.frame;
-  $("frame").setAttribute("aria-valuetext", said);
-  $("reading").textContent = pictured === show.frame ? said : `${said}; the picture is of frame ${pictured * D.step}`;
-  $("picture").setAttribute("aria-label", `Camera ${show.camera + 1} with the body on it, ${said}`);
-  $("turning").setAttribute("aria-label", `The body in 3D, which arrow keys turn, ${said}`);
+  $("frame").setAttribute("aria-valuetext", text);
+  $("reading").textContent = pictured === show.frame ? text : `${text}; the picture is of frame ${pictured * D.step}`;
+  $("picture").setAttribute("aria-label", `Camera ${show.camera + 1} with the body on it, ${text}`);
+  $("turning").setAttribute("aria-label", `The body in 3D, which arrow keys turn, ${text}`);
 }
 
 const play = clock(
@@ -60,11 +62,11 @@ function seek(frame) {
   paint();
 }
 
-// The next frame that is marked, or the one before; the first after the last.
-function mark(way) {
+// The next marked frame, or the previous one; the first comes after the last.
+function seekMark(way) {
   if (!marked.length) return;
-  const later = way > 0 ? marked.find((k) => k > show.frame) : marked.findLast((k) => k < show.frame);
-  seek(later ?? marked.at(way > 0 ? 0 : -1));
+  const next = way > 0 ? marked.find((k) => k > show.frame) : marked.findLast((k) => k < show.frame);
+  seek(next ?? marked.at(way > 0 ? 0 : -1));
 }
 
 const KEYS = {
@@ -73,39 +75,31 @@ const KEYS = {
   ArrowRight: (event) => seek(show.frame + (event.shiftKey ? 10 : 1)),
   Home: () => seek(0),
   End: () => seek(shown - 1),
-  n: () => mark(1),
-  p: () => mark(-1),
+  n: () => seekMark(1),
+  p: () => seekMark(-1),
 };
 
-function pressed(event) {
+document.addEventListener("keydown", (event) => {
   const act = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   const on = event.target;
   if (!act || event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
   if (on.closest("select") || (event.key === " " && on.closest("button, summary, input[type=checkbox]"))) return;
   event.preventDefault();
   act(event);
-}
+});
 
 function player() {
   $("controls").hidden = shown === 1;
   $("frame").max = shown - 1;
   $("frame").oninput = () => seek(+$("frame").value);
-  choose(
-    $("speed"),
-    [1, 0.5, 0.25, 0.1].map((speed) => [String(speed), `${speed}×`]),
-    "1",
-    () => {},
-  );
-  choose(
-    $("camera"),
-    D.cameras.map((_, k) => [String(k), String(k + 1)]),
-    "0",
-    () => {
-      show.camera = +$("camera").value;
-      upright();
-      paint();
-    },
-  );
+  const speeds = [1, 0.5, 0.25, 0.1].map((speed) => [String(speed), `${speed}×`]);
+  choose($("speed"), speeds, "1", () => {});
+  const cameras = D.cameras.map((_, k) => [String(k), String(k + 1)]);
+  choose($("camera"), cameras, "0", () => {
+    show.camera = +$("camera").value;
+    upright();
+    paint();
+  });
   $("camera-label").hidden = D.cameras.length < 2;
   $("with-film").parentNode.hidden = !D.film;
   $("with-mask").checked = !D.film;
@@ -120,12 +114,11 @@ function player() {
   $("from-side").onclick = () => look(Math.PI / 2, 0);
   $("from-above").onclick = () => look(0, 1.4);
   $("doubtful").hidden = !marked.length;
-  $("before").onclick = () => mark(-1);
-  $("after").onclick = () => mark(1);
-  document.addEventListener("keydown", pressed);
+  $("before").onclick = () => seekMark(-1);
+  $("after").onclick = () => seekMark(1);
 }
 
-// A picture of a camera that stands upright is no higher than most of the window.
+// A picture of an upright camera is no higher than most of the window.
 function upright() {
   const [wide, high] = D.cameras[show.camera].size;
   $("picture").style.maxWidth = `calc(62vh * ${wide / high})`;

@@ -1,10 +1,10 @@
-// The two views of a frame: what a camera saw with the body on it, and the body in 3D.
+// The two views of a frame: a camera's picture with the body on it, and the body in 3D.
 const SURE = 0.05; // metres: a joint's 80 % interval, up to which a limb is drawn solid,
 const UNSURE = 0.3; // and from which on it is faintest
 const FAINTEST = 0.2; // how much of a faintest limb's colour is left
-const SOLID = 0.65; // how much of what was filmed the body hides
-const CLOSE = 1.4; // times the body's height is that of a close-up, which is
-const CALM = 6; // centred on the mean over so many frames to either side
+const SOLID = 0.65; // of the picture that the body hides
+const CLOSE = 1.4; // height of a close-up, in heights of the body
+const CALM = 6; // frames to either side whose mean position a close-up is centred on
 const show = { frame: 0, camera: 0 };
 const shown = Math.ceil(D.count / D.step); // frames of this page
 const estimateAt = decoded(D.estimate);
@@ -12,13 +12,13 @@ const truthAt = D.truth ? decoded(D.truth) : null;
 const otherAt = decoded(D.others.joints);
 const radiusAt = D.intervals ? unpacked(D.intervals.joints) : () => null;
 
-// Metres that a joint may be off at a level; null where nobody says.
+// The radius in metres of a joint's interval at a level; null where unknown.
 function radius(frame, level, joint) {
   const value = radiusAt((frame * D.intervals.levels.length + level) * D.joints.length + joint);
   return given(value) ? value / 1000 : null;
 }
 
-// How solid each bone is drawn, 0 to 1: as sure as the less sure of its ends.
+// How solid each bone is drawn, 0 to 1: as certain as the less certain of its ends.
 function solids(frame) {
   if (!D.intervals) return BONES.map(() => 1);
   const level = D.intervals.levels.indexOf(80);
@@ -29,13 +29,13 @@ function solids(frame) {
   return BONES.map(([parent, joint]) => Math.min(each[parent], each[joint]));
 }
 
-// What else a frame may show: its weight and joints; null where nothing else is likely.
+// The other likely pose of a frame, its weight and joints; null if there is none.
 function otherOf(frame) {
   const place = D.others.at.indexOf(frame);
   return place < 0 ? null : { weight: D.others.weights[place], joints: otherAt(place) };
 }
 
-// A picture by its data: it is there once it is decoded, and then everything is painted again.
+// A picture by its data, null until it is decoded: then everything is painted again.
 const pictures = new Map();
 function pictureOf(uri) {
   if (!pictures.has(uri)) {
@@ -48,14 +48,14 @@ function pictureOf(uri) {
   return image.complete && image.naturalWidth ? image : null;
 }
 
-// Draws what was filmed in a frame: all of it, coarse, and the part about the person.
+// Draws the film of a frame: all of it, coarse, and the part around the person.
 function photograph(pen, size, [box, near, coarse]) {
   const [behind, person] = [pictureOf(coarse), pictureOf(near)];
   if (behind) pen.drawImage(behind, 0, 0, size[0], size[1]);
   if (person) pen.drawImage(person, ...box);
 }
 
-// The pen of a sheet as large as another canvas, for what has to be put together before it is drawn there.
+// The pen of a sheet as large as another canvas, for pictures that are put together before they are drawn there.
 function layer(canvas) {
   const { width, height } = canvas;
   const pen = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
@@ -63,10 +63,10 @@ function layer(canvas) {
   return pen;
 }
 
-// Of each camera, where the body's middle is and how tall it is in pixels, frame by frame.
+// The body's middle and height in pixels of each camera and frame.
 const framed = D.cameras.map((camera) =>
   range(shown).map((frame) => {
-    const pixels = seen(camera, estimateAt(frame)).filter(([, , depth]) => depth > NEAR);
+    const pixels = projected(camera, estimateAt(frame)).filter(([, , depth]) => depth > NEAR);
     const [xs, ys] = [0, 1].map((k) => pixels.map((pixel) => pixel[k]));
     const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     return pixels.length ? { x: (left + right) / 2, y: (top + bottom) / 2, tall: bottom - top } : null;
@@ -74,13 +74,13 @@ const framed = D.cameras.map((camera) =>
 );
 const middle = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
 
-// How many times larger a picture of a camera is in a close-up: so that most of its height is the body's.
+// The zoom of a camera's close-up: the body fills most of its height.
 function closeness(camera) {
   const tall = framed[camera].filter(given).map((one) => one.tall);
   return tall.length ? Math.max(1, Math.min(6, D.cameras[camera].size[1] / (CLOSE * Math.max(middle(tall), 1)))) : 1;
 }
 
-// The part of a camera's picture that is shown: its left and top, and how many times larger it is.
+// The part of a camera's picture that is shown: its left and top, and its zoom.
 function part(frame) {
   const [wide, high] = D.cameras[show.camera].size;
   const zoom = $("close-up").checked ? closeness(show.camera) : 1;
@@ -91,21 +91,21 @@ function part(frame) {
   return { left: within(mean("x"), wide), top: within(mean("y"), high), zoom };
 }
 
-// A body of tapered cones, far ones first; what lies behind shows through where it is not solid.
+// A body of tapered cones, far ones first; those that are not solid are transparent.
 function cones(pen, camera, pixels, solid, width) {
   const colours = limbs();
   const edge = ink("--back");
   const far = BONES.map(([parent, joint]) => pixels[parent][2] + pixels[joint][2]);
   const order = range(BONES.length).sort((a, b) => far[b] - far[a]);
   for (const bone of order) {
-    const path = new Path2D();
-    if (!addCone(path, camera, pixels, D.radii, bone)) continue;
+    const cone = new Path2D();
+    if (!addCone(cone, camera, pixels, D.radii, bone)) continue;
     pen.globalAlpha = solid[bone];
     pen.strokeStyle = edge;
     pen.lineWidth = width;
-    pen.stroke(path);
+    pen.stroke(cone);
     pen.fillStyle = colours[D.sides[BONES[bone][1]]];
-    pen.fill(path);
+    pen.fill(cone);
   }
   pen.globalAlpha = 1;
 }
@@ -121,8 +121,8 @@ function cutOut(image) {
   return cut.canvas;
 }
 
-// Where mask and body agree, and where they do not, each in its colour.
-function agreement(pen, size, [box, uri], path) {
+// The parts of mask and body in common, and those of one alone, each in its colour.
+function agreement(pen, size, [box, uri], body) {
   const mask = pictureOf(uri);
   if (mask) {
     pen.drawImage(cutOut(mask), ...box);
@@ -130,18 +130,18 @@ function agreement(pen, size, [box, uri], path) {
     pen.fillStyle = ink("--missed");
     pen.fillRect(0, 0, size[0], size[1]);
   }
-  if (path) {
+  if (body) {
     pen.globalCompositeOperation = "source-atop";
     pen.fillStyle = ink("--both");
-    pen.fill(path);
+    pen.fill(body);
     pen.globalCompositeOperation = "destination-over";
     pen.fillStyle = ink("--spilled");
-    pen.fill(path);
+    pen.fill(body);
   }
   pen.globalCompositeOperation = "source-over";
 }
 
-// The strip of a camera's pictures that is shown: what was filmed, if that is wanted, or the masks.
+// The film, if it is shown.
 const filmed = () => (show.camera === 0 && D.film && $("with-film").checked ? D.film : null);
 
 function paintPicture() {
@@ -154,14 +154,14 @@ function paintPicture() {
   const body = $("with-body").checked;
   const masked = $("with-mask").checked;
   const every = Math.max(film ? film.every : 1, masked || !film ? masks.every : 1);
-  const frame = Math.floor((show.frame * D.step) / every) * (every / D.step); // all is drawn as it was in the picture
+  const frame = Math.floor((show.frame * D.step) / every) * (every / D.step); // the body is that of the picture
   const { left, top, zoom } = part(frame);
   const factor = zoom * scale;
   pen.scale(factor, factor);
   pen.translate(-left, -top);
   const of = (strip) => strip.pictures[Math.min((frame * D.step) / strip.every, strip.pictures.length - 1)];
   if (film) photograph(pen, camera.size, of(film));
-  const pixels = seen(camera, estimateAt(frame));
+  const pixels = projected(camera, estimateAt(frame));
   const over = layer(canvas);
   over.setTransform(pen.getTransform());
   const solid = solids(frame);
@@ -174,7 +174,7 @@ function paintPicture() {
   if (!body) return frame;
   if (masked) sticks(pen, pixels, limbs(), 2.5 / factor);
   const other = otherOf(frame);
-  if (other) sticks(pen, seen(camera, other.joints), ink("--other"), 2.5 / factor);
+  if (other) sticks(pen, projected(camera, other.joints), ink("--other"), 2.5 / factor);
   return frame;
 }
 
@@ -185,10 +185,10 @@ function paintBody() {
   const joints = estimateAt(show.frame);
   const canvas = $("turning");
   const { pen, camera } = stage(canvas, joints[0], floor, canvas.clientWidth < 420 ? 0.9 : 0.75);
-  cones(pen, camera, seen(camera, joints), solids(show.frame), 1.5);
-  if (truthAt && $("with-truth").checked) sticks(pen, seen(camera, truthAt(show.frame)), ink("--ink"), 1.5);
+  cones(pen, camera, projected(camera, joints), solids(show.frame), 1.5);
+  if (truthAt && $("with-truth").checked) sticks(pen, projected(camera, truthAt(show.frame)), ink("--ink"), 1.5);
   const other = otherOf(show.frame);
-  if (other) sticks(pen, seen(camera, other.joints), ink("--other"), 2.5);
+  if (other) sticks(pen, projected(camera, other.joints), ink("--other"), 2.5);
 }
 
 // Looks from where the first camera stands, turned by some radians to its right, and from so high up.
@@ -218,9 +218,9 @@ function legends() {
     body ? entry("--spilled", "body only") : null,
   ];
   const sides = () => [entry("--left", "left limbs"), entry("--right", "right limbs")];
-  const may = () => (D.others.at.length ? entry("--other", "may be this, too", true) : null);
+  const may = () => (D.others.at.length ? entry("--other", "may also be this", true) : null);
   const truth = truthAt && $("with-truth").checked ? entry("--ink", "truth", true) : null;
-  const faint = D.intervals ? make("li", {}, "faint: unsure") : null;
+  const faint = D.intervals ? make("li", {}, "faint: uncertain") : null;
   const below = (id, entries) => $(id).replaceChildren(...entries.filter(given));
   below("picture-legend", [...(masked ? fit : []), ...(body ? [...sides(), may()] : [])]);
   below("turning-legend", [...sides(), truth, may(), faint]);

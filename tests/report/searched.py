@@ -15,7 +15,7 @@ def cell(method: str, function: int = 1, dimension: int = 9, instance: int = 10_
     return SearchCell(method, suite, function, dimension, instance, more.pop("budget", BUDGET) * dimension, **more)
 
 
-def found(one: SearchCell, targets: int) -> CellResult:
+def search_result(one: SearchCell, targets: int) -> CellResult:
     """Return the result of a search that reaches so many of 29 targets above 0: one each ten evaluations."""
     costs = [40.0, *(2.0 ** (5.0 - k / 4.0) for k in range(targets))]
     used = [1, *(10 * (k + 1) for k in range(targets))]
@@ -37,11 +37,11 @@ def searched(
 ) -> Path:
     """Write a ledger in which each method reaches so many targets, up to two more on some instances."""
     made = [
-        found(cell(method, *problem), targets + (problem[0] + problem[2]) % 3)
+        search_result(cell(method, *problem), targets + (problem[0] + problem[2]) % 3)
         for method, targets in methods.items()
         for problem in problems
     ]
-    return ledger(path, made, list(lost))  # type: ignore[arg-type]
+    return ledger(path, made, list(lost))
 
 
 def problems(functions: Iterable[int], dimensions: Iterable[int], instances: int) -> list[tuple[int, int, int]]:

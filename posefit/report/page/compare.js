@@ -1,0 +1,290 @@
+// Methods compared: ranks and paired tests, published claims, selection by instance, one method against all others.
+const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
+const stated = (p) => `p ${p < 0.001 ? "" : "= "}${probability(p)}`; // in a sentence
+const degrees = (value) => `${number(value, 2)}°`;
+const twoDigits = (value) => number(value, 2);
+const verdict = (row) => (row.adjusted >= 0.05 ? "no difference shown" : row.difference < 0 ? "better" : "worse");
+
+// Mean ranks on a line; bars join methods that do not differ. Demšar, 2006.
+function ranksDiagram(P, room) {
+  const order = P.ranks.map((rank, k) => [rank, k]).sort((a, b) => a[0] - b[0]);
+  const count = order.length;
+  const half = Math.ceil(count / 2);
+  const width = Math.max(290, Math.min(760, room));
+  const side = Math.min(250, 0.4 * width);
+  const [left, right, line] = [side, width - side, 62];
+  const at = (rank) => left + ((right - left) * (rank - 1)) / Math.max(count - 1, 1);
+  const names = line + 22 + 8 * P.cliques.length;
+  const ranks = order.map(([rank, k]) => `${METHODS[P.methods[k]]} ${rank.toFixed(2)}`);
+  const svg = drawing(width, names + 20 * half + 4, `Mean ranks, best first: ${ranks.join(", ")}`);
+  const long = Math.min(P.critical_difference, count - 1);
+  const longer = P.critical_difference > long ? ", longer than the line" : "";
+  const text = `critical difference ${P.critical_difference.toFixed(2)}${longer}`;
+  svg.append(
+    drawLine(at(1), 26, at(1 + long), 26, { class: "ink", "stroke-width": 2 }),
+    drawText(Math.max(0, Math.min(at(1), width - textWidth(text) - 4)), 17, text),
+    drawLine(at(1), line, at(count), line, { class: "ink" }),
+  );
+  const every = Math.ceil((textWidth(String(count)) + 4) / ((right - left) / Math.max(count - 1, 1)));
+  for (let rank = 1; rank <= count; rank += every)
+    svg.append(
+      drawLine(at(rank), line - 6, at(rank), line, { class: "ink" }),
+      drawText(at(rank), line - 10, String(rank), { "text-anchor": "middle" }),
+    );
+  P.cliques.forEach((clique, k) => {
+    const [low, high, y] = [P.ranks[clique[0]], P.ranks[clique.at(-1)], line + 10 + 8 * k];
+    svg.append(drawLine(at(low) - 4, y, at(high) + 4, y, { class: "ink", "stroke-width": 4 }));
+  });
+  order.forEach(([rank, k], place) => {
+    const m = P.methods[k];
+    const best = place < half;
+    const y = names + 20 * (best ? place : count - 1 - place) + 6;
+    const edge = best ? left - 14 : right + 14;
+    const value = rank.toFixed(2);
+    const name = fitted(METHODS[m], side - 22 - textWidth(` ${value}`));
+    const points = corners([
+      [at(rank), line],
+      [at(rank), y],
+      [edge, y],
+    ]).join(" ");
+    svg.append(
+      draw("polyline", { points, ...stroke(m, 1) }),
+      mark(m, at(rank), line, 4),
+      drawText(best ? edge - 5 : edge + 5, y + 4, best ? `${name}  ${value}` : `${value}  ${name}`, {
+        "text-anchor": best ? "end" : "start",
+      }),
+    );
+  });
+  return svg;
+}
+
+// Every paired test of a method, turned so that it comes first: a difference below 0 is in its favour.
+function duelsOf(m) {
+  const P = D.pairs;
+  const mine = P.methods.indexOf(m);
+  const not = (share) => (given(share) ? 1 - share : null);
+  return P.pairs
+    .filter((pair) => pair[0] === mine || pair[1] === mine)
+    .map(([first, second, difference, p, adjusted, better, low, high]) =>
+      first === mine
+        ? { other: P.methods[second], difference, p, adjusted, better, low, high }
+        : {
+            other: P.methods[first],
+            difference: -difference,
+            p,
+            adjusted,
+            better: not(better),
+            low: not(high),
+            high: not(low),
+          },
+    );
+}
+
+function comparison() {
+  const P = D.pairs;
+  if (!P) {
+    $("friedman").textContent = "A comparison needs two methods that share at least two runs.";
+    return $("against").closest(".row").remove();
+  }
+  $("friedman").textContent =
+    `Friedman's test over ${whole(P.blocks)} pairs of instance and seed: ${stated(P.friedman)} that all methods are ` +
+    `equal${P.friedman >= 0.05 ? "; the rest of this section means little then" : ""}. Below are mean ranks, 1 is best; ` +
+    "bars join methods whose ranks differ by less than Nemenyi's critical difference at 5 %. " +
+    "Seeds of one instance are not independent: all of it holds for these instances.";
+  drawn($("difference"), (width) => ranksDiagram(P, width));
+  const columns = [
+    textColumn("other method", (row) => METHODS[row.other]),
+    column("median difference °", (row) => row.difference, twoDigits, { about: "Below 0 the chosen method is better" }),
+    column("Wilcoxon p", (row) => row.p, probability),
+    column("p after Holm", (row) => row.adjusted, probability, {
+      about: `Adjusted for all ${P.pairs.length} comparisons`,
+    }),
+    column("probability of improvement", (row) => row.better, twoDigits, {
+      about: "That a run of the chosen method has the lower error",
+      down: true,
+    }),
+    {
+      title: "95 % interval",
+      about: "From three seeds on, if the runs are not too many",
+      value: (row) => row.low,
+      show: (row) => (given(row.low) ? `${number(row.low, 2)} – ${number(row.high, 2)}` : "–"),
+    },
+    textColumn("verdict", verdict),
+  ];
+  const show = (m) => table($("pairs"), columns, duelsOf(m), { name: "Paired tests", by: 1 });
+  const names = P.methods.map((m) => [String(m), METHODS[m]]);
+  choose($("against"), names, String(D.leaderboard[0].method), () => show(+$("against").value));
+  show(D.leaderboard[0].method);
+}
+
+// The results of orders of methods that publications claim.
+function claims() {
+  for (const C of D.claims ?? []) {
+    const names = C.methods.map((m) => METHODS[m]);
+    const errors = names.map((name, k) => `${name} ${k ? "" : "has "}${degrees(C.errors[k])}`);
+    const parts = C.steps.map(({ difference, adjusted, by_instance }, k) => {
+      const how = difference < 0 ? "worse" : difference > 0 ? "better" : "the same";
+      return (
+        `${names[k + 1]} is ${how} by a median of ${degrees(Math.abs(difference))} than ${names[k]} (paired Wilcoxon, ` +
+        `Holm over all steps, ${C.blocks} pairs: ${stated(adjusted)}; over ${C.instances} instances alone: ` +
+        `${stated(by_instance)})`
+      );
+    });
+    const confirmed = C.steps.flatMap((one, k) => (one.confirmed ? [`from ${names[k]} to ${names[k + 1]}`] : []));
+    const which = confirmed.length === C.steps.length ? "All of it is" : `Only the step ${confirmed.join(" and ")} is`;
+    const result = `${confirmed.length ? which : "It is not"} confirmed here, at 5 %.`;
+    const text = `: ${C.said}. Here ${errors.join(", ")}. ${parts.join("; ")}. ${result}`;
+    $("claims").append(make("div", { class: "note claim" }, make("strong", {}, `The claim of ${C.source}`), text));
+  }
+}
+
+// Who wins where, and what choosing a method by its instance would gain.
+function selection() {
+  const S = D.selection;
+  const [best, leader] = [METHODS[S.best], METHODS[D.leaderboard[0].method]];
+  const gap = S.single - S.oracle;
+  const closed = (share) => (share < 0 ? "worse than the single best" : percents(share));
+  const pays =
+    S.closed >= 0.05
+      ? "pays here"
+      : given(S.oracle_apart) && S.oracle_apart >= S.single
+        ? "does not pay here"
+        : "might pay, but no selector here knows how";
+  const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ");
+  const other = best === leader ? "" : `, the lowest plain mean (${leader} has the lowest interquartile mean),`;
+  const apart = given(S.oracle_apart) ? `, or ${degrees(S.oracle_apart)} if it is picked on other seeds` : "";
+  const share = given(S.closed) ? `, ${closed(S.closed)}${S.closed < 0 ? "" : " of the gap between them"}` : "";
+  const learnt = given(S.selector)
+    ? `, and a selector that knows ${listed(S.features)} ${degrees(S.selector)}${share}`
+    : "";
+  $("selection-text").textContent =
+    `Choosing a method by its instance ${pays}: ${best} alone has a mean error of ${degrees(S.single)}${other} over ` +
+    `${counted(S.instances, "instance")}, the best method of each ${degrees(S.oracle)} in hindsight${apart}${learnt}.` +
+    (S.why ? ` There is no selector: ${S.why}.` : "");
+  const ways = [
+    [`single best, by the plain mean: ${best}`, S.single],
+    ["selector, on instances it was not trained on", S.selector],
+    ["oracle, scored on seeds it was not picked on", S.oracle_apart],
+    ["oracle", S.oracle],
+  ].filter(([, error]) => given(error));
+  const plain = (title, show) => ({ title, show });
+  const error = plain("mean error °", (row) => twoDigits(row.error ?? row[1]));
+  const way = { ...plain("choice of a method", ([name]) => name), text: true };
+  const part = plain("gap closed", (row) => (gap > 0 ? closed((S.single - row[1]) / gap) : "–"));
+  table($("choosing"), [way, error, part], ways, { name: "Ways of choosing" });
+  const won = column("instances won", (row) => row[1], whole, { down: true });
+  const taken = column("chosen by the selector", (row) => row[2], whole, { down: true });
+  const wins = [methodColumn(([m]) => m), won, ...(given(S.selector) ? [taken] : [])];
+  table($("wins"), wins, S.wins, { name: "Instances won" });
+  if (!S.where.length) return $("where").remove();
+  const where = [
+    { ...plain("where", (row) => row.part), text: true },
+    plain("instances", (row) => whole(row.instances)),
+    { ...plain("best there", (row) => [swatch(row.method), METHODS[row.method]]), text: true },
+    error,
+    plain(`${shortened(best, 20)} behind by °`, (row) => twoDigits(row.behind)),
+  ];
+  table($("where"), where, S.where, { name: "Who wins where" });
+}
+
+// One method against all others, instance by instance.
+function author() {
+  const first = D.leaderboard ? D.leaderboard[0].method : 0;
+  choose($("mine"), numbered(METHODS), String(first), () => against(+$("mine").value));
+  against(first);
+}
+
+// The mean error over seeds of each instance and method.
+const meanErrors = () => {
+  const sums = INSTANCES.map(() => METHODS.map(() => [0, 0]));
+  D.rows.error.forEach((error, k) => {
+    if (!given(error)) return;
+    const sum = sums[D.rows.instance[k]][D.rows.method[k]];
+    sum[0] += error;
+    sum[1] += 1;
+  });
+  return sums.map((row) => row.map(([sum, count]) => (count ? sum / count : null)));
+};
+
+function against(m) {
+  const R = D.rows;
+  const duels = meanErrors()
+    .map((errors, instance) => {
+      const others = errors.map((error, one) => [error, one]).filter(([error, one]) => given(error) && one !== m);
+      const [least, best] = others.sort((a, b) => a[0] - b[0])[0] ?? [null, null];
+      const rank = 1 + others.filter(([error]) => error < errors[m]).length;
+      return { instance, errors, mine: errors[m], least, best, rank, of: others.length + 1 };
+    })
+    .filter((row) => given(row.mine));
+  $("verdict").textContent = duels.length ? verdictText(m, duels) : "No run of it has an error.";
+  const all = duels.flatMap((row) => row.errors.filter(given)).sort((a, b) => a - b);
+  const most = all[Math.floor(0.98 * (all.length - 1))] || 1;
+  const skill = (name) => (row) => {
+    const base = D.instances[row.instance][name];
+    return given(base) && base > 0 ? 1 - row.mine / base : null;
+  };
+  const instanceColumn = (of) => textColumn("instance", of, (row) => INSTANCES[of(row)]);
+  table(
+    $("duels"),
+    [
+      instanceColumn((row) => row.instance),
+      { title: "all methods", text: true, show: (row) => errorDots(row.errors, m, most) },
+      figure("error", (row) => row.mine),
+      { title: "rank", value: (row) => row.rank, show: (row) => `${row.rank} of ${row.of}` },
+      {
+        title: "best other °",
+        value: (row) => row.least,
+        show: (row) => (given(row.least) ? [number(row.least, 2), make("small", {}, METHODS[row.best])] : "–"),
+      },
+      column("behind it by °", (row) => (given(row.least) ? row.mine - row.least : null), twoDigits, { down: true }),
+      ...Object.keys(D.baseline_names).map((name) => figure(`skill_${name}`, skill(name))),
+    ],
+    duels,
+    { name: "Instance by instance", by: 5, down: true },
+  );
+  const { lost, swapped } = D.columns;
+  $("lost-note").textContent = `${lost.label}: ${lost.about}; ${swapped.label}: ${swapped.about}.`;
+  const gone = range(R.key.length).filter((k) => R.method[k] === m && (R.lost[k] > 0 || R.swapped[k] > 0));
+  if (!gone.length)
+    return $("tracks").replaceChildren(make("p", {}, "None of its runs lost a frame or swapped left and right."));
+  table(
+    $("tracks"),
+    [
+      instanceColumn((k) => R.instance[k]),
+      column(
+        "seed",
+        (k) => R.seed[k],
+        (seed) => String(D.seeds[seed]),
+      ),
+      ...["lost", "swapped", "error"].map((name) => ({ ...figure(name, (k) => R[name][k]), down: true })),
+      buttonColumn("watch, or run again", runButtons),
+    ],
+    gone,
+    { name: "Lost and swapped tracks", by: 2, down: true },
+  );
+}
+
+function verdictText(m, duels) {
+  const { settings, evaluations, version } = D.methods[m];
+  const about = `${settings || "default settings"}; ${whole(evaluations)} evaluations; posefit ${version}`;
+  const won = duels.filter((row) => row.of > 1 && row.rank === 1).length;
+  const board = (D.leaderboard ?? []).find((row) => row.method === m);
+  const skill = board ? `a skill of ${number(board.skill_mean_pose, 2)} against the ${D.baseline_names.mean_pose}` : "";
+  const mean = board ? `, an interquartile mean of ${degrees(board.error)}, ${skill}` : "";
+  const tests = D.pairs && D.pairs.methods.includes(m) ? duelsOf(m) : [];
+  const [better, worse] = ["better", "worse"].map((word) => tests.filter((row) => verdict(row) === word).length);
+  const than = `${better}, worse than ${worse}, and not shown to differ from ${tests.length - better - worse}`;
+  const tally = tests.length ? `; of ${tests.length} others it is better than ${than}` : "";
+  return `${METHODS[m]} (${about}) has the lowest error of all on ${won} of ${duels.length} instances${mean}${tally}.`;
+}
+
+// The errors of all methods on a line, that of one method larger.
+function errorDots(errors, mine, most) {
+  const at = (value) => 6 + (248 * Math.min(value, most)) / most;
+  const svg = draw("svg", { width: 260, height: 18, role: "img", "aria-label": "errors of all methods" });
+  svg.append(drawLine(6, 9, 254, 9, { class: "rule" }));
+  const others = range(METHODS.length).filter((m) => m !== mine && given(errors[m]));
+  for (const m of [...others, mine])
+    svg.append(mark(m, at(errors[m]), 9, m === mine ? 6 : 3, `${METHODS[m]}: ${degrees(errors[m])}`));
+  return svg;
+}

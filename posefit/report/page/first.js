@@ -1,0 +1,165 @@
+// The first screen: all methods with their intervals, three tracks of the leader, failures, progress of a sweep.
+const MAX_METHODS = 20; // of the figure
+const MAX_MISSING = 20; // instances that a note names
+const MAX_WARNINGS = 5; // that it names
+
+function firstScreen() {
+  $("standing-note").textContent = D.score.caption;
+  drawn($("standing"), standing);
+  const more = D.leaderboard.filter((row) => row.taking_part).length - MAX_METHODS;
+  if (more > 0) $("standing-note").append(` The ${MAX_METHODS} best; ${whole(more)} more are in the table.`);
+  examples();
+}
+
+function standing(width) {
+  const { name: of, digits, unit, better } = D.score;
+  const rows = D.leaderboard.filter((row) => row.taking_part && given(row[of])).slice(0, MAX_METHODS);
+  const bases = D.baselines
+    .filter((row) => given(row[of]))
+    .map((row) => ({ ...row, name: D.baseline_names[row.baseline] }))
+    .sort((a, b) => a[of] - b[of]);
+  const narrow = width < 480;
+  const step = narrow ? 38 : 26;
+  const left = narrow ? 14 : 24 + Math.max(...rows.map((row) => textWidth(shortened(row.name, 27), 700)));
+  const right = narrow ? 12 : 66;
+  // a logarithmic scale where less is better and the worst is far from the best
+  const values = [...rows, ...bases].flatMap((row) => [row[of], row.low, row.high].filter((one) => one > 0));
+  const [least, most] = [Math.min(...values), Math.max(...values)];
+  const log = better === "less" && most > 15 * least;
+  const [from, to] = log ? [0.8 * least, 1.15 * most] : [0, 1.05 * most || 1];
+  const marks = log ? logSteps(from, to) : steps(0, to, Math.max(3, (width - left - right) / 90));
+  const x = { from, to, log, marks, rules: true, show: (value) => `${rounded(value)}${unit}` };
+  x.label = `${D.score.axis}${log ? ", on a logarithmic scale" : ""}; ${better} is better`;
+  const titles = [...rows, ...bases].map((row) => {
+    const ends = given(row.low) ? ` from ${number(row.low, digits)} to ${number(row.high, digits)}` : "";
+    return `${row.name} ${number(row[of], digits)}${ends}`;
+  });
+  const top = 16 * bases.length + 10;
+  const bottom = top + step * rows.length;
+  const name = `${D.score.label} with 95 % intervals: ${titles.join("; ")}`;
+  const { svg, at } = axes({ width, height: bottom + 40, left, right, top, bottom: 40, name }, x);
+  // a baseline's name stands to the right of its line, in a row of its own
+  bases.forEach((row, k) => {
+    const [text, y] = [`${row.name} ${scored(row[of])}`, 16 * (bases.length - 1 - k)];
+    const place = Math.min(at(row[of]) + 5, width - textWidth(text) - 4);
+    svg.append(
+      drawLine(at(row[of]), y + 2, at(row[of]), bottom, { class: "baseline" }),
+      drawText(place, y + 12, text, { class: "soft over" }),
+    );
+  });
+  rows.forEach((row, k) => {
+    const y = top + step * (k + 0.5) + (narrow ? 8 : 0);
+    const best = k === 0 || D.not_worse.includes(row.method) ? "best" : "";
+    const short = shortened(row.name, narrow ? 34 : 27);
+    if (narrow) svg.append(drawText(left, y - 11, `${short}  ${scored(row[of])}`, { class: `over ${best}` }));
+    else
+      svg.append(
+        drawText(left - 12, y + 4, short, { "text-anchor": "end", class: best }),
+        drawText(width - right + 12, y + 4, scored(row[of]), { class: best }),
+      );
+    if (given(row.low))
+      svg.append(drawLine(at(row.low), y, at(row.high), y, { ...stroke(row.method, 3), "stroke-dasharray": null }));
+    svg.append(mark(row.method, at(row[of]), y, 5.5, titles[k]));
+  });
+  return svg;
+}
+
+// Three tracks of the leader, which move.
+function examples() {
+  const rows = (D.examples ?? []).filter(([, row]) => D.animations.tracks[row]);
+  if (!rows.length) return $("examples").remove();
+  const stills = rows.map(([name, row]) => {
+    const canvas = make("canvas", { "aria-hidden": "true" });
+    const words = [
+      make("strong", {}, `${name} track: ${number(D.rows.error[row], 2)}°`),
+      make("small", {}, `${INSTANCES[D.rows.instance[row]]}, seed ${D.seeds[D.rows.seed[row]]}`),
+    ];
+    $("three").append(button([canvas, ...words], () => openTrack(row), { class: "example" }));
+    return { canvas, still: stillOf(row) };
+  });
+  $("examples-of").textContent = `Three tracks of ${METHODS[D.leaderboard[0].method]}: `;
+  let frame = 0;
+  let inView = true;
+  const repaint = () => inView && stills.forEach(({ canvas, still }) => paintStill(canvas, still, frame));
+  const { step, fps } = stills[0].still.scene;
+  const run = clock(
+    $("moving"),
+    () => (1000 * step) / fps,
+    (over) => {
+      frame += over;
+      repaint();
+    },
+  );
+  new IntersectionObserver((entries) => {
+    inView = entries.at(-1).isIntersecting;
+    repaint();
+  }).observe($("three"));
+  new ResizeObserver(repaint).observe($("three"));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  run(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+}
+
+// What failed and what is left out, with the reasons.
+function trouble() {
+  const H = D.header;
+  const note = (kind, text, items, ...more) =>
+    $("trouble").append(
+      make(
+        "div",
+        { class: `note ${kind}` },
+        ...text,
+        make("ul", {}, ...items.map((item) => make("li", {}, item))),
+        ...more,
+      ),
+    );
+  if (H.failed) {
+    const by = Object.entries(H.failed_by).map(([method, count]) => `${method} ${whole(count)}`);
+    const text = `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join(", ")}. `;
+    const reasons = H.reasons.map(([reason, count]) => `${whole(count)} × ${reason}`);
+    note("warn", [text, make("a", { href: "#failures" }, "Which ones")], reasons, H.unpaired ? `${H.unpaired}.` : "");
+  }
+  if (H.dropped.length) {
+    const missing = H.dropped.map((one) => {
+      const why = one.missing.length
+        ? `no run of ${one.missing.map((m) => METHODS[m]).join("; ")}`
+        : "no seed in common";
+      return `${INSTANCES[one.instance]}: ${why}`;
+    });
+    const more = missing.length > MAX_MISSING ? [`and ${whole(missing.length - MAX_MISSING)} more`] : [];
+    const text = `${counted(missing.length, "instance")} left out of the comparison, for every method:`;
+    note("warn", [text], [...missing.slice(0, MAX_MISSING), ...more]);
+  }
+  if (H.unfinished.length)
+    note("warn", [`No cell finished, so not on the leaderboard: ${H.unfinished.join("; ")}.`], []);
+  const warned = Object.keys(D.warned).length;
+  if (warned)
+    note("", [`${counted(warned, "run")} with a warning, marked ⚠ below:`], D.warnings.slice(0, MAX_WARNINGS));
+}
+
+// The progress of a running sweep, whose page loads itself again.
+function live() {
+  const L = D.live;
+  if (!L) return $("live").remove();
+  const [size, unit] = L.seconds >= 5400 ? [3600, "hours"] : L.seconds >= 90 ? [60, "minutes"] : [1, "seconds"];
+  const time = given(L.seconds) ? `about ${number(L.seconds / size, size === 1 ? 0 : 1)} ${unit}` : "some time";
+  const running = L.running ? `${whole(L.running)} running, ${time} left` : "no process works on it now";
+  const again = L.failed ? `, ${counted(L.failed, "failed attempt")} to be repeated` : "";
+  const sums = `${whole(L.done)} done, ${whole(L.quarantined)} quarantined${again}`;
+  const settled = L.done + L.quarantined;
+  if (given(L.cells)) {
+    $("live-text").textContent =
+      `${whole(settled)} of ${whole(L.cells)} cells: ${sums}; ${L.left ? running : "finished"}.`;
+    $("live-bar").max = L.cells;
+    $("live-bar").value = settled;
+    if (!L.left) return $("live-reload").remove();
+  } else {
+    $("live-text").textContent = `Cells: ${sums}. No plan is known, nor how many cells are left.`;
+    $("live-bar").remove();
+  }
+  const box = $("live-stop");
+  box.checked = sessionStorage.getItem("posefit-stop") === "1";
+  box.onchange = () => sessionStorage.setItem("posefit-stop", box.checked ? "1" : "0");
+  setInterval(() => {
+    if (!box.checked && !document.querySelector("dialog[open]")) location.reload();
+  }, 1000 * L.reload);
+}
