@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 
 from posefit.statistics.improvement import improvement_interval, probability_of_improvement
+from tests.cases import each
 
 
 def test_improvement_by_hand_with_a_tie():
@@ -37,7 +38,7 @@ def test_the_interval_has_the_same_value_and_holds_it():
     assert 0.0 <= low < value < high <= 1.0
 
 
-@pytest.mark.parametrize("seeds", [3, 10])
+@each("seeds", [3, 10])
 @pytest.mark.slow
 def test_intervals_hold_the_truth_in_93_to_98_percent_of_1000_studies(seeds: int):
     # normal runs, the second method worse by d: P = Phi(d / sqrt(2)) on each of eight instances

@@ -6,6 +6,7 @@ from scipy import stats
 
 from posefit.statistics import intervals
 from posefit.statistics.intervals import iqm, iqm_intervals
+from tests.cases import each
 from tests.statistics.studies import DRAWS, INSTANCES, studies, truth
 
 COUNT = 1000
@@ -23,8 +24,8 @@ def coverage(kind: str, seeds: int, count: int) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seeds", [5, 10, 20])
-@pytest.mark.parametrize("kind", DRAWS)
+@each("seeds", [5, 10, 20])
+@each("kind", DRAWS)
 def test_intervals_hold_the_truth_whatever_the_noise_and_the_number_of_seeds(kind, seeds):
     share = coverage(kind, seeds, 2 * COUNT)  # so that chance moves the share by 0.5 % only
     print(f"{kind}, {seeds} seeds: {100 * share:.1f} %")
@@ -111,7 +112,7 @@ def test_a_higher_level_gives_a_wider_interval():
     assert wide.low[0] < narrow.low[0] < narrow.high[0] < wide.high[0]
 
 
-@pytest.mark.parametrize(
+@each(
     ("errors", "settings", "message"),
     [
         (np.ones((2, 3)), {}, r"errors must have shape \(methods, instances, seeds\), got \(2, 3\)"),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from posefit.statistics.pairing import complete, paired, shared
+from tests.cases import each
 
 ROWS = [
     (method, instance, seed, 100.0 * (method == "b") + 10.0 * instance + seed)
@@ -45,7 +46,7 @@ def test_an_error_that_is_nan_is_a_gap_and_an_instance_nobody_shares_is_left_out
     assert left_out == 2
 
 
-@pytest.mark.parametrize(
+@each(
     ("rows", "message"),
     [
         ([], "runs must be at least one, got none"),

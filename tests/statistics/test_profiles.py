@@ -13,6 +13,7 @@ from posefit.statistics.profiles import (
     ratios,
     trace,
 )
+from tests.cases import each
 
 QUICK = trace([1, 10, 100], [8.0, 4.0, 2.0])
 SLOW = trace([10, 200], [8.0, 3.0])
@@ -94,7 +95,7 @@ def test_ratios_are_to_the_best_on_the_same_instance_and_seed():
     assert performance_profile(found, [1.0]).tolist() == [[0.5], [0.5]]
 
 
-@pytest.mark.parametrize(
+@each(
     ("call", "message"),
     [
         (lambda: trace([], []), r"evaluations must have shape \(k\), got \(0,\)"),

@@ -1,12 +1,23 @@
 """Friedman, Nemenyi, Wilcoxon and Holm against scipy, scikit-posthocs, published tables and sums by hand."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 import scikit_posthocs
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
-from posefit.statistics.ranks import _cliques, friedman, holm, nemenyi_difference, wilcoxon
+from posefit.statistics.ranks import (
+    LETTERS,
+    _cliques,
+    compact_letters,
+    friedman,
+    holm,
+    nemenyi_difference,
+    wilcoxon,
+)
+from tests.cases import each
 
 # Hollander and Wolfe, Nonparametric statistical methods, 1973, page 140: rounding first base in three ways (R's
 # example of friedman.test quotes them, with a chi-squared of 11.1429 and a p-value of 0.003805)
@@ -37,7 +48,7 @@ def test_friedman_of_a_textbook_example():
     assert found.p_value == pytest.approx(0.003805, abs=5e-7)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@each("seed", range(5))
 def test_friedman_is_scipys_with_ties(seed):
     errors = np.random.default_rng(seed).integers(0, 4, (5, 6, 2)).astype(float)
     expected = stats.friedmanchisquare(*errors.reshape(5, -1))
@@ -56,7 +67,7 @@ def test_methods_that_are_always_equal_are_one_clique():
     assert (found.statistic, found.p_value, found.cliques) == (0.0, 1.0, ((0, 1, 2),))
 
 
-@pytest.mark.parametrize(("methods", "quantile"), [(2, 1.960), (3, 2.343), (4, 2.569), (5, 2.728), (10, 3.164)])
+@each(("methods", "quantile"), [(2, 1.960), (3, 2.343), (4, 2.569), (5, 2.728), (10, 3.164)])
 def test_the_critical_difference_has_the_quantiles_of_demsars_table_5a(methods, quantile):
     blocks = 30
     expected = quantile * (methods * (methods + 1) / (6 * blocks)) ** 0.5
@@ -68,7 +79,7 @@ def test_the_critical_difference_of_demsars_example():
     assert nemenyi_difference(4, 14) == pytest.approx(1.25, abs=0.005)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@each("seed", range(4))
 def test_methods_are_told_apart_where_scikit_posthocs_does(seed):
     errors = tied(5, 12, seed)
     expected = scikit_posthocs.posthoc_nemenyi_friedman(errors.reshape(5, -1).T).to_numpy()
@@ -83,7 +94,7 @@ def test_cliques_are_as_large_as_they_can_be_and_none_is_part_of_another():
     assert _cliques(np.array([2.0, 9.0, 1.0, 3.4, 2.9]), 1.5) == ((2, 0), (0, 4, 3))
 
 
-@pytest.mark.parametrize("seed", range(10))
+@each("seed", range(10))
 def test_cliques_are_those_of_a_slow_twin(seed):
     mean = np.random.default_rng(seed).uniform(1.0, 8.0, 8)
     alike = [
@@ -150,7 +161,7 @@ def test_an_instance_is_one_block_where_its_seeds_are_averaged():
     assert friedman(errors).critical_difference == nemenyi_difference(3, 200)
 
 
-@pytest.mark.parametrize(
+@each(
     ("call", "message"),
     [
         (lambda: friedman(np.ones((1, 2, 2))), r"errors must have shape .*, at least \(2, 1, 1\), got \(1, 2, 2\)"),
@@ -170,3 +181,40 @@ def test_an_instance_is_one_block_where_its_seeds_are_averaged():
 def test_what_cannot_be_ranked_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_methods_that_nothing_tells_apart_share_one_letter() -> None:
+    assert compact_letters(3, []) == ["a", "a", "a"]
+
+
+def test_methods_that_all_differ_have_a_letter_each() -> None:
+    assert compact_letters(3, [(0, 1), (0, 2), (1, 2)]) == ["a", "b", "c"]
+
+
+def test_one_between_two_groups_has_both_letters() -> None:
+    assert compact_letters(3, [(0, 2)]) == ["a", "ab", "b"]
+
+
+def test_piephos_definition_holds_whatever_is_told_apart() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        count = int(rng.integers(2, 9))
+        apart = [pair for pair in combinations(range(count), 2) if rng.random() < rng.choice([0.1, 0.5, 0.9])]
+        letters = compact_letters(count, apart)
+        for pair in combinations(range(count), 2):
+            assert (not set(letters[pair[0]]) & set(letters[pair[1]])) == (pair in apart)
+        used = sorted(set("".join(letters)))
+        assert used == list(LETTERS[: len(used)])
+        members = [{m for m in range(count) if letter in letters[m]} for letter in used]
+        assert not any(one <= other for one in members for other in members if one is not other)
+
+
+def test_too_many_groups_have_no_letters() -> None:
+    count = 2 * 6  # six pairs that are told apart within themselves alone are 2^6 groups
+    assert compact_letters(count, [(2 * k, 2 * k + 1) for k in range(6)]) == [""] * count
+
+
+@each("pair", [(0, 0), (0, 3), (-1, 1)])
+def test_a_pair_that_is_none_is_refused(pair: tuple[int, int]) -> None:
+    with pytest.raises(ValueError, match="apart must be of two different methods of 0 to 2"):
+        compact_letters(3, [pair])

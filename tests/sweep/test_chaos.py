@@ -1,12 +1,10 @@
 """Whatever is killed, no row is lost, none comes twice, and nothing runs again that was not killed."""
 
 import os
-import random
 import signal
 import subprocess
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +13,7 @@ import pytest
 
 from posefit.sweep.ledger import Ledger
 from tests.sweep.chaos import Chaos
-from tests.sweep.fake import LIMITS, STARTS, cells, starts
+from tests.sweep.fake import LIMITS, STARTS, starts
 
 ROOT = Path(__file__).parents[2]
 CELLS, WORKER_KILLS, DRIVER_KILLS = 300, 5, 2
@@ -53,46 +51,6 @@ def living(process: int) -> bool:
 
 def leased(folder: Path) -> set[str]:
     return {path.name.partition(".")[0] for path in (folder / "ledger" / "leases").glob("[!.]*")}
-
-
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for left-over processes in /proc")
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.slow
-def test_300_cells_survive_five_kills_of_workers_and_two_of_the_driver(engine: str, tmp_path: Path) -> None:
-    if engine == "dask":
-        pytest.importorskip("distributed")
-    choice, noted, killed = random.Random(7), tmp_path / "starts", set()
-    events = ["worker"] * WORKER_KILLS
-    for place in (2, 5):
-        events.insert(place, "driver")
-    for round_ in range(DRIVER_KILLS + 1):
-        with driver(tmp_path, engine, CELLS) as process:
-            while events:
-                before = len(starts(noted))
-                wait_for(lambda before=before: len(starts(noted)) > before + choice.randint(5, 15))
-                event = events.pop(0)
-                if event == "driver":
-                    process.kill()
-                    process.wait()
-                    killed |= leased(tmp_path)
-                    break
-                alive = [one for one in {worker for _, worker in starts(noted)[-4:]} if living(one)]
-                victim = choice.choice(sorted(alive))
-                os.kill(victim, signal.SIGKILL)
-                wait_for(lambda victim=victim: not living(victim))
-                killed.add([key for key, worker in starts(noted) if worker == victim][-1])
-            else:
-                assert process.wait(timeout=600) == 0
-                assert round_ == DRIVER_KILLS
-    ledger = Ledger(tmp_path / "ledger")
-    keys = [row["key"] for row in ledger.rows()]
-    assert len(keys) == CELLS
-    assert set(keys) == {cell.key for cell in cells(CELLS)}
-    assert not leased(tmp_path)
-    assert not ledger.quarantined()
-    runs = Counter(key for key, _ in starts(noted))
-    assert {key for key, count in runs.items() if count > 1} <= killed
-    wait_for(lambda: not any(living(worker) for worker in {worker for _, worker in starts(noted)}))
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds a driver's processes in /proc")

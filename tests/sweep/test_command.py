@@ -4,13 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from posefit.cli import main
 from posefit.sweep.command import duration_text
 from posefit.sweep.driver import Driver, Lease, State
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
+from tests.cases import each
 from tests.cli.test_command_line import fails, run
 
 PLAN = """
@@ -123,7 +122,7 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
     assert "1 cell is out of quarantine, to be tried again" in again.stderr
 
 
-@pytest.mark.parametrize(
+@each(
     ("words", "message"),
     [
         (["none.toml", "--out", "OUT"], "none.toml: expected a plan (.toml) or default, got no file of that name"),
@@ -158,7 +157,3 @@ def test_without_distributed_dask_says_what_to_install(
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     line = fails("sweep", plan, "--out", tmp_path / "out", "--dask-local", 2)
     assert line.endswith("python -m pip install 'posefit[dask]'")
-
-
-def test_help_tells_what_a_sweep_is() -> None:
-    assert "methods, motions, views" in CliRunner().invoke(main, ["sweep", "--help"]).output

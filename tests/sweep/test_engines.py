@@ -4,7 +4,6 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from dataclasses import replace
@@ -40,32 +39,6 @@ def make(request: pytest.FixtureRequest) -> Make:
     from posefit.sweep.engines.cluster import Cluster
 
     return lambda run=behave, limits=LIMITS: Cluster(workers=2, limits=limits, run=run, patience=PATIENCE)
-
-
-@pytest.mark.slow
-def test_poisoned_cells_are_quarantined_with_their_reasons_and_all_others_finish(make: Make, tmp_path: Path) -> None:
-    poisons = [fake.SEGFAULT, fake.HOG, fake.RAISE]
-    bad = [replace(cells(1)[0], frames=poison) for poison in poisons]
-    tally = swept(tmp_path / "ledger", [*bad, *cells(20)], make())
-    assert (tally.done, tally.quarantined, tally.failed) == (20, 3, ATTEMPTS * 3)
-    ledger = Ledger(tmp_path / "ledger")
-    assert {row["key"] for row in ledger.rows()} == {cell.key for cell in cells(20)}
-    quarantined = {row["spec"]["frames"]: row["reasons"] for row in ledger.quarantined()}
-    assert quarantined[fake.HOG] == ["it wanted more memory than its limit of 0.6 GB"] * 3
-    assert quarantined[fake.RAISE] == ["ZeroDivisionError: one by none"] * 3
-    assert set(quarantined[fake.SEGFAULT]) <= {"its process died of SIGSEGV", "its process died", "its worker died"}
-    assert len(quarantined[fake.SEGFAULT]) == 3
-    assert not list((tmp_path / "ledger" / "leases").iterdir())
-
-
-@pytest.mark.slow
-def test_a_cell_without_an_end_is_quarantined_and_all_others_finish(make: Make, tmp_path: Path) -> None:
-    # only the time that a cell itself takes counts: that of the others is a twentieth of a second
-    endless = replace(cells(1)[0], frames=fake.ENDLESS)
-    tally = swept(tmp_path / "ledger", [endless, *cells(20)], make(limits=replace(LIMITS, seconds=5.0)))
-    assert (tally.done, tally.quarantined, tally.failed) == (20, 1, ATTEMPTS)
-    (found,) = Ledger(tmp_path / "ledger").quarantined()
-    assert found["reasons"] == ["it ran past its limit of 5 s"] * 3
 
 
 def test_a_cell_that_was_quarantined_is_tried_again_once_its_file_is_gone(tmp_path: Path) -> None:
@@ -261,39 +234,6 @@ def test_two_workers_run_two_cells_at_once(make: Make, tmp_path: Path, monkeypat
     tally = swept(tmp_path / "ledger", cells(2, fake.TOGETHER), make())
     assert (tally.done, tally.failed) == (2, 0)
     assert len({worker for _, worker in fake.starts(tmp_path / "starts")}) == 2
-
-
-def timed(count: int, engine: Engine, folder: Path) -> float:
-    """Return how long cells of a second each take, once the workers are there."""
-    with Driver(folder) as driver:
-        for _ in range(engine.window()):  # each worker has one cell behind it
-            engine.submit(cells(1)[0])
-        warm = 0
-        while warm < engine.window():
-            warm += len(engine.wait(1.0))
-        began = time.perf_counter()
-        tally = drive_cells(cells(count, fake.SECOND), driver, Unclosed(engine), print)
-        taken = time.perf_counter() - began
-    engine.close()
-    assert tally.done == count
-    return taken
-
-
-class Unclosed:
-    """An engine that goes on after a sweep."""
-
-    def __init__(self, engine: Engine) -> None:
-        self.window, self.submit, self.wait = engine.window, engine.submit, engine.wait
-
-    def close(self) -> None:
-        """Stay."""
-
-
-@pytest.mark.slow
-def test_what_a_worker_adds_to_cells_of_a_second_is_printed(make: Make, tmp_path: Path) -> None:
-    one = timed(8, Processes(1, LIMITS, behave), tmp_path / "one")
-    two = timed(16, make(), tmp_path / "two")
-    print(f"8 cells with one worker: {one:.2f} s; 16 cells with two: {two:.2f} s")
 
 
 def test_a_number_of_workers_below_one_is_a_mistake() -> None:

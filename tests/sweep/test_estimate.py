@@ -10,6 +10,7 @@ from posefit.sweep.check import cell_of
 from posefit.sweep.engines.engine import Ended, Outcome
 from posefit.sweep.estimate import Workload, estimate_of
 from posefit.sweep.plan import search_cells
+from tests.cases import each
 
 SECONDS, EACH = 0.25, 0.001  # of a cell, and of an evaluation of it
 
@@ -46,7 +47,7 @@ def searches(**more: Any) -> Sequence[Cell]:
     return search_cells(plan)
 
 
-@pytest.mark.parametrize(
+@each(
     ("cells", "evaluations"),
     [
         (tracks(), 3_000),

@@ -2,7 +2,6 @@
 
 import errno
 import fcntl
-import json
 import os
 import subprocess
 import sys
@@ -18,6 +17,7 @@ from posefit.sweep.drive import drive_cells
 from posefit.sweep.driver import Driver, Lease
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.locks import on_one_machine
+from tests.cases import each
 from tests.sweep.fake import cells, result
 from tests.sweep.test_ledger import Here, filled
 
@@ -148,7 +148,7 @@ def test_a_log_that_somebody_removes_ends_the_sweep_in_one_line(tmp_path: Path) 
             drive_cells(cells(2), driver, Here(), print)
 
 
-@pytest.mark.parametrize("content", [b'{"key"', DEEP, b"\xff"])
+@each("content", [b'{"key"', DEEP, b"\xff"])
 def test_a_damaged_file_of_the_quarantine_is_put_aside_and_its_cell_is_tried_again(
     content: bytes, tmp_path: Path
 ) -> None:
@@ -162,7 +162,7 @@ def test_a_damaged_file_of_the_quarantine_is_put_aside_and_its_cell_is_tried_aga
     filled(folder, 2)
 
 
-@pytest.mark.parametrize("content", [b'{"driver"', DEEP, b"\xff", b"{}"])
+@each("content", [b'{"driver"', DEEP, b"\xff", b"{}"])
 def test_a_damaged_lease_holds_nothing(content: bytes, tmp_path: Path) -> None:
     folder, cell = tmp_path / "ledger", cells(1)[0]
     with Driver(folder) as driver:
@@ -180,7 +180,7 @@ def test_a_damaged_note_of_a_plan_is_passed_over(tmp_path: Path) -> None:
     assert Ledger(folder).plans() == []
 
 
-@pytest.mark.parametrize("step", [-86_400.0, 86_400.0])
+@each("step", [-86_400.0, 86_400.0])
 def test_a_clock_that_is_set_back_or_ahead_changes_nothing(step: float, tmp_path: Path, monkeypatch: Any) -> None:
     folder, clock = tmp_path / "ledger", time.time
     with Driver(folder) as one:
@@ -196,7 +196,7 @@ def test_a_clock_that_is_set_back_or_ahead_changes_nothing(step: float, tmp_path
     assert len(list(Ledger(folder).rows())) == 4
 
 
-@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+@each("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
 def test_a_disk_without_locks_is_refused_and_nothing_is_left(number: int, tmp_path: Path, monkeypatch: Any) -> None:
     def refuse(*_: object) -> None:
         raise OSError(number, os.strerror(number))
@@ -213,7 +213,7 @@ def test_a_disk_that_forgets_locks_is_refused(tmp_path: Path, monkeypatch: Any) 
         Driver(tmp_path / "ledger").__enter__()
 
 
-@pytest.mark.parametrize(
+@each(
     ("mount", "found"),
     [
         ("nfs rw - nfs host:/x rw,vers=3,local_lock=none", None),
@@ -253,49 +253,6 @@ def test_where_locks_stay_on_one_machine_another_ones_cells_are_not_judged(tmp_p
     monkeypatch.setattr("posefit.sweep.driver.on_one_machine", lambda _: None)
     assert locks.MOUNTS.name == "mountinfo"
     filled(folder, 1)
-
-
-SMALL = """
-set -e
-mount -t tmpfs -o size=48k none {folder}
-cd {root}
-{python} - <<'END'
-from pathlib import Path
-from tests.sweep.fake import cells
-from tests.sweep.test_ledger import Here
-from posefit.sweep.drive import drive_cells
-from posefit.sweep.driver import Driver
-from posefit.sweep.ledger import Ledger
-import json
-folder = Path({folder!r}) / "ledger"
-said = ""
-try:
-    with Driver(folder) as driver:
-        drive_cells(cells(200), driver, Here(), print)
-except ValueError as error:
-    said = str(error)
-damaged = []
-print(json.dumps([said, len(Ledger(folder, damaged.append)), damaged, len(list((folder / "leases").iterdir()))]))
-END
-"""
-
-
-def test_a_disk_that_is_really_full_ends_the_sweep_in_one_line_and_keeps_what_was_done(tmp_path: Path) -> None:
-    try:
-        able = subprocess.run(["unshare", "-rm", "mount", "-t", "tmpfs", "none", str(tmp_path)], capture_output=True)
-    except FileNotFoundError:
-        pytest.skip("there is no unshare here, with which a small disk is made")
-    if able.returncode:
-        pytest.skip("nobody may mount a small disk here")
-    script = SMALL.format(folder=str(tmp_path), root=ROOT, python=sys.executable)
-    done = subprocess.run(["unshare", "-rm", "bash", "-c", script], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    said, rows, damaged, leases = json.loads(done.stdout)
-    assert "expected room to write to, got No space left on device" in said
-    assert f"; {rows} of 200 cells are done and safe" in said
-    assert 0 < rows < 200
-    assert not damaged
-    assert leases == 0
 
 
 def test_a_log_has_its_name_only_when_it_is_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from posefit.sweep.driver import ATTEMPTS, LOSSES, Driver, Lease, State
 from posefit.sweep.engines.engine import Outcome
 from posefit.sweep.ledger import Ledger
 from posefit.version import posefit_build
+from tests.cases import each
 from tests.sweep.fake import cells, result
 
 
@@ -95,7 +96,7 @@ def test_without_pandas_a_frame_says_what_to_install(tmp_path: Path, monkeypatch
         Ledger(filled(tmp_path / "ledger", 1)).frame()
 
 
-@pytest.mark.parametrize(
+@each(
     "harm",
     [
         lambda line: line.replace(b'"cost": 0', b'"cost": 1'),
@@ -196,7 +197,7 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_are_run_ag
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
 
 
-@pytest.mark.parametrize(
+@each(
     ("content", "message"),
     [
         ("{", "expected the index of a ledger, got"),
@@ -242,7 +243,7 @@ def test_a_folder_that_cannot_be_written_to_is_named(tmp_path: Path, monkeypatch
         Driver(tmp_path / "new")
 
 
-@pytest.mark.parametrize("room", [3, 1500])
+@each("room", [3, 1500])
 def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
     room: int, tmp_path: Path, monkeypatch: Any
 ) -> None:
@@ -395,14 +396,3 @@ def test_many_drivers_may_make_the_same_ledger_at_once(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert not failed
-
-
-@pytest.mark.parametrize(
-    "content",
-    [b'{"format": "\xff"}', b"[]", b"{}", b"[" * 9000, b'{"format": 3}', b" " * 20_000],
-)
-def test_an_index_that_is_damaged_is_one_line(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "ledger.json").write_bytes(content)
-    with pytest.raises(ValueError, match="expected (the index of a ledger|a ledger of format 1), got") as caught:
-        Ledger(tmp_path)
-    assert str(tmp_path) in str(caught.value)

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator
 
-import pytest
-
 from posefit.sweep.cell import TrackCell
 from posefit.sweep.drive import LOOKAHEAD, interleaved
+from tests.cases import each
 
 METHODS = ("sapso@pca", "cma@pca", "vsmm")
 
@@ -21,7 +20,7 @@ def order(given: list[TrackCell], workers: int) -> list[int]:
     return [given.index(cell) for cell in interleaved(iter(given), lambda: workers)]
 
 
-@pytest.mark.parametrize(
+@each(
     ("workers", "expected"),
     [
         (1, [0, 1, 2, 3, 4, 5, 6, 7, 8]),

@@ -23,6 +23,7 @@ from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit.tracking import method
 from posefit.version import posefit_build, source_digest
+from tests.cases import each
 from tests.effort import effort
 from tests.testing.planted import Holds
 
@@ -81,7 +82,7 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
     ]
 
 
-@pytest.mark.parametrize(
+@each(
     ("tables", "message"),
     [
         ({"product": None}, "a plan must hold at least one cell, got none"),

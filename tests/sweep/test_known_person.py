@@ -1,4 +1,4 @@
-"""What a cell's method is told of the person: where he faces at first, and how he is built."""
+"""What a cell's method knows of the person: where they face at first, and their body."""
 
 from typing import Any
 
@@ -9,6 +9,7 @@ from posefit.report.repeat import repeat_command
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
+from tests.cases import each
 
 SPEC = {"method": "sapso@pca", "motion": "walk", "frames": 2, "size": [160, 120]}
 
@@ -17,35 +18,35 @@ def cell(**fields: Any) -> TrackCell:
     return cell_of({**SPEC, **fields})
 
 
-def test_cells_that_are_told_less_have_keys_of_their_own_however_they_are_made() -> None:
-    told = [{}, {"yaw_off_degrees": 25}, {"yaw_off_degrees": 180}, {"body_off_percent": 10}]
-    cells = [cell(**one) for one in told]
-    assert len({one.key for one in cells}) == len(told)
+def test_cells_with_less_knowledge_have_keys_of_their_own_however_they_are_made() -> None:
+    known = [{}, {"yaw_off_degrees": 25}, {"yaw_off_degrees": 180}, {"body_off_percent": 10}]
+    cells = [cell(**one) for one in known]
+    assert len({one.key for one in cells}) == len(known)
     assert cells[1].spec["yaw_off_degrees"] == 25.0
     product = {"methods": ["sapso@pca"], "motions": ["walk"], "seeds": [0]}
-    for one, made in zip(told, cells, strict=True):
+    for one, made in zip(known, cells, strict=True):
         entry = {"instance": 0, **one}  # of fields that are checked by themselves
         plan = Plan.of({"defaults": {"frames": 2, "size": [160, 120]}, "product": {**product, "instances": [entry]}})
         assert list(plan.keys()) == [found.key for found in plan] == [made.key]
 
 
-def test_the_first_yaw_is_off_by_no_more_than_was_said_and_not_told_at_180() -> None:
+def test_the_first_yaw_is_off_by_no_more_than_was_said_and_unknown_at_180() -> None:
     truth = cell_scene(cell()).yaw
     assert truth is not None
     offs = []
     for instance in range(8):
         true = cell_scene(cell(instance=instance)).yaw
-        seen = cell_scene(cell(instance=instance, yaw_off_degrees=25.0)).yaw
+        given = cell_scene(cell(instance=instance, yaw_off_degrees=25.0)).yaw
         assert true is not None
-        assert seen is not None
-        offs.append(np.degrees(seen - true))
+        assert given is not None
+        offs.append(np.degrees(given - true))
     assert np.abs(offs).max() <= 25.0
     assert np.abs(offs).max() > 10.0
     assert min(offs) < 0.0 < max(offs)
     assert cell_scene(cell(yaw_off_degrees=180.0)).yaw is None
 
 
-def test_the_body_is_off_and_neither_the_truth_nor_what_is_seen() -> None:
+def test_the_body_is_off_and_neither_the_truth_nor_the_observations() -> None:
     exact, off = cell_scene(cell()), cell_scene(cell(body_off_percent=10.0))
     shares = off.body.skeleton.lengths / exact.body.skeleton.lengths
     assert 1e-3 < np.abs(shares - 1.0).max() <= 0.1
@@ -57,18 +58,18 @@ def test_the_body_is_off_and_neither_the_truth_nor_what_is_seen() -> None:
         assert np.array_equal(one, other)
 
 
-def test_what_is_told_is_the_same_for_every_method_and_seed_and_another_for_another_motion() -> None:
-    def told(**fields: Any) -> float:
+def test_what_is_known_is_the_same_for_every_method_and_seed_and_another_for_another_motion() -> None:
+    def known(**fields: Any) -> float:
         found, true = cell_scene(cell(yaw_off_degrees=25.0, **fields)).yaw, cell_scene(cell(**fields)).yaw
         assert found is not None
         assert true is not None
         return found - true
 
-    assert told() == told(seed=3) == told(method="random@full") == told(body_off_percent=5.0)
-    assert told() != told(motion="run")
+    assert known() == known(seed=3) == known(method="random@full") == known(body_off_percent=5.0)
+    assert known() != known(motion="run")
 
 
-@pytest.mark.parametrize(
+@each(
     ("field", "value", "said"),
     [
         ("yaw_off_degrees", 181, "yaw_off_degrees must lie in 0 to 180, got 181"),
