@@ -22,7 +22,7 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.alike import facing
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.sides import second_side
@@ -110,9 +110,8 @@ def greatest_distance(skeleton: Skeleton, posterior: Posterior, pose: Array) -> 
 
     Roots are at the same point.
     """
-    joints, every = skeleton.joints(pose), skeleton.joints(posterior.poses)
-    off = np.linalg.norm((every - every[:, :1]) - (joints - joints[:1]), axis=-1).mean(axis=1)
-    return float(off.max())
+    every = joint_distances(skeleton.joints(posterior.poses), skeleton.joints(pose))
+    return float(every.mean(axis=1).max())
 
 
 class EvidenceMeans:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
-from posefit.geometry.skeleton import ANGLES, JOINTS
+from posefit.geometry.skeleton import ANGLES, JOINTS, joint_distances
 from posefit.uncertainty.sides import nearer_mirrored
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
@@ -51,7 +51,7 @@ def mpjpe_mm(truth: Array, joints: Array) -> Array:
     count, the root with its zero.
     """
     truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
-    return np.asarray(1e3 * _distances(_rooted(truth), _rooted(joints)).mean(axis=1))
+    return np.asarray(1e3 * joint_distances(truth, joints).mean(axis=1))
 
 
 def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
@@ -69,7 +69,7 @@ def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
     size = (source**2).sum(axis=(1, 2))
     scale = spread.sum(axis=1) / np.where(size > 0.0, size, 1.0)
     moved = scale[:, None, None] * (source @ left @ right)
-    return np.asarray(1e3 * _distances(target, moved).mean(axis=1))
+    return np.asarray(1e3 * np.linalg.norm(target - moved, axis=-1).mean(axis=1))
 
 
 def iou(areas: NDArray[np.int64]) -> Array:
@@ -123,11 +123,3 @@ def _series(name: str, values: Array) -> Array:
     if values.ndim != 1 or not len(values):
         raise ValueError(f"{name} must have shape (T,), at least one frame, got {values.shape}")
     return values
-
-
-def _rooted(joints: Array) -> Array:
-    return joints - joints[:, :1]
-
-
-def _distances(first: Array, second: Array) -> Array:
-    return np.asarray(np.linalg.norm(first - second, axis=-1))

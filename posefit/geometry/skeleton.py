@@ -104,6 +104,16 @@ def angle_index(joint: int) -> int:
 _STARTS, _TURNING = np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))])
 
 
+def root_centred(joints: Array) -> Array:
+    """Return joints (..., 27, 3) with their root at the origin."""
+    return np.asarray(joints - joints[..., :1, :])
+
+
+def joint_distances(first: Array, second: Array) -> Array:
+    """Return the distances (..., 27) between joints (..., 27, 3), both roots at one point."""
+    return np.asarray(np.linalg.norm(root_centred(first) - root_centred(second), axis=-1))
+
+
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """Bone vectors at rest and the frames their angles are counted in. Lengths are metres."""

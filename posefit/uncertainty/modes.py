@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.geometry.skeleton import ANGLES, Skeleton
+from posefit.geometry.skeleton import ANGLES, Skeleton, joint_distances
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.kernels import mean_distances
 
@@ -125,7 +125,7 @@ def likeliest_is_right(skeleton: Skeleton, modes: Sequence[Mode], joints: Array,
 def _nearest(skeleton: Skeleton, modes: Sequence[Mode], joints: Array) -> tuple[int, float]:
     """Return which mode joints (27, 3) are nearest to, and how far off, metres, both roots at one point."""
     each = skeleton.joints(np.array([mode.pose for mode in modes]))
-    off = np.linalg.norm((each - each[:, :1]) - (joints - joints[:1]), axis=-1).mean(axis=-1)
+    off = joint_distances(each, joints).mean(axis=-1)
     return int(off.argmin()), float(off.min())
 
 

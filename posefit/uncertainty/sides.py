@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import JOINTS, MIRROR, SIDES, Skeleton
+from posefit.geometry.skeleton import JOINTS, MIRROR, SIDES, Skeleton, root_centred
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 
@@ -18,7 +18,7 @@ def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
     The mirror is the plane through the root that the hips face each other across; left and right trade names. Roots
     are moved to one point, and only joints that have a counterpart count.
     """
-    targets, joints = targets - targets[:, :1], joints - joints[:, :1]
+    targets, joints = root_centred(targets), root_centred(joints)
     across = joints[:, _LEFT_HIP] - joints[:, _RIGHT_HIP]
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
     mirrored = joints - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]

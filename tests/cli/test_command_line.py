@@ -460,7 +460,7 @@ def test_a_new_command_has_a_new_name(taken: str, tmp_path: Path) -> None:
     assert f"name must be a new one, got '{taken}', which posefit registers already" in said
 
 
-@pytest.mark.parametrize("name", ["swarm", "experiments", "envs"])
+@pytest.mark.parametrize("name", ["swarm", "reproduce", "envs"])
 def test_a_new_plugin_has_a_module_of_its_own(name: str, tmp_path: Path) -> None:
     said = fails("plugins", "new", name, "--out", tmp_path / "x")
     assert f"name must make a new module, got '{name}': its module posefit_{name} would hide the one" in said
