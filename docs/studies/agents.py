@@ -16,8 +16,7 @@ import numpy as np
 
 from posefit import minimise
 from posefit.arrays import Array
-from posefit.evolution.constants import usual_population
-from posefit.evolution.strategy import Strategy
+from posefit.evolution.strategy import Strategy, default_population_size
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs.configure import EVERY, ITERATIONS, POPULATION_SIZE
@@ -159,7 +158,7 @@ def _apart(seed: int) -> np.random.Generator:
 
 def generation(task: str, length: int) -> int:
     """Return how many steps a generation of CMA-ES over settings takes, where an episode has `length`."""
-    return usual_population(SIZES[task]) * EPISODES * length
+    return default_population_size(SIZES[task]) * EPISODES * length
 
 
 def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
@@ -169,7 +168,7 @@ def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look)
     """
     rng, other = np.random.default_rng(seed), _apart(seed)
     d, size, whole = env.action_space.shape[0], SIZES[task], generation(task, length)
-    population = usual_population(size)
+    population = default_population_size(size)
     strategy = Strategy(np.zeros(size), np.full(size, WIDE), population)
     for number in range(1, steps // whole + 1):
         settings = np.clip(strategy.sample(rng, population), -1.0, 1.0)

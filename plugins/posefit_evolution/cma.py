@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evolution.constants import usual_population
-from posefit.evolution.strategy import LAG, Strategy
+from posefit.evolution.strategy import LAG, Strategy, default_population_size
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
 from posefit.fitting.optimiser import finite_costs
@@ -32,7 +31,7 @@ class CMAES:
         spread (sigma): the first step size where no prediction is, in half-ranges of the box, above 0. Ours.
         growth: a restart's population is so many times as large, 1 or more. Auger and Hansen 2005.
         redraws: of a proposal that breaks a constraint before it is moved, 0 or more. Ours.
-        lag: axes are decomposed anew every lag / (d (c_1 + c_mu)) generations, 0 or more. Hansen 2016, B.2.
+        lag: axes are decomposed every lag / (d (c_1 + c_mu)) generations, 0 or more. Hansen 2016, B.2.
     """
 
     def __init__(
@@ -54,7 +53,7 @@ class CMAES:
         at_least("lag", lag, 0.0)
         self._space, self._rng, self._spread, self._growth = space, rng, spread, growth
         self._redraws, self._lag = redraws, lag
-        self._population_size = max(population_size or usual_population(space.dimensions), 5)
+        self._population_size = max(population_size or default_population_size(space.dimensions), 5)
         self._asked: Array | None = None
         anywhere = np.full(space.dimensions, spread)
         self._strategy = self._begun(anywhere if space.start is None else space.start.spread)

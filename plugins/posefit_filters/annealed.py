@@ -1,7 +1,7 @@
 """The annealed particle filter of Deutscher and Reid.
 
 J. Deutscher, I. Reid, Articulated body motion capture by stochastic search, International Journal of Computer Vision
-61(2), 2005. Where we choose ourselves, the constant says so.
+61(2), 2005. Our own choices are marked `ours`.
 """
 
 import numpy as np
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.box import Space, converted, displacement, draw_population, sample_normal
 from posefit.fitting.check import at_least, between, positive
-from posefit_filters.kernels import sharpness
-from posefit_filters.resampling import systematic, weigh
+from posefit_filters.weighting import sharpness, systematic, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10
@@ -21,7 +20,7 @@ NOISE = 0.1  # ours: P0, the motion from frame to frame, in half-ranges of the b
 
 
 class Annealed:
-    """Layers of resampling with an ever sharper likelihood exp(-beta cost), every frame anew.
+    """Layers of resampling with an ever sharper likelihood exp(-beta cost), in every frame.
 
     In each layer, beta is what lets a given share of the particles survive: the effective sample size by their number.
     Each survivor moves by normal noise in proportion to the spread of the weighted particles, so that the search

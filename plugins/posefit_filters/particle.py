@@ -9,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Space, converted, draw_population, repair, sample_normal
 from posefit.fitting.check import at_least, positive
-from posefit_filters.resampling import systematic, weigh
+from posefit_filters.weighting import systematic, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost

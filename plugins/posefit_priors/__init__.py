@@ -1,7 +1,7 @@
 """Priors for posefit: `pca`, the paper's compact pose space; `loose`, freer limbs; `full`; `union`; scikit-learn's.
 
 - `pca.PCA` is section 2 of the SAPSO paper: principal components, a range (constraint 1) and clusters (constraint 2).
-- `loose.Loose` adds freedom at shoulders, elbows, hips and knees, for people who move as nobody in training did.
+- `loose.Loose` adds freedom at shoulders, elbows, hips and knees, for movements that are not in the training poses.
 - `union.Union` is one space for several motions, feasible near any of many local Gaussians.
 - `full.Full` is all joint angles that are free, within their limits.
 - `sklearn.Transformed` is any transformer of scikit-learn that has an inverse: `sklearn:KernelPCA`.

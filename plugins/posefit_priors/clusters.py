@@ -23,11 +23,11 @@ def clustered(latents: Array, clusters: int, seed: int) -> tuple[Array, NDArray[
     enough = STILL * float(latents.var(axis=0).mean())
     least, centres, labels = np.inf, points[:0], np.zeros(0, dtype=np.int64)
     for _ in range(BEGINNINGS):
-        found, mine = _settled(points, _seeded(points, clusters, draws), enough)
-        spread = float(((points - found[mine]) ** 2).sum())
+        moved, mine = _converged(points, _seeded(points, clusters, draws), enough)
+        spread = float(((points - moved[mine]) ** 2).sum())
         # rounding may call one of two equal partitions the better one
         if spread < least and not _same(mine, labels, clusters):
-            least, centres, labels = spread, found, mine
+            least, centres, labels = spread, moved, mine
     return centres + middle, labels
 
 
@@ -47,7 +47,7 @@ def _seeded(points: Array, clusters: int, draws: np.random.RandomState) -> Array
     return points[picked]
 
 
-def _settled(points: Array, centres: Array, enough: float) -> tuple[Array, NDArray[np.int64]]:
+def _converged(points: Array, centres: Array, enough: float) -> tuple[Array, NDArray[np.int64]]:
     """Return where centres (K, m) arrive that move to the mean of their points, and each point's cluster (n,)."""
     labels = np.full(len(points), -1)
     for _ in range(ROUNDS):
@@ -62,7 +62,7 @@ def _settled(points: Array, centres: Array, enough: float) -> tuple[Array, NDArr
 
 
 def _means(points: Array, labels: NDArray[np.int64], centres: Array) -> Array:
-    """Return the means (K, m) of clusters; one without points begins anew at a point far from its own centre."""
+    """Return the means (K, m) of clusters; one without points begins again at a point far from its own centre."""
     count = len(centres)
     members = np.bincount(labels, minlength=count)
     if not members.all():

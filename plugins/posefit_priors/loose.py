@@ -1,4 +1,4 @@
-"""Principal components with freedom around them at the limbs: people swing their arms as nobody in training did."""
+"""Principal components with freedom around them at the limbs: arms may swing as in no training pose."""
 
 from pathlib import Path
 from typing import Any, Self

@@ -109,8 +109,8 @@ class PCA:
 
         `prefix` is what stands before the names, where the file holds more than this space.
         """
-        found = load_arrays(path, {prefix + name: shape for name, shape in _SHAPES.items()})
-        arrays = {name: found[prefix + name] for name in _SHAPES}
+        stored = load_arrays(path, {prefix + name: shape for name, shape in _SHAPES.items()})
+        arrays = {name: stored[prefix + name] for name in _SHAPES}
         m = len(arrays["components"])
         prior = cls(components=m, clusters=len(arrays["centres"]))
         for name, value in arrays.items():

@@ -2,8 +2,8 @@
 
 The paper's own first stated limit is one learnt space a motion. A mixture of local spaces would need a coordinate that
 says which one, and a search that moves continuously cannot cross it. So there is one linear space for all, in which
-every region counts alike however long its clip was; and constraint 2 becomes the local part: a pose is feasible where
-it is near one of many clusters, each with a shape of its own, a tube along its motion and not a ball.
+every region has equal weight however long its clip was; and constraint 2 becomes the local part: a pose is feasible
+where it is near one of many clusters, each with a shape of its own, a tube along its motion and not a ball.
 """
 
 from pathlib import Path

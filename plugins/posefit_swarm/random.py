@@ -8,7 +8,7 @@ from posefit.fitting.check import at_least
 
 
 class Random:
-    """Draws every population uniformly from the feasible part of the box, whatever was found before.
+    """Draws every population uniformly from the feasible part of the box, whatever was proposed before.
 
     Settings:
         population_size: size of a population, 1 or more.

@@ -65,13 +65,13 @@ class SwarmState:
         self.velocity = self._first_velocities()
         self.position, self.cost = self.moved.copy(), np.full(population_size, np.inf)
         self.best, self.best_cost = self.moved.copy(), np.full(population_size, np.inf)
-        # room for the next velocities, and for who was stopped at the border
+        # room for the next velocities, and for particles stopped at the border
         self._next_velocity, self._stopped = np.empty_like(self.moved), np.zeros(population_size, dtype=bool)
 
     def accept(
         self, proposals: Array, costs: Array, temperature: float, kept: float = 1.0
     ) -> tuple[NDArray[np.bool_], int]:
-        """Accept or refuse each move, remember the bests; return who was accepted (n,) and the swarm's best row.
+        """Accept or refuse each move, remember the bests; return which were accepted (n,) and the swarm's best row.
 
         `proposals` are what `moved` was. A particle whose move is refused keeps `kept` times its velocity.
         """
@@ -86,15 +86,14 @@ class SwarmState:
     def accept_and_move(
         self, proposals: Array, costs: Array, temperature: float, kept: float, omega: float, acceleration: float
     ) -> NDArray[np.bool_]:
-        """Accept or refuse, then move towards the best, in one compiled call; return who was accepted (n,)."""
+        """Accept or refuse, then move towards the best, in one compiled call; return which were accepted (n,)."""
         costs, accepted = self._checked(proposals, costs), np.empty(len(self.moved), dtype=bool)
-        told = costs, temperature, kept, accepted
         rand = self._draws(len(costs), len(costs))
         self._restock()
         draws = rand, self._spare, self._used, self._coordinate_redraws
         moves = self._next_velocity, self.moved, self._stopped
         leader, reached, self._used = accept_and_move(
-            *told, self._all_rows, *draws, omega, acceleration, self._arrays(), *moves
+            costs, temperature, kept, accepted, self._all_rows, *draws, omega, acceleration, self._arrays(), *moves
         )
         self._finish(reached, rand, (omega, acceleration, self.best[leader]))
         return accepted
@@ -148,7 +147,7 @@ class SwarmState:
         self.velocity, self._next_velocity = self._next_velocity, self.velocity
 
     def _move(self, reached: int, rows: NDArray[np.int64], rand: Array, pull: Pull, moves: tuple[Any, ...]) -> None:
-        """Write the moves of particles (k,), velocities, positions and who is stopped, from number `reached` on."""
+        """Write the moves of particles (k,), velocities, positions and which are stopped, from number `reached` on."""
         swarm = self._arrays()
         while reached < len(rows):
             self._restock()

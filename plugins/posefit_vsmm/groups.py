@@ -1,7 +1,7 @@
 """Which models belong together, and which change into each other. VSMM steps 4 and 5, Interpretation V1.
 
-A TOML file says it: `stay`, a table `groups` of names and their models, and a table `neighbours` of models and those
-that they change into.
+A TOML file holds `stay`, a table `groups` of names and their models, and a table `neighbours` of models and those that
+they change into.
 """
 
 import tomllib

@@ -106,7 +106,7 @@ class Measurement:
 
 
 def start(state: Array, covariance: Array, models: int) -> Belief:
-    """Return the belief that knows a state and holds all models equally probable."""
+    """Return the belief in one state, with all models equally probable."""
     return Belief(
         np.tile(state, (models, 1)),
         np.tile(covariance, (models, 1, 1)),
@@ -134,7 +134,7 @@ class IMM:
             raise ValueError(f"transition must hold probabilities whose rows sum to 1, got {matrix.tolist()}")
 
     def cycle(self, belief: Belief, measure: Callable[[Array], Measurement]) -> Belief:
-        """Return the belief one frame later; `measure` says what was measured against what a state expects."""
+        """Return the belief one frame later; `measure` returns the measurement for a state."""
         mixed = self.mixed(belief)
         repairs = mixed.repairs
         states, covariances, likelihoods = [], [], []
@@ -146,9 +146,9 @@ class IMM:
             covariances.append(left)
             likelihoods.append(likelihood)
             repairs += repaired
-        found = np.array(likelihoods)
-        joint = found + mixed.log_probabilities  # VSMM 6.4
-        return Belief(np.array(states), np.array(covariances), joint - np.logaddexp.reduce(joint), found, repairs)
+        joint = np.array(likelihoods) + mixed.log_probabilities  # VSMM 6.4
+        log_probabilities = joint - np.logaddexp.reduce(joint)
+        return Belief(np.array(states), np.array(covariances), log_probabilities, np.array(likelihoods), repairs)
 
     def mixed(self, belief: Belief) -> Belief:
         """Return what each model starts its cycle from, and the probabilities c_j that it is the one.
@@ -187,23 +187,23 @@ class IMM:
         return middle, self.manifold.spread(belief.states, belief.covariances, belief.probabilities, middle)
 
 
-def update(state: Array, covariance: Array, seen: Measurement, manifold: Manifold) -> tuple[Array, Array, float]:
+def update(state: Array, covariance: Array, measurement: Measurement, manifold: Manifold) -> tuple[Array, Array, float]:
     """Return state and covariance after a measurement, and the log of its likelihood; as they were without one."""
-    if not len(seen.residual):
-        return state, covariance, seen.log_likelihood
+    if not len(measurement.residual):
+        return state, covariance, measurement.log_likelihood
     from scipy.linalg import cho_factor, cho_solve  # a fifth of a second to import
 
-    jacobian, noise = seen.jacobian, seen.covariance
+    jacobian, noise = measurement.jacobian, measurement.covariance
     innovation = jacobian @ covariance @ jacobian.T + noise  # VSMM 6.3b
     factor = cho_factor(innovation, lower=True)
     size = 2.0 * float(np.log(np.diag(factor[0])).sum())
     # the squared Mahalanobis distance of the residual, also called the normalised innovation squared (NIS)
-    distance = float(seen.residual @ cho_solve(factor, seen.residual))
-    likelihood = -0.5 * (distance + size + len(seen.residual) * float(np.log(2.0 * np.pi)))  # VSMM 6.3c
+    distance = float(measurement.residual @ cho_solve(factor, measurement.residual))
+    likelihood = -0.5 * (distance + size + len(measurement.residual) * float(np.log(2.0 * np.pi)))  # VSMM 6.3c
     gain = cho_solve(factor, jacobian @ covariance).T  # VSMM 6.3d
     keep = np.eye(len(covariance)) - gain @ jacobian
     left = keep @ covariance @ keep.T + gain @ noise @ gain.T  # Joseph's form, which stays symmetric
-    return manifold.plus(state, gain @ seen.residual), left, likelihood + seen.log_likelihood
+    return manifold.plus(state, gain @ measurement.residual), left, likelihood + measurement.log_likelihood
 
 
 def positive_definite(covariance: Array) -> tuple[Array, int]:

@@ -23,7 +23,7 @@ from posefit_vsmm.imm import PLACED, Measurement
 from posefit_vsmm.motion import library
 from posefit_vsmm.state import ERROR, FIRST_BONE, YAW_PITCH_ROLL, Reliance, decode, encode, free_errors
 from posefit_vsmm.switching import Rules, SequentialTest, Switching
-from posefit_vsmm.tracker import Course, Found, Matcher
+from posefit_vsmm.tracker import Matcher, SearchResult, TrackFilter
 
 STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
 
@@ -81,7 +81,7 @@ REACH = 3.5  # deviations to either side
 ROOT_LEAST = np.radians([6.0, 4.0, 4.0])  # deviations of yaw, pitch and roll, at the least
 # How far what a search finds is off, as one silhouette lets it be: metres across, up and along the depth, then radians
 # of the whole body and of the bones
-FOUND = np.repeat([0.03, 0.03, 0.08, np.radians(6.0), np.radians(9.0)], [1, 1, 1, 3, ERROR - FIRST_BONE])
+SEARCH_DEVIATIONS = np.repeat([0.03, 0.03, 0.08, np.radians(6.0), np.radians(9.0)], [1, 1, 1, 3, ERROR - FIRST_BONE])
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class Search:
 
     def find(
         self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator
-    ) -> Found | None:
+    ) -> SearchResult | None:
         """Return the best state around one (43,) with covariance (33, 33), and what it tells the filter."""
         if budget < LEAST_BUDGET:
             return None
@@ -125,17 +125,17 @@ class Search:
 
         best = minimise(posterior, optimiser, budget, told=True)
         pose, place = problem.decode(best.proposal[None])
-        found = encode(pose, place)[0]
+        best_state = encode(pose, place)[0]
 
         def measure(one: Array) -> Measurement:
-            return Measurement(PLACED.minus(found, one), np.eye(ERROR), np.diag(FOUND**2))
+            return Measurement(PLACED.minus(best_state, one), np.eye(ERROR), np.diag(SEARCH_DEVIATIONS**2))
 
-        return Found(pose[0], best.evaluations, measure)
+        return SearchResult(pose[0], best.evaluations, measure)
 
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """Follows a person with a `Course` whose every frame ends in a search."""
+    """Follows a person with a `TrackFilter` whose every frame ends in a search."""
 
     task: Task
     switching: Switching = field(repr=False)
@@ -143,7 +143,7 @@ class Joined:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; its `details` are those of the filter."""
-        course = Course(self.task, self.switching, rng, self.search)
+        course = TrackFilter(self.task, self.switching, rng, self.search)
         for observation in observations:
             yield course.frame(observation)
 

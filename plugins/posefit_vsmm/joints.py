@@ -1,7 +1,7 @@
 """Where the 17 points are in a silhouette, by the rules of VSMM step 2, and how far off such rules are.
 
-Distances are counted in legs (hip to ankle, as seen at the person's depth), so that neither the size of the image nor
-that of the person matters.
+Distances are in legs (hip to ankle, projected at the person's depth), so that neither the size of the image nor that of
+the person matters.
 """
 
 import json
@@ -17,7 +17,7 @@ from posefit_vsmm.state import AT, POINTS
 
 BODY = ("torso", "left clavicle", "right clavicle", "left shoulder", "right shoulder", "left hip", "right hip")
 _TORSO = np.array([AT[name] for name in BODY])
-OWN = np.array([name not in BODY for name in POINTS])  # (17,) what is found in the image, and not carried along
+OWN = np.array([name not in BODY for name in POINTS])  # (17,) what is detected in the image, and not carried along
 _TIPS = np.array([AT[name] for name in ("head", "left hand", "right hand", "left foot", "right foot")])
 _RINGS = np.array([0.8, 1.0, 1.2])  # radii of the head
 
@@ -27,8 +27,8 @@ class Detection:
     """The points that one camera saw."""
 
     points: Array  # (17, 2) pixels; where confidence is 0, what was expected
-    confidence: Array  # (17,) 0 to 1; 0 is not seen
-    spare: int = 0  # end points that belong to none of them
+    confidence: Array  # (17,) 0 to 1; 0 is not detected
+    unassigned: int = 0  # end points that belong to none of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,30 +55,30 @@ def detected(lines: Lines, expected: Array, gates: Array, leg: float, head: floa
     """
     points, confidence = expected.copy(), np.zeros(len(POINTS))
 
-    def found(name: str, place: Array, sure: float) -> None:
-        points[AT[name]], confidence[AT[name]] = place, sure
+    def place(name: str, point: Array, sure: float) -> None:
+        points[AT[name]], confidence[AT[name]] = point, sure
 
     def near(name: str, place: Array) -> float:
         away = float(np.linalg.norm(place - expected[AT[name]]) / gates[AT[name]])
         return max(0.0, 1.0 - away * away)
 
-    found("root", lines.centroid, 1.0)  # VSMM 2.2
+    place("root", lines.centroid, 1.0)  # VSMM 2.2
     middle = _head(lines, expected[AT["head"]], head, gates[AT["head"]])
     if middle is not None:
-        found("head", *middle)
-    tips, spare = _tips(lines, expected, gates)
-    for tip, place in tips:  # VSMM 2.4
-        found(POINTS[tip], place, near(POINTS[tip], place))
+        place("head", *middle)
+    tips, unassigned = _tips(lines, expected, gates)
+    for tip, end in tips:  # VSMM 2.4
+        place(POINTS[tip], end, near(POINTS[tip], end))
     points -= bias * leg * (confidence > 0.0)[:, None]
     anchor = points[AT["root"]] - expected[AT["root"]]
     points[_TORSO] = expected[_TORSO] + anchor  # VSMM 2.3
     confidence[_TORSO] = 1.0
     for side in ("left", "right"):
         if (elbow := _elbow(lines, points, confidence, expected, side, gates)) is not None:
-            found(f"{side} elbow", elbow - bias[AT[f"{side} elbow"]] * leg, near(f"{side} elbow", elbow))
+            place(f"{side} elbow", elbow - bias[AT[f"{side} elbow"]] * leg, near(f"{side} elbow", elbow))
     for side, knee in _knees(lines, points, confidence, expected, gates).items():
-        found(f"{side} knee", knee - bias[AT[f"{side} knee"]] * leg, near(f"{side} knee", knee))
-    return Detection(points, confidence, spare)
+        place(f"{side} knee", knee - bias[AT[f"{side} knee"]] * leg, near(f"{side} knee", knee))
+    return Detection(points, confidence, unassigned)
 
 
 def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Array, float] | None:
@@ -96,7 +96,7 @@ def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Ar
 
 
 def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, Array]], int]:
-    """Return which end points are hands and feet, and how many are nobody's: the assignment of least distance.
+    """Return which end points are hands and feet, and how many are unassigned: the assignment of least distance.
 
     It is a linear sum assignment, as the Hungarian algorithm solves it. Distances are counted in gates; the head takes
     part, since the skeleton line ends in it too.
@@ -107,8 +107,8 @@ def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, 
     from scipy.optimize import linear_sum_assignment  # half a second to import
 
     share = away / gates[_TIPS][:, None]
-    who, which = linear_sum_assignment(np.minimum(share, 1.0))
-    pairs = [(int(_TIPS[a]), lines.ends[b]) for a, b in zip(who, which, strict=True) if share[a, b] < 1.0]
+    rows, columns = linear_sum_assignment(np.minimum(share, 1.0))
+    pairs = [(int(_TIPS[a]), lines.ends[b]) for a, b in zip(rows, columns, strict=True) if share[a, b] < 1.0]
     return [pair for pair in pairs if pair[0] != AT["head"]], len(lines.ends) - len(pairs)
 
 
@@ -139,14 +139,14 @@ def _knees(lines: Lines, points: Array, confidence: Array, expected: Array, gate
     crossings = lines.skeleton[off < 1.0]
     if not len(crossings):
         return {}
-    found = {}
+    crossing = {}
     for side in ("left", "right"):
         away = np.linalg.norm(crossings - expected[AT[f"{side} knee"]], axis=1)
         if away.min() < gates[AT[f"{side} knee"]]:
-            found[side] = crossings[away.argmin()]
-    if len(found) == 2 and np.linalg.norm(found["left"] - found["right"]) < 2.0:
+            crossing[side] = crossings[away.argmin()]
+    if len(crossing) == 2 and np.linalg.norm(crossing["left"] - crossing["right"]) < 2.0:
         return {}  # one crossing is not two knees
-    return found
+    return crossing
 
 
 PUSH = 2.0  # pixels a frame squared: the deviation of a joint's acceleration
@@ -154,7 +154,7 @@ _STEP = np.kron([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
 _NOISE = PUSH**2 * np.kron([[0.25, 0.5], [0.5, 1.0]], np.eye(2))
 
 
-class Shown:
+class JointFilter:
     """Place and velocity of the 17 points in one image."""
 
     def __init__(self, points: Array) -> None:
@@ -164,11 +164,11 @@ class Shown:
     def follow(self, points: Array, confidence: Array, variances: Array) -> Array:
         """Return the points (17, 2) one frame later, `variances` (17, 2) being those of what was detected."""
         states, covariances = self._states @ _STEP.T, _STEP @ self._covariances @ _STEP.T + _NOISE  # VSMM 2.7
-        seen = np.flatnonzero(confidence > 0.0)
-        across = covariances[seen][:, :, :2]
-        innovation = across[:, :2] + variances[seen][:, :, None] * np.eye(2)
+        visible = np.flatnonzero(confidence > 0.0)
+        across = covariances[visible][:, :, :2]
+        innovation = across[:, :2] + variances[visible][:, :, None] * np.eye(2)
         gain = across @ np.linalg.inv(innovation)
-        states[seen] += np.einsum("pij,pj->pi", gain, points[seen] - states[seen, :2])
-        covariances[seen] -= gain @ across.transpose(0, 2, 1)
+        states[visible] += np.einsum("pij,pj->pi", gain, points[visible] - states[visible, :2])
+        covariances[visible] -= gain @ across.transpose(0, 2, 1)
         self._states, self._covariances = states, covariances
         return np.array(states[:, :2])

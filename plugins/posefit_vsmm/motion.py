@@ -1,8 +1,8 @@
 """The motion models: how a body that walks, squats or jumps goes on to its next pose. VSMM step 3.
 
 A model is X_{k+1} = F X_k + W_k in a frame that turns with the body: its vertical axis is the world's, its heading the
-body's, its origin the root, so that it does not matter where somebody walks to. Lengths are counted in legs. The
-models were fitted by `fit/motion.py`, which says how good they are.
+body's, its origin the root, so that places and directions do not matter. Lengths are counted in legs. The
+models were fitted by `fit/motion.py`, which reports their errors.
 """
 
 import json
@@ -54,8 +54,8 @@ class MotionModel:
     def nearest(self, state: Array) -> Array:
         """Return a state (43,) with its place and heading, in the typical pose that is nearest to it."""
         back, quaternions = without_heading(state)
-        alike = np.abs(np.einsum("nij,ij->ni", self.poses.reshape(len(self.poses), -1, 4), quaternions))
-        pose = self.poses[np.arccos(np.minimum(alike, 1.0)).sum(axis=1).argmin()].copy()
+        similarity = np.abs(np.einsum("nij,ij->ni", self.poses.reshape(len(self.poses), -1, 4), quaternions))
+        pose = self.poses[np.arccos(np.minimum(similarity, 1.0)).sum(axis=1).argmin()].copy()
         pose[:4] = product(back, pose[:4])
         return np.concatenate([state[:3], pose])
 
@@ -114,6 +114,6 @@ def without_heading(state: Array) -> tuple[Array, Array]:
 
     The heading is the part of the first one that turns about the vertical.
     """
-    found = np.empty((len(state) // 4, 4))
-    w, y = kernels.headed(state, found.reshape(-1), np.empty(len(found)))
-    return np.array([w, 0.0, y, 0.0]), found
+    quaternions = np.empty((len(state) // 4, 4))
+    w, y = kernels.headed(state, quaternions.reshape(-1), np.empty(len(quaternions)))
+    return np.array([w, 0.0, y, 0.0]), quaternions

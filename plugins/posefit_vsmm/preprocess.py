@@ -19,7 +19,7 @@ SPUR = 1.2  # radii of the body where it branches off: a shorter branch of the s
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """What is seen of a person, as points in pixels."""
+    """The silhouette of a person as points in pixels."""
 
     area: int  # pixels
     centroid: Array  # (2,)
@@ -30,7 +30,7 @@ class Lines:
 
 
 def lines_of(mask: Mask) -> Lines | None:
-    """Return the lines of a mask (height, width); None where it shows nobody."""
+    """Return the lines of a mask (height, width); None where it is empty."""
     from skimage.morphology import skeletonize  # half a second to import
 
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
@@ -68,9 +68,9 @@ def _pieces(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _ends(thin: Mask, radii: NDArray[np.float32]) -> NDArray[np.int64]:
     """Return row and column (n, 2) of the ends of the skeleton line, but for those of spurs, which are pruned."""
     number = cv2.filter2D(thin.astype(np.uint8), -1, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT)
-    found = []
+    ends = []
     for end in np.argwhere(thin & (number == 2)):
         row, column = branch(thin, number, end[0], end[1])
         if row < 0 or np.hypot(end[0] - row, end[1] - column) > SPUR * radii[row, column]:
-            found.append(end)
-    return np.array(found, dtype=np.int64).reshape(-1, 2)
+            ends.append(end)
+    return np.array(ends, dtype=np.int64).reshape(-1, 2)

@@ -54,11 +54,11 @@ class Rules:
         if self.dwell < 0:
             raise ValueError(f"dwell must be 0 or more, got {self.dwell}")
 
-    def wanted(self, seen: Sequence[Array]) -> int | None:
+    def requested_group(self, points: Sequence[Array]) -> int | None:
         """Return which group, 0 to 2, the latest projected points (17, 2) ask for; None where it is no other."""
-        if len(seen) < 2 * self.smoothing + 1:
+        if len(points) < 2 * self.smoothing + 1:
             return None
-        angles = np.array([limb_angles(points) for points in seen[-2 * self.smoothing - 1 :]])
+        angles = np.array([limb_angles(frame) for frame in points[-2 * self.smoothing - 1 :]])
         changes = np.degrees(np.abs(wrapped(np.diff(angles, axis=0))))
         before, now = changes[: self.smoothing].mean(axis=0), changes[self.smoothing :].mean(axis=0)
         moves, moved = now >= self.floor_degrees, before >= self.floor_degrees
@@ -188,7 +188,7 @@ class Rivalry:
 
 
 FIRST = 10  # cycles over all models before a group is chosen
-RECENT = 5  # frames: where the median of their surprise is larger than SURPRISED, the group is chosen anew
+RECENT = 5  # frames: where the median of their surprise is larger than SURPRISED, the group is chosen again
 SURPRISED = 1.2  # of the normalised innovation squared a coordinate, which is 1 on average where a filter is consistent
 
 Structure = Literal["variable", "all"]
@@ -242,7 +242,7 @@ class Models:
         return self._made(self.active)
 
     def cycle(self, before: Belief, measure: Measure, surprise: float) -> Belief:
-        """Return the belief one frame later. Groups come and go; `surprise` is that of what was just seen."""
+        """Return the belief one frame later. Groups come and go; `surprise` is of the latest frame."""
         after = self.imm.cycle(before, measure)
         self._surprises = [*self._surprises, surprise][-RECENT:]
         if self._how.structure == "all":
@@ -265,12 +265,12 @@ class Models:
             return self._reconsidered(before, measure)
         return self._activated(before, after, measure)
 
-    def drawn(self, points: Array) -> None:
+    def record(self, points: Array) -> None:
         """Take where the points (17, 2) of the latest state are projected."""
         self._drawn = [*self._drawn, points][-2 * self._how.rules.smoothing - 1 :]
 
     def _reconsidered(self, before: Belief, measure: Measure) -> Belief:
-        """Choose the group anew, as at first: the present one cannot explain what is seen, and no rule saw it come."""
+        """Choose the group again, as at first: the present one does not explain the measurements."""
         old, (state, spread) = self.active, self.imm.fused(before)
         self.restart()
         return self.imm.cycle(enlarged(before, old, self.active, state, spread), measure)
@@ -278,7 +278,7 @@ class Models:
     def _activated(self, before: Belief, after: Belief, measure: Measure) -> Belief:
         """Bring the group that the rules ask for into force beside the present one, if they ask for one."""
         groups, names = self._topology.groups, tuple(self._topology.groups)
-        asked = self._how.rules.wanted(self._drawn)
+        asked = self._how.rules.requested_group(self._drawn)
         if self.group is None or asked is None or asked >= len(names) or names[asked] == self.group:
             return after
         old, imm = self.active, self.imm

@@ -15,11 +15,11 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import areas, mismatch
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import Belief, Measurement, product, start
-from posefit_vsmm.joints import Shown, rule_errors
+from posefit_vsmm.joints import JointFilter, rule_errors
 from posefit_vsmm.kernels import minus, plus
+from posefit_vsmm.measurement import Figure, JointCameras, JointMeasurement
 from posefit_vsmm.motion import STIFF, MotionModel, Shrink, library
 from posefit_vsmm.preprocess import Lines, lines_of
-from posefit_vsmm.sight import Figure, Sight, Sighting
 from posefit_vsmm.state import AT, ERROR, Reliance, bone_errors, decode, encode, free_errors
 from posefit_vsmm.switching import Measure, Models, New, Rules, SequentialTest, Structure, Switching, Test
 
@@ -27,7 +27,7 @@ NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # yaws that are tried where 
 ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)
 SHARE = 0.6  # of the budget: what the typical poses may have
 ROUND = 40  # draws around the best so far
-USUAL = np.radians(15.0)  # as far from a typical pose, a quaternion costs 1 of 100, as much as 1 % of the silhouette
+TYPICAL_DEVIATION = np.radians(15.0)  # from a typical pose: a quaternion that far off costs 1 per cent
 SPREADS = np.radians([20.0, 12.0, 7.0, 4.0])  # of the draws, one a round, the last one for the rest
 
 
@@ -41,16 +41,16 @@ class Matcher:
 
     def costs(self, states: Array) -> tuple[Array, Array]:
         """Return the costs (n,) of states (n, 43), and the states, moved to where their silhouettes fit."""
-        task, seen = self._task, self._observation
+        task, observation = self._task, self._observation
         poses, places = decode(states, self._reliance)
-        if seen.translation is not None:
-            places[:] = seen.translation
+        if observation.translation is not None:
+            places[:] = observation.translation
         else:
-            places = align(task.body, task.cameras, seen.silhouettes, poses, places)
+            places = align(task.body, task.cameras, observation.silhouettes, poses, places)
         costs = np.mean(
             [
                 mismatch(areas(task.body, camera, silhouette, poses, places, task.threads))
-                for camera, silhouette in zip(task.cameras, seen.silhouettes, strict=True)
+                for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True)
             ],
             axis=0,
         )
@@ -58,7 +58,7 @@ class Matcher:
         return costs, np.column_stack([places, states[:, 3:]])
 
 
-def estimated(
+def estimated_state(
     matcher: Matcher,
     models: Sequence[MotionModel],
     yaw: float | None,
@@ -69,7 +69,7 @@ def estimated(
 ) -> Array:
     """Return the state (43,) that fits an observation best, for at most so many evaluations.
 
-    `yaw` is about where the person faces, None for anywhere; `given` a pose (66,) that somebody knows, if anybody.
+    `yaw` is about where the person faces, None for anywhere; `given` is a known pose (66,), if there is one.
     """
     yaws = ALL_AROUND if yaw is None else yaw + NEAR
     typical = np.concatenate([model.poses for model in models])
@@ -87,16 +87,16 @@ def estimated(
         errors[:, :3] = 0.0
         errors *= matcher.free
         costs, states = matcher.costs(np.array([plus(best, error) for error in errors]))
-        costs = costs + np.array([_doubt(state, home) for state in states])
+        costs = costs + np.array([_deviation_cost(state, home) for state in states])
         if costs.min() < least:
             best, least = states[costs.argmin()], float(costs.min())
         left, turn = left - ROUND, turn + 1
     return np.asarray(best)
 
 
-def _doubt(state: Array, home: Array) -> float:
-    """Return what a state costs beside its silhouette for being another pose than the typical one."""
-    return float(((minus(state, home)[3:] / USUAL) ** 2).sum())
+def _deviation_cost(state: Array, home: Array) -> float:
+    """Return the cost of a state's deviation from the typical pose, beside that of its silhouette."""
+    return float(((minus(state, home)[3:] / TYPICAL_DEVIATION) ** 2).sum())
 
 
 def _placed(pose: Array, yaw: float, anchor: Array) -> Array:
@@ -106,12 +106,12 @@ def _placed(pose: Array, yaw: float, anchor: Array) -> Array:
     return np.concatenate([anchor, turned])
 
 
-COAST = 15  # frames that the models go on alone when nothing is seen; then the track is lost
+MAX_BLIND_FRAMES = 15  # frames that the models go on alone without a visible person; then the track is lost
 LOST = 0.35  # IoU: below it, for so many frames, the track is lost
 LOST_FRAMES = 8
 UNSURE = np.repeat([0.05, np.radians(15.0)], [3, ERROR - 3])  # metres and radians: deviations of a fresh estimation
-ASTRAY = 2  # frames: a limb that is not where it is sought, while an end point is nobody's, is sought all around
-ASTRAY_SPREAD = np.radians(15.0)  # deviation that each of its joints then gains a frame
+MISSING_FRAMES = 2  # after these a limb that is not detected, while an end point is unassigned, is sought all around
+MISSING_SPREAD = np.radians(15.0)  # deviation that each of its joints then gains a frame
 # the bones whose turns a limb's end depends on
 _LIMBS = {
     "left hand": ("lhumerus", "lradius"),
@@ -122,12 +122,12 @@ _LIMBS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """What a search found in one frame."""
+class SearchResult:
+    """The result of a search in one frame."""
 
     pose: Array  # (66,)
     evaluations: int
-    measure: Measure  # what it tells the filter
+    measure: Measure  # its measurement for the filter
 
 
 class Searcher(Protocol):
@@ -139,13 +139,13 @@ class Searcher(Protocol):
 
     def find(
         self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator
-    ) -> Found | None:
-        """Return what is found around a state (43,) with covariance (33, 33), for at most so many evaluations."""
+    ) -> SearchResult | None:
+        """Return the best result around a state (43,) with covariance (33, 33), for at most so many evaluations."""
         ...
 
 
 @final
-class Course:
+class TrackFilter:
     """One track, as far as it has come; with a `searcher`, every frame ends in a search."""
 
     def __init__(
@@ -153,23 +153,23 @@ class Course:
     ) -> None:
         self._task, self._reliance, self._rng, self._searcher = task, switching.library.reliance, rng, searcher
         self._models = Models(switching, task.body.skeleton, task.fps)
-        self._sight = Sight(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), rule_errors())
+        self._cameras = JointCameras(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), rule_errors())
         self._free = np.maximum(free_errors(task.body.skeleton), STIFF)
         self._latest: Frame | None = task.before[-1] if task.before else None
-        self._shown: list[Shown] = []
+        self._shown: list[JointFilter] = []
         self._belief: Belief | None = None
         self._unseen = self._bad = 0
-        self._astray = dict.fromkeys(_LIMBS, 0)
+        self._missing = dict.fromkeys(_LIMBS, 0)
 
     def frame(self, observation: Observation) -> Frame:
-        """Return what is found in the next frame."""
+        """Return the next frame."""
         began, models = time.perf_counter(), self._models
         self._begun = time.process_time()
         blind = not observation.usable
         lines = [None if blind else lines_of(silhouette.mask) for silhouette in observation.silhouettes]
         blind = all(one is None for one in lines)
         self._unseen = self._unseen + 1 if blind else 0
-        if self._bad >= LOST_FRAMES or self._unseen > COAST:
+        if self._bad >= LOST_FRAMES or self._unseen > MAX_BLIND_FRAMES:
             self._belief = None
         if self._belief is None and blind:
             return self._held(observation, began)
@@ -179,45 +179,45 @@ class Course:
         state, spread = models.imm.fused(belief)
         likely = models.known[models.active[int(belief.probabilities.argmax())]]
         expected, spread = likely.predict(state, spread)
-        seen = self._look(lines, expected, spread)
-        if (extra := self._astray_spread(seen)).any():
+        measured = self._look(lines, expected, spread)
+        if (extra := self._missing_spread(measured)).any():
             belief = replace(belief, covariances=belief.covariances + np.diag(extra))
-            seen = self._look(lines, expected, spread + np.diag(extra))
+            measured = self._look(lines, expected, spread + np.diag(extra))
         details = {"detection_seconds": time.perf_counter() - began}
 
         filtering, used = time.perf_counter(), spent
 
         def measure(one: Array) -> Measurement:
             nonlocal used
-            found = self._sight.measure(one, seen, observation.translation)
+            measurement = self._cameras.measure(one, measured, observation.translation)
             if self._searcher is None or blind:
-                return found
+                return measurement
             used += 1
-            return replace(found, log_likelihood=self._searcher.likelihood(one, observation))
+            return replace(measurement, log_likelihood=self._searcher.likelihood(one, observation))
 
-        surprise = float(np.mean([one.surprise for one in seen if one is not None] or [0.0]))
+        surprise = float(np.mean([one.surprise for one in measured if one is not None] or [0.0]))
         self._belief = models.cycle(belief, measure, surprise)
         state, spread = models.imm.fused(self._belief)
         details["filter_seconds"] = time.perf_counter() - filtering
         poses, places = decode(state[None], self._reliance)
         pose, place = poses[0], places[0]
         if self._searcher is not None and not blind:
-            found = self._searcher.find(state, spread, observation, self._task.evaluations - used - 1, self._rng)
-            if found is not None:
-                pose, used = found.pose, used + found.evaluations
-                self._belief = models.imm.updated(self._belief, found.measure)
-                place = models.imm.fused(self._belief)[0][:3]  # one frame alone says little of the depth
-        models.drawn(self._sight.figure.seen(self._task.cameras[0], models.imm.fused(self._belief)[0])[0])
-        told = {**details, **self._joints(seen, expected), "surprise": surprise, **self._told()}
-        return self._frame(pose, place, observation, used + 1, began, told)
+            result = self._searcher.find(state, spread, observation, self._task.evaluations - used - 1, self._rng)
+            if result is not None:
+                pose, used = result.pose, used + result.evaluations
+                self._belief = models.imm.updated(self._belief, result.measure)
+                place = models.imm.fused(self._belief)[0][:3]  # one frame alone hardly shows the depth
+        models.record(self._cameras.figure.project(self._task.cameras[0], models.imm.fused(self._belief)[0])[0])
+        details |= {**self._joints(measured, expected), "surprise": surprise, **self._model_details()}
+        return self._frame(pose, place, observation, used + 1, began, details)
 
-    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[Sighting | None]:
+    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[JointMeasurement | None]:
         return [
-            None if one is None else self._sight.look(view, one, expected, spread) for view, one in enumerate(lines)
+            None if one is None else self._cameras.detect(view, one, expected, spread) for view, one in enumerate(lines)
         ]
 
     def _begin(self, observation: Observation) -> int:
-        """Estimate a pose from this frame alone, all models alike; return how many evaluations that took."""
+        """Estimate a pose from this frame alone, with all models equally probable; return the evaluations that took."""
         task, latest = self._task, self._latest
         matcher = Matcher(task, observation, self._reliance)
         yaw, anchor, given = task.yaw, task.anchor, None
@@ -227,54 +227,54 @@ class Course:
             given = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
         budget = task.evaluations - 1 if self._searcher is None else task.evaluations // 2
         models = list(self._models.known.values())
-        state = estimated(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
+        state = estimated_state(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
         self._models.restart()
         self._belief = start(state, np.diag((UNSURE * self._free) ** 2), len(models))
         self._bad = 0
-        self._astray = dict.fromkeys(_LIMBS, 0)
+        self._missing = dict.fromkeys(_LIMBS, 0)
         return matcher.evaluations
 
-    def _astray_spread(self, seen: Sequence[Sighting | None]) -> Array:
-        """Return the variances (33,) to add for limbs whose ends are not found though an end point is nobody's."""
+    def _missing_spread(self, measured: Sequence[JointMeasurement | None]) -> Array:
+        """Return the variances (33,) to add for limbs whose ends are not detected while an end point is unassigned."""
         extra = np.zeros(ERROR)
-        spare = any(one.spare for one in seen if one is not None)
+        unassigned = any(one.unassigned for one in measured if one is not None)
         for limb, bones in _LIMBS.items():
-            found = any(one.confidence[AT[limb]] > 0.0 for one in seen if one is not None)
-            self._astray[limb] = self._astray[limb] + 1 if spare and not found else 0
-            if self._astray[limb] >= ASTRAY:
+            detected = any(one.confidence[AT[limb]] > 0.0 for one in measured if one is not None)
+            self._missing[limb] = self._missing[limb] + 1 if unassigned and not detected else 0
+            if self._missing[limb] >= MISSING_FRAMES:
                 for bone in bones:
-                    extra[bone_errors(bone)] = ASTRAY_SPREAD**2
+                    extra[bone_errors(bone)] = MISSING_SPREAD**2
         return np.asarray(extra * self._free**2)
 
-    def _joints(self, seen: Sequence[Sighting | None], expected: Array) -> dict[str, Any]:
-        """Return the 17 joints (views, 17, 2) as they are shown, and how sure the rules were of them (views, 17)."""
+    def _joints(self, measured: Sequence[JointMeasurement | None], expected: Array) -> dict[str, Any]:
+        """Return the 17 joints (views, 17, 2) as they are displayed, and the rules' confidence in them (views, 17)."""
         points, confidence = [], []
-        for view, (camera, one) in enumerate(zip(self._task.cameras, seen, strict=True)):
+        for view, (camera, one) in enumerate(zip(self._task.cameras, measured, strict=True)):
             if one is None:
-                pixels, _ = self._sight.figure.seen(camera, expected)
-                one = Sighting(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
+                pixels, _ = self._cameras.figure.project(camera, expected)
+                one = JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
             if len(self._shown) == view:
-                self._shown.append(Shown(one.points))
+                self._shown.append(JointFilter(one.points))
             points.append(self._shown[view].follow(one.points, one.confidence, one.variances))
             confidence.append(one.confidence)
         return {"joints": np.array(points), "confidence": np.array(confidence)}
 
-    def _told(self) -> dict[str, Any]:
-        """Return what is told of the models beside the pose."""
+    def _model_details(self) -> dict[str, Any]:
+        """Return the details of a frame that are about the models."""
         belief, models = self._belief, self._models
-        told: dict[str, Any] = {"lost": belief is None, "models": models.active}
-        told |= {"group": models.group, "newcomer": models.newcomer, "groups": models.groups}
+        details: dict[str, Any] = {"lost": belief is None, "models": models.active}
+        details |= {"group": models.group, "newcomer": models.newcomer, "groups": models.groups}
         if belief is not None:
-            told |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
-        return told
+            details |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
+        return details
 
     def _held(self, observation: Observation, began: float) -> Frame:
-        """Return the latest pose once more, or an upright one, while nothing is seen."""
+        """Return the latest pose once more, or an upright one, while no person is visible."""
         pose, place = np.zeros(66), np.array(self._task.anchor, dtype=np.float64)
         pose[0] = self._task.yaw or 0.0
         if self._latest is not None:
             pose, place = self._latest.pose, self._latest.translation
-        return self._frame(pose, place, observation, 0, began, self._told())
+        return self._frame(pose, place, observation, 0, began, self._model_details())
 
     def _frame(
         self, pose: Array, place: Array, observation: Observation, used: int, began: float, details: dict[str, Any]
@@ -286,10 +286,10 @@ class Course:
         pose = np.where(task.body.skeleton.free, pose, 0.0)
         counts = np.concatenate([areas(task.body, camera, one, pose[None], place[None]) for camera, one in views])
         known = [one.known for one in observation.silhouettes]
-        heard = counts[known] if any(known) else counts
-        cost = float(mismatch(heard).mean())
+        counted = counts[known] if any(known) else counts
+        cost = float(mismatch(counted).mean())
         if not self._unseen:
-            self._bad = self._bad + 1 if float(metrics.iou(heard).mean()) < LOST else 0
+            self._bad = self._bad + 1 if float(metrics.iou(counted).mean()) < LOST else 0
         seconds = time.perf_counter() - began
         spent = time.process_time() - self._begun
         self._latest = Frame(
@@ -307,7 +307,7 @@ class VSMM:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; its `details` tell models, probabilities, group and joints."""
-        course = Course(self.task, self.switching, rng)
+        course = TrackFilter(self.task, self.switching, rng)
         for observation in observations:
             yield course.frame(observation)
 

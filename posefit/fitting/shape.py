@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evolution.constants import usual_population
-from posefit.evolution.strategy import Strategy
+from posefit.evolution.strategy import Strategy, default_population_size
 from posefit.fitting.alignment import align
 from posefit.fitting.box import REDRAWS
 from posefit.fitting.tracker import Frame, Observation
@@ -137,7 +136,7 @@ class _Frames:
     ) -> Array:
         """Return the factors (17,) that fit the chosen frames best, by CMA-ES in spreads of their logarithms."""
         mean = np.clip(np.log(start) / SPREAD, -REACH, REACH)
-        population = usual_population(len(NAMES))
+        population = default_population_size(len(NAMES))
         strategy = Strategy(mean, np.full(len(NAMES), WIDTH if first else NEAR), population)
         best, least = mean, np.inf
         for _ in range(GENERATIONS if first else AGAIN):

@@ -25,7 +25,7 @@ from posefit_vsmm.imm import PLACED
 from posefit_vsmm.joined import Search, joined
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.state import decode, encode
-from posefit_vsmm.tracker import COAST, vsmm
+from posefit_vsmm.tracker import MAX_BLIND_FRAMES, vsmm
 
 SIZE = (200, 240)
 NAMES = ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
@@ -127,7 +127,7 @@ def test_after_a_long_gap_the_track_is_lost_and_found_again() -> None:
         observations[k] = blank(observations[k])
     frames = follow(task, observations)
     lost = [k for k, frame in enumerate(frames) if frame.details["lost"]]
-    assert lost == list(range(15 + COAST, 75))
+    assert lost == list(range(15 + MAX_BLIND_FRAMES, 75))
     assert all(np.array_equal(frames[k].pose, frames[lost[0] - 1].pose) for k in lost)
     assert frames[75].evaluations > 100  # estimated anew
     assert iou(frames)[76:].mean() > 0.5

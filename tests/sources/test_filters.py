@@ -9,9 +9,8 @@ from posefit import Start
 from posefit.arrays import Array
 from posefit.testing.toy import Toy, ball, sphere
 from posefit_filters.annealed import Annealed
-from posefit_filters.kernels import sharpness, survival
 from posefit_filters.particle import Particle
-from posefit_filters.resampling import systematic, weigh
+from posefit_filters.weighting import sharpness, survival, systematic, weigh
 
 
 def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (likelihood)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.evolution.constants import Constants, usual_population
-from posefit.evolution.strategy import Strategy
+from posefit.evolution.strategy import Constants, Strategy, default_population_size
 
 # Six proposals in two dimensions, worked by hand. mu = 3 and ln 3.5 - ln i is:
 RAW = np.array([1.252763, 0.559616, 0.154151, -0.133531, -0.356675, -0.538997])
@@ -186,7 +185,7 @@ def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step(far: floa
 
 def test_eq_48_the_population_is_4_plus_3_ln_d() -> None:  # HANSEN2016 (48)
     # 4 + floor(3 ln d): ln 4 = 1.386, ln 9 = 2.197, ln 66 = 4.190
-    assert [usual_population(d) for d in (1, 4, 9, 66)] == [4, 8, 10, 16]
+    assert [default_population_size(d) for d in (1, 4, 9, 66)] == [4, 8, 10, 16]
 
 
 def test_eq_49_weights_fall_as_the_logarithm_of_the_rank() -> None:  # HANSEN2016 (49)

@@ -14,11 +14,11 @@ from posefit.motion import built_in
 from posefit_vsmm.fit.motion import LAMBDA, ridge
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import Belief, Measurement, start
-from posefit_vsmm.joints import Shown, detected
+from posefit_vsmm.joints import JointFilter, detected
 from posefit_vsmm.kernels import minus, plus
+from posefit_vsmm.measurement import Figure
 from posefit_vsmm.motion import library
 from posefit_vsmm.preprocess import Lines, lines_of
-from posefit_vsmm.sight import Figure
 from posefit_vsmm.state import AT, ERROR, HELD_ANGLES, POINTS, decode, encode, points_of
 from posefit_vsmm.switching import (
     FIRST,
@@ -150,7 +150,7 @@ def test_an_end_point_out_of_reach_is_nobodys() -> None:
     found = detected(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, NO_BIAS)
     assert found.confidence[AT["left hand"]] == 0.0
     assert np.array_equal(found.points[AT["left hand"]], expected[AT["left hand"]])
-    assert found.spare == 1
+    assert found.unassigned == 1
 
 
 def test_knees_are_where_the_parallel_to_the_feet_crosses_the_legs() -> None:  # VSMM 2.5
@@ -175,7 +175,7 @@ def test_an_elbow_is_as_far_from_the_hand_as_from_the_shoulder() -> None:  # VSM
 
 def test_a_hidden_joint_goes_on_as_it_went() -> None:  # VSMM 2.7
     points, sure, variances = np.zeros((17, 2)), np.ones(17), np.full((17, 2), 0.01)
-    shown = Shown(points)
+    shown = JointFilter(points)
     for k in range(1, 30):
         shown.follow(points + [3.0 * k, -1.0 * k], sure, variances)
     hidden = sure.copy()
@@ -314,11 +314,11 @@ def test_the_points_are_projected_and_their_jacobian_is_right() -> None:  # VSMM
     camera = Camera.around(np.array([0.0, 1.0, 0.0]), 0.4, 4.0, (320, 240))
     for k in (0, 9, 21):
         state = encode(jacks.poses[k : k + 1], jacks.translations[k : k + 1])[0]
-        pixels, jacobian = shown.seen(camera, state)
+        pixels, jacobian = shown.project(camera, state)
         poses, places = decode(state[None], library().reliance)
         assert np.allclose(pixels, camera.project(points_of(jacks.skeleton.joints(poses, places)[0]))[0])
         step = 1e-6 * np.eye(ERROR)
-        slow = [(shown.seen(camera, plus(state, e))[0] - shown.seen(camera, plus(state, -e))[0]) / 2e-6 for e in step]
+        slow = [(shown.project(camera, plus(state, e))[0] - shown.project(camera, plus(state, -e))[0]) / 2e-6 for e in step]
         assert np.abs(np.moveaxis(slow, 0, 2) - jacobian).max() < 1e-4
 
 
@@ -349,8 +349,8 @@ def test_limb_angles_are_those_of_thighs_shanks_and_hips() -> None:
 
 
 def test_a_hip_that_turns_twice_as_fast_asks_for_the_third_group() -> None:  # VSMM 7a
-    assert PATENT.wanted(swinging([[2.0, 3.0, 3.0, 3.0], [4.0, 3.0, 3.0, 3.0]])) == 2
-    assert PATENT.wanted(swinging([[2.0, 3.0, 3.0, 3.0], [3.9, 3.0, 3.0, 3.0]])) is None
+    assert PATENT.requested_group(swinging([[2.0, 3.0, 3.0, 3.0], [4.0, 3.0, 3.0, 3.0]])) == 2
+    assert PATENT.requested_group(swinging([[2.0, 3.0, 3.0, 3.0], [3.9, 3.0, 3.0, 3.0]])) is None
 
 
 def test_most_limbs_that_turn_twice_as_fast_ask_for_the_second_group() -> None:  # VSMM 7b
@@ -360,24 +360,24 @@ def test_most_limbs_that_turn_twice_as_fast_ask_for_the_second_group() -> None: 
         points[AT["root"]] = points[AT["torso"]] + 25.0 * np.array(
             [np.sin(np.radians(degrees)), np.cos(np.radians(degrees))]
         )
-    assert PATENT.wanted(frames) == 1
+    assert PATENT.requested_group(frames) == 1
 
 
 def test_most_limbs_that_turn_half_as_fast_ask_for_the_first_group() -> None:  # VSMM 7c
-    assert PATENT.wanted(swinging([[4.0, 4.0, 4.0, 4.0], [2.0, 3.0, 2.0, 2.0]])) == 0
-    assert PATENT.wanted(swinging([[4.0, 4.0, 4.0, 4.0], [2.0, 3.0, 3.0, 2.0]])) is None
+    assert PATENT.requested_group(swinging([[4.0, 4.0, 4.0, 4.0], [2.0, 3.0, 2.0, 2.0]])) == 0
+    assert PATENT.requested_group(swinging([[4.0, 4.0, 4.0, 4.0], [2.0, 3.0, 3.0, 2.0]])) is None
 
 
 def test_small_changes_ask_for_nothing() -> None:
     rules = Rules(smoothing=1, floor_degrees=2.0, dwell=0)
-    assert rules.wanted(swinging([[0.1, 0.1, 0.1, 0.1], [1.9, 1.9, 1.9, 1.9]])) is None
-    assert rules.wanted(swinging([[0.1, 0.1, 0.1, 0.1], [2.0, 2.0, 2.0, 2.0]])) == 2
+    assert rules.requested_group(swinging([[0.1, 0.1, 0.1, 0.1], [1.9, 1.9, 1.9, 1.9]])) is None
+    assert rules.requested_group(swinging([[0.1, 0.1, 0.1, 0.1], [2.0, 2.0, 2.0, 2.0]])) == 2
 
 
 def test_changes_are_means_over_frames() -> None:
     rules = Rules(smoothing=2, floor_degrees=0.0, dwell=0)
-    assert rules.wanted(swinging([[2.0] * 4] * 3)) is None  # too few frames
-    assert rules.wanted(swinging([[2.0] * 4, [2.0] * 4, [1.0] * 4, [7.1] * 4])) == 2
+    assert rules.requested_group(swinging([[2.0] * 4] * 3)) is None  # too few frames
+    assert rules.requested_group(swinging([[2.0] * 4, [2.0] * 4, [1.0] * 4, [7.1] * 4])) == 2
 
 
 # ------------------------------------------------------------------------------------------ 8: how a group begins

@@ -19,9 +19,9 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit_vsmm import joints
 from posefit_vsmm.joints import BODY, detected
+from posefit_vsmm.measurement import NARROWEST, head_radius
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import lines_of
-from posefit_vsmm.sight import NARROWEST, head_radius
 from posefit_vsmm.state import POINTS, points_of
 
 MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a")
@@ -35,7 +35,7 @@ CIRCULAR = 0.25  # legs: the deviation granted to points that are only carried a
 
 def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
     """Return the errors (2,) in legs of each point where it was detected."""
-    found: dict[str, list[Array]] = {name: [] for name in POINTS}
+    errors_of: dict[str, list[Array]] = {name: [] for name in POINTS}
     for name, azimuth in product(MOTIONS, AZIMUTHS):
         motion = built_in.motion(name)
         body = Body.of(motion.skeleton)
@@ -48,21 +48,23 @@ def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
             expected = true + rng.normal(0.0, OFF * leg * scale, true.shape)
             assert lines is not None
             gates = np.full(len(POINTS), NARROWEST * leg * scale)
-            seen = detected(lines, expected, gates, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2)))
+            detection = detected(
+                lines, expected, gates, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2))
+            )
             for k, one in enumerate(POINTS):
-                if seen.confidence[k] > 0.0:
-                    found[one].append((seen.points[k] - true[k]) / (leg * scale))
-    return found
+                if detection.confidence[k] > 0.0:
+                    errors_of[one].append((detection.points[k] - true[k]) / (leg * scale))
+    return errors_of
 
 
 def main() -> None:
     """Write joints.json beside the rules."""
-    found = detection_errors(np.random.default_rng(0))
-    frames = len(found["root"])
+    errors_of = detection_errors(np.random.default_rng(0))
+    frames = len(errors_of["root"])
     stored: dict[str, dict[str, Any]] = {}
     for name in dict.fromkeys(one.removeprefix("left ").removeprefix("right ") for one in POINTS):
         sides = [one for one in POINTS if one.split()[-1] == name]
-        errors = np.concatenate([np.array(found[one]).reshape(-1, 2) for one in sides])
+        errors = np.concatenate([np.array(errors_of[one]).reshape(-1, 2) for one in sides])
         middle = np.array([0.0, np.median(errors[:, 1])])
         kept = errors[np.linalg.norm(errors - middle, axis=1) < OUTLIER]
         bias = np.array([0.0, kept[:, 1].mean()])

@@ -55,7 +55,7 @@ class Teaching(NamedTuple):
 
     fitted: tuple[Excerpt, ...]
     kept: Excerpt
-    drawn: tuple[str, ...] = ()  # built-in motions: no clip of ours shows somebody who walks with arms held out
+    drawn: tuple[str, ...] = ()  # built-in motions: no clip shows walking with arms held out
 
 
 TEACHINGS = {
@@ -125,7 +125,7 @@ def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
     unit = np.sqrt(inputs.var(axis=0).sum() / (len(inputs[0]) / 4))
     scaled = (inputs - middle) / unit
     wanted = after - before - inputs @ target.T
-    wanted[:, [0, 2]] = 0.0  # nobody's way over the ground is predicted: who steps on the spot walks, too
+    wanted[:, [0, 2]] = 0.0  # the way over the ground is not predicted: stepping on the spot is walking, too
     mean = wanted.mean(axis=0)
     normal = scaled.T @ scaled + LAMBDA * len(scaled) * np.eye(scaled.shape[1])  # VSMM 3
     matrix = np.linalg.solve(normal, scaled.T @ (wanted - mean)).T / unit

@@ -1,8 +1,8 @@
-"""What cameras measure of a state: the rules' joints, against where the state's points are seen. VSMM 6.1.
+"""What cameras measure of a state: the rules' joints, against the projected points of the state. VSMM 6.1.
 
 How far off a detected joint is, is counted in the standard deviations of its prediction and its detection together:
 the squared Mahalanobis distance, known as the normalised innovation squared (NIS). A validation gate on it decides
-which detections are believed, and its mean over a frame says how surprising that frame was.
+which detections are accepted, and its mean over a frame is the surprise of that frame.
 """
 
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import Lines
 from posefit_vsmm.state import ERROR, FIRST_BONE, POINTS, Reliance
 
-NEAREST = 0.05  # metres: what is nearer to the camera than that is taken to be so far away
+NEAREST = 0.05  # metres: a smaller distance to the camera counts as this one
 NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected
 DEVIATIONS = 3.0  # between these, so many standard deviations
-SURPRISE = 16.0  # the Mahalanobis gate, squared standard deviations in the image: what is farther off is not believed
-LEAST = 0.05  # confidence that is counted as such
+SURPRISE = 16.0  # the Mahalanobis gate, squared standard deviations in the image: a detection farther off is rejected
+LEAST = 0.05  # the lowest confidence that counts
 KNOWN = 0.002  # metres: the deviation of a translation that is known
 
 
@@ -51,14 +51,14 @@ class Figure:
         frames, joints = empty_frames(len(JOINTS)), np.empty((len(JOINTS), 3))
         place_joints(self.skeleton.chain, pose, state[:3], sines, cosines, frames, joints)
         count = len(POINTS)
-        found, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))
+        points, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))
         others = np.empty((count, 3, len(offset)))
-        points_and_jacobian(sines, cosines, frames, joints, found, jacobian, others)
+        points_and_jacobian(sines, cosines, frames, joints, points, jacobian, others)
         jacobian[:, :, FIRST_BONE:] += (others.reshape(-1, len(offset)) @ chained).reshape(count, 3, -1)
-        return found, jacobian
+        return points, jacobian
 
-    def seen(self, camera: Camera, state: Array) -> tuple[Array, Array]:
-        """Return where a camera sees the points (17, 2) of a state, in pixels, and their Jacobian (17, 2, 33)."""
+    def project(self, camera: Camera, state: Array) -> tuple[Array, Array]:
+        """Return the projected points (17, 2) of a state, in pixels, and their Jacobian (17, 2, 33)."""
         points, jacobian = self.points(state)
         inside = points @ camera.rotation.T + camera.translation
         depths = np.maximum(inside[:, 2], NEAREST)
@@ -70,19 +70,19 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class Sighting:
+class JointMeasurement:
     """What one camera measured."""
 
     points: Array  # (17, 2) pixels
     confidence: Array  # (17,); 0 is hidden
     variances: Array = field(repr=False)  # (17, 2) square pixels
-    spare: int  # end points of the skeleton line that belong to none of them
-    # mean squared standard deviations a coordinate (NIS / 2) of the points that the rules found by themselves
+    unassigned: int  # end points of the skeleton line that belong to none of them
+    # mean squared standard deviations a coordinate (NIS / 2) of the points that the rules detected by themselves
     surprise: float
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class JointCameras:
     """A body before cameras."""
 
     body: Body
@@ -90,36 +90,40 @@ class Sight:
     figure: Figure
     errors: Errors = field(repr=False)
 
-    def look(self, view: int, lines: Lines, expected: Array, spread: Array) -> Sighting:
-        """Return what a camera sees of a state (43,) that is expected, to within a covariance (33, 33).
+    def detect(self, view: int, lines: Lines, expected: Array, spread: Array) -> JointMeasurement:
+        """Return the joints that a camera shows, where a state (43,) is expected with a covariance (33, 33).
 
-        What is too surprising is not believed.
+        Detections outside the Mahalanobis gate are rejected.
         """
         camera = self.cameras[view]
-        pixels, jacobian = self.figure.seen(camera, expected)
+        pixels, jacobian = self.figure.project(camera, expected)
         depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
         metre = float(camera.focal.mean()) / max(depth, NEAREST)  # in pixels, at the root's depth
         leg = leg_of(self.body.skeleton) * metre
         covariances = jacobian @ spread @ jacobian.transpose(0, 2, 1)
         gates = DEVIATIONS * np.sqrt(np.einsum("pii->pi", covariances).max(axis=1))
         gates = np.clip(gates, NARROWEST * leg, WIDEST * leg)
-        found = detected(lines, pixels, gates, leg, head_radius(self.body) * metre, self.errors.bias)
-        variances = (self.errors.deviation * leg) ** 2 / np.maximum(found.confidence, LEAST)[:, None]
-        off = found.points - pixels
+        detection = detected(lines, pixels, gates, leg, head_radius(self.body) * metre, self.errors.bias)
+        variances = (self.errors.deviation * leg) ** 2 / np.maximum(detection.confidence, LEAST)[:, None]
+        off = detection.points - pixels
         distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
-        confidence = np.where(distance < SURPRISE, found.confidence, 0.0)
-        dropped = np.count_nonzero((confidence == 0.0) & (found.confidence > 0.0))
-        return Sighting(
-            found.points, confidence, variances, found.spare + int(dropped), _surprise(distance, found.confidence)
+        confidence = np.where(distance < SURPRISE, detection.confidence, 0.0)
+        dropped = np.count_nonzero((confidence == 0.0) & (detection.confidence > 0.0))
+        return JointMeasurement(
+            detection.points,
+            confidence,
+            variances,
+            detection.unassigned + int(dropped),
+            _surprise(distance, detection.confidence),
         )
 
-    def measure(self, state: Array, seen: Sequence[Sighting | None], known: Array | None) -> Measurement:
+    def measure(self, state: Array, measured: Sequence[JointMeasurement | None], known: Array | None) -> Measurement:
         """Return the residuals of detected joints for a state (43,). Hidden joints have no row. Interpretation V9."""
         residuals, jacobians, noise = [np.zeros(0)], [np.zeros((0, ERROR))], [np.zeros(0)]
-        for camera, one in zip(self.cameras, seen, strict=True):
+        for camera, one in zip(self.cameras, measured, strict=True):
             if one is None:
                 continue
-            pixels, jacobian = self.figure.seen(camera, state)  # VSMM 6.1
+            pixels, jacobian = self.figure.project(camera, state)  # VSMM 6.1
             shown = one.confidence > 0.0
             residuals.append((one.points - pixels)[shown].ravel())
             jacobians.append(jacobian[shown].reshape(-1, ERROR))

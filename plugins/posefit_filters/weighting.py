@@ -1,8 +1,32 @@
-"""How sharply costs are weighed so that a share of the particles survives, in numba: plain functions over arrays."""
+"""From costs to weights, how sharply costs are weighed, and which particles survive by their weights."""
 
 import math
 
-from posefit.arrays import jit
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array, jit
+
+
+def weigh(costs: Array, beta: float) -> Array:
+    """Return the weights (n,), exp(-beta cost), which sum to 1. A cost that is nan or infinite weighs nothing."""
+    known = np.isfinite(costs)
+    if not known.any():  # no cost is known: equal weights
+        return np.full(costs.size, 1.0 / costs.size)
+    rises = np.where(known, costs, np.inf) - costs[known].min()
+    weights: Array = np.exp(-beta * rises) if beta else known.astype(np.float64)  # GORDON1993 (likelihood)
+    return np.asarray(weights / weights.sum())
+
+
+def systematic(weights: Array, u: float) -> NDArray[np.int64]:
+    """Return which rows (n,) survive: as often as their weight asks, one of the two whole numbers next to n times it.
+
+    This is systematic resampling. `u` in [0, 1) is where the comb of n evenly spaced teeth begins.
+    """
+    teeth = (np.arange(weights.size) + u) / weights.size
+    rows = weights.cumsum().searchsorted(teeth, side="right")  # GORDON1993 (resampling)
+    return np.minimum(rows, weights.size - 1)
+
 
 HALVINGS = 60  # ours: bisection steps; a double has 53 bits
 
@@ -12,7 +36,7 @@ def survival(costs, beta):
     """Return the share of particles (0 to 1) that survives resampling by weights exp(-beta cost): D / n.
 
     D = 1 / sum of the squared weights, which sum to 1, is the effective sample size (ESS) of Kish; the share is the
-    survival diagnostic of MacCormick. A cost that is nan or infinite weighs nothing; where all do, all weigh alike.
+    survival diagnostic of MacCormick. A cost that is nan or infinite has no weight; where all are, all have the same.
     """
     lowest = math.inf
     for i in range(costs.size):
