@@ -318,7 +318,9 @@ def test_the_points_are_projected_and_their_jacobian_is_right() -> None:  # VSMM
         poses, places = decode(state[None], library().reliance)
         assert np.allclose(pixels, camera.project(points_of(jacks.skeleton.joints(poses, places)[0]))[0])
         step = 1e-6 * np.eye(ERROR)
-        slow = [(shown.project(camera, plus(state, e))[0] - shown.project(camera, plus(state, -e))[0]) / 2e-6 for e in step]
+        slow = [
+            (shown.project(camera, plus(state, e))[0] - shown.project(camera, plus(state, -e))[0]) / 2e-6 for e in step
+        ]
         assert np.abs(np.moveaxis(slow, 0, 2) - jacobian).max() < 1e-4
 
 
