@@ -30,10 +30,12 @@ from posefit_envs.instance import (
     select,
 )
 from posefit_envs.rendering import MODES, Picture, Window, check_mode
-from posefit_envs.stage import Stage
+from posefit_envs.stage import Rows, Stage
 
 Flags = NDArray[np.bool_]  # (n,)
 Infos = dict[str, Any]
+
+_ONE, _FIRST = np.ones(1, dtype=bool), np.zeros(1, dtype=np.int64)
 
 
 class VectorArguments(Arguments, total=False):
@@ -205,7 +207,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         for i in np.flatnonzero(self._ended).tolist():
             self._begin(i, None)
         self._steps += stepping
-        outcome = self._advance(actions, stepping)
+        outcome = self._advance(actions, stepping, np.flatnonzero(stepping))
         # the time limit of Gymnasium cuts an episode that ends by itself, too
         truncated = stepping & (outcome.truncated | (self._steps >= self._longest))
         self._ended = outcome.terminated | truncated
@@ -249,8 +251,11 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         """Return observations (n, ...) after a reset of some environments, and the infos (n, ...) of those by name."""
 
     @abstractmethod
-    def _advance(self, actions: Array, stepping: Flags) -> Outcome:
-        """Return the outcome of actions (n, ...) in [-1, 1]; environments that do not step have just begun."""
+    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
+        """Return the outcome of actions (n, ...) in [-1, 1].
+
+        `rows` are the environments that step, where `stepping` (n,) is true; the others have just begun.
+        """
 
     @abstractmethod
     def _render_row(self, i: int, episode: Episode) -> Picture:
@@ -285,7 +290,7 @@ class SearchEnv(RenderedEnv):
         super().reset(seed=seed)
         self._vector._generators[0] = self.np_random
         self._vector._begin(0, options.get("instance") if options else None)
-        observations, infos = self._vector._opened(np.ones(1, dtype=bool))
+        observations, infos = self._vector._opened(_ONE)
         self._update_window()
         return row_of(observations, 0), _single_infos(infos)
 
@@ -297,7 +302,7 @@ class SearchEnv(RenderedEnv):
             raise error.ResetNeeded("the episode has ended: reset before the next step")
         action = vector._validator.check(action, self._shape)
         vector._steps += 1
-        outcome = vector._advance(action[None], np.ones(1, dtype=bool))
+        outcome = vector._advance(action[None], _ONE, _FIRST)
         terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
         vector._ended[0] = terminated or truncated
         self._update_window()

@@ -22,6 +22,7 @@ from posefit_envs.population import (
 )
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.scales import log_improvement
+from posefit_envs.stage import Rows
 
 POPULATION_SIZE, ITERATIONS = 40, 60
 EVERY = 5  # iterations a step
@@ -60,12 +61,12 @@ class ConfigureVectorEnv(SearchVectorEnv):
         self._evaluate_first(np.flatnonzero(begun).tolist())
         return self._states(), self._infos()
 
-    def _advance(self, actions: Array, stepping: Flags) -> Outcome:
+    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
         if not stepping.all():
             self._evaluate_first(np.flatnonzero(~stepping).tolist())
         populations = list(self._populations.values())
         before = [population.best for population in populations]
-        for i in np.flatnonzero(stepping).tolist():
+        for i in rows.tolist():
             populations[i].begin_step(control_of(actions[i]))
         while open_rows := [i for i, population in enumerate(populations) if population.open]:
             asked = {i: populations[i].ask() for i in open_rows}

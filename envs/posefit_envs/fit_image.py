@@ -18,7 +18,7 @@ from posefit_envs.base import (
 )
 from posefit_envs.instance import Episode, Image, first_episode
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.stage import Evaluation
+from posefit_envs.stage import Evaluation, Rows
 
 MAX_EVALUATIONS = 200
 TARGET_COST = 2.0
@@ -53,8 +53,8 @@ class FitImageVectorEnv(SearchVectorEnv):
     def _opened(self, begun: Flags) -> tuple[Image, Infos]:
         return self._stage.pictures(), {"instance": self._numbers.copy()}
 
-    def _advance(self, actions: Array, stepping: Flags) -> Outcome:
-        last = self._last = self._stage.evaluate(actions, np.flatnonzero(stepping))
+    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
+        last = self._last = self._stage.evaluate(actions, rows)
         np.minimum(self._best, last.costs, out=self._best, where=stepping)
         terminated = stepping & (self._best <= self._target)
         truncated = ~terminated & (self._steps >= self._budget)

@@ -22,7 +22,7 @@ from posefit_envs.fit_image import MAX_EVALUATIONS
 from posefit_envs.instance import ArgumentError, Episode, World, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.scales import log_cost, log_improvement, scaled
-from posefit_envs.stage import Evaluation
+from posefit_envs.stage import Evaluation, Rows
 
 State = NDArray[np.float32]
 
@@ -101,6 +101,7 @@ class FitStateVectorEnv(SearchVectorEnv):
         super().__init__(num_envs, search_spaces, **arguments)
         self._budget, self._image, self._dimensions = int(max_evaluations), image, self._shape[1] - 1
         self._memories = [ProposalMemory(self._dimensions, np.inf, self._budget) for _ in range(num_envs)]
+        self._best, self._used = np.empty(num_envs), np.zeros(num_envs, dtype=np.int64)
         self._last: Evaluation | None = None
 
     def _begin_search(self, i: int, number: int) -> None:
@@ -112,38 +113,36 @@ class FitStateVectorEnv(SearchVectorEnv):
         evaluation = self._evaluate(np.where(begun[:, None], 0.0, last), begun)
         return self._observations(evaluation), self._infos(evaluation)
 
-    def _advance(self, actions: Array, stepping: Flags) -> Outcome:
-        middle = np.zeros(self._dimensions)
-        proposals = np.stack(
-            [
-                memory.proposal(action) if steps else middle
-                for memory, action, steps in zip(self._memories, actions, stepping, strict=True)
-            ]
-        )
+    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
+        proposals = np.zeros((self.num_envs, self._dimensions))  # the middle of the box where an episode begins
+        for i in rows.tolist():
+            proposals[i] = self._memories[i].proposal(actions[i])
         evaluation = self._evaluate(proposals, ~stepping)
         rewards = np.zeros(self.num_envs)
-        for i in np.flatnonzero(stepping).tolist():
-            rewards[i] = self._memories[i].add(proposals[i], float(evaluation.costs[i]))
-        terminated = stepping & (np.array([memory.used for memory in self._memories]) >= self._budget)
+        for i in rows.tolist():
+            memory = self._memories[i]
+            rewards[i] = memory.add(proposals[i], float(evaluation.costs[i]))
+            self._best[i], self._used[i] = memory.best_costs[0], memory.used
+        terminated = stepping & (self._used >= self._budget)
         infos = self._infos(evaluation)
-        return Outcome(self._observations(evaluation), rewards, terminated, np.zeros_like(terminated), infos, infos)
+        never = np.zeros_like(terminated)
+        return Outcome(self._observations(evaluation), rewards, terminated, never, infos, infos)
 
     def _evaluate(self, proposals: Array, begun: Flags) -> Evaluation:
         """Evaluate proposals (n, d); in environments that have begun they are the first ones."""
         evaluation = self._last = self._stage.evaluate(proposals, self._stage.all_rows)
         for i in np.flatnonzero(begun).tolist():
             self._memories[i] = ProposalMemory(self._dimensions, float(evaluation.costs[i]), self._budget)
+            self._best[i], self._used[i] = evaluation.costs[i], 1
         return evaluation
 
     def _observations(self, evaluation: Evaluation) -> Any:
-        states = np.stack([memory.state() for memory in self._memories])
+        states = np.array([memory.state() for memory in self._memories])
         return {"search": states, "image": evaluation.pictures} if self._image else states
 
     def _infos(self, evaluation: Evaluation) -> Infos:
-        best = np.array([float(memory.best_costs[0]) for memory in self._memories])
-        used = np.array([memory.used for memory in self._memories])
         infos = {"cost": evaluation.costs, "areas": evaluation.areas}
-        return infos | self._progress(best, used, lambda: evaluation.poses)
+        return infos | self._progress(self._best.copy(), self._used.copy(), lambda: evaluation.poses)
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
         memory, last = self._memories[i], self._last

@@ -19,6 +19,7 @@ from posefit_envs.instance import BODY, Image, Scenery, World
 from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes
 
 Rows = NDArray[np.int64]
+_BODY = np.uint16(BODY)
 _READ_ONLY = ("radii", "rotations", "places", "focals", "centres")
 
 
@@ -139,15 +140,15 @@ class Stage:
         views = self._scenes.places.shape[1]
         count_poses(len(rows) * k * views)
         areas = np.zeros((views, n, k, 3), dtype=np.int64)
-        scenes = self._read_only()
-
-        def draw(part: slice) -> None:
-            at = self._chain, scenes, self._width, self._height, rows[part]
-            draw_scenes(*at, poses, translations, areas, np.uint16(BODY), pictures)
-
+        at = self._chain, self._read_only(), self._width, self._height
+        values = poses, translations, areas, _BODY, pictures
         shares = max(min(self._threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
-        cuts = [len(rows) * share // shares for share in range(shares + 1)]
-        work_through([slice(a, b) for a, b in pairwise(cuts)], self._threads, lambda _: (), draw)
+        if shares == 1:
+            draw_scenes(*at, rows, *values)
+        else:
+            cuts = [len(rows) * share // shares for share in range(shares + 1)]
+            parts = [slice(a, b) for a, b in pairwise(cuts)]
+            work_through(parts, self._threads, lambda _: (), lambda part: draw_scenes(*at, rows[part], *values))
         # every pixel of a scene is known, so that the silhouettes of one row do for all
         costs = mean_cost(areas.reshape(views, n * k, 3), self._silhouettes)
         return costs.reshape(n, k), areas

@@ -22,6 +22,7 @@ from posefit_envs.base import (
 )
 from posefit_envs.instance import Episode, Image, Instance, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
+from posefit_envs.stage import Rows
 
 FRAMES = 20
 EVALUATIONS = 100  # a frame
@@ -47,7 +48,7 @@ class TrackVectorEnv(SearchVectorEnv):
         self._followers: list[Follower | None] = [None] * num_envs
         # of the current frame: the count of proposals, the last one, and the best one
         n, d = self._shape
-        self._used = np.zeros(num_envs, dtype=np.int64)
+        self._used, self._frame_numbers = np.zeros(num_envs, dtype=np.int64), np.zeros(num_envs, dtype=np.int64)
         self._costs, self._poses, self._places = np.empty(n), np.empty((n, ANGLES)), np.empty((n, 3))
         self._best, self._best_proposals = np.empty(n), np.empty((n, d))
         self._best_poses, self._best_places = np.empty((n, ANGLES)), np.empty((n, 3))
@@ -59,19 +60,20 @@ class TrackVectorEnv(SearchVectorEnv):
 
     def _enter(self, i: int, episode: Episode) -> None:
         super()._enter(i, episode)
-        self._used[i], self._best[i] = 0, np.inf
+        self._frame_numbers[i], self._used[i], self._best[i] = episode.frame, 0, np.inf
 
     def _opened(self, begun: Flags) -> tuple[Image, Infos]:
         frames = np.zeros(self.num_envs, dtype=np.int64)
         return self._stage.pictures(), {"instance": self._numbers.copy(), "frame": frames}
 
-    def _advance(self, actions: Array, stepping: Flags) -> Outcome:
-        last = self._stage.evaluate(actions, np.flatnonzero(stepping))
+    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
+        last = self._stage.evaluate(actions, rows)
         self._used += stepping
         self._costs, self._poses, self._places = last.costs, last.poses, last.translations
         better = np.flatnonzero(stepping & (last.costs < self._best))
-        self._best[better], self._best_proposals[better] = last.costs[better], actions[better]
-        self._best_poses[better], self._best_places[better] = last.poses[better], last.translations[better]
+        if better.size:
+            self._best[better], self._best_proposals[better] = last.costs[better], actions[better]
+            self._best_poses[better], self._best_places[better] = last.poses[better], last.translations[better]
         infos = {"cost": last.costs, "areas": last.areas}
         infos |= self._progress(self._best.copy(), self._used.copy(), lambda: last.poses)
         committed, terminated = {}, np.zeros(self.num_envs, dtype=bool)
@@ -80,9 +82,10 @@ class TrackVectorEnv(SearchVectorEnv):
             terminated[i] = self.episodes[i].frame + 1 >= self._frames
             if not terminated[i]:
                 self._enter_next(i)
-        entered = np.array([i for i in committed if not terminated[i]], dtype=np.int64)
-        self._stage.redraw(self._poses, self._places, entered, last.pictures)
-        frames = np.array([episode.frame for episode in self.episodes])
+        if committed:
+            entered = np.array([i for i in committed if not terminated[i]], dtype=np.int64)
+            self._stage.redraw(self._poses, self._places, entered, last.pictures)
+        frames = self._frame_numbers.copy()
         common = {"instance": self._numbers, "frame": frames}
         never = np.zeros_like(terminated)
         return Outcome(last.pictures, -last.costs, terminated, never, infos | {"frame": frames}, common, committed)
