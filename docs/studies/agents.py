@@ -32,8 +32,8 @@ from posefit_envs.policies import (
     uniform_policy,
 )
 from posefit_envs.population import ACTION_NUMBERS, ControlAction, action_of
-from posefit_reproduce.grid import Progress, each, earlier, kept
-from table import WORKERS, bar, markdown
+from posefit_reproduce.jobs import each
+from table import WORKERS, earlier, kept, markdown
 
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES, SEEDS, STEPS = 40, 5, 20_000
@@ -228,7 +228,6 @@ def trained(
 
 
 BEST = "best known"
-FIGURES = ("costs", "curve", "minutes")  # of a row, beside what was asked for
 SAMPLED = ("fit",)  # tasks in which a learner's actions are drawn, as its noise is what searches
 
 
@@ -241,7 +240,6 @@ def agents(
     quick: bool,
     rows: str | None,
     workers: int | None,
-    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Return the table of agents: normalised scores on held-out instances, with intervals, and learning curves.
 
@@ -254,9 +252,9 @@ def agents(
     turns = agent_turns(asked, names, seeds, steps, instances)
     check_learners({turn.agent for turn in turns})
     turns += [Training(name, BEST, 0, 0, instances) for name in asked]
-    done = earlier(rows, (*Training._fields, *FIGURES), turn_of)
+    done = earlier(rows, turn_of)
     jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
-    done |= each(jobs, workers, partial(kept, rows, progress)) if jobs else {}
+    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
     found = [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
     return {"seeds": seeds, "steps": steps, "instances": instances, "rows": found} | agent_tables(found)
 
@@ -475,7 +473,7 @@ def main(
     rows: str | None,
     workers: int | None,
 ) -> None:
-    for line in agents_lines(agents(environments, names, seeds, steps, instances, quick, rows, workers, bar)):
+    for line in agents_lines(agents(environments, names, seeds, steps, instances, quick, rows, workers)):
         click.echo(line)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.space import Translation
+from posefit.fitting.tracker import Task
 from posefit.footage.scene import Rendered, synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
@@ -22,11 +23,10 @@ from posefit.motion import built_in
 from posefit.tracking.initialise import BODY_FRAMES, fitted_build, following
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_reproduce.grid import Progress, each
-from posefit_reproduce.known import SIZE, known_task
+from posefit_reproduce.jobs import Progress, each
 from table import WORKERS, bar
 
-MOTION = "walk-b"
+MOTION, SIZE = "walk-b", (320, 240)
 PERCENT = 10.0
 SUBJECTS = 8
 
@@ -94,7 +94,8 @@ def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[floa
     scene = replace(scene, body=true, observations=Rendered(walk, true, scene.cameras))
     height = true.stature if setup.stature else None
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
-    task = known_task(scene, options, start, setup.translation)
+    training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]
+    task = Task(start, scene.cameras, options.budget, scene.yaw, scene.anchor, setup.translation, training=training)
     shape = fitted_build(task, scene.observations, following(prepare(options, task)), BODY_FRAMES, height, seed)
     return _off(shape.body, true), _off(start, true)
 

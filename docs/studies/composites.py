@@ -41,8 +41,8 @@ from posefit.silhouette.cost import project
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.front import track
 from posefit.tracking.summary import Track
-from posefit_reproduce.grid import Progress, check_seeds, each, earlier, kept
-from table import WORKERS, bar
+from posefit_reproduce.jobs import each
+from table import WORKERS, earlier, kept
 
 Masks = NDArray[np.bool_]  # (views, T, height, width)
 
@@ -250,7 +250,6 @@ def composites(
     quick: bool,
     rows: str | None,
     workers: int | None,
-    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Return a row of figures for each situation, number of cameras, extraction and seed.
 
@@ -258,9 +257,9 @@ def composites(
     """
     shots = asked(situations, views, extractions, seeds, quick)
     check_video(video)
-    done = earlier(rows, Shot._fields, shot_of)
+    done = earlier(rows, shot_of)
     jobs = {shot: partial(measured, video, shot) for shot in shots if shot not in done}
-    done |= each(jobs, workers, partial(kept, rows, progress)) if jobs else {}
+    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
     found = [done[shot] for shot in shots]
     return {"rows": found, "groups": by_presence(found)}
 
@@ -269,7 +268,6 @@ def asked(
     situations: Sequence[str], views: Sequence[int], extractions: Sequence[str], seeds: int, quick: bool
 ) -> list[Shot]:
     """Return the rows that are asked for; nothing named is all. Raises ValueError where a name or number is none."""
-    check_seeds(seeds)
     grid = list(product(situations or SHOWS, views or PLACES))
     for place in grid:
         check_situation(*place)
@@ -366,7 +364,7 @@ def _taken_out(videos: Sequence[Path], how: Extraction, frames: Any, folder: Pat
 @click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
 @WORKERS
 def main(**asked: Any) -> None:
-    for line in composites_lines(composites(**asked, progress=bar)):
+    for line in composites_lines(composites(**asked)):
         click.echo(line)
 
 

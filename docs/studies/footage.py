@@ -24,7 +24,7 @@ from posefit.silhouette.foreground import Image, median_background
 from posefit.silhouette.mask import Mask
 from posefit.tracking.front import track
 from posefit.tracking.smoothing.path import SeenFrames, steadied
-from posefit_reproduce.grid import Progress, check_seeds, each
+from posefit_reproduce.jobs import Progress, each
 from table import WORKERS, bar
 
 GREY, GAP = 18, 11  # levels, pixels
@@ -97,7 +97,6 @@ def filmed(
 
     Raises ValueError where the video, the region or the frames make no sense.
     """
-    check_seeds(seeds)
     existing(Path(video))
     tracks = each({seed: partial(filmed_figures, video, roi, frames, seed) for seed in range(seeds)}, workers, progress)
     return {"video": video, "roi": list(roi), "frames": list(frames), "tracks": list(tracks.values())}

@@ -32,7 +32,7 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.uncertainty.calibration import auroc, calibration_error, false_alarms, kept_errors
 from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
-from posefit_reproduce.grid import Progress, each
+from posefit_reproduce.jobs import Progress, each
 from table import WORKERS, bar, markdown, percent
 
 SALT = 2026  # part of every seed

@@ -34,7 +34,7 @@ from posefit.registry import registry
 from posefit.settings import planned
 from posefit.uncertainty.modes import Posterior, modes_of
 from posefit.uncertainty.searches import boltzmann_weights
-from posefit_reproduce.grid import Progress, each
+from posefit_reproduce.jobs import Progress, each
 from table import WORKERS, bar
 
 KNOWN, LIBRARY = "known", "library"  # what is known itself, as a ceiling; the nearest poses of the library

@@ -18,7 +18,6 @@ import click
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.cli.output import say
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Observation
@@ -31,8 +30,8 @@ from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
-from posefit_reproduce.grid import Progress, each, rows
-from table import LEDGER, WORKERS, bar, grouped, markdown, percent
+from posefit_reproduce.jobs import Progress, each
+from table import LEDGER, WORKERS, bar, grouped, markdown, percent, rows
 
 
 class Piece(NamedTuple):
@@ -194,7 +193,7 @@ def people_lines(method: str, quick: bool, workers: int | None, ledger: str | No
     tracks = list(design(method, quick))
     specs = [track.spec(method) for track in tracks]
     different = {repr(spec): spec for spec in specs}  # a plan has no cell twice
-    found = dict(zip(different, rows(Plan.of({"cells": [*different.values()]}), workers, ledger, say), strict=True))
+    found = dict(zip(different, rows(Plan.of({"cells": [*different.values()]}), workers, ledger), strict=True))
     for table in dict.fromkeys(track.table for track in tracks):
         lines = [
             (track.line, found[repr(spec)]) for track, spec in zip(tracks, specs, strict=True) if track.table == table

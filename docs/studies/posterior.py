@@ -41,7 +41,7 @@ from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import APART, Posterior, modes_of
 from posefit.uncertainty.sides import nearer_mirrored, second_side
 from posefit_exemplars.calibration import Calibration, evidence, none_features
-from posefit_reproduce.grid import Progress, each
+from posefit_reproduce.jobs import Progress, each
 from table import WORKERS, bar, markdown
 
 FRAMES, QUICK_FRAMES = 50, 12

@@ -6,29 +6,69 @@ A line is a group of cells that have the fields of `--by` in common: medians ove
 in `--ledger` is not run again.
 """
 
+import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from contextlib import closing, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
 
 import click
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.cli.output import progress, say
+from posefit.sweep.cell import run_cell
+from posefit.sweep.command import cores, swept
+from posefit.sweep.engines.engine import Limits
+from posefit.sweep.engines.processes import Processes
+from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit_reproduce.columns import head_of, number
-from posefit_reproduce.grid import rows
 
 Row = Mapping[str, Any]
+K = TypeVar("K", bound=Hashable)
 RESAMPLES, LEVEL = 2000, 0.95
 SHARES = ("lost_rate", "swap_rate")
 TRIVIAL = ("nearest", "mean_pose")  # baselines, which know the true root
 WORKERS = click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes; one a core by default.")
 LEDGER = click.option("--ledger", metavar="DIR", help="Folder of finished rows: the same command continues there.")
 bar = partial(progress, unit="run")
+
+
+def rows(plan: Plan, workers: int | None, ledger: str | None) -> list[dict[str, Any]]:
+    """Return the rows of a plan's cells, in its order; those that a folder `ledger` holds are not run again.
+
+    Raises ValueError where a cell failed.
+    """
+    with nullcontext(ledger) if ledger else TemporaryDirectory() as folder:
+        with closing(Processes(workers or cores(), Limits(), run_cell)) as engine:
+            tally = swept(plan, folder, engine, say)
+        if tally.stopped:
+            raise KeyboardInterrupt
+        found = Ledger(folder)
+        for one in found.quarantined():
+            raise ValueError(f"{one['key']}: {one['reasons'][-1]}")
+        return [found.row(cell.key) for cell in plan]
+
+
+def earlier(path: str | None, key: Callable[[Row], K]) -> dict[K, Row]:
+    """Return the rows of a file, each under its key; none where there is no file."""
+    if path is None or not Path(path).exists():
+        return {}
+    return {key(row): row for row in map(json.loads, Path(path).read_text("utf-8").splitlines())}
+
+
+def kept(path: str | None, ended: Iterator[tuple[K, Row]], count: int) -> Iterator[tuple[K, Row]]:
+    """Yield rows under their keys as they come, each written to a file at once where one is named."""
+    for key, row in bar(ended, count):
+        if path is not None:
+            with Path(path).open("a", encoding="utf-8") as file:
+                file.write(f"{json.dumps(row)}\n")
+        yield key, row
 
 
 def markdown(heads: Sequence[str], cells: Sequence[Sequence[str]], words: int = 1) -> Iterator[str]:
@@ -102,11 +142,11 @@ def field_text(row: Row, field: str) -> str:
 @LEDGER
 @WORKERS
 def main(plan: str, by: tuple[str, ...], clips: str | None, ledger: str | None, workers: int | None) -> None:
-    path, kept = Path(plan).resolve(), ledger and str(Path(ledger).resolve())
+    path, folder = Path(plan).resolve(), ledger and str(Path(ledger).resolve())
     if clips:
         os.chdir(clips)
     names = by or ("method", "motion")
-    found = rows(Plan.read(path), workers, kept, say)
+    found = rows(Plan.read(path), workers, folder)
     for line in grouped(found, lambda row: [field_text(row, name) for name in names], names):
         click.echo(line)
 

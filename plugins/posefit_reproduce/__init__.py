@@ -10,5 +10,5 @@ folder `docs/studies`.
     commands/       the command lines
     sapso/, vsmm/   the experiments
     bench/          the benchmark
-    grid.py         runs jobs in processes, by the engine of `posefit sweep`
+    jobs.py         runs jobs in processes, by the engine of `posefit sweep`
 """

@@ -12,9 +12,3 @@ def head_of(name: str, which: str = "") -> str:
 def number(name: str, value: float | None) -> str:
     """Return a value with a figure's digits, in its unit."""
     return MEASURES[name].number(value)
-
-
-def labelled(name: str, value: float | None, width: int = 0) -> str:
-    """Return a value with a figure's label and unit, the number right in so many columns: `MPJPE   18 mm`."""
-    measure = MEASURES[name]
-    return " ".join(word for word in (measure.label, measure.number(value).rjust(width), measure.unit) if word)

@@ -53,6 +53,17 @@ def test_the_table_of_a_plan_has_a_line_a_group(tmp_path: Path) -> None:
     ]
 
 
+def test_rows_are_written_as_they_come_and_read_again(tmp_path: Path) -> None:
+    table, path = importlib.import_module("table"), str(tmp_path / "rows.jsonl")
+    found = {name: {"name": name, "cost": cost} for name, cost in (("one", 1.5), ("other", 2.5))}
+    assert table.earlier(path, lambda row: row["name"]) == {}
+    coming = table.kept(path, iter(found.items()), 2)
+    assert next(coming) == ("one", found["one"])
+    assert table.earlier(path, lambda row: row["name"]) == {"one": found["one"]}
+    assert list(coming) == [("other", found["other"])]
+    assert table.earlier(path, lambda row: row["name"]) == found
+
+
 def test_an_interval_holds_the_median() -> None:
     import numpy as np
 

@@ -14,7 +14,7 @@ from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit_reproduce.bench import device, experiment, optimisers, timing
+from posefit_reproduce.bench import device, experiment, kernel, optimisers
 from posefit_reproduce.bench.kernel import bench_problem, opencv_costs
 from posefit_reproduce.bench.optimisers import Stopwatch, wide_space
 from posefit_reproduce.bench.processor import instructions, processor
@@ -81,8 +81,8 @@ def test_the_instructions_of_a_named_processor_are_told() -> None:
 
 @pytest.mark.slow
 def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(timing, "ROUNDS", 1)
-    monkeypatch.setattr(timing, "TURN", 1e-6)
+    monkeypatch.setattr(kernel, "ROUNDS", 1)
+    monkeypatch.setattr(kernel, "TURN", 1e-6)
     monkeypatch.setattr(optimisers, "SEARCHES", 1)
     monkeypatch.setattr(optimisers, "POPULATIONS", 10)
     monkeypatch.setattr(experiment, "SEEDS", 1)

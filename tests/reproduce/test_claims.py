@@ -7,8 +7,8 @@ from posefit.arrays import Array
 from posefit.tracking.measures import BASELINES
 from posefit_reproduce.sapso.claims import PaperClaim, paper_claims
 from posefit_reproduce.sapso.design import COMPARED, Scale
+from posefit_reproduce.sapso.experiment import PaperResults, PaperTrack, TrackKey
 from posefit_reproduce.sapso.motions import paper_motions
-from posefit_reproduce.sapso.results import PaperResults, PaperTrack, TrackKey
 
 SEEDS = 12
 SCALE = Scale(frames=2, views=(45.0,), iterations=60, swarms=(20, 100))

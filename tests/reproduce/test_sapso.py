@@ -15,11 +15,10 @@ from posefit.motion import built_in
 from posefit.tracking.front import track
 from posefit.tracking.measures import BASELINES
 from posefit_reproduce.sapso.design import COMPARED, METHODS, Scale
-from posefit_reproduce.sapso.experiment import baseline_poses, follow_paper
+from posefit_reproduce.sapso.experiment import TrackKey, baseline_poses, follow_paper
 from posefit_reproduce.sapso.first_frame import watched_swarm
 from posefit_reproduce.sapso.motions import CLIPS, PaperMotion, paper_motions, paper_scene, turned
 from posefit_reproduce.sapso.numbers import TABLE_1, TABLE_2
-from posefit_reproduce.sapso.results import TrackKey
 
 TINY = Scale(frames=4, views=(45.0,), iterations=3, swarms=(5, 10))
 FIGURES = {

@@ -15,8 +15,7 @@ from posefit.motion import built_in
 from posefit_reproduce.vsmm import activities
 from posefit_reproduce.vsmm.activities import film_of
 from posefit_reproduce.vsmm.experiment import METHODS, PatentTrack, follow_film
-from posefit_reproduce.vsmm.switches import switching_figures
-from posefit_reproduce.vsmm.told import ModelsTold, told_by
+from posefit_reproduce.vsmm.switches import ModelsTold, switching_figures, told_by
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ from posefit.silhouette.cost import areas
 from posefit.silhouette.cuda.device import check_device
 from posefit.silhouette.cuda.moving import moved_to
 from posefit.sweep.command import cores
+from posefit_reproduce.bench.experiment import seen_at
 from posefit_reproduce.bench.kernel import bench_problem
-from posefit_reproduce.bench.many import seen_at
 from posefit_reproduce.bench.processor import processor
 from posefit_swarm.sapso import SAPSO
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit_reproduce.bench.timing import fastest
+from posefit_reproduce.bench.kernel import fastest
 
 ENVIRONMENTS = 40
 EPISODE = 40  # steps of a learner's episodes

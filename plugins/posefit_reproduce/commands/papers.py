@@ -5,16 +5,16 @@ from functools import partial
 import click
 
 from posefit.cli.output import json_line, progress
-from posefit_reproduce.commands.options import JSON, seeds, workers
 
-NEIGHBOURS = "Seconds of a frame are those beside so many neighbours."
+JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+NEIGHBOURS = "Processes. Seconds of a frame are those beside so many neighbours."
 
 
 @click.command("vsmm")
-@seeds(10, "Films, each in other phases and views.")
+@click.option("--seeds", type=int, default=10, show_default=True, help="Films, each in other phases and views.")
 @click.option("--searches", is_flag=True, help="Compare with SAPSO and with the joined tracker too; minutes more.")
 @click.option("--out", metavar="DIR", help="New folder for report.json and the figures; needs posefit[figures].")
-@workers(1, NEIGHBOURS)
+@click.option("--workers", type=int, default=1, show_default=True, metavar="N", help=NEIGHBOURS)
 @JSON
 def vsmm_command(seeds: int, searches: bool, out: str | None, workers: int, as_json: bool) -> None:
     """Stepping, waving, jumping jacks and squats: the experiment of CN101894278, against an IMM over all models."""
@@ -33,16 +33,15 @@ def vsmm_command(seeds: int, searches: bool, out: str | None, workers: int, as_j
     metavar="CMU_DIR",
     help="Folder of CMU clips; by default POSEFIT_CMU, else built-in.",
 )
-@seeds(5, "Tracks of each method, motion and view.")
+@click.option("--seeds", type=int, default=5, show_default=True, help="Tracks of each method, motion and view.")
 @click.option("--quick", is_flag=True, help="30 frames from one view, a sixth of the time.")
 @click.option("--out", metavar="DIR", help="New folder for the report and the figures; needs posefit[figures].")
-@workers(2, NEIGHBOURS)
+@click.option("--workers", type=int, default=2, show_default=True, metavar="N", help=NEIGHBOURS)
 @JSON
 def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, workers: int, as_json: bool) -> None:
     """A walk, a walk with a turn and a run: tables 1 and 2 and figures 3-7 and 9 of Acta Automatica Sinica 38(5)."""
     from posefit_reproduce.sapso.design import QUICK, Scale
-    from posefit_reproduce.sapso.report import paper_report
-    from posefit_reproduce.sapso.text import paper_text
+    from posefit_reproduce.sapso.report import paper_report, paper_text
 
     told = paper_report(clips, seeds, QUICK if quick else Scale(), out, workers, partial(progress, unit="run"))
     click.echo(json_line(told) if as_json else paper_text(told))

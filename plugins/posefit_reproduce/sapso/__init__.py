@@ -3,11 +3,9 @@
 numbers.py      the paper's own tables
 motions.py      a walk, a walk with a turn and a run: CMU's clips, or built in
 design.py       the methods that are compared, and how much is run
-experiment.py   the tracks, the first frames and the baselines, in processes of the sweep engine
-results.py      what they found
-first_frame.py  the compact space, and one search in it, watched
-claims.py       what the paper claims, and whether that is borne out
-report.py       tables 1 and 2, and what was shortened
-text.py         the same, as it is printed
+experiment.py   the tracks, the first frames and the baselines
+first_frame.py  the compact space, and the swarm of one search in it
+claims.py       what the paper claims, and whether the experiments confirm it
+report.py       tables 1 and 2, what was shortened, and the printed text
 figures.py      figures 3 to 7 and 9
 """

@@ -1,11 +1,10 @@
-"""The experiments of the SAPSO paper's section 5: tracks of three motions, first frames, and what anybody reaches.
+"""The experiments of the SAPSO paper's section 5: tracks of three motions, first frames, and baselines.
 
-The tables need errors of single angles and of single frames, and the figures poses; the motions begin after a clip's
-first frame, and one is bent on purpose. A cell's row holds none of it, so all of them are jobs; see
-`posefit_reproduce.grid`.
+The tables need errors of single angles and frames, and the figures poses, which a sweep does not keep; so all are jobs.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
 from typing import NamedTuple
@@ -13,12 +12,74 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting import metrics
+from posefit.geometry.rotation import wrapped
 from posefit.tracking.evaluation import nearest
 from posefit.tracking.front import track
-from posefit_reproduce.grid import Progress, check_seeds, each
+from posefit.tracking.measures import BASELINES
+from posefit_reproduce.jobs import Progress, check_seeds, each
 from posefit_reproduce.sapso.design import COMPARED, DRIVEN, METHODS, WORKERS, Scale
 from posefit_reproduce.sapso.motions import PaperMotion, paper_scene
-from posefit_reproduce.sapso.results import PaperResults, PaperTrack, TrackKey
+
+
+class TrackKey(NamedTuple):
+    """Names a track."""
+
+    motion: str
+    method: str
+    view: float
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class PaperTrack:
+    """What a track found."""
+
+    poses: Array = field(repr=False)  # (T, 66)
+    seconds: float  # a frame
+    evaluations: float  # a frame
+    swapped: float  # share of frames
+    lost: float
+
+
+@dataclass(frozen=True, eq=False)
+class PaperResults:
+    """Everything that was found, from which tables and figures are made."""
+
+    motions: dict[str, PaperMotion]
+    scale: Scale
+    seeds: int
+    tracks: dict[TrackKey, PaperTrack] = field(repr=False)
+    baselines: dict[tuple[str, float], dict[str, Array]] = field(repr=False)  # poses (T, 66) of each baseline
+    histories: dict[tuple[str, float, int], Array] = field(repr=False)  # (swarms, iterations + 1) lowest cost
+
+    def of(self, motion: str, method: str) -> list[PaperTrack]:
+        """Return the tracks of a method, view by view and seed by seed."""
+        return [self.tracks[TrackKey(motion, method, view, seed)] for view, seed in self._pairs]
+
+    @property
+    def _pairs(self) -> list[tuple[float, int]]:
+        return list(product(self.scale.views, range(self.seeds)))
+
+    def poses(self, motion: str, name: str) -> Array:
+        """Return what a method or a baseline makes of a motion, (views, seeds, T, 66)."""
+        found = [
+            self.baselines[motion, view][name]
+            if name in BASELINES
+            else self.tracks[TrackKey(motion, name, view, seed)].poses
+            for view, seed in self._pairs
+        ]
+        return np.array(found).reshape(len(self.scale.views), self.seeds, *found[0].shape)
+
+    def errors(self, motion: str, name: str) -> Array:
+        """Return the errors (8) in degrees of a method or a baseline, (views, seeds, T)."""
+        poses, truth = self.poses(motion, name), self.motions[motion].test.poses
+        return np.array([[metrics.pose_error_degrees(truth, one) for one in view] for view in poses])
+
+    def angle_errors(self, motion: str, name: str) -> Array:
+        """Return the mean absolute error (66,) of each angle in degrees, over views, seeds and frames."""
+        away = wrapped(self.poses(motion, name) - self.motions[motion].test.poses)
+        return np.asarray(np.degrees(np.abs(away)).mean(axis=(0, 1, 2)))
 
 
 class ViewKey(NamedTuple):

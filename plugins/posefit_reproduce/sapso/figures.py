@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from posefit.arrays import Array
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
 from posefit_reproduce.sapso.design import METHODS, PAPER
+from posefit_reproduce.sapso.experiment import PaperResults
 from posefit_reproduce.sapso.first_frame import WatchedSwarm, compact_space, watched_swarm
 from posefit_reproduce.sapso.motions import LABELS
 from posefit_reproduce.sapso.numbers import CONVERGED, SHOWN_ITERATIONS, SHOWN_PARTICLES, SMALL_DEGREES
-from posefit_reproduce.sapso.results import PaperResults
 
 # Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers too
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

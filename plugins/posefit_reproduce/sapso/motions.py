@@ -13,9 +13,9 @@ from posefit.footage.source import motion_of
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit_reproduce.clips import clip_path
-from posefit_reproduce.known import SIZE
 from posefit_reproduce.sapso.numbers import TRAINING_FRAMES
 
+SIZE = (320, 240)  # pixels
 FPS = 60.0  # not in the paper; at this rate a clip of a walk has more than the 100 frames, and of a run nearly
 TURN = 90.0  # degrees, of the built-in walk with a turn
 # the clip, and those that its prior learns from; there is one run of each person, so its prior knows only others

@@ -1,7 +1,7 @@
 """The experiment of the VSMM patent: model probabilities, joint errors and switches, over seeds.
 
 The film is made for the occasion, by noise and a mean background, and what counts is which models are in force in each
-frame. A cell says and keeps none of it, so the runs are jobs; see `posefit_reproduce.grid`.
+frame. A cell says and keeps none of it, so the runs are jobs; see `posefit_reproduce.jobs`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,10 +19,9 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_reproduce.grid import Progress, check_seeds, each
+from posefit_reproduce.jobs import Progress, check_seeds, each
 from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
-from posefit_reproduce.vsmm.switches import switching_figures
-from posefit_reproduce.vsmm.told import told_by
+from posefit_reproduce.vsmm.switches import switching_figures, told_by
 
 # What is compared, by the name under which the figures are given.
 METHODS: dict[str, TrackOptions] = {

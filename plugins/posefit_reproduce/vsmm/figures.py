@@ -15,7 +15,7 @@ from posefit.silhouette.foreground import Image
 from posefit.tracking.drawing.body import draw_body, side_view
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film
 from posefit_reproduce.vsmm.experiment import ELBOW, HAND, both_joints, projected_cm
-from posefit_reproduce.vsmm.told import ModelsTold, told_by
+from posefit_reproduce.vsmm.switches import ModelsTold, told_by
 
 STILLS = (10, 60, 110, 140, 180, 235, 258, 290, 340, 380, 405, 430)
 PATENT_CM = (2.7, 5.2)  # between these lie the patent's own mean errors

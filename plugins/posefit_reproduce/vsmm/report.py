@@ -10,7 +10,7 @@ from typing import Any
 from posefit.files import new_folder
 from posefit.version import __version__
 from posefit_reproduce.columns import head_of
-from posefit_reproduce.grid import Progress
+from posefit_reproduce.jobs import Progress
 from posefit_reproduce.vsmm.activities import film_of
 from posefit_reproduce.vsmm.experiment import SHOWN, WORKERS, repeat_patent
 

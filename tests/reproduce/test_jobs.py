@@ -1,0 +1,29 @@
+"""Jobs in processes: their results come back under their keys."""
+
+import os
+from functools import partial
+
+import pytest
+
+from posefit_reproduce.jobs import each
+
+
+def test_jobs_come_back_under_their_keys_from_other_processes() -> None:
+    steps: list[int] = []
+
+    def watched(found, count):  # type: ignore[no-untyped-def]
+        for one in found:
+            steps.append(count)
+            yield one
+
+    found = each({k: partial(divmod, k, 3) for k in (5, 4, 9)}, 2, watched)
+    assert list(found.items()) == [(5, (1, 2)), (4, (1, 1)), (9, (3, 0))]
+    assert steps == [3, 3, 3]
+    assert each({"who": os.getpid}, 1)["who"] != os.getpid()
+
+
+def test_mistakes_are_reported() -> None:
+    with pytest.raises(ValueError, match="workers must be at least 1, got 0"):
+        each({"one": os.getpid}, 0)
+    with pytest.raises(ValueError, match=r"\('a', 0\): ZeroDivisionError"):
+        each({("a", k): partial(divmod, 1, k) for k in (0, 1)}, 1)
