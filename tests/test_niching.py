@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from posefit.fitting.box import displacement, draw_population, wrap
-from posefit.geometry.alike import mirrored_poses
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.niching import (
     APART_MM,

@@ -5,9 +5,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Observation, Task
-from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, only_camera, pose_costs
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette

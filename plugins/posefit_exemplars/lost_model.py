@@ -20,7 +20,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Task
-from posefit.geometry.alike import facing
+from posefit.geometry.symmetry import facing
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.uncertainty.calibration import Recalibration

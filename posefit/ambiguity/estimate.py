@@ -27,10 +27,10 @@ from posefit.footage.masks import FPS
 from posefit.footage.scene import Scene
 from posefit.footage.source import HEIGHTS, Source, kind_of, scene_of, useless_for
 from posefit.footage.training import training_clips, training_motions
-from posefit.geometry.alike import facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, Skeleton
+from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.listening import QUIET, Listener
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
@@ -206,7 +206,7 @@ class PoseCluster:
     best: int  # row of the states
     spread_mm: float  # of the joints about their mean
     away_mm: float  # mean distance of the best one's joints from those of the first cluster's best one
-    image: str  # of the first cluster: mirrored, turned or reflected, see posefit.geometry.alike; or ""
+    image: str  # of the first cluster: mirrored, turned or reflected, see posefit.geometry.symmetry; or ""
 
 
 def clusters_of(moment: Moment, states: States, weights: Array) -> list[PoseCluster]:

@@ -11,10 +11,10 @@ import numpy as np
 
 from posefit.ambiguity.estimate import YAWS, Ambiguity, Floor, PoseCluster
 from posefit.files import new_folder
-from posefit.geometry.alike import facing
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, kind
+from posefit.geometry.symmetry import facing
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.drawing.body import draw_body, side_view
@@ -199,10 +199,10 @@ def floors_of(floors: Sequence[Floor], width: int) -> Image:
     bar = max(LINE // len(floors) - 1, 3)
     row = len(floors) * bar + 5
     image = _blank(LEGEND * (len(floors) + 1) + 20 + row * len(names), width)
-    write(image, "spread of what cannot be told apart, mm", (12, 20))
+    write(image, "spread of poses that cannot be distinguished, mm", (12, 20))
     for k, floor in enumerate(floors):
-        told = f"{floor.spread_mm:.0f}  by {floor.views}, {floor.count:,} poses"
-        write(image, told, (12, 20 + LEGEND * (k + 1)), BARS[k % len(BARS)])
+        label = f"{floor.spread_mm:.0f}  by {floor.views}, {floor.count:,} poses"
+        write(image, label, (12, 20 + LEGEND * (k + 1)), BARS[k % len(BARS)])
     top = LEGEND * (len(floors) + 1) + 10
     most = max(max(max(one.values()) for one in spreads), 1e-9)
     for n, name in enumerate(names):

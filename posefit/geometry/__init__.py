@@ -6,7 +6,7 @@
 | which bones, and which angles of a pose, belong to a limb | limbs.py |
 | cones around the bones, and builds | body.py |
 | root and joint angles as rotations. Interpretation S3 | rotation.py |
-| poses with nearly the same silhouette: mirrored, turned, reflected, limbs exchanged | alike.py |
+| poses with nearly the same silhouette: mirrored, turned, reflected, limbs exchanged | symmetry.py |
 | a pinhole camera | camera.py |
 | calibration files: OpenCV, Qualisys, Pose2Sim and ours; lens distortion | calibration.py |
 | forward kinematics, compiled | kernels.py |

@@ -147,18 +147,18 @@ def _units(lines: list[_Line]) -> tuple[float, bool]:
 
 
 def _check_root(lines: list[_Line]) -> None:
-    seen = False
+    has_order = False
     for line in lines[1:]:
         values = tuple(word.upper() for word in line.words[1:])
         if line.key == "order":
-            seen = True
+            has_order = True
             if values != ROOT_CHANNELS:
                 raise line.mistake(f"root order {' '.join(ROOT_CHANNELS)}")
         elif line.key == "axis" and values != ("XYZ",):
             raise line.mistake("root axis XYZ")
         elif line.key in ("position", "orientation") and any(line.numbers(3)):
             raise line.mistake(f"root {line.key} 0 0 0")
-    if not seen:
+    if not has_order:
         raise lines[-1].mistake(f"root order {' '.join(ROOT_CHANNELS)}", "none")
 
 

@@ -15,11 +15,11 @@ from posefit.arrays import Array
 from posefit.fitting.box import Start
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.geometry.alike import facing, reflected_poses
 from posefit.geometry.body import Body, varied
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.symmetry import facing, reflected_poses
 from posefit.motion import recorded
 from posefit.silhouette.corruption import corrupted
 from posefit.silhouette.cost import project

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.rotation import wrapped
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in, recorded
 from posefit.suites.boxes import NOBODY_ELSE, SIZES, STEP, TRAINING_PEOPLE, is_upright
 

@@ -22,8 +22,8 @@ from posefit.fitting.optimiser import BudgetError, Filter, Optimiser, population
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
-from posefit.geometry.alike import facing, reflected_poses, turned_poses
 from posefit.geometry.rotation import wrapped
+from posefit.geometry.symmetry import facing, reflected_poses, turned_poses
 from posefit.tracking.restarts import independent
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.modes import Posterior

@@ -21,9 +21,9 @@ from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit.fitting.space import ROOT_RANGE_DEGREES
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.geometry.alike import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion.motion import Motion
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask

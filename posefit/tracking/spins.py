@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
-from posefit.geometry.alike import facing
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
+from posefit.geometry.symmetry import facing
 from posefit.motion.steadiness import runs
 
 MAX_TURN_RATE = np.radians(450.0)  # a second: the fastest that a person turns on the spot

@@ -18,10 +18,10 @@ from posefit.ambiguity.estimate import (
     states_within,
     total,
 )
-from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, JOINTS, angle_index
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project

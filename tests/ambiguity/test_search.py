@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from posefit.ambiguity.estimate import YAWS, LibraryPoses, Moment, States, spaced_frames, states_within, turned_to
-from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project

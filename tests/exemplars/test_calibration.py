@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from posefit.fitting.tracker import Observation
-from posefit.geometry.alike import facing, mirrored_poses, reflected_poses
+from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit.uncertainty.modes import Posterior

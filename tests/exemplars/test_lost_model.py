@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from posefit.fitting.tracker import Frame
-from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.camera import Camera
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.sides import unknown_sides
 from posefit_exemplars.factory import exemplars

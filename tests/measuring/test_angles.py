@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.skeleton import ANGLES, JOINTS
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.measuring.angles import COLUMNS, clinical_angles
 from posefit.measuring.centres import CENTRES, PLACES, joint_centres
 from posefit.measuring.segments import bone_rotations, segment_rotations

@@ -14,8 +14,8 @@ import posefit
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, synthetic
-from posefit.geometry.alike import mirrored_poses, turned_poses
 from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.motion import built_in
 from posefit.tracking.evaluation import Evaluation
 from posefit.tracking.outputs import OutputFolder

@@ -15,7 +15,7 @@ from posefit.arrays import Array
 from posefit.cli import main
 from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import synthetic
-from posefit.geometry.alike import mirrored_poses
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.drawn import PoseCount

@@ -8,9 +8,9 @@ import pytest
 
 import posefit
 from posefit.fitting.problem import PoseProblem
-from posefit.geometry.alike import facing, reflected_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.symmetry import facing, reflected_poses
 from posefit.motion import built_in
 from posefit.registry import registry
 from posefit.silhouette.cost import project

@@ -9,8 +9,8 @@ import pytest
 
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene, synthetic
-from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.tracking.drawing.body import FAINTEST, draw_body, opacities, solid_map
 from posefit.tracking.drawing.chart import HEAD, LEFT_MARGIN, RIGHT_MARGIN, doubts

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from posefit.fitting.prior import Tilt
-from posefit.geometry.alike import facing
+from posefit.geometry.symmetry import facing
 from posefit.motion import built_in
 from posefit.testing.problem import pose_problem
 from posefit.tracking.modes import proposals_of, symmetric_proposals

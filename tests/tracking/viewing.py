@@ -9,8 +9,8 @@ import pytest
 
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene, synthetic
-from posefit.geometry.alike import mirrored_poses
 from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.tracking import method
 from posefit.tracking.outputs import OutputFolder

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefit.geometry.alike import mirrored_poses
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion.built_in import average_skeleton, motion
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior

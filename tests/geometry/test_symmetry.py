@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.geometry.alike import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS
 from posefit.geometry.rotation import rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, MIRROR, Skeleton, angle_index
+from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from tests.cases import each
