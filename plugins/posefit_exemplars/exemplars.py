@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.geometry import alike
+from posefit.geometry import symmetry
 from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.motion.motion import Motion
 
@@ -216,7 +216,7 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
 
 def mirror_image(motion: Motion) -> Motion:
     """Return a motion mirrored in the plane x = 0: left and right are exchanged."""
-    poses = alike.mirrored_poses(motion.skeleton, motion.poses)
+    poses = symmetry.mirrored_poses(motion.skeleton, motion.poses)
     poses[:, 0] *= -1.0
     return replace(motion, poses=poses, translations=motion.translations * [-1.0, 1.0, 1.0])
 

@@ -1,4 +1,4 @@
-"""The usual checks of a plugin's settings, so that every plugin words its refusals alike."""
+"""The usual checks of a plugin's settings, so that every plugin words its refusals symmetry."""
 
 import math
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Poses of clips, what came after each of them, and groups of poses that are alike."""
+"""Poses of clips, what came after each of them, and groups of poses that are symmetry."""
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
