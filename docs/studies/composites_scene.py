@@ -505,7 +505,7 @@ def _actors(name: str, views: int, seed: int) -> Sequence[Actor]:
 
 
 def _dressed(motion: Motion, seed: int) -> tuple[Motion, Body]:
-    """Return a motion, and a body whose parts are thicker and thinner than proportions say, left and right symmetry."""
+    """Return a motion, and a body whose parts are thicker and thinner than proportions say, left and right alike."""
     body = Body.of(motion.skeleton)
     shares = 1.0 + np.random.default_rng([seed, 1]).uniform(-GIRTH, GIRTH, len(body.radii)) / 100.0
     return motion, body.scaled(1.0, 0.5 * (shares + shares[MIRRORED]))

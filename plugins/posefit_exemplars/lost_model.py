@@ -20,9 +20,9 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Task
-from posefit.geometry.symmetry import facing
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton, joint_distances
+from posefit.geometry.symmetry import facing
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.sides import second_side

@@ -1,4 +1,4 @@
-"""The usual checks of a plugin's settings, so that every plugin words its refusals symmetry."""
+"""The usual checks of a plugin's settings, so that every plugin words its refusals alike."""
 
 import math
 from collections.abc import Iterable

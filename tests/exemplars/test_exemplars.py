@@ -1,4 +1,4 @@
-"""Poses of clips, what came after each of them, and groups of poses that are symmetry."""
+"""Poses of clips, what came after each of them, and groups of poses that are alike."""
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
