@@ -1,4 +1,4 @@
-"""What the first screen of a report says, worked by hand."""
+"""The sentences of a report's first screen, worked by hand."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -32,7 +32,7 @@ def sentence(found: Contest) -> str:
     return leader_sentence(found, board, baseline_rows(found, board), tests)
 
 
-def test_who_leads_and_who_cannot_be_told_apart_is_one_sentence(tmp_path: Path) -> None:
+def test_the_leader_and_methods_not_shown_to_be_worse_are_one_sentence(tmp_path: Path) -> None:
     # as in the letters of a leaderboard: b is behind a in each of 12 pairs; a and c differ by chance alone
     errors = full({"a": 1.0, "b": 2.0}, instances=6)
     errors |= {("c", i, s): error + 0.001 * (-1) ** i for (_, i, s), error in full({"a": 1.0}, instances=6).items()}
@@ -45,12 +45,7 @@ def test_who_leads_and_who_cannot_be_told_apart_is_one_sentence(tmp_path: Path) 
     )
 
 
-def test_where_all_others_are_worse_it_says_so(tmp_path: Path) -> None:
-    said = sentence(contest(tmp_path, full({"a": 1.0, "b": 2.0}, instances=6)))
-    assert "; every other method is worse (" in said
-
-
-def test_whoever_leads_by_the_middle_may_be_worse_on_most_runs_and_that_is_said(tmp_path: Path) -> None:
+def test_a_leader_by_the_mean_may_be_worse_on_most_runs(tmp_path: Path) -> None:
     # b is better in 11 of 12 instances, p = 0.034; in the fourth it is so much worse that its middle half is, too
     errors = {("a", i, 0): 1.0 + i for i in range(12)}
     errors |= {("b", i, 0): 7.5 if i == 3 else 0.9 + 0.999 * i for i in range(12)}
@@ -59,7 +54,7 @@ def test_whoever_leads_by_the_middle_may_be_worse_on_most_runs_and_that_is_said(
     assert "; all others differ, and on most runs b is better (Wilcoxon's signed ranks" in said
 
 
-def test_of_those_that_are_not_alike_it_is_said_how_many_are_worse_and_who_is_better() -> None:
+def test_the_sentence_counts_worse_methods_and_names_better_ones() -> None:
     tests = {
         "methods": (0, 1, 2, 3),
         "blocks": 9,
@@ -75,6 +70,8 @@ def test_of_those_that_are_not_alike_it_is_said_how_many_are_worse_and_who_is_be
 
 
 def test_one_method_alone_and_one_run_alone_are_not_compared(tmp_path: Path) -> None:
+    both = sentence(contest(tmp_path / "c", full({"a": 1.0, "b": 2.0}, instances=6)))
+    assert "; every other method is worse (" in both
     alone = sentence(contest(tmp_path / "a", full({"a": 1.0})))
     assert alone.startswith("a has an error of 1.06° on 2 instances of walk with 2 seeds each; no other method")
     once = sentence(contest(tmp_path / "b", full({"a": 1.0, "b": 2.0}, instances=1, seeds=1)))
@@ -109,7 +106,7 @@ def test_a_claimed_order_is_tested_step_by_step(tmp_path: Path) -> None:
     assert published_claims(contest(tmp_path / "two", full({"a": 1.0, "b": 2.0})), [ORDER]) == []
 
 
-def test_a_step_is_seen_where_it_is_better_and_not_where_it_is_worse(tmp_path: Path) -> None:
+def test_a_step_is_confirmed_where_it_is_better_and_not_where_it_is_worse(tmp_path: Path) -> None:
     found = contest(tmp_path, full({"a": 2.0, "b": 1.0, "c": 3.0}, instances=6))
     (one,) = published_claims(found, [ORDER])
     assert [step["confirmed"] for step in one["steps"]] == [True, False]
@@ -183,7 +180,7 @@ def test_an_instance_has_no_say_in_what_is_chosen_for_it() -> None:
     assert selected(np.arange(12.0)[:, None] == 5.0, errors)[5] == 0
 
 
-def test_an_oracle_is_told_apart_from_chance(tmp_path: Path) -> None:
+def test_an_oracle_scored_on_other_seeds_has_no_luck(tmp_path: Path) -> None:
     # on seed 0 a is better, on seed 1 b: who is best on the other seed is worse on this one
     errors: Errors = {}
     for i in range(3):
@@ -208,21 +205,22 @@ def test_where_the_plan_says_the_same_of_all_there_is_no_selector(tmp_path: Path
     assert found["why"].startswith("the plan is the same for every instance")
 
 
-@pytest.mark.parametrize(
-    ("change", "name"),
-    [({"view_degrees": (90.0,)}, "view"), ({"motion": "run"}, "motion"), ({"frames": 9}, "frames"),
-     ({"view_degrees": (45.0, 90.0)}, "cameras"), ({"size": (80, 60)}, "size")],
-)  # fmt: skip
-def test_what_a_plan_says_of_instances_is_told_by_name(tmp_path: Path, change: dict[str, Any], name: str) -> None:
-    other = replace(FIRST, **change)
-    made = [result(replace(cell, instance=i), 1.0) for cell in (FIRST, other) for i in range(3)]
-    runs = runs_of(Ledger(ledger(tmp_path / "results", made)))
-    names, values = features_of(runs, range(6))
-    assert names == [name]
-    assert len(np.unique(values, axis=0)) == 2
+def test_features_of_instances_are_named_by_the_fields_that_differ(tmp_path: Path) -> None:
+    changes: dict[str, dict[str, Any]] = {
+        "view": {"view_degrees": (90.0,)},
+        "motion": {"motion": "run"},
+        "frames": {"frames": 9},
+        "cameras": {"view_degrees": (45.0, 90.0)},
+        "size": {"size": (80, 60)},
+    }
+    for name, change in changes.items():
+        made = [result(replace(cell, instance=i), 1.0) for cell in (FIRST, replace(FIRST, **change)) for i in range(3)]
+        names, values = features_of(runs_of(Ledger(ledger(tmp_path / name, made))), range(6))
+        assert names == [name]
+        assert len(np.unique(values, axis=0)) == 2
 
 
-def test_where_no_test_could_see_a_difference_the_runs_are_too_few_and_nobody_is_called_alike(tmp_path: Path) -> None:
+def test_too_few_runs_for_any_difference_are_reported(tmp_path: Path) -> None:
     # of eight pairs the least p is 2 / 2^8, times ten after Holm; of nine it is half of that, and below 5 %
     errors = full(dict.fromkeys("abcde", 1.0) | {"e": 2.0}, instances=4, seeds=2)
     assert (
@@ -234,7 +232,7 @@ def test_where_no_test_could_see_a_difference_the_runs_are_too_few_and_nobody_is
     assert "b, c and d are not shown to be worse, and 1 other is worse (" in said
 
 
-def test_the_lead_is_told_in_degrees_and_so_are_lost_frames_of_the_first_two(tmp_path: Path) -> None:
+def test_the_lead_is_in_degrees_and_lost_frames_of_the_first_two_are_counted(tmp_path: Path) -> None:
     lost = {("b", 1): 0.2, ("c", 0): 0.5}
     made = [
         result(replace(FIRST, method=m, instance=i), error + 0.1 * i, lost_rate=lost.get((m, i), 0.0))

@@ -1,7 +1,8 @@
-"""IOHprofiler folders, opened by iohinspector, and CSV."""
+"""IOHprofiler folders, opened by iohinspector, CSV, and tables that LaTeX takes as they are."""
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import iohinspector
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from posefit.report import export
-from posefit.report.export import LoggedRun, write_csv, write_iohprofiler
+from posefit.report.export import LoggedRun, latex, latex_table, write_csv, write_iohprofiler
 
 
 def run(method="sapso@pca", settings=None, problem="walk", dimension=9, instance=0, seed=0, evaluations=(1, 40, 80), costs=(90.0, 5.0, 2.5)):  # fmt: skip
@@ -149,15 +150,6 @@ def test_no_cost_stands_in_a_file_that_nobody_measured(tmp_path):
     assert sorted(manager.overview["best_y"]) == [4.0, 4.0, 4.0]
 
 
-def test_iohinspectors_expected_running_time_bears_a_trace_that_starts_with_a_population(tmp_path):
-    from iohinspector.metrics.fixed_target import aggregate_running_time
-
-    write_iohprofiler([run(seed=k, evaluations=(40, 80), costs=(20.0, 4.0)) for k in range(3)], tmp_path / "ioh")
-    data = opened(tmp_path / "ioh").load(include_meta_data=True)
-    table = aggregate_running_time(data, f_min=5.0, f_max=19.0, scale_f_log=False)
-    assert set(table["ERT"].to_list()) == {80.0}
-
-
 def test_one_method_and_problem_in_two_dimensions_are_two_scenarios(tmp_path):
     write_iohprofiler([run(), run(dimension=12, costs=(8.0, 3.0, 1.0))], tmp_path / "ioh")
     overview = opened(tmp_path / "ioh").overview
@@ -177,25 +169,20 @@ def test_hostile_names_stay_in_their_folder_and_are_not_run_by_a_reader(tmp_path
     assert not trap.exists()
 
 
-@pytest.mark.parametrize(
-    ("runs", "message"),
-    [
+def test_invalid_runs_and_folders_that_exist_are_refused_and_nothing_is_written(tmp_path):
+    name = "sapso@pca on walk, instance 0, seed 0"
+    for runs, message in (
         ([], "runs must be at least one, got none"),
-        ([run(), run()], "runs must differ in method, settings, .* got two of sapso@pca on walk, instance 0, seed 0"),
-        ([run(dimension=0)], "sapso@pca on walk, instance 0, seed 0: dimension must lie in 1 to 65535, got 0"),
+        ([run(), run()], f"runs must differ in method, settings, .* got two of {name}"),
+        ([run(dimension=0)], f"{name}: dimension must lie in 1 to 65535, got 0"),
         ([run(instance=70000)], "seed 0: instance must lie in 0 to 65535, got 70000"),
         ([run(costs=(1.0, 2.0, 3.0))], "seed 0: costs must be the best so far and never rise, got 1, 2, 3"),
         ([run(costs=(np.nan, 2.0, 1.0))], "seed 0: costs must be finite, got 1 that are not"),
         ([run(evaluations=(1, 2.5, 3))], "seed 0: evaluations must be whole numbers, got 2.5"),
-    ],
-)
-def test_senseless_runs_are_refused_and_nothing_is_written(tmp_path, runs, message):
-    with pytest.raises(ValueError, match=message):
-        write_iohprofiler(runs, tmp_path / "ioh")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_folder_that_exists_is_kept(tmp_path):
+    ):
+        with pytest.raises(ValueError, match=message):
+            write_iohprofiler(runs, tmp_path / "ioh")
+        assert list(tmp_path.iterdir()) == []
     with pytest.raises(ValueError, match="expected a new name to write to, got one that exists"):
         write_iohprofiler([run()], tmp_path)
 
@@ -219,3 +206,30 @@ def test_csv_without_rows_or_over_a_file_is_refused(tmp_path):
     with pytest.raises(ValueError, match="rows.csv: expected a new name to write to, got one that exists"):
         write_csv([{"a": 1}], tmp_path / "rows.csv")
     assert (tmp_path / "rows.csv").read_text() == "mine"
+
+
+def test_a_table_by_hand():
+    text = latex_table(["method", "error", "runs"], [["sapso@pca", 1.056, 10], ["a_b & c", None, 3]])
+    assert text.splitlines() == [
+        r"\begin{tabular}{lrr}",
+        r"\hline",
+        r"method & error & runs \\",
+        r"\hline",
+        r"sapso@pca & 1.06 & 10 \\",
+        r"a\_b \& c & -- & 3 \\",
+        r"\hline",
+        r"\end{tabular}",
+    ]
+    assert r"-- \\" in latex_table(["low"], [[float("nan")]])
+    with pytest.raises(ValueError, match="rows must have 2 cells, as the header has, got 1"):
+        latex_table(["a", "b"], [["x"]])
+
+
+def test_every_sign_that_latex_would_read_is_escaped():
+    found = latex("\\input{x} $a^2$ #1 50% ~ <|> [2]\n\nend")
+    assert found == (
+        r"\textbackslash{}input\{x\} \$a\textasciicircum{}2\$ \#1 50\% \textasciitilde{} "
+        r"\textless{}\textbar{}\textgreater{} {[}2{]} end"
+    )
+    # what is left of commands once the escapes themselves are gone
+    assert not re.search(r"[\\$^~#%&_]", re.sub(r"\\(text\w+\{\}|[&%$#_{}])", "", found))

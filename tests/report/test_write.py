@@ -81,22 +81,23 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
 
 
-def test_without_a_file_it_prints_the_same_and_writes_nothing(results: Path, tmp_path: Path) -> None:
+def test_the_same_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_report(
+    results: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "report.html"
     done = run("report", results)
     assert done.exit_code == 0, done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results"]
     assert json.loads(run("report", results, "--json").stdout)["out"] is None
-    written = run("report", results, "--out", tmp_path / "report.html").stdout.splitlines()
-    assert done.stdout.splitlines() == written[:-1]
-
-
-def test_the_same_ledger_gives_the_same_bytes_and_replaces_an_earlier_report(results: Path, tmp_path: Path) -> None:
-    out = tmp_path / "report.html"
-    run("report", results, "--out", out)
+    assert run("report", results, "--out", out).stdout.splitlines()[:-1] == done.stdout.splitlines()
     first = out.read_bytes()
     out.write_text(MARK + "of another day")
-    assert run("report", results, "--out", out).exit_code == 0
+    printed = json.loads(run("report", results, "--out", out, "--json").stdout)
     assert out.read_bytes() == first
+    assert [row["name"] for row in printed["leaderboard"]] == ["sapso@pca", "random@pca"]
+    assert printed["leaderboard"][0]["skill_mean_pose"] == pytest.approx(1.0 - 1.06 / 4.0)
+    assert {row["baseline"] for row in printed["baselines"]} == {"mean_pose", "persistence", "nearest"}
+    assert printed["header"]["failed"] == 1
 
 
 def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_above_the_leaderboard(
@@ -136,14 +137,6 @@ def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: 
     page = Page(tmp_path / "report.html")
     assert page.data["failures"][0]["reasons"] == ["ValueError: it had to", "its process died of SIGSEGV"]
     assert page.data["header"]["unfinished"] == ["random@pca"]
-
-
-def test_json_is_the_leaderboard(results: Path, tmp_path: Path) -> None:
-    found = json.loads(run("report", results, "--out", tmp_path / "report.html", "--json").stdout)
-    assert [row["name"] for row in found["leaderboard"]] == ["sapso@pca", "random@pca"]
-    assert found["leaderboard"][0]["skill_mean_pose"] == pytest.approx(1.0 - 1.06 / 4.0)
-    assert {row["baseline"] for row in found["baselines"]} == {"mean_pose", "persistence", "nearest"}
-    assert found["header"]["failed"] == 1
 
 
 def test_figures_tables_rows_and_iohprofiler_on_demand(results: Path, tmp_path: Path) -> None:
@@ -189,49 +182,47 @@ def test_methods_that_say_how_sure_they_are_have_figures_of_it(tmp_path: Path) -
     assert data["rows"]["coverage_80"] == [0.8] * 4 + [None] * 2
 
 
-def test_a_ledger_from_before_there_were_posteriors_has_no_such_columns(results: Path, tmp_path: Path) -> None:
+def test_methods_without_uncertainty_have_no_such_columns(results: Path, tmp_path: Path) -> None:
     assert run("report", results, "--out", tmp_path / "report.html").exit_code == 0
     data = Page(tmp_path / "report.html").data
     assert data["certainty"] is None
     assert not [name for name in (*data["columns"], *data["rows"]) if re.match("coverage|interval|unknown", name)]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["NONE", "--out", "OUT.html"], "expected a ledger, a folder that posefit sweep wrote, got none"),
-        (["EMPTY", "--out", "OUT.html"], "expected a ledger with finished rows, got one with none"),
-        (["NONE"], "expected a ledger, a folder that posefit sweep wrote, got none"),
-        (["RESULTS", "--out", "OUT.html", "--port", "1"], "--port must be given with --serve, got it without"),
-        (["RESULTS", "--serve", "--out", "OUT.html"], "--serve must be given without --out, which it does not write"),
-        (["RESULTS", "--serve", "--csv", "OUT.csv"], "--serve must be given without --csv, which it does not write"),
-        (["RESULTS", "--serve", "--json"], "--serve must be given without --json, which it does not write"),
-        (["NONE", "--serve"], "expected a ledger, a folder that posefit sweep wrote, got none"),
-        (["RESULTS", "--serve", "--port", "70000"], "--port must be 0 to 65535, got 70000"),
-        (["RESULTS", "--out", "OUT.txt"], "--out must be a file that ends in .html, got "),
-        (["RESULTS", "--out", "OTHER.html"], "expected a new name or an earlier report, got something else"),
-        (["RESULTS", "--out", "DIR.html"], "expected a new name or an earlier report, got something else"),
-        (["RESULTS", "--out", "none/OUT.html"], "expected a place to write to, got one in "),
-        (["RESULTS", "--out", "OUT.html", "--csv", "OTHER.html"], "expected a new name to write to, got one that exists"),
-        (["RESULTS", "--out", "OUT.html", "--figures", "RESULTS"], "expected a place of its own for each"),
-        (["RESULTS", "--out", "OUT.html", "--csv", "OUT.html"], "expected a place of its own for each"),
-        (["RESULTS", "--out", "OUT.html", "--iohprofiler", "none/OUT"], "expected a place to write to, got one in "),
-    ],
-)  # fmt: skip
+MISTAKES = [
+    (["NONE", "--out", "OUT.html"], "expected a ledger, a folder that posefit sweep wrote, got none"),
+    (["EMPTY", "--out", "OUT.html"], "expected a ledger with finished rows, got one with none"),
+    (["NONE"], "expected a ledger, a folder that posefit sweep wrote, got none"),
+    (["RESULTS", "--out", "OUT.html", "--port", "1"], "--port must be given with --serve, got it without"),
+    (["RESULTS", "--serve", "--out", "OUT.html"], "--serve must be given without --out, which it does not write"),
+    (["RESULTS", "--serve", "--json"], "--serve must be given without --json, which it does not write"),
+    (["NONE", "--serve"], "expected a ledger, a folder that posefit sweep wrote, got none"),
+    (["RESULTS", "--serve", "--port", "70000"], "--port must be 0 to 65535, got 70000"),
+    (["RESULTS", "--out", "OUT.txt"], "--out must be a file that ends in .html, got "),
+    (["RESULTS", "--out", "OTHER.html"], "expected a new name or an earlier report, got something else"),
+    (["RESULTS", "--out", "DIR.html"], "expected a new name or an earlier report, got something else"),
+    (["RESULTS", "--out", "none/OUT.html"], "expected a place to write to, got one in "),
+    (["RESULTS", "--out", "OUT.html", "--csv", "OTHER.html"], "expected a new name to write to, got one that exists"),
+    (["RESULTS", "--out", "OUT.html", "--figures", "RESULTS"], "expected a place of its own for each"),
+    (["RESULTS", "--out", "OUT.html", "--iohprofiler", "none/OUT"], "expected a place to write to, got one in "),
+]
+
+
 def test_mistakes_are_one_line_and_write_nothing(
-    words: list[str], message: str, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("posefit.report.live.LEDGER_TIMEOUT_SECONDS", 0.0)
     ledger(tmp_path / "EMPTY", [])
     (tmp_path / "OTHER.html").write_text("<p>mine</p>")
     (tmp_path / "DIR.html").mkdir()
     before = sorted(tmp_path.rglob("*"))
-    places = [
-        word if word.startswith("--") or word.isdigit() else tmp_path / word.replace("RESULTS", "results")
-        for word in words
-    ]
-    assert message in fails("report", *places)
-    assert sorted(tmp_path.rglob("*")) == before
+    for words, message in MISTAKES:
+        places = [
+            word if word.startswith("--") or word.isdigit() else tmp_path / word.replace("RESULTS", "results")
+            for word in words
+        ]
+        assert message in fails("report", *places), words
+        assert sorted(tmp_path.rglob("*")) == before, words
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
 
 
@@ -267,14 +258,11 @@ def test_a_damaged_picture_is_left_out_and_said(results: Path) -> None:
     assert "must be whole, got damaged ones; this run has no animation" in said[0]
 
 
-@pytest.mark.parametrize("text", ["</script>", "<!--", "]]>", "&lt;", "\u2028\u2029", '"\\', "\U0001f600é"])
-def test_embedded_data_cannot_leave_its_element(text: str) -> None:
-    found = embedded({text: [text, float("nan"), float("inf"), 1.23456789]})
-    assert not set("<>&\u2028\u2029") & set(found)
-    assert json.loads(found) == {text: [text, None, None, 1.2346]}
-
-
-def test_numbers_are_plain() -> None:
+def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
+    for text in ("</script>", "<!--", "]]>", "&lt;", "\u2028\u2029", '"\\', "\U0001f600é"):
+        json_text = embedded({text: [text, float("nan"), float("inf"), 1.23456789]})
+        assert not set("<>&\u2028\u2029") & set(json_text)
+        assert json.loads(json_text) == {text: [text, None, None, 1.2346]}
     assert plain({"a": np.arange(2), "b": np.array([0.5, np.nan]), "c": (np.int64(2**60), True, None)}) == {
         "a": [0, 1], "b": [0.5, None], "c": [2**60, True, None],
     }  # fmt: skip

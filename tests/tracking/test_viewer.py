@@ -63,10 +63,36 @@ def state(page: Any) -> tuple[bytes, bytes, tuple[str, ...]]:
     return picture(page, "picture").tobytes(), picture(page, "turning").tobytes(), tuple(lines)
 
 
-@pytest.mark.parametrize("width", [320, 390, 1280])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+CONTRASTS = """() => {
+  const parts = (text) => text.match(/[\\d.]+/g).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((one) => one / 255)
+    .map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, one, k) => sum + [0.2126, 0.7152, 0.0722][k] * one, 0);
+  const found = [];
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const node = walker.currentNode.parentElement;
+    if (!walker.currentNode.data.trim() || node.closest("script, noscript, [hidden]")) continue;
+    const style = getComputedStyle(node);
+    let under = node;
+    while (under && (parts(getComputedStyle(under).backgroundColor)[3] ?? 1) === 0) under = under.parentElement;
+    const [ink, back] = [node.closest("svg") ? style.fill : style.color, getComputedStyle(under).backgroundColor]
+      .map((one) => light(parts(one)));
+    found.push([walker.currentNode.data.trim(), (Math.max(ink, back) + 0.05) / (Math.min(ink, back) + 0.05)]);
+  }
+  return found;
+}"""
+NAMELESS = """() => [...document.querySelectorAll("button, input, select, canvas, svg, section")]
+  .filter((one) => !one.closest("[hidden], [aria-hidden=true]"))
+  .filter((one) => !(one.getAttribute("aria-label") || one.getAttribute("aria-labelledby") ||
+    one.closest("label")?.textContent.trim() || (one.tagName === "BUTTON" && one.textContent.trim())))
+  .map((one) => one.outerHTML.slice(0, 80))"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "scheme"), [(320, "light"), (390, "dark"), (1280, "light")])
 @pytest.mark.parametrize("which", ["doubtful", "filmed"])
-def test_it_opens_without_a_complaint_and_asks_for_nothing_else(
+def test_it_opens_without_errors_or_requests_and_everything_can_be_read(
     chromium: Any, request: pytest.FixtureRequest, which: str, width: int, scheme: str
 ) -> None:
     path = request.getfixturevalue(which)
@@ -80,6 +106,10 @@ def test_it_opens_without_a_complaint_and_asks_for_nothing_else(
                 assert seen.page.locator(f"#{select}-chart svg path").count() >= 1
         seen.page.locator("summary").click()
         assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+        contrasts = seen.page.evaluate(CONTRASTS)
+        assert len(contrasts) > 40
+        assert [(words, ratio) for words, ratio in contrasts if ratio < 4.5] == []
+        assert seen.page.evaluate(NAMELESS) == []
         assert seen.complaints == []
         assert [one for one in seen.requests if not one.startswith("data:")] == [path.as_uri()]
 
@@ -97,6 +127,7 @@ def test_the_slider_moves_picture_body_and_curves_together(chromium: Any, doubtf
         assert page.locator("#turning").get_attribute("aria-label").endswith(reading(page))
 
 
+@pytest.mark.slow
 def test_it_plays_and_stops(chromium: Any, doubtful: Path) -> None:
     with opened(chromium, doubtful, 390) as seen:
         page, readings = seen.page, set()
@@ -139,7 +170,8 @@ def test_keys_go_from_frame_to_frame_and_to_what_is_marked(chromium: Any, doubtf
         assert page.locator("#play").inner_text() == "Play"
 
 
-def test_the_body_turns_by_mouse_and_keys_and_stands_as_somebody_sees_it(chromium: Any, doubtful: Path) -> None:
+@pytest.mark.slow
+def test_the_body_turns_by_mouse_keys_and_buttons(chromium: Any, doubtful: Path) -> None:
     with opened(chromium, doubtful, 390, has_touch=True) as seen:
         page = seen.page
         page.locator("#turning").scroll_into_view_if_needed()
@@ -165,9 +197,8 @@ def test_the_body_turns_by_mouse_and_keys_and_stands_as_somebody_sees_it(chromiu
         assert picture(page, "turning").tobytes() != shown[-1]
 
 
-@pytest.mark.parametrize("camera", [0, 1])
-def test_the_body_is_where_the_camera_sees_it(chromium: Any, doubtful: Path, camera: int) -> None:
-    scene = walk(FRAMES, [45.0, 135.0])
+def test_the_body_is_where_the_camera_sees_it(chromium: Any, doubtful: Path) -> None:
+    camera, scene = 1, walk(FRAMES, [45.0, 135.0])
     assert scene.truth is not None
     with opened(chromium, doubtful) as seen:
         page = seen.page
@@ -192,6 +223,7 @@ def pixels(image: Any, colour: str) -> int:
     return int(((np.abs(image[..., :3].astype(int) - wanted).max(axis=2) < 12) & (image[..., 3] > 200)).sum())
 
 
+@pytest.mark.slow
 def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(chromium: Any, doubtful: Path) -> None:
     with opened(chromium, doubtful, color_scheme="light") as seen:
         page = seen.page
@@ -202,7 +234,7 @@ def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(chromium: Any, dou
                 assert (pixels(picture(page, canvas), "#9a3f86") > 60) == (weight > 20), (frame, canvas)
 
 
-def test_doubtful_frames_are_marked_and_said(chromium: Any, doubtful: Path) -> None:
+def test_doubtful_frames_are_marked(chromium: Any, doubtful: Path) -> None:
     with opened(chromium, doubtful) as seen:
         page = seen.page
         told = page.locator("#verdict").inner_text()
@@ -234,6 +266,11 @@ def test_a_joint_has_intervals_and_a_clinical_angle_has_none(chromium: Any, doub
             page.locator("#joint").select_option(label=label)
             assert page.locator("#joint-chart polygon").count() == bands
             assert page.locator("#joint-caption").inner_text() == said
+        page.locator("#joint-chart").scroll_into_view_if_needed()
+        box = page.locator("#joint-chart svg").bounding_box()
+        for x, frame in ((box["width"] - 13, 11), (49, 0)):  # a click goes to its frame
+            page.mouse.click(box["x"] + x, box["y"] + 30)
+            assert reading(page).startswith(f"frame {frame} of")
 
 
 def test_a_single_frame_has_no_player_and_no_curves(chromium: Any, tmp_path: Path) -> None:
@@ -247,17 +284,7 @@ def test_a_single_frame_has_no_player_and_no_curves(chromium: Any, tmp_path: Pat
         assert seen.complaints == []
 
 
-def test_a_click_in_a_curve_goes_to_its_frame(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful) as seen:
-        page = seen.page
-        page.locator("#joint-chart").scroll_into_view_if_needed()
-        box = page.locator("#joint-chart svg").bounding_box()
-        page.mouse.click(box["x"] + box["width"] - 13, box["y"] + 30)
-        assert reading(page).startswith("frame 11 of")
-        page.mouse.click(box["x"] + 49, box["y"] + 30)
-        assert reading(page).startswith("frame 0 of")
-
-
+@pytest.mark.slow
 def test_what_was_filmed_lies_behind_the_body_and_can_be_hidden(chromium: Any, filmed: Path) -> None:
     with opened(chromium, filmed) as seen:
         page = seen.page
@@ -273,7 +300,7 @@ def test_what_was_filmed_lies_behind_the_body_and_can_be_hidden(chromium: Any, f
         waited(seen, lambda: (np.abs(picture(page, "picture").astype(int) - [180, 200, 40, 255]).max(2) > 40).any())
 
 
-def test_names_are_text_and_what_nobody_says_is_not_shown(chromium: Any, filmed: Path) -> None:
+def test_names_are_text_and_unreported_figures_are_hidden(chromium: Any, filmed: Path) -> None:
     with opened(chromium, filmed) as seen:
         page = seen.page
         assert page.locator("#title").text_content() == EVIL
@@ -285,42 +312,3 @@ def test_names_are_text_and_what_nobody_says_is_not_shown(chromium: Any, filmed:
             assert not page.locator(hidden).is_visible()
         assert "MPJPE" not in page.locator("body").inner_text()
         assert seen.complaints == []
-
-
-CONTRASTS = """() => {
-  const parts = (text) => text.match(/[\\d.]+/g).map(Number);
-  const light = ([r, g, b]) => [r, g, b].map((one) => one / 255)
-    .map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4))
-    .reduce((sum, one, k) => sum + [0.2126, 0.7152, 0.0722][k] * one, 0);
-  const found = [];
-  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-  while (walker.nextNode()) {
-    const node = walker.currentNode.parentElement;
-    if (!walker.currentNode.data.trim() || node.closest("script, noscript, [hidden]")) continue;
-    const style = getComputedStyle(node);
-    let under = node;
-    while (under && (parts(getComputedStyle(under).backgroundColor)[3] ?? 1) === 0) under = under.parentElement;
-    const [ink, back] = [node.closest("svg") ? style.fill : style.color, getComputedStyle(under).backgroundColor]
-      .map((one) => light(parts(one)));
-    found.push([walker.currentNode.data.trim(), (Math.max(ink, back) + 0.05) / (Math.min(ink, back) + 0.05)]);
-  }
-  return found;
-}"""
-NAMELESS = """() => [...document.querySelectorAll("button, input, select, canvas, svg, section")]
-  .filter((one) => !one.closest("[hidden], [aria-hidden=true]"))
-  .filter((one) => !(one.getAttribute("aria-label") || one.getAttribute("aria-labelledby") ||
-    one.closest("label")?.textContent.trim() || (one.tagName === "BUTTON" && one.textContent.trim())))
-  .map((one) => one.outerHTML.slice(0, 80))"""
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("which", ["doubtful", "filmed"])
-def test_words_can_be_read_and_everything_has_a_name(
-    chromium: Any, request: pytest.FixtureRequest, which: str, scheme: str
-) -> None:
-    with opened(chromium, request.getfixturevalue(which), color_scheme=scheme) as seen:
-        seen.page.locator("summary").click()
-        contrasts = seen.page.evaluate(CONTRASTS)
-        assert len(contrasts) > 40
-        assert [(words, ratio) for words, ratio in contrasts if ratio < 4.5] == []
-        assert seen.page.evaluate(NAMELESS) == []
