@@ -86,36 +86,42 @@ def test_a_folder_that_a_killed_run_left_is_neither_in_the_way_nor_removed(tmp_p
     assert (tmp_path / ".out.partial" / "old").read_text() == "old"
 
 
-@pytest.mark.parametrize("opened", [new_file, lambda path: replaced_file(path, MARK)], ids=["new", "replaced"])
-@pytest.mark.parametrize("fails", [False, True])
-def test_no_link_is_followed_and_none_removed(tmp_path, opened, fails):
-    theirs = tmp_path / "theirs"
-    theirs.write_text("theirs")
-    for name in (".out.partial", ".out.partial.html", ".out.html.partial", ".out.html"):
-        (tmp_path / name).symlink_to(theirs)
-    before = sorted(tmp_path.iterdir())
-    try:
-        with opened(tmp_path / "out.html") as building:
-            assert not building.is_symlink()
-            building.write_text("mine")
-            if fails:
-                raise RuntimeError
-    except RuntimeError:
-        pass
-    assert theirs.read_text() == "theirs"
-    assert sorted(tmp_path.iterdir()) == sorted([*before, *([] if fails else [tmp_path / "out.html"])])
-    assert all((tmp_path / name).is_symlink() for name in (".out.partial", ".out.html"))
+def test_no_link_is_followed_and_none_removed(tmp_path):
+    for fails in [False, True]:
+        for opened in [new_file, lambda path: replaced_file(path, MARK)]:
+            folder_of_case = tmp_path / str(len(list(tmp_path.iterdir())))
+            folder_of_case.mkdir()
+            theirs = folder_of_case / "theirs"
+            theirs.write_text("theirs")
+            for name in (".out.partial", ".out.partial.html", ".out.html.partial", ".out.html"):
+                (folder_of_case / name).symlink_to(theirs)
+            before = sorted(folder_of_case.iterdir())
+            try:
+                with opened(folder_of_case / "out.html") as building:
+                    assert not building.is_symlink()
+                    building.write_text("mine")
+                    if fails:
+                        raise RuntimeError
+            except RuntimeError:
+                pass
+            assert theirs.read_text() == "theirs"
+            assert sorted(folder_of_case.iterdir()) == sorted(
+                [*before, *([] if fails else [folder_of_case / "out.html"])]
+            )
+            assert all((folder_of_case / name).is_symlink() for name in (".out.partial", ".out.html"))
 
 
-@pytest.mark.parametrize("opened", [new_folder, new_file, lambda path: replaced_file(path, MARK)])
-def test_a_link_at_the_name_itself_counts_as_existing(tmp_path, opened):
-    (tmp_path / "theirs").write_bytes(MARK)
-    (tmp_path / "out").symlink_to(tmp_path / "theirs")
-    (tmp_path / "dangling").symlink_to(tmp_path / "nothing")
-    for name in ("out", "dangling"):
-        with pytest.raises(ValueError, match="expected a new name"), opened(tmp_path / name):
-            pass
-    assert not (tmp_path / "nothing").exists()
+def test_a_link_at_the_name_itself_counts_as_existing(tmp_path):
+    for case, opened in enumerate([new_folder, new_file, lambda path: replaced_file(path, MARK)]):
+        folder_of_case = tmp_path / str(case)
+        folder_of_case.mkdir()
+        (folder_of_case / "theirs").write_bytes(MARK)
+        (folder_of_case / "out").symlink_to(folder_of_case / "theirs")
+        (folder_of_case / "dangling").symlink_to(folder_of_case / "nothing")
+        for name in ("out", "dangling"):
+            with pytest.raises(ValueError, match="expected a new name"), opened(folder_of_case / name):
+                pass
+        assert not (folder_of_case / "nothing").exists()
 
 
 def test_a_name_and_its_place_are_checked_before_anything_is_computed(tmp_path):

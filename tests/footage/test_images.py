@@ -13,19 +13,21 @@ from posefit.footage.images import read_image, size_of
 from posefit.footage.readers import read_masks
 
 
-@pytest.mark.parametrize("suffix", [".png", ".jpg", ".bmp", ".tif", ".pgm", ".ppm"])
-@pytest.mark.parametrize("channels", [1, 3])
-def test_the_size_that_is_stated_is_the_size_that_comes(tmp_path: Path, suffix: str, channels: int) -> None:
-    if (suffix, channels) in ((".pgm", 3), (".ppm", 1)):
-        pytest.skip("one is grey, the other is not")
-    drawn = np.random.default_rng(0).integers(0, 255, (37, 53, channels), dtype=np.uint8)
-    path = tmp_path / f"a{suffix}"
-    assert cv2.imwrite(str(path), drawn if channels == 3 else drawn[..., 0])
-    assert size_of(path.read_bytes()) == (53, 37)
-    for grey in (True, False):
-        found = read_image(path, grey=grey)
-        wanted = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
-        np.testing.assert_array_equal(found, wanted)
+def test_the_size_that_is_stated_is_the_size_that_comes(tmp_path: Path) -> None:
+    for channels in [1, 3]:
+        for suffix in [".png", ".jpg", ".bmp", ".tif", ".pgm", ".ppm"]:
+            folder_of_case = tmp_path / str(len(list(tmp_path.iterdir())))
+            folder_of_case.mkdir()
+            if (suffix, channels) in ((".pgm", 3), (".ppm", 1)):
+                continue
+            drawn = np.random.default_rng(0).integers(0, 255, (37, 53, channels), dtype=np.uint8)
+            path = folder_of_case / f"a{suffix}"
+            assert cv2.imwrite(str(path), drawn if channels == 3 else drawn[..., 0])
+            assert size_of(path.read_bytes()) == (53, 37)
+            for grey in (True, False):
+                found = read_image(path, grey=grey)
+                wanted = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
+                np.testing.assert_array_equal(found, wanted)
 
 
 def bomb(path: Path, side: int) -> None:

@@ -3,7 +3,7 @@
 import json
 import struct
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -73,15 +73,15 @@ def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]]) -
 # what values mean
 
 
-@pytest.mark.parametrize("values", [(0, 1), (0, 255), (0, 38), (0, 128), (64, 192)])
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-def test_two_values_are_a_mask_whichever_they_are(
-    walk: list[Any], tmp_path: Path, values: tuple[int, int], kind: Any
-) -> None:
-    images = [np.where(mask, values[1], values[0]).astype(kind) for mask in walk]
-    assert check(folder(tmp_path / "a", images), walk)[1] == []
-    np.savez(tmp_path / "a.npz", masks=np.stack(images))
-    check(tmp_path / "a.npz", walk)
+def test_two_values_are_a_mask_whichever_they_are(walk: list[Any], tmp_path: Path) -> None:
+    for kind in [np.uint8, np.uint16]:
+        for values in [(0, 1), (0, 255), (0, 38), (0, 128), (64, 192)]:
+            folder_of_case = tmp_path / str(len(list(tmp_path.iterdir())))
+            folder_of_case.mkdir()
+            images = [np.where(mask, values[1], values[0]).astype(kind) for mask in walk]
+            assert check(folder(folder_of_case / "a", images), walk)[1] == []
+            np.savez(folder_of_case / "a.npz", masks=np.stack(images))
+            check(folder_of_case / "a.npz", walk)
 
 
 def test_sixteen_bits_and_jpeg_are_read_as_ever(walk: list[Any], tmp_path: Path) -> None:
@@ -96,15 +96,17 @@ def softened(mask: Any) -> Any:
     return cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) * 0.97
 
 
-@pytest.mark.parametrize(("kind", "full"), [(np.uint8, 255), (np.uint16, 65_535), (np.float32, 1.0), (np.float64, 255)])
-def test_soft_masks_are_cut_half_way(walk: list[Any], tmp_path: Path, kind: Any, full: float) -> None:
-    soft = [(softened(mask) * full).astype(kind) for mask in walk]
-    soft[2] = (soft[2] * 0.3).astype(kind)  # nobody, as the network thinks; a frame's own scale would show him
-    wanted = [one > (full // 2 if full > 1 else 0.5) for one in soft]
-    np.savez(tmp_path / "a.npz", masks=np.stack(soft))
-    assert not check(tmp_path / "a.npz", wanted)[0].usable[2]
-    if np.issubdtype(kind, np.integer):
-        check(folder(tmp_path / "a", soft), wanted)
+def test_soft_masks_are_cut_half_way(walk: list[Any], tmp_path: Path) -> None:
+    for case, (kind, full) in enumerate([(np.uint8, 255), (np.uint16, 65_535), (np.float32, 1.0), (np.float64, 255)]):
+        folder_of_case = tmp_path / str(case)
+        folder_of_case.mkdir()
+        soft = [(softened(mask) * full).astype(kind) for mask in walk]
+        soft[2] = (soft[2] * 0.3).astype(kind)  # nobody, as the network thinks; a frame's own scale would show him
+        wanted = [one > (full // 2 if full > 1 else 0.5) for one in soft]
+        np.savez(folder_of_case / "a.npz", masks=np.stack(soft))
+        assert not check(folder_of_case / "a.npz", wanted)[0].usable[2]
+        if np.issubdtype(kind, np.integer):
+            check(folder(folder_of_case / "a", soft), wanted)
 
 
 def test_the_alpha_of_somebody_cut_out_is_the_mask(walk: list[Any], tmp_path: Path) -> None:
@@ -181,42 +183,44 @@ def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path)
     check(folder(tmp_path / "a", smooth), [one > 127 for one in smooth])
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["MASKS", "--label", "person"], "expected a whole number such as 15, or a colour 0xRRGGBB, got 'person'"),
-        (["MASKS", "--holes", "2"], "holes must lie in 0 to 1, a share of the person's area, got 2.0"),
-        (["walk", "--label", "1"], "label must be given for masks only, got 1 for a motion"),
-        (["walk", "--holes", "0.1"], "holes must be given for masks only, got 0.1 for a motion"),
-        (["SOFT", "--label", "1"], "label must be given for masks whose values are labels, PNG or whole numbers"),
-        (["PHOTOS"], "photos: expected masks, got pictures in many colours; a person cut out needs an alpha channel"),
-        (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
-        (
-            ["EMPTY"],
-            "0000.png: expected a mask with a person before a background, got an empty one first, and no other",
-        ),
-        (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
-    ],
-)
-def test_a_mistake_with_masks_is_one_line_and_leaves_nothing(
-    walk: list[Any], tmp_path: Path, words: list[str], message: str
-) -> None:
-    inputs = tmp_path / "in"
-    inputs.mkdir()
-    images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
-    photo = [np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)]
-    stand = {
-        "MASKS": folder(inputs / "masks", images),
-        "SOFT": folder(inputs / "soft", images, ".jpg"),
-        "PHOTOS": folder(inputs / "photos", photo, ".jpg"),
-        "PICTURES": folder(inputs / "pictures", photo),
-        "EMPTY": folder(inputs / "empty", [np.zeros_like(one) for one in images]),
-        "SIZES": folder(inputs / "sizes", [images[0], images[1][::2, ::2], *images[2:]]),
-    }
-    result = run("track", *(stand.get(word, word) for word in words), "--out", tmp_path / "out", *QUICK)
-    assert result.exit_code == 2, result.output
-    assert message in result.stderr.splitlines()[-1]
-    assert [one.name for one in tmp_path.iterdir()] == ["in"]
+def test_a_mistake_with_masks_is_one_line_and_leaves_nothing(walk: list[Any], tmp_path: Path) -> None:
+    for case, (words, message) in enumerate(
+        [
+            (["MASKS", "--label", "person"], "expected a whole number such as 15, or a colour 0xRRGGBB, got 'person'"),
+            (["MASKS", "--holes", "2"], "holes must lie in 0 to 1, a share of the person's area, got 2.0"),
+            (["walk", "--label", "1"], "label must be given for masks only, got 1 for a motion"),
+            (["walk", "--holes", "0.1"], "holes must be given for masks only, got 0.1 for a motion"),
+            (["SOFT", "--label", "1"], "label must be given for masks whose values are labels, PNG or whole numbers"),
+            (
+                ["PHOTOS"],
+                "photos: expected masks, got pictures in many colours; a person cut out needs an alpha channel",
+            ),
+            (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
+            (
+                ["EMPTY"],
+                "0000.png: expected a mask with a person before a background, got an empty one first, and no other",
+            ),
+            (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
+        ]
+    ):
+        folder_of_case = tmp_path / str(case)
+        folder_of_case.mkdir()
+        inputs = folder_of_case / "in"
+        inputs.mkdir()
+        images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
+        photo = [np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)]
+        stand = {
+            "MASKS": folder(inputs / "masks", images),
+            "SOFT": folder(inputs / "soft", images, ".jpg"),
+            "PHOTOS": folder(inputs / "photos", photo, ".jpg"),
+            "PICTURES": folder(inputs / "pictures", photo),
+            "EMPTY": folder(inputs / "empty", [np.zeros_like(one) for one in images]),
+            "SIZES": folder(inputs / "sizes", [images[0], images[1][::2, ::2], *images[2:]]),
+        }
+        result = run("track", *(stand.get(word, word) for word in words), "--out", folder_of_case / "out", *QUICK)
+        assert result.exit_code == 2, result.output
+        assert message in result.stderr.splitlines()[-1]
+        assert [one.name for one in folder_of_case.iterdir()] == ["in"]
 
 
 def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> None:
@@ -236,15 +240,17 @@ def stack(path: Path, masks: Sequence[Any]) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    "write", [stack, lambda path, masks: folder(path, [255 * one.astype(np.uint8) for one in masks])]
-)
-def test_inverted_masks_are_turned_round_and_said(
-    walk: list[Any], tmp_path: Path, write: Callable[[Path, Sequence[Any]], Path]
-) -> None:
-    path = write(tmp_path / "a.npz", [~mask for mask in walk])
-    (warning,) = check(path, walk)[1]
-    assert warning == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
+def test_inverted_masks_are_turned_round_and_said(walk: list[Any], tmp_path: Path) -> None:
+    for case, write in enumerate(
+        [stack, lambda path, masks: folder(path, [255 * one.astype(np.uint8) for one in masks])]
+    ):
+        folder_of_case = tmp_path / str(case)
+        folder_of_case.mkdir()
+        path = write(folder_of_case / "a.npz", [~mask for mask in walk])
+        (warning,) = check(path, walk)[1]
+        assert (
+            warning == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
+        )
 
 
 def test_somebody_who_fills_a_side_is_not_inverted(tmp_path: Path) -> None:

@@ -37,14 +37,14 @@ def assert_as_whole(body: Body, camera: Camera, poses: LimbPoses, where: Sequenc
     np.testing.assert_array_equal(found, areas(body, camera, silhouette, whole, np.tile(place, (len(whole), 1))))
 
 
-@pytest.mark.parametrize("size", [(96, 72), (320, 240), (64, 48), (65, 90)])
-def test_all_combinations_have_the_areas_of_their_whole_poses(body: Body, size: tuple[int, int]) -> None:
-    camera = Camera.around(np.zeros(3), 0.4, 3.5, size)
-    poses = candidates(0, (3, 2, 4, 1, 2))
-    every = every_combination(poses.counts)
-    assert every.tolist() == sorted(every.tolist())
-    assert len({tuple(row) for row in every.tolist()}) == len(every) == 3 * 2 * 4 * 1 * 2
-    assert_as_whole(body, camera, poses, (0.0, 0.1, 0.0), every)
+def test_all_combinations_have_the_areas_of_their_whole_poses(body: Body) -> None:
+    for size in [(96, 72), (320, 240), (64, 48), (65, 90)]:
+        camera = Camera.around(np.zeros(3), 0.4, 3.5, size)
+        poses = candidates(0, (3, 2, 4, 1, 2))
+        every = every_combination(poses.counts)
+        assert every.tolist() == sorted(every.tolist())
+        assert len({tuple(row) for row in every.tolist()}) == len(every) == 3 * 2 * 4 * 1 * 2
+        assert_as_whole(body, camera, poses, (0.0, 0.1, 0.0), every)
 
 
 def test_any_combinations_in_any_order_do_so_too(body: Body, camera: Camera) -> None:
@@ -56,15 +56,11 @@ def test_any_combinations_in_any_order_do_so_too(body: Body, camera: Camera) -> 
     assert_as_whole(body, camera, poses, (0.0, 0.0, 0.0), some[:0])
 
 
-@pytest.mark.parametrize(
-    "where", [(0.9, 0.3, 0.0), (-1.2, 0.0, 0.0), (0.0, 0.0, 3.6), (9.0, 0.0, 0.0), (0.0, 0.0, 9.0)]
-)
-def test_limbs_off_the_image_or_behind_the_camera_have_no_pixels(
-    body: Body, camera: Camera, where: tuple[float, float, float]
-) -> None:
-    poses = candidates(3, (2, 2, 2, 2, 2))
-    towards = camera.rotation.T @ np.array([where[0], where[1], -where[2]])
-    assert_as_whole(body, camera, poses, towards.tolist(), every_combination(poses.counts))
+def test_limbs_off_the_image_or_behind_the_camera_have_no_pixels(body: Body, camera: Camera) -> None:
+    for where in [(0.9, 0.3, 0.0), (-1.2, 0.0, 0.0), (0.0, 0.0, 3.6), (9.0, 0.0, 0.0), (0.0, 0.0, 9.0)]:
+        poses = candidates(3, (2, 2, 2, 2, 2))
+        towards = camera.rotation.T @ np.array([where[0], where[1], -where[2]])
+        assert_as_whole(body, camera, poses, towards.tolist(), every_combination(poses.counts))
 
 
 def test_limbs_may_be_the_callers_own_and_only_their_angles_are_used(body: Body, camera: Camera) -> None:

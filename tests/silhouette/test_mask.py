@@ -50,13 +50,13 @@ def test_shapes_are_checked() -> None:
         Silhouette.of(np.zeros((2, 3)), np.zeros((3, 2)))
 
 
-@pytest.mark.parametrize("width", [1, 63, 64, 65, 127, 128, 130, 321])
-def test_bits_beyond_the_image_stay_clear(width: int) -> None:
-    bits = pack(np.ones((3, width), dtype=bool))
-    assert bits.dtype == np.uint64
-    assert bits.shape == strips_and_words(width, 3) == (2 * ((width + 63) // 64), 4)
-    assert sum(int(word).bit_count() for word in bits.flat) == 3 * width
-    assert not bits[:, 2:].any()
+def test_bits_beyond_the_image_stay_clear() -> None:
+    for width in [1, 63, 64, 65, 127, 128, 130, 321]:
+        bits = pack(np.ones((3, width), dtype=bool))
+        assert bits.dtype == np.uint64
+        assert bits.shape == strips_and_words(width, 3) == (2 * ((width + 63) // 64), 4)
+        assert sum(int(word).bit_count() for word in bits.flat) == 3 * width
+        assert not bits[:, 2:].any()
 
 
 def test_any_value_but_0_is_the_person() -> None:
@@ -91,10 +91,10 @@ def test_nobody_has_no_extent_and_one_pixel_has_its_own() -> None:
     assert np.isnan(Silhouette.of(np.ones((4, 5))).extent).all()
 
 
-@pytest.mark.parametrize("shape", [(), (0, 3), (3, 0), (2, 2, 3)])
-def test_a_mask_has_two_sides(shape: tuple[int, ...]) -> None:
-    with pytest.raises(ValueError, match=r"mask must have shape \(height, width\), got \("):
-        Silhouette.of(np.zeros(shape))
+def test_a_mask_has_two_sides() -> None:
+    for shape in [(), (0, 3), (3, 0), (2, 2, 3)]:
+        with pytest.raises(ValueError, match=r"mask must have shape \(height, width\), got \("):
+            Silhouette.of(np.zeros(shape))
 
 
 def test_small_pieces_apart_have_no_say_in_where_the_borders_are() -> None:
