@@ -131,7 +131,7 @@ def test_two_calibrated_cameras_find_the_person_where_he_is(filmed: tuple[Path, 
     for name, azimuth in (("a.npz", np.pi / 2), ("b.npz", 0.6)):
         np.savez(tmp_path / name, masks=np.stack(truth(azimuth)[6:30]).astype(np.uint8))
     seen = [tmp_path / "a.npz", tmp_path / "b.npz"]
-    result = posefit.track(seen, camera=calibration, up="y", method="@pca", **{**QUICK, "frames": (None, None)})
+    result = posefit.track(seen, camera=calibration, up="y", **{**QUICK, "method": "sapso@pca", "frames": (None, None)})
     assert result.summary["views"] == 2
     motion = walk().frames(6, 30)
     away = np.linalg.norm(result.motion.translations - motion.translations, axis=1)
@@ -227,8 +227,8 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path, optimiser: str) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8), usable=np.arange(20) != 11)
     settings: dict[str, Any] = {"evaluations": 400, "restarts": 1, "body_frames": 0, "method": optimiser}
-    if optimiser == "annealed":  # what is steady is so over all frames, and those that are found anew are others
-        settings["steady"] = False
+    if optimiser == "annealed":  # smoothing mixes all frames, those that are tracked again after the interruption too
+        settings["smooth"] = False
     whole = posefit.track(path, out=tmp_path / "whole", **settings)
     said: list[str] = []
     with pytest.raises(StopError):

@@ -347,7 +347,7 @@ def test_settings_of_a_segmenter_are_checked(filmed: tuple[Path, list[Any]]) -> 
     assert result.exit_code == 2
     assert "threshold must be above 0, got -3" in result.stderr
     result = run("track", filmed[0], "--set", "median.samples=3")
-    assert "--set must name one of tracker, sapso, loose, mixture, which are in use here" in result.stderr
+    assert "--set must name one of " in result.stderr
 
 
 def test_settings_of_a_segmenter_reach_it(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
