@@ -4,7 +4,7 @@
     result = posefit.track("walk")          # follow a built-in motion; the same as `posefit track walk`
     print(result.summary["error_degrees"])
 
-The pieces: `Skeleton`, `Body` and `Camera` describe the person and the view; `Silhouette` what was seen; `SearchSpace`
+The pieces: `Skeleton`, `Body` and `Camera` describe the person and the view; `Silhouette` an observation; `SearchSpace`
 the box that optimisers search; `PoseProblem` the cost; `minimise` the loop; `SynthesisTracker` follows a sequence;
 `suite` numbers problems for a benchmark.
 Plugins add optimisers and priors: see `posefit.hooks`. Each name is imported when it is first used.

@@ -1,4 +1,4 @@
-"""The settings of a plugin: read from its signature, so that a mistake is found before anything runs."""
+"""The settings of a plugin: read from its signature, so that a mistake is reported before anything runs."""
 
 import inspect
 import re
@@ -55,17 +55,17 @@ def settings_in(text: str) -> dict[str, Entry]:
     """
     lines = text.splitlines()
     start, stop = _section(lines)
-    found: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     indents = [len(line) - len(line.lstrip()) for line in lines[start + 1 : stop] if line.strip()]
     name = ""
     for line in lines[start + 1 : stop]:
         entry = _ENTRY.fullmatch(line.strip())
         if entry is not None and len(line) - len(line.lstrip()) == min(indents):
             name = entry["name"]
-            found[name] = Entry(entry["symbol"] or "", entry["meaning"])
+            entries[name] = Entry(entry["symbol"] or "", entry["meaning"])
         elif name and line.strip():
-            found[name] = found[name]._replace(meaning=f"{found[name].meaning} {line.strip()}")
-    return found
+            entries[name] = entries[name]._replace(meaning=f"{entries[name].meaning} {line.strip()}")
+    return entries
 
 
 def without_settings(text: str) -> str:

@@ -23,7 +23,7 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, median_background
 from posefit.silhouette.mask import Mask
 from posefit.tracking.front import track
-from posefit.tracking.smoothing.path import SeenFrames, steadied
+from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit_reproduce.jobs import Progress, each
 from table import WORKERS, bar
 
@@ -137,7 +137,7 @@ def filmed_figures(source: str | Path, roi: Box, frames: Range, seed: int) -> di
         "iou_masks": result.summary["iou"],
         "iou_reference": float(np.mean(_overlaps(motion, radii, camera, seen)[usable])),
         "lowest_iou_masks": min(row["iou"] for row, ok in zip(result.frames, usable, strict=True) if ok),
-        **gait(steadied(motion, SeenFrames(usable, np.tile(camera.position, (len(usable), 1)))), camera, seen),
+        **gait(smooth_path(motion, Visibility(usable, np.tile(camera.position, (len(usable), 1)))), camera, seen),
     }
 
 

@@ -13,7 +13,7 @@ from posefit.cli.ambiguity import ambiguity
 from posefit.cli.motions import motions
 from posefit.version import __version__
 
-MISTAKE = 2  # the exit status of everything that is told in one line
+MISTAKE = 2  # the exit status of a mistake, which is shown in one line
 BUILT_IN = (
     tracking.track,
     tracking.fit,

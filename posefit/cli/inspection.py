@@ -34,18 +34,18 @@ def described(offer: Offer) -> dict[str, Any]:
     }
 
 
-def listing(found: Registry) -> Iterator[str]:
+def listing(registry: Registry) -> Iterator[str]:
     """Yield the lines of `posefit plugins`."""
     for kind in KINDS:
-        for offer in found.offers[kind].values():
+        for offer in registry.offers[kind].values():
             yield _head(offer)
             yield from _wrapped(offer.summary, 4 * " ", 4 * " ")
             yield from _wrapped(", ".join(map(_typed, offer.settings)), "    --set ", 10 * " ")
 
 
-def explanation(found: Registry, name: str) -> Iterator[str]:
+def explanation(registry: Registry, name: str) -> Iterator[str]:
     """Yield the lines of `posefit plugins show`: whatever has the name. Raises ValueError listing the known names."""
-    offers = [offer for kind in KINDS for offer in found.offers[kind].values()]
+    offers = [offer for kind in KINDS for offer in registry.offers[kind].values()]
     mine = [offer for offer in offers if offer.name == name]
     if not mine:
         known = sorted({offer.name for offer in offers})
@@ -82,7 +82,7 @@ def _wrapped(text: str, first: str, other: str) -> list[str]:
 
 
 def diagnosis(
-    found: Registry,
+    registry: Registry,
     added: Sequence[Plugin[click.Command]] = (),
     claiming: Sequence[Plugin[ClaimedOrder]] = (),
     verbose: bool = False,
@@ -93,7 +93,7 @@ def diagnosis(
     `verbose`, the traceback of what could not be loaded follows its line.
     """
     lines = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ]
-    for plugin in found.plugins:
+    for plugin in registry.plugins:
         names = ", ".join(f"{offer.kind} {offer.name}" for offer in plugin.offers) or "nothing"
         lines += _state(plugin, f"offers {names}", verbose)
         for offer in plugin.offers:
@@ -107,7 +107,7 @@ def diagnosis(
     for one in claiming:
         names = "; ".join(f"claim {claim.name}" for claim in one.offers) or "nothing"
         lines += _state(one, f"offers {names}", verbose)
-    groups: tuple[Sequence[Plugin[Any]], ...] = (found.plugins, added, claiming)
+    groups: tuple[Sequence[Plugin[Any]], ...] = (registry.plugins, added, claiming)
     well = all(plugin.state != "broken" for group in groups for plugin in group)
     more_told = "" if verbose else "; -v shows where they fail"
     lines.append("all plugins work" if well else f"broken plugins are left out; the others work{more_told}")

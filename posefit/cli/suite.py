@@ -122,7 +122,7 @@ def suite_run(
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
-    """Print what a sweep of a plan of single searches to DIR found, by dimension, function and method."""
+    """Print what a sweep of a plan of single searches to DIR reached, by dimension, function and method."""
     from posefit.files import check_new, check_place
     from posefit.suites.tally import score_lines, suite_scores
     from posefit.sweep.ledger import Ledger
@@ -156,7 +156,7 @@ def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
 )
 @click.option("--method", "methods", multiple=True, help="Searches with the usual budget; repeatable.")
 @click.option("--times", type=int, default=100, show_default=True, help="How much longer CMA-ES searches; 0 for not.")
-@click.option("--write", metavar="FILE", help="New file of the best costs found, as the suite has one.")
+@click.option("--write", metavar="FILE", help="New file of the best costs, as the suite has one.")
 @click.pass_context
 def suite_audit(
     context: click.Context,
@@ -212,7 +212,7 @@ def write_runs(runs: "list[SuiteRun]", out: str) -> None:
     from posefit.suites.functions import suite_function
     from posefit.suites.tally import budgets_differ
 
-    def told(run: "SuiteRun") -> dict[str, Any]:
+    def settings(run: "SuiteRun") -> dict[str, Any]:
         budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
         return {**run.settings, "infeasible proposals": run.infeasible, **budget}
 
@@ -221,7 +221,7 @@ def write_runs(runs: "list[SuiteRun]", out: str) -> None:
         (
             LoggedRun(
                 run.method,
-                told(run),
+                settings(run),
                 f"f{run.function} {suite_function(run.function).name}",
                 run.dimension,
                 run.instance,

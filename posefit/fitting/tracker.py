@@ -24,7 +24,7 @@ from posefit.uncertainty.modes import Mode, Posterior
 
 SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiples of the predicted step
 KEPT = 3  # frames: how far back a prediction looks
-TILT_SHARE = 0.99  # ours: of the training poses, whose tilt can be found
+TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
 FLOOR = 0.05  # Interpretation S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
 
@@ -35,13 +35,13 @@ class Observation:
 
     silhouettes: Sequence[Silhouette] = field(repr=False)
     translation: Array | None = None  # (3,) metres
-    usable: bool = True  # False: too little is seen to learn from it, and a tracker holds its pose
-    yaw: float | None = None  # radians: about which way the person faces; None where nobody says
+    usable: bool = True  # False: it shows too little to learn from, and a tracker holds its pose
+    yaw: float | None = None  # radians: about which way the person faces; None where it is unknown
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a tracker found in one frame."""
+    """What a tracker estimates in one frame."""
 
     pose: Array = field(repr=False)  # (66,)
     translation: Array  # (3,) metres
@@ -50,7 +50,7 @@ class Frame:
     evaluations: int
     seconds: float
     history: Array = field(repr=False)  # (populations,) best cost after each
-    coordinates: Array | None = field(default=None, repr=False)  # (d,) where it was found in a search space
+    coordinates: Array | None = field(default=None, repr=False)  # (d,) of the pose in a search space
     spent: NDArray[np.int64] | None = field(default=None, repr=False)  # (populations,) evaluations so far after each
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
     # of all threads of the process, where a tracker says: unlike `seconds` it does not grow on a busy machine
@@ -66,7 +66,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What a tracker is told before the first frame."""
+    """What a tracker knows before the first frame."""
 
     body: Body
     cameras: Sequence[Camera]
@@ -76,11 +76,11 @@ class Task:
     translation: Translation = "known"  # Interpretation S4
     fps: float = 30.0
     training: Sequence[Motion] = field(default=(), repr=False)  # what may be learned from
-    first_pose: Array | None = None  # (63,) joint angles in the first frame, where somebody knows them
-    before: Sequence[Frame] = field(default=(), repr=False)  # found earlier, where a track goes on that was interrupted
+    first_pose: Array | None = None  # (63,) joint angles in the first frame, where they are known
+    before: Sequence[Frame] = field(default=(), repr=False)  # earlier ones, where an interrupted track goes on
     threads: int = 1
     backwards: bool = False  # whether observations and training come in reverse, the last one first
-    fastest_turn: float | None = None  # radians a second that nobody's yaw turns faster than; None where nobody says
+    fastest_turn: float | None = None  # radians a second that the yaw turns at most; None where it is unknown
 
     @property
     def angles(self) -> Array:
@@ -112,12 +112,12 @@ class Prediction:
         prediction (v_pred): the "latest" step, or the "literal" one before it. Interpretation S12.
         root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
         tilt: pitch and roll are "learned" with the latents, or a "box" around upright. Interpretation S16.
-        tilt_share: of the training poses, above 0 and at most 1, whose tilt can be found. Ours.
-        tilt_margin_degrees: what can be found beyond them, to either side, 0 or more. Ours.
+        tilt_share: of the training poses, above 0 and at most 1, whose tilt is searched. Ours.
+        tilt_margin_degrees: what is searched beyond them, to either side, 0 or more. Ours.
         translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
         modes: searches of a frame that its modes are weighed by, the track's own and others; 0 weighs none. Ours.
-        modes_share: what they are found and weighed by, over the evaluations of the track's own search, above 0. Ours.
+        modes_share: their evaluations, over those of the track's own search, above 0. Ours.
         posterior_temperature: what costs are divided by where modes are weighed, above 0. Ours.
         relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
     """
@@ -165,7 +165,7 @@ class Prediction:
 
 
 class Follower:
-    """Goes from frame to frame: gives the space of the next one, and takes the proposal that was found in it.
+    """Goes from frame to frame: gives the space of the next one, and takes the best proposal in it.
 
     A `tilt` that was learned from the task's training before is not learned again.
     """
@@ -182,12 +182,12 @@ class Follower:
         limits = np.array(prediction.translation_range)
         self._space = SearchSpace(prior, centre, reach, task.anchor, task.translation, limits, tilt=self._tilt)
         earlier = [frame.coordinates for frame in task.before if frame.coordinates is not None]
-        self._found: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
+        self._latest: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
 
     def space(self, observation: Observation) -> SearchSpace:
         """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
-        anchor, found, space = observation.translation, self._found, self._space
-        if not found:
+        anchor, latest, space = observation.translation, self._latest, self._space
+        if not latest:
             if anchor is not None:
                 space = space.around(space.centre, anchor=anchor)
             if self._task.first_pose is not None:
@@ -196,21 +196,21 @@ class Follower:
             return space
         if self._task.yaw is None or self._tilt is not None:  # only the first frame looks all around
             space = self._narrowed(space)
-        space = space.around(found[-1], anchor=anchor)
+        space = space.around(latest[-1], anchor=anchor)
         # Interpretation S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
         back = 1 if self._how.prediction == "latest" else 2
         step = np.zeros(space.dimensions)
-        if len(found) > back:
+        if len(latest) > back:
             half = np.where(space.half > 0.0, space.half, 1.0)  # as in proposals: 0 where nothing is searched
-            step = displacement(space, found[-back - 1] / half, found[-back] / half)
-        mean = space.proposals(found[-1])
+            step = displacement(space, latest[-back - 1] / half, latest[-back] / half)
+        mean = space.proposals(latest[-1])
         spread = np.maximum(self._how.spread * np.abs(step), self._how.floor)  # Interpretation S5
-        self._space = space.around(found[-1], Start(mean, spread, step), anchor)
+        self._space = space.around(latest[-1], Start(mean, spread, step), anchor)
         return self._space
 
     def commit(self, proposal: Array) -> None:
         """Take the best proposal (d,) of the space that was given last."""
-        self._found = [*self._found, self._space.coordinates(proposal)][-KEPT:]
+        self._latest = [*self._latest, self._space.coordinates(proposal)][-KEPT:]
 
     def _given(self, space: SearchSpace, angles: Array) -> Start:
         """Return the start of a first frame whose joint angles are about known; its root need not be."""
@@ -278,8 +278,8 @@ class SynthesisTracker:
     def problem(self, space: SearchSpace, observation: Observation) -> PoseProblem:
         """Return the problem that a frame is."""
         task, beta = self.task, self.prediction.beta
-        seen = observation.silhouettes
-        return PoseProblem(task.body, task.cameras, seen, space, beta=beta, threads=task.threads, blank=True)
+        silhouettes = observation.silhouettes
+        return PoseProblem(task.body, task.cameras, silhouettes, space, beta=beta, threads=task.threads, blank=True)
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
         """Return the optimiser of the next frame, as `next_frame` asks."""
@@ -292,6 +292,8 @@ class SynthesisTracker:
 def _frame(problem: PoseProblem, best: Minimum, seconds: float, cpu_seconds: float) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
     counts = problem.areas(poses, translations)[:, 0]
-    found = problem.space.coordinates(best.proposal)
+    coordinates = problem.space.coordinates(best.proposal)
     effort = (best.evaluations, seconds, best.history)
-    return Frame(poses[0], translations[0], best.cost, counts, *effort, found, best.spent, cpu_seconds=cpu_seconds)
+    return Frame(
+        poses[0], translations[0], best.cost, counts, *effort, coordinates, best.spent, cpu_seconds=cpu_seconds
+    )

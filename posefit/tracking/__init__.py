@@ -1,4 +1,4 @@
-"""A scene is followed: by a method, from a first pose that has to be found, into files and figures.
+"""A scene is followed: by a method, from a first pose that has to be searched, into files and figures.
 
     import posefit
     result = posefit.track("walk", view_degrees=90, seed=1)     # the flat call

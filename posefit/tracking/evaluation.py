@@ -121,13 +121,13 @@ class Evaluation:
         if self._scene.truth is not None:
             per_frame, errors = self._errors()
             columns |= per_frame
-        told, said = self._doubts(columns.get("swapped"))
-        columns |= told
+        doubts, doubt_measures = self._doubts(columns.get("swapped"))
+        columns |= doubts
         used, seconds = sum(frame.evaluations for frame in frames), sum(frame.seconds for frame in frames)
         spent = [frame.cpu_seconds for frame in frames if frame.cpu_seconds is not None]
         measures = Measures(
             **errors,
-            **said,
+            **doubt_measures,
             **self._steadiness(),
             iou=float(columns["iou"][usable].mean()),
             cost=float(columns["cost"][usable].mean()),
@@ -135,7 +135,7 @@ class Evaluation:
             seconds_per_frame=seconds / len(frames),
             cpu_seconds_per_frame=sum(spent) / len(spent) if spent else None,
             evaluations=used,
-            evaluations_per_second=used / max(seconds, 1e-9),  # a tracker of somebody else may say 0
+            evaluations_per_second=used / max(seconds, 1e-9),  # a plugin may report 0
         )
         columns["evaluations"] = np.array([frame.evaluations for frame in frames])
         columns["seconds"] = np.array([frame.seconds for frame in frames])
@@ -143,7 +143,7 @@ class Evaluation:
         return rows, measures
 
     def _doubts(self, swapped: Array | None) -> tuple[dict[str, Array], dict[str, Any]]:
-        """Return the columns and the measures of what is said to be unknown; NaN in frames of which nobody says."""
+        """Return the columns and the measures of how certain the method is; NaN in frames where that is unknown."""
         skeleton, truth = self._scene.body.skeleton, self._scene.truth
         sides, lost = np.full((2, len(self._frames)), np.nan)
         inside: list[NDArray[np.bool_]] = []
@@ -174,15 +174,15 @@ class Evaluation:
         poses = np.array([frame.pose for frame in self._frames])
         places = np.array([frame.translation for frame in self._frames])
         joints, fps = self._scene.body.skeleton.joints(poses, places), self._scene.fps
-        found, ratio, stands = _mean(acceleration(joints, fps)), None, standing(joints, fps)
+        mean, ratio, stands = _mean(acceleration(joints, fps)), None, standing(joints, fps)
         if self._scene.truth is not None:
             truth = self._scene.truth.frames(0, len(self._frames))
             true_joints = truth.skeleton.joints(truth.poses, truth.translations)
             true, stands = _mean(acceleration(true_joints, fps)), standing(true_joints, fps)
-            ratio = found / true if found is not None and true else None
+            ratio = mean / true if mean is not None and true else None
         slid = slides(joints, stands)
         return {
-            "acceleration": found,
+            "acceleration": mean,
             "acceleration_ratio": ratio,
             "foot_slide_mm": 1e3 * float(slid.mean()) if len(slid) else None,
         }
@@ -194,7 +194,7 @@ class Evaluation:
         places = self._scene.truth.translations[: len(self._frames)]
         poses = np.array([frame.pose for frame in self._frames])
         skeleton = self._scene.body.skeleton
-        true_joints = self._scene.truth.skeleton.joints(truth, places)  # the body that was told may be another
+        true_joints = self._scene.truth.skeleton.joints(truth, places)  # the given body may be another
         joints = skeleton.joints(poses, np.array([frame.translation for frame in self._frames]))
         errors = metrics.pose_error_degrees(truth, poses)
         mpjpe = metrics.mpjpe_mm(true_joints, joints)

@@ -108,7 +108,7 @@ def _cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], task: Task) -> tup
 
 def _first_usable(scene: Scene, frames: Sequence[Frame]) -> Frame:
     """Return the first frame of a track that shows enough of the person; where none does, the first one."""
-    shown = (frame for frame, seen in zip(frames, scene.observations, strict=True) if seen.usable)
+    shown = (frame for frame, observation in zip(frames, scene.observations, strict=True) if observation.usable)
     return next(shown, frames[0])
 
 

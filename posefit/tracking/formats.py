@@ -39,7 +39,7 @@ State = dict[str, Any]
 
 
 def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:
-    """Return how far joints and angles may be off, as poses.npz has it; nothing where nobody says.
+    """Return how far joints and angles may be off, as poses.npz has it; empty where no frame has a posterior.
 
     `levels` (3,), `joint_radii` (T, 3, 27) metres, `angle_halves` (T, 3, 66) radians; NaN in frames without any.
     """
@@ -100,6 +100,6 @@ def write_formats(
         writer = csv.writer(file)
         writer.writerow([*rows[0], *names])
         for k, (row, points) in enumerate(zip(rows, joints, strict=True)):
-            told = ["" if np.isnan(value) else value for value in row.values()]
-            writer.writerow([*told, *("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))])
+            values = ["" if np.isnan(value) else value for value in row.values()]
+            writer.writerow([*values, *("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))])
     (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -19,7 +19,7 @@ from posefit.listening import QUIET, Listener
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.reading import quoted
-from posefit.tracking.identity import Told
+from posefit.tracking.identity import ArgumentDigest
 from posefit.tracking.method import resolved
 from posefit.tracking.options import VIEW, TrackOptions, declared
 from posefit.tracking.outputs import Nowhere, OutputFolder
@@ -32,7 +32,7 @@ _FILES = ("source", "train", "asf", "camera", "extraction")  # options that may 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The pose found in one frame."""
+    """The estimated pose of one frame."""
 
     pose: Array = field(repr=False)  # (66,)
     translation: Array  # (3,) metres
@@ -102,7 +102,7 @@ def track(
 
 
 def fit(source: Source | Sequence[Source] = "walk", *, frame: int = 0, **options: Any) -> Fit:
-    """Return the pose found in one frame of a source; options as for `track`, but for `frames`."""
+    """Return the estimated pose of one frame of a source; options as for `track`, but for `frames`."""
     frame = whole("frame", frame, 0)
     result = track(source, frames=(frame, frame + 1), **options)
     history = np.array(result.summary.pop("history"))
@@ -130,14 +130,14 @@ def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Source]) 
         raise InputError("restarts must be at least 1 for a motion, which is searched once where it is left out, got 0")
 
 
-def _identity(sources: Sequence[Source], options: TrackOptions, train: Sequence[Source]) -> dict[str, Told]:
+def _identity(sources: Sequence[Source], options: TrackOptions, train: Sequence[Source]) -> dict[str, ArgumentDigest]:
     """Return what a track must have in common with one that it goes on with."""
     same = [one.name for one in fields(options) if declared(one).identifies]
     values: dict[str, Any] = {name: getattr(options, name) for name in same}
     values |= {"source": sources, "train": train, "version": __version__}
     named = kind_of(sources[0]) == "motion" and sources[0] in built_in.names()  # a folder of that name is not read
     return {
-        name: Told.of(value, files=name in _FILES and not (named and name == "source"))
+        name: ArgumentDigest.of(value, files=name in _FILES and not (named and name == "source"))
         for name, value in values.items()
     }
 

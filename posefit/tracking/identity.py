@@ -1,4 +1,4 @@
-"""Whether two tracks are the same: what they were told is compared by content, as cells of a sweep are."""
+"""Whether two tracks are the same: their arguments are compared by content, as cells of a sweep are."""
 
 import hashlib
 import json
@@ -15,14 +15,14 @@ PIECE = 1 << 20  # bytes of a file that are read at a time
 
 
 @dataclass(frozen=True)
-class Told:
-    """One thing that a track was told: how a message calls it, and the SHA-256 of what it is."""
+class ArgumentDigest:
+    """One argument of a track: its text in a message, and the SHA-256 of its content."""
 
     text: str
     digest: str
 
     @classmethod
-    def of(cls, value: Any, files: bool = False) -> "Told":
+    def of(cls, value: Any, files: bool = False) -> "ArgumentDigest":
         """Return what a value is; with `files`, a text that names a file or folder is what that holds."""
         text = repr(value)
         shown = text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
@@ -33,14 +33,14 @@ class Told:
         return {"text": self.text, "digest": self.digest}
 
 
-def difference(before: Mapping[str, Mapping[str, str]], now: Mapping[str, Told]) -> str | None:
-    """Return a sentence about the first thing that two tracks were told differently, or None where there is none."""
+def difference(before: Mapping[str, Mapping[str, str]], now: Mapping[str, ArgumentDigest]) -> str | None:
+    """Return a sentence about the first argument in which two tracks differ, or None where there is none."""
     for name in sorted(before.keys() | now.keys()):
-        earlier, told = before.get(name), now.get(name)
-        digest = None if told is None else told.digest
+        earlier, later = before.get(name), now.get(name)
+        digest = None if later is None else later.digest
         if (None if earlier is None else earlier.get("digest")) == digest:
             continue
-        expected, came = (None if earlier is None else earlier.get("text")), (None if told is None else told.text)
+        expected, came = (None if earlier is None else earlier.get("text")), (None if later is None else later.text)
         if expected == came:
             return f"{name} must be {expected} as it was, to resume, got one with another content"
         return f"{name} must be {expected}, as before, to resume, got {came}"
@@ -84,10 +84,10 @@ def _content(path: Path) -> Any:
             return [[one.name, _content(one)] for one in sorted(path.iterdir()) if one.is_file()]
         if not path.is_file():
             return None
-        found = hashlib.sha256()
+        digest = hashlib.sha256()
         with path.open("rb") as file:
             while piece := file.read(PIECE):
-                found.update(piece)
-        return found.hexdigest()
+                digest.update(piece)
+        return digest.hexdigest()
     except OSError as error:
         raise ValueError(f"{path}: expected a file that can be read, got {error.strerror}") from None

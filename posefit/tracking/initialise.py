@@ -90,7 +90,7 @@ def fitted_build(
 ) -> Shape:
     """Return the person's build, from the first usable frames: every third, where there are so many.
 
-    With several cameras it begins with the first frame that most of them see: a person who comes in is seen by one.
+    With several cameras it begins with the first frame that most of them see: a person who comes in is visible to one.
     """
     stride = TRIAL_STRIDE
     chosen = usable_observations(observations, frames, stride, first_seen_by_most(observations))

@@ -1,7 +1,7 @@
 """The figures that say what a track is worth, each defined once: its name, label, unit, digits and meaning.
 
 `Measures` are those of a whole track: summary.json, `--json`, the rows of a sweep, its CSV and the report's columns
-have them under these names. `FRAME` are the columns of frames.csv, one value a frame. Where nobody knows the truth, a
+have them under these names. `FRAME` are the columns of frames.csv, one value a frame. Where the truth is unknown, a
 figure that needs it is None.
 """
 
@@ -89,7 +89,9 @@ class Measures:
             "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
         )
     )
-    cost: float = field(metadata=_about("cost", "", 2, "silhouette mismatch of the poses found, 0 to 100. SAPSO (4)"))
+    cost: float = field(
+        metadata=_about("cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)")
+    )
     swap_rate: float | None = field(
         default=None,
         metadata=_about("left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored", 100.0),
@@ -157,7 +159,7 @@ class Measures:
             "mm a step",
             0,
             "how far a foot gets along the ground from where it first stood, the mean over steps; a foot stands where "
-            "the true one does, or, where nobody knows, where it is low and slow; about 20 of motion capture; none "
+            "the true one does, or, where that is unknown, where it is low and slow; about 20 of motion capture; none "
             "where no foot stands",
         ),
     )
@@ -219,7 +221,7 @@ FRAME = {
     one.name: one
     for one in (
         Measure("frame", "frame", "", 0, "number of the frame, from 0"),
-        Measure("cost", "cost", "", 2, "silhouette mismatch of the pose found, 0 to 100. SAPSO (4)"),
+        Measure("cost", "cost", "", 2, "silhouette mismatch of the estimated pose, 0 to 100. SAPSO (4)"),
         Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
         Measure("usable", "usable", "", 0, "1 where the frame was searched, 0 where the pose was held"),
         Measure("error_degrees", "error", "degrees", 2, "mean absolute difference of the 66 angles. SAPSO (8)"),
@@ -227,8 +229,14 @@ FRAME = {
         Measure("mpjpe_mm", "MPJPE", "mm", 0, "mean distance of the 27 joints, both roots at one point"),
         Measure("pa_mpjpe_mm", "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation"),
         Measure("swapped", "swapped", "", 0, "1 where the frame is nearer to the truth when mirrored"),
-        Measure("unknown_sides", "sides unknown", "", 0, "1 where left and right are unknown; blank where nobody says"),
-        Measure("lost", "lost", "", 2, "how likely the frame is lost, 0 to 1; blank where nobody says"),
+        Measure(
+            "unknown_sides",
+            "sides unknown",
+            "",
+            0,
+            "1 where left and right are unknown; blank where it is not estimated",
+        ),
+        Measure("lost", "lost", "", 2, "how likely the frame is lost, 0 to 1; blank where it is not estimated"),
         Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
         Measure("seconds", "time", "ms", 1, "wall time", 1e3),
     )

@@ -179,14 +179,14 @@ def parsed_settings(
         if name not in places:
             raise InputError(f"--set must name one of {', '.join(places)}, which are in use here, got {item!r}")
         each[name][setting] = given[item] if isinstance(given, Mapping) else value
-    found: dict[str, dict[str, Any]] = {}
+    parsed: dict[str, dict[str, Any]] = {}
     for name, (kind, factory) in places.items():
         if texts:
-            found[kind] = settings.parse(name, factory, each[name])
+            parsed[kind] = settings.parse(name, factory, each[name])
         else:
             settings.check(name, factory, each[name])
-            found[kind] = each[name]
-    return found
+            parsed[kind] = each[name]
+    return parsed
 
 
 def _family(name: str) -> str:

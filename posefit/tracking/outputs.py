@@ -1,14 +1,14 @@
 """The folder a track leaves behind: it appears whole under its name, or not at all.
 
-Until it is whole it stands beside its place, hidden, with every frame that was found so far. Where a track ends too
-early, because a disk is full or somebody stops it, those frames are kept, and the same track can go on from them.
+Until it is whole it stands beside its place, hidden, with every frame that was estimated so far. Where a track ends too
+early, because a disk is full or it is stopped, those frames are kept, and the same track can go on from them.
 """
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from posefit.footage.video import VideoWriter
 from posefit.motion.motion import Motion
 from posefit.reading import cut
 from posefit.tracking.formats import FILES, Rows, State, intervals_of, write_formats
-from posefit.tracking.identity import Told, difference
+from posefit.tracking.identity import ArgumentDigest, difference
 from posefit.tracking.page import track_document
 from posefit.tracking.page.content import track_data
 from posefit.tracking.page.stills import Stills
@@ -27,21 +27,21 @@ from posefit.tracking.picture import Painter
 from posefit.tracking.table import undetermined
 from posefit.uncertainty.modes import Posterior
 
-_FOUND = "found.jsonl"
-_MINE = (*FILES, _FOUND)  # what a track writes to its folder
+_RECORD = "frames.jsonl"
+_MINE = (*FILES, _RECORD)  # what a track writes to its folder
 _ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
-_NUMBERS = ("cost", "evaluations", "seconds", "lost")
+_PLAIN = ("cost", "evaluations", "seconds", "cpu_seconds", "lost", "details")
 
 
 class Output(Protocol):
     """Where a track goes."""
 
     def earlier(self) -> tuple[list[Frame], State | None]:
-        """Return the frames that were found before, and the state of the random generator after them."""
+        """Return the frames that were recorded before, and the state of the random generator after them."""
         ...
 
     def record(self, frame: Frame, state: State) -> None:
-        """Keep a frame that was found, and the state of the random generator after it."""
+        """Record a frame, and the state of the random generator after it."""
         ...
 
     def finish(self, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State) -> None:
@@ -76,7 +76,12 @@ class OutputFolder:
     """
 
     def __init__(
-        self, path: str | Path, force: bool, resume: bool, spec: Mapping[str, Told], say: Callable[[str], None]
+        self,
+        path: str | Path,
+        force: bool,
+        resume: bool,
+        spec: Mapping[str, ArgumentDigest],
+        say: Callable[[str], None],
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
         if self.path.exists() and not self.path.is_dir():
@@ -90,7 +95,7 @@ class OutputFolder:
         self._place = self._same() if resume else None
 
     def _same(self) -> Unfinished:
-        """Return the folder of the track that goes on: the latest that was told the same."""
+        """Return the folder of the track that goes on: the latest with the same arguments."""
         left = Unfinished.interrupted(self.path)
         if not left:
             raise ValueError(f"{self.path}: expected a track that was interrupted to resume, got none")
@@ -104,12 +109,12 @@ class OutputFolder:
         return place
 
     def __enter__(self) -> Self:
-        told = {name: one.as_json() for name, one in self._spec.items()}
+        arguments = {name: one.as_json() for name, one in self._spec.items()}
         try:
             if self._place is None:
                 for earlier in Unfinished.interrupted(self.path):
                     earlier.remove(_MINE)
-                self._place = Unfinished.begin(self.path, told)
+                self._place = Unfinished.begin(self.path, arguments)
             self._building = self._place.path
         except OSError as error:
             raise ValueError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
@@ -124,7 +129,7 @@ class OutputFolder:
                 self._place.close()
                 where = f"{taken.strerror}; the results are in {self._building}"
                 raise ValueError(f"{self.path}: expected its name to be free, got {where}") from None
-            (self.path / _FOUND).unlink(missing_ok=True)
+            (self.path / _RECORD).unlink(missing_ok=True)
             return
         kept = ""
         if self._recorded:
@@ -142,15 +147,15 @@ class OutputFolder:
             self._say(kept[2:])
 
     def earlier(self) -> tuple[list[Frame], State | None]:
-        """Return the frames that were found before, and the state of the random generator after them."""
+        """Return the frames that were recorded before, and the state of the random generator after them."""
         frames: list[Frame] = []
         whole: list[str] = []
         state: State | None = None
-        path = self._building / _FOUND
+        path = self._building / _RECORD
         for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
             try:
-                row = json.loads(line)
-                values = {name: row[name] for name in _NUMBERS}
+                row = json.loads(line, object_hook=_decoded)
+                values = {name: row[name] for name in _PLAIN}
                 values |= {name: None if row[name] is None else np.array(row[name]) for name in _ARRAYS}
                 posterior = row["posterior"]
                 values["posterior"] = None if posterior is None else Posterior.from_dict(posterior)
@@ -165,14 +170,14 @@ class OutputFolder:
         return frames, state
 
     def record(self, frame: Frame, state: State) -> None:
-        """Keep a frame that was found, and the state of the random generator after it."""
-        row: State = {name: getattr(frame, name) for name in _NUMBERS} | {"state": state}
+        """Record a frame, and the state of the random generator after it."""
+        row: State = {name: getattr(frame, name) for name in _PLAIN} | {"state": state}
         for name in _ARRAYS:
             value = getattr(frame, name)
             row[name] = None if value is None else np.asarray(value).tolist()
         row["posterior"] = None if frame.posterior is None else frame.posterior.as_dict()
-        with (self._building / _FOUND).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        with (self._building / _RECORD).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row, default=_encoded) + "\n")
         self._recorded += 1
 
     def finish(self, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State) -> None:
@@ -186,8 +191,10 @@ class OutputFolder:
         write_formats(folder, scene, estimate, frames, rows, summary, sure)
         filmed = scene.pictures() if scene.pictures is not None else repeat(None)
         writer: VideoWriter | None = None
-        told = repeat(None) if radii is None else radii
-        for frame, observation, row, picture, one in zip(frames, scene.observations, rows, filmed, told, strict=False):
+        each_radii = repeat(None) if radii is None else radii
+        for frame, observation, row, picture, one in zip(
+            frames, scene.observations, rows, filmed, each_radii, strict=False
+        ):
             stills.add(frame, observation, picture)
             image = painter.add(frame, observation, row, picture, one)
             if writer is None:
@@ -200,3 +207,17 @@ class OutputFolder:
             raise OSError("no room for summary.png")
         page = track_document(track_data(scene, estimate, frames, rows, summary, sure, stills))
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
+
+
+def _encoded(value: Any) -> Any:
+    """Return what JSON holds of a value in a frame's details: arrays with their type, else what it prints as."""
+    if isinstance(value, np.ndarray | np.generic):
+        return {"dtype": str(value.dtype), "values": value.tolist()}
+    return dict(value) if isinstance(value, Mapping) else str(value)
+
+
+def _decoded(mapping: dict[str, Any]) -> Any:
+    """Return a mapping of JSON, or the array that it holds."""
+    if mapping.keys() == {"dtype", "values"}:
+        return np.array(mapping["values"], dtype=mapping["dtype"])
+    return mapping

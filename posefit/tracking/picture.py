@@ -54,7 +54,7 @@ class Painter:
     ) -> Image:
         """Return the picture (height, width, 3) of a frame: on what was `filmed`, or on the masks.
 
-        `radii` (levels, 27) are those of its joints' intervals, where somebody says.
+        `radii` (levels, 27) are those of its joints' intervals, where it has a posterior.
         """
         body, cameras = self._scene.body, self._scene.cameras
         solid = None if radii is None else opacities(radii[DRAWN])
@@ -78,7 +78,7 @@ class Painter:
             + ([f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else [])
             + ([] if observation.usable else ["pose held"])
         )
-        image[:BAND] //= 4  # so that the label is seen before a bright sky
+        image[:BAND] //= 4  # so that the label stands out from a bright sky
         write(image, label, (12, 26))
         write(image, "from the camera's right", (width + 12, 26))
         if filmed is None:
@@ -116,12 +116,12 @@ class Painter:
         return _grid(panels, columns)
 
     def summary(
-        self, rows: Sequence[Mapping[str, float]], radii: Array | None = None, told: str = "", trust: str = ""
+        self, rows: Sequence[Mapping[str, float]], radii: Array | None = None, title: str = "", trust: str = ""
     ) -> Image:
         """Return stills of the track above a curve of its error, or of its cost where there is no truth.
 
         Where a method says how sure it is, a chart of that stands below: of the radii (T, levels, 27) of the joints'
-        intervals, and of `told`, which says in words what was not determined. `trust` is a sentence at the top.
+        intervals, and of `title`, which says in words what was not determined. `trust` is a sentence at the top.
         """
         stills = self._stills + [np.full_like(self._stills[0], BACKGROUND[0])] * (-len(self._stills) % 3)
         grid = np.vstack([np.hstack(stills[k : k + 3]) for k in range(0, len(stills), 3)])
@@ -129,7 +129,7 @@ class Painter:
         parts = [] if not trust else [_headed(trust, width)]
         parts += [grid, curve([row[name] for row in rows], name.replace("_", " "), width, 160)]
         if says_doubts(rows, radii):
-            parts.append(doubts(rows, radii, told, width, 240))
+            parts.append(doubts(rows, radii, title, width, 240))
         return np.vstack(parts)
 
 

@@ -44,7 +44,7 @@ def check_recording(path: str | Path) -> None:
 def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Frame]) -> None:
     """Write a recording (.rrd) of the motion in 3D, with the cameras and the masks they saw.
 
-    `frames` are what a tracker found; they say how sure each is, and whether it is lost.
+    `frames` are a tracker's, with their posterior and whether each is lost.
     """
     rerun = _library()
     recording = rerun.RecordingStream("posefit")
@@ -56,7 +56,7 @@ def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Fr
         lens = rerun.Pinhole(
             resolution=[camera.width, camera.height], focal_length=camera.focal, principal_point=camera.centre
         )
-        recording.log(f"world/camera-{v}/seen", lens, static=True)
+        recording.log(f"world/camera-{v}/mask", lens, static=True)
     joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
     parents = np.array(PARENTS[1:])
     radii = scene.body.radii.mean(axis=1)
@@ -70,7 +70,7 @@ def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Fr
         if frame.lost is not None and frame.lost >= LOST:
             recording.log("lost", rerun.TextLog(f"frame {k} is lost", level=rerun.TextLogLevel.WARN))
         for v, silhouette in enumerate(observation.silhouettes):
-            recording.log(f"world/camera-{v}/seen", rerun.SegmentationImage(silhouette.mask.astype(np.uint8)))
+            recording.log(f"world/camera-{v}/mask", rerun.SegmentationImage(silhouette.mask.astype(np.uint8)))
     recording.flush()
 
 

@@ -21,7 +21,7 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
 from posefit.tracking.restarts import RELOCALISED
 from posefit.tracking.smoothing.smooth import Pass
-from posefit.tracking.trust.evidence import trust_of
+from posefit.tracking.trust import trust_of
 from posefit.uncertainty.modes import TrackMode, modes_of, track_modes
 from posefit.version import __version__
 

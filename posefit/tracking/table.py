@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from posefit.tracking.measures import BASELINES, MEASURES
-from posefit.tracking.trust.evidence import trust_line
+from posefit.tracking.trust import trust_line
 
 NOTABLE = 0.05  # a part of the build that is off the average by less is not worth a word
 
@@ -30,8 +30,8 @@ def table(summary: Mapping[str, Any]) -> str:
         if summary["prior_floor_degrees"] is not None:  # a tracker of its own may have no prior
             projected = MEASURES["prior_floor_degrees"]
             lines.append(f"{projected.label:{WIDTH}} {projected.number(summary[projected.name]):>9}")
-        told = (_shown(summary, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
-        lines.append(f"{', '.join(told)} of frames")
+        shown = (_shown(summary, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
+        lines.append(f"{', '.join(shown)} of frames")
     if summary["held_frames"]:
         held = summary["held_frames"]
         show = "frame shows" if held == 1 else "frames show"
@@ -76,7 +76,7 @@ def undetermined(summary: Mapping[str, Any]) -> str:
 
 
 def gait_line(gait: Mapping[str, Any]) -> str:
-    """Return in one line what somebody's gait is like, or why nobody can say."""
+    """Return one line about the gait, or why it has no figures."""
     if not gait["walk"]:
         return f"no figures of gait: {gait['why']}"
     stance = "" if gait["stance_share"] is None else f"stance {100.0 * gait['stance_share']:.0f} %, "

@@ -15,7 +15,7 @@ from posefit.fitting.tracker import Frame
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
 
-STEPS_PER_SECOND = 30.0  # how often velocities are compared, so that the jitter of a search counts alike at any rate
+STEPS_PER_SECOND = 30.0  # how often velocities are compared, so that the jitter of a search counts the same at any rate
 WALKING_SPEED = 1.0  # metres a second, of the joints about the root: the typical speed where nothing is learned from
 MIN_TYPICAL_SPEED = 0.25  # metres a second
 TURNING = 2.0  # typical speeds, which a joint's velocity changes by when it turns around on the spot

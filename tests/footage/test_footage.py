@@ -264,7 +264,7 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="seed must be 0, as before, to resume, got 1"):
         posefit.track(path, resume=True, seed=1, **settings)
     # a line that was half written does not count
-    (found,) = tmp_path.glob(".out.*/found.jsonl")
+    (found,) = tmp_path.glob(".out.*/frames.jsonl")
     found.write_text(found.read_text()[:-40])
     said: list[str] = []
     posefit.track(path, resume=True, say=said.append, **settings)
@@ -274,9 +274,9 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
 def test_a_track_removes_nobody_elses_hidden_folder(tmp_path: Path) -> None:
     theirs = tmp_path / ".out.partial"
     theirs.mkdir()
-    (theirs / "found.jsonl").write_text("theirs")
+    (theirs / "frames.jsonl").write_text("theirs")
     posefit.track("walk", frames=(0, 2), evaluations=80, out=tmp_path / "out")
-    assert (theirs / "found.jsonl").read_text() == "theirs"
+    assert (theirs / "frames.jsonl").read_text() == "theirs"
     assert sorted(path.name for path in tmp_path.iterdir()) == [".out.partial", "out"]
 
 

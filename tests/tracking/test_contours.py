@@ -25,7 +25,7 @@ from posefit.tracking.smoothing.contours import (
     pose_jacobian,
     projected_body,
 )
-from posefit.tracking.smoothing.path import SeenFrames, Squares
+from posefit.tracking.smoothing.path import Squares, Visibility
 from posefit.tracking.smoothing.smooth import smoothed_frames
 from posefit.uncertainty.modes import Posterior
 
@@ -54,9 +54,9 @@ def off(motion: Motion, degrees: float = 5.0, seed: int = 0) -> Motion:
     return replace(motion, poses=motion.poses + np.radians(degrees) * waves * motion.skeleton.free)
 
 
-def seen_by(scene: Scene) -> SeenFrames:
+def seen_by(scene: Scene) -> Visibility:
     eye = scene.cameras[0].position if len(scene.cameras) == 1 else np.full(3, np.nan)
-    return SeenFrames(np.array([one.usable for one in scene.observations]), np.tile(eye, (scene.count, 1)))
+    return Visibility(np.array([one.usable for one in scene.observations]), np.tile(eye, (scene.count, 1)))
 
 
 def away(motion: Motion, truth: Motion) -> float:

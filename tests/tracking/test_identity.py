@@ -9,7 +9,7 @@ import pytest
 
 import posefit
 from posefit.motion import built_in
-from posefit.tracking.identity import Told, difference
+from posefit.tracking.identity import ArgumentDigest, difference
 
 QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200}
 
@@ -55,15 +55,15 @@ def test_two_motions_of_one_name_are_not_the_same_track(tmp_path: Path) -> None:
 def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
     first, second = tmp_path / "a.npz", tmp_path / "b"
     first.write_bytes(b"masks")
-    before = Told.of(first, files=True)
-    assert Told.of(str(first), files=True).digest == before.digest
-    assert Told.of(first).digest != before.digest
+    before = ArgumentDigest.of(first, files=True)
+    assert ArgumentDigest.of(str(first), files=True).digest == before.digest
+    assert ArgumentDigest.of(first).digest != before.digest
     first.write_bytes(b"maskz")
-    assert Told.of(first, files=True).digest != before.digest
+    assert ArgumentDigest.of(first, files=True).digest != before.digest
     second.mkdir()
-    empty = Told.of(second, files=True)
+    empty = ArgumentDigest.of(second, files=True)
     (second / "0.png").write_bytes(b"x")
-    assert Told.of(second, files=True).digest != empty.digest
+    assert ArgumentDigest.of(second, files=True).digest != empty.digest
 
 
 @pytest.mark.parametrize(
@@ -82,14 +82,28 @@ def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
     ],
 )
 def test_what_differs_has_another_digest(one: Any, other: Any) -> None:
-    assert Told.of(one).digest == Told.of(one).digest
-    assert Told.of(one).digest != Told.of(other).digest
+    assert ArgumentDigest.of(one).digest == ArgumentDigest.of(one).digest
+    assert ArgumentDigest.of(one).digest != ArgumentDigest.of(other).digest
 
 
 def test_the_first_difference_is_said_in_one_line() -> None:
-    now = {"seed": Told.of(1), "source": Told.of("walk")}
+    now = {"seed": ArgumentDigest.of(1), "source": ArgumentDigest.of("walk")}
     before = {name: told.as_json() for name, told in now.items()}
     assert difference(before, now) is None
-    assert difference(before, {**now, "seed": Told.of(2)}) == "seed must be 1, as before, to resume, got 2"
+    assert difference(before, {**now, "seed": ArgumentDigest.of(2)}) == "seed must be 1, as before, to resume, got 2"
     assert difference({"seed": before["seed"]}, now) == "source must be None, as before, to resume, got 'walk'"
-    assert len(Told.of("x" * 1000).text) == 80
+    assert len(ArgumentDigest.of("x" * 1000).text) == 80
+
+
+def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) -> None:
+    asked: dict[str, Any] = {"method": "vsmm", "out": tmp_path / "out", **QUICK}
+    with pytest.raises(StopError):
+        posefit.track("walk", progress=stopping, **asked)
+    resumed = posefit.track("walk", resume=True, **asked)
+    whole = posefit.track("walk", **{**asked, "out": None})
+    for before, after in zip(whole.found, resumed.found, strict=True):
+        assert after.cpu_seconds is not None
+        assert after.details.keys() == before.details.keys()
+    first, again = whole.found[0].details, resumed.found[0].details
+    np.testing.assert_array_equal(first["probabilities"], again["probabilities"])
+    assert resumed.summary["cpu_seconds_per_frame"] is not None

@@ -10,7 +10,7 @@ from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.tracking.smoothing import path
-from posefit.tracking.smoothing.path import SeenFrames, Squares, smooth_path, standing_feet
+from posefit.tracking.smoothing.path import Squares, Visibility, smooth_path, standing_feet
 
 EYE = np.array([0.0, 1.0, 6.0])
 
@@ -43,8 +43,8 @@ def joints_of(motion: Motion) -> np.ndarray:
     return motion.skeleton.joints(motion.poses, motion.translations)
 
 
-def all_seen(motion: Motion) -> SeenFrames:
-    return SeenFrames(np.ones(len(motion), dtype=bool), np.tile(EYE, (len(motion), 1)))
+def all_seen(motion: Motion) -> Visibility:
+    return Visibility(np.ones(len(motion), dtype=bool), np.tile(EYE, (len(motion), 1)))
 
 
 def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
@@ -109,10 +109,10 @@ def test_depth_is_believed_where_several_cameras_see_and_hardly_where_one_does()
     places[:alone, 2] -= 0.1
     eyes = np.full((len(motion), 3), np.nan)
     several = smooth_path(
-        replace(motion, translations=places), SeenFrames(np.ones(len(motion), dtype=bool), eyes.copy())
+        replace(motion, translations=places), Visibility(np.ones(len(motion), dtype=bool), eyes.copy())
     )
     eyes[:alone] = EYE
-    told = smooth_path(replace(motion, translations=places), SeenFrames(np.ones(len(motion), dtype=bool), eyes))
+    told = smooth_path(replace(motion, translations=places), Visibility(np.ones(len(motion), dtype=bool), eyes))
     off, was = (np.abs(one.translations - motion.translations)[:, 2] for one in (told, several))
     assert off[alone - 5 : alone].mean() < 0.7 * was[alone - 5 : alone].mean()
     assert off[alone + 5 :].max() < 0.02
@@ -125,7 +125,7 @@ def test_frames_that_show_too_little_are_bridged_and_strange_places_are_not_beli
     places = motion.translations.copy()
     places[~usable] += [200.0, 30.0, -500.0]
     places[40, 2] -= 20.0
-    told = smooth_path(replace(motion, translations=places), SeenFrames(usable, np.tile(EYE, (len(motion), 1))))
+    told = smooth_path(replace(motion, translations=places), Visibility(usable, np.tile(EYE, (len(motion), 1))))
     off = np.linalg.norm(told.translations - motion.translations, axis=1)
     assert off[20:25].max() < 0.05
     assert off[40] < 0.1

@@ -14,18 +14,23 @@ from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion.steadiness import BALLS
 from posefit.tracking.table import table
-from posefit.tracking.trust.evidence import ONE_CAMERA, trust_line, trust_of
-from posefit.tracking.trust.moving import covered
-from posefit.tracking.trust.signs import (
+from posefit.tracking.trust import (
+    ONE_CAMERA,
+    SIGNS,
+    against,
+    covered,
     depth_scatter,
     foot_share,
+    grade_of,
     held_share,
     jerks,
     longer_side,
+    sentence,
     size_ratio,
     stance_spread,
+    trust_line,
+    trust_of,
 )
-from posefit.tracking.trust.verdict import SIGNS, against, grade_of, sentence
 from tests.tracking.viewing import right, viewed, walk
 
 ALL = np.ones(60, dtype=bool)
@@ -197,7 +202,7 @@ def test_several_cameras_tell_the_size_of_a_right_track() -> None:
     trust = judged(scene, right(scene), lost=0.0, unknown_sides=0.0)
     assert trust["size_ratio"] == 1.0
     assert trust["grade"] == "good"
-    assert trust["not_told"] == {"explained": "there are masks alone"}
+    assert trust["unknown_signs"] == {"explained": "there are masks alone"}
 
 
 def test_several_cameras_see_that_the_height_given_is_too_small() -> None:
@@ -211,8 +216,8 @@ def test_one_camera_says_that_it_cannot_tell_the_size() -> None:
     scene = walk(30)
     trust = judged(scene, right(scene))
     assert trust["size_ratio"] is None
-    assert trust["not_told"]["size_ratio"] == ONE_CAMERA
-    assert trust["not_told"]["lost"] == "the method does not say"
+    assert trust["unknown_signs"]["size_ratio"] == ONE_CAMERA
+    assert trust["unknown_signs"]["lost"] == "the method does not say"
     assert ONE_CAMERA in trust_line(trust)
 
 

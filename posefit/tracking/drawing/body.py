@@ -25,7 +25,7 @@ _ENDS = [JOINTS.index(side + name) for side in "lr" for name in ("wrist", "foot"
 def opacities(radii: Array) -> Array:
     """Return how solid each bone (26,) is drawn, 0 to 1, given how far its joints (27,) may be off in metres.
 
-    A bone is as sure as the less sure of its two ends. Where nobody says, which is NaN, it is solid.
+    A bone is as sure as the less sure of its two ends. Where that is unknown, NaN, it is solid.
     """
     solid = np.clip((UNSURE - np.nan_to_num(radii)) / (UNSURE - SURE), FAINTEST, 1.0)
     return np.asarray(np.minimum(solid[_PARENTS], solid[1:]))
@@ -44,7 +44,7 @@ def side_camera(body: Body, camera: Camera, pose: Array, translation: Array, sid
 def side_view(
     body: Body, camera: Camera, pose: Array, translation: Array, side: int, solid: Array | None = None
 ) -> Image:
-    """Return the body (side, side, 3) seen from the camera's right: left limbs orange, right ones blue."""
+    """Return the body (side, side, 3) viewed from the camera's right: left limbs orange, right ones blue."""
     image = np.full((side, side, 3), BACKGROUND, dtype=np.uint8)
     draw_body(image, body, side_camera(body, camera, pose, translation, side), pose, translation, solid)
     return image

@@ -43,11 +43,11 @@ def says_doubts(rows: Sequence[Mapping[str, float]], radii: Array | None) -> boo
     return radii is not None or bool(np.isfinite([[row["unknown_sides"], row["lost"]] for row in rows]).any())
 
 
-def doubts(rows: Sequence[Mapping[str, float]], radii: Array | None, told: str, width: int, height: int) -> Image:
+def doubts(rows: Sequence[Mapping[str, float]], radii: Array | None, title: str, width: int, height: int) -> Image:
     """Return a chart (height, width, 3) of how far joints may be off, frame by frame, and of which frames are doubtful.
 
     Bands are the radii (T, levels, 27) of intervals, the mean over joints; where the truth is known, a line is how far
-    joints really are off. Rows of marks are frames whose sides are unknown, and lost ones. `told` is written above.
+    joints really are off. Rows of marks are frames whose sides are unknown, and lost ones. `title` is written above.
     """
     image = np.full((height, width, 3), BACKGROUND, dtype=np.uint8)
     count, bottom = len(rows), height - FOOT
@@ -83,7 +83,7 @@ def doubts(rows: Sequence[Mapping[str, float]], radii: Array | None, told: str, 
             ends = np.rint(np.clip([at - half, at + half], LEFT_MARGIN, width - RIGHT_MARGIN)).astype(int).tolist()
             cv2.rectangle(image, (ends[0], row), (ends[1], row + STRIP), colour, -1)
         write(image, ("sides", "lost")[k], (8, row + STRIP - 2), colour, 0.4)
-    write(image, told or "nothing is said to be unknown or lost", (60, 16), scale=0.45)
+    write(image, title or "nothing is said to be unknown or lost", (60, 16), scale=0.45)
     _legend(image, bands is not None, bool(np.isfinite(off).all()))
     return image
 

@@ -26,7 +26,7 @@ from posefit.silhouette.mask import PIECE, Mask
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.silhouette.rasteriser import NEAR
 from posefit.tracking.smoothing import kernels
-from posefit.tracking.smoothing.path import SeenFrames, Squares, add_root, add_standing, standing_feet, windows_over
+from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
 
 FINE = 80.0  # pixels of a metre; of finer masks every second pixel, third, ... is looked at
 MARGIN = 48  # pixels around a mask that know how far they are from it
@@ -43,7 +43,7 @@ class MaskContours:
     camera: Camera  # whose pixels these are: of fine masks a coarser one than theirs
     metres: Array  # (T,) pixels of a metre where the person is
     step: float  # pixels of the border that a point stands for
-    fields: Distances = field(repr=False)  # (T, h, w) pixels outside the mask, below 0 within; 0 where nobody knows
+    fields: Distances = field(repr=False)  # (T, h, w) pixels outside the mask, below 0 within; 0 where it is unknown
     corners: Integers = field(repr=False)  # (T, 2) column and row of each field's first pixel
     sizes: Integers = field(repr=False)  # (T, 2) rows and columns of each field
     points: Array = field(repr=False)  # (n, 2) pixels: of the borders, frame after frame
@@ -58,14 +58,14 @@ class MaskContours:
         factor = min(factor, camera.width, camera.height)
         camera, metres = coarser_camera(camera, factor), metres / factor
         step = max(int(np.median(metres) * SPAN / 1e3), 1)
-        found = [_border(observation, view, factor, step) for observation in observations]
-        sizes = np.array([one.shape for _, _, one in found])
-        fields = np.zeros((len(found), *sizes.max(axis=0)), dtype=np.float32)
-        for whole, (_, _, one) in zip(fields, found, strict=True):
+        traced = [_border(observation, view, factor, step) for observation in observations]
+        sizes = np.array([one.shape for _, _, one in traced])
+        fields = np.zeros((len(traced), *sizes.max(axis=0)), dtype=np.float32)
+        for whole, (_, _, one) in zip(fields, traced, strict=True):
             whole[: one.shape[0], : one.shape[1]] = one
-        points = [points for points, _, _ in found]
+        points = [points for points, _, _ in traced]
         starts = np.cumsum([0, *(len(one) for one in points)])
-        corners = np.array([corner for _, corner, _ in found])
+        corners = np.array([corner for _, corner, _ in traced])
         return cls(camera, metres, float(step), fields, corners, sizes, np.concatenate(points), starts)
 
 
@@ -82,7 +82,7 @@ def _border(observation: Observation, view: int, factor: int, step: int) -> tupl
     top, left = max(int(rows[0]) - MARGIN, 0), max(int(columns[0]) - MARGIN, 0)
     part = np.s_[top : rows[-1] + 1 + MARGIN, left : columns[-1] + 1 + MARGIN]
     mask = mask[part]
-    around = silhouette.valid[part] & ~mask  # nobody is seen there
+    around = silhouette.valid[part] & ~mask  # the background there is known
     if not around.any():
         return nothing
     pixels = np.concatenate([_between(mask, around), _between(mask.T, around.T)[:, ::-1]])
@@ -121,9 +121,9 @@ def projected_body(body: Body, camera: Camera, poses: Array, places: Array) -> A
 
     A joint that is nearer than 5 cm, or behind the camera, counts as that far.
     """
-    seen = body.skeleton.joints(poses, places) @ camera.rotation.T + camera.translation
-    far = np.maximum(seen[..., 2:], NEAR)
-    pixels = seen[..., :2] / far * camera.focal + camera.centre
+    points = body.skeleton.joints(poses, places) @ camera.rotation.T + camera.translation
+    far = np.maximum(points[..., 2:], NEAR)
+    pixels = points[..., :2] / far * camera.focal + camera.centre
     metres = np.sqrt(camera.focal.prod()) / far[..., 0]
     radii = np.stack([metres[:, STARTS] * body.radii[:, 0], metres[:, 1:] * body.radii[:, 1]], axis=-1)
     return np.concatenate([pixels.reshape(len(poses), -1), radii.reshape(len(poses), -1)], axis=1)
@@ -155,11 +155,13 @@ ROUGH = 0.5  # pixels, besides
 TOGETHER = 0.09  # metres of the border that are off together, so that they are one measurement
 SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)  # metres, step by step: what is
 LEAST_SCALE = 3.0  # pixels           farther off counts less, and at last is another person's, or a bag's
-GIVING = np.radians(8.0)  # that an angle may be off what was found
+GIVING = np.radians(8.0)  # that an angle may be off the estimate
 SHAKING = np.radians(450.0)  # a second squared, of that difference
-AWAY = 0.03  # metres that the root may be off what was found, across the line of sight
+AWAY = 0.03  # metres that the root may be off the estimate, across the line of sight
 FARTHEST, WIDEST = np.radians(20.0), 0.2  # that a step may turn an angle, and change the logarithm of a factor
-ALIKE = 3.0  # frames for each of which the build is held once more: borders are off alike in many, and add up
+BUILD_FRAMES = (
+    3.0  # frames for each of which the build is held once more: the errors of contours are correlated, and add up
+)
 WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
@@ -167,12 +169,12 @@ WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that 
 class _Part:
     """A window of a track, as far as it is fitted."""
 
-    motion: Motion  # as it was found
+    motion: Motion  # as it was estimated
     body: Body
     factors: Array  # (17,) logarithms of what the body was fitted by before
     height: float | None
     usable: NDArray[np.bool_]
-    eyes: Array  # (T, 3): see `SeenFrames`
+    eyes: Array  # (T, 3): see `Visibility`
     poses: Array
     places: Array
 
@@ -191,28 +193,28 @@ class _Pulled:
 
 
 def fit_contours(
-    scene: Scene, motion: Motion, seen: SeenFrames, shape: Shape | None, beta: float = BETA
+    scene: Scene, motion: Motion, visibility: Visibility, shape: Shape | None, beta: float = BETA
 ) -> tuple[Motion, Shape | None]:
     """Return a steady motion fitted to the borders of a scene's masks, and the build fitted with it.
 
-    The build stays as it is where it was not fitted before (`shape` is None): it is then known. That of a long track
-    is found in the window of which most is seen. What costs more than what it began with is not kept. A motion of fewer
-    than 3 frames is returned as it is.
+    The build stays as it is where it was not fitted before (`shape` is None): it is then known. That of a long
+    track is fitted in the window with most usable frames. A result that costs more than its start is not kept. A
+    motion of fewer than 3 frames is returned as it is.
     """
-    if len(motion) < 3 or not seen.usable.any():
+    if len(motion) < 3 or not visibility.usable.any():
         return motion, shape
     parts = windows_over(len(motion), WINDOW, OVERLAP)
     fitted: dict[int, _Part] = {}
     if shape is not None:
-        best = int(np.argmax([seen.usable[rows].sum() for rows, _ in parts]))
-        found = _fitted(scene, motion, seen, parts[best][0], scene.body, shape, beta)
-        if found.body is not scene.body:  # else no build was found that fits better, and only poses are fitted
-            shape = replace(shape, body=found.body, factors=np.exp(found.factors))
-            fitted[best] = found
+        best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
+        part = _fitted(scene, motion, visibility, parts[best][0], scene.body, shape, beta)
+        if part.body is not scene.body:  # else no build fits better, and only poses are fitted
+            shape = replace(shape, body=part.body, factors=np.exp(part.factors))
+            fitted[best] = part
     body = scene.body if shape is None else shape.body
     poses, places = motion.poses.copy(), motion.translations.copy()
     for k, (rows, kept) in enumerate(parts):
-        part = fitted.get(k) or _fitted(scene, motion, seen, rows, body, None, beta)
+        part = fitted.get(k) or _fitted(scene, motion, visibility, rows, body, None, beta)
         poses[rows[kept]], places[rows[kept]] = part.poses[kept], part.places[kept]
     return replace(motion, skeleton=body.skeleton, poses=poses, translations=places), shape
 
@@ -220,7 +222,7 @@ def fit_contours(
 def _fitted(
     scene: Scene,
     motion: Motion,
-    seen: SeenFrames,
+    visibility: Visibility,
     rows: NDArray[np.int64],
     body: Body,
     shape: Shape | None,
@@ -231,8 +233,8 @@ def _fitted(
     observations: Sequence[Observation] = [scene.observations[k] for k in rows.tolist()]
     borders = [MaskContours.of(camera, view, observations, places) for view, camera in enumerate(scene.cameras)]
     factors, height = (np.zeros(len(SPREAD)), None) if shape is None else (np.log(shape.factors), shape.height)
-    found = Motion(motion.name, body.skeleton, poses, places, motion.fps)
-    part = _Part(found, body, factors, height, seen.usable[rows], seen.eyes[rows], poses, places)
+    estimate = Motion(motion.name, body.skeleton, poses, places, motion.fps)
+    part = _Part(estimate, body, factors, height, visibility.usable[rows], visibility.eyes[rows], poses, places)
     best, least = part, _mean_cost(scene, part, observations, beta)
     for scale in SCALES:
         part = _stepped(part, _pulled(part, borders, scale, build=shape is not None), build=shape is not None)
@@ -245,8 +247,8 @@ def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], b
     """Return the mean cost of the frames that show enough of the person; infinite where there is none."""
     costs = []
     for row in np.flatnonzero(part.usable).tolist():
-        seen, pose, place = observations[row].silhouettes, part.poses[row : row + 1], part.places[row : row + 1]
-        costs.append(float(pose_costs(part.body, scene.cameras, seen, pose, place, beta)[0][0]))
+        silhouettes, pose, place = observations[row].silhouettes, part.poses[row : row + 1], part.places[row : row + 1]
+        costs.append(float(pose_costs(part.body, scene.cameras, silhouettes, pose, place, beta)[0][0]))
     return float(np.mean(costs)) if costs else np.inf
 
 
@@ -265,16 +267,16 @@ def _pulled(part: _Part, borders: Sequence[MaskContours], scale: float, *, build
         shown = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
         kernels.pull_to_borders(STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), *shown, scales, out)
         worth = 1.0 / (view.metres**3 * TOGETHER * (OFF**2 + (ROUGH / view.metres) ** 2))
-        found, asked = out[0] * worth[:, None, None], out[1] * worth[:, None]
+        curvature, gradient = out[0] * worth[:, None, None], out[1] * worth[:, None]
         ways = pose_jacobian(part.body, view.camera, part.poses, part.places, angles)
         across = ways.transpose(0, 2, 1)
-        curves += across @ (found @ ways)
-        slopes += (across @ asked[..., None])[..., 0]
+        curves += across @ (curvature @ ways)
+        slopes += (across @ gradient[..., None])[..., 0]
         if build:
             grown = build_jacobian(part.body, view.camera, part.poses, part.places, part.height)
-            mixed += across @ (found @ grown)
-            curve += np.einsum("tqi,tqj->ij", grown, found @ grown)
-            slope += np.einsum("tqi,tq->i", grown, asked)
+            mixed += across @ (curvature @ grown)
+            curve += np.einsum("tqi,tqj->ij", grown, curvature @ grown)
+            slope += np.einsum("tqi,tq->i", grown, gradient)
     return _Pulled((curves, slopes), mixed, (curve, slope))
 
 
@@ -284,9 +286,9 @@ def _stepped(part: _Part, pulled: _Pulled, *, build: bool) -> _Part:
     if not build:
         way = steps.least()
     else:
-        found = steps.steps_for(np.concatenate([steps.slopes[..., None], pulled.mixed], axis=2))
-        way, answers = found[..., 0], found[..., 1:]
-        known = max(np.count_nonzero(part.usable) / ALIKE, 1.0) / SPREAD**2
+        solved = steps.steps_for(np.concatenate([steps.slopes[..., None], pulled.mixed], axis=2))
+        way, answers = solved[..., 0], solved[..., 1:]
+        known = max(np.count_nonzero(part.usable) / BUILD_FRAMES, 1.0) / SPREAD**2
         curve = pulled.build[0] + np.diag(known) - np.einsum("tni,tnj->ij", pulled.mixed, answers)
         slope = pulled.build[1] + known * part.factors - np.einsum("tni,tn->i", pulled.mixed, way)
         turns = np.clip(np.linalg.solve(curve, slope), -WIDEST, WIDEST)
@@ -304,7 +306,7 @@ def _squares(part: _Part, pulled: _Pulled) -> Squares:
     turned = slice(3, 3 + len(angles))
     squares = Squares.of(len(part.poses), 3 + len(angles))
     squares.add(slice(None), *pulled.poses)
-    add_root(squares, part.motion, SeenFrames(part.usable, part.eyes), AWAY, part.places - part.motion.translations)
+    add_root(squares, part.motion, Visibility(part.usable, part.eyes), AWAY, part.places - part.motion.translations)
     change = wrapped(part.poses - part.motion.poses)[:, angles]
     squares.add(turned, np.eye(len(angles)) / GIVING**2, change / GIVING**2)
     squares.add_bends(turned, change, fps**2 / SHAKING)

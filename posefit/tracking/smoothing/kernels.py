@@ -11,7 +11,7 @@ import numpy as np
 from posefit.arrays import jit
 
 CAP = 3  # points of a quarter, about, of the disc at a bone's end
-COVERED = 0.25  # pixels within another bone from which on a point of a bone's border is not seen
+COVERED = 0.25  # pixels within another bone from which on a point of a bone's border is hidden
 TINY = 1e-9
 
 

@@ -1,7 +1,7 @@
 """The likeliest path of a root and two legs, by least squares over all frames at once.
 
-Each frame pulls the root to where it was estimated, as hard as it could be seen there; accelerations cost; and standing
-feet do not move. The legs give way a little, so that they do not.
+Each frame pulls the root to its estimate, weighted by how well that is known; accelerations cost; and standing feet
+do not move. The legs give way a little, so that they do not.
 """
 
 from collections.abc import Sequence
@@ -79,8 +79,8 @@ class Squares:
                     if off >= 0:
                         values = self.curves[apart, : count - apart, row, column]
                         lines[band - 1 - off, apart * numbers + column :: numbers] = values
-        found = solveh_banded(lines, slopes.reshape(count * numbers, -1), check_finite=False)
-        return np.asarray(found).reshape(slopes.shape)
+        steps = solveh_banded(lines, slopes.reshape(count * numbers, -1), check_finite=False)
+        return np.asarray(steps).reshape(slopes.shape)
 
 
 SLOW = 0.25  # metres a second that a standing foot may seem to move
@@ -131,14 +131,14 @@ def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     return kept
 
 
-ACROSS = 0.006  # metres that a root may be off where it was found: standard deviation, as all that follow
+ACROSS = 0.006  # metres that a root may be off from its estimate: standard deviation, as all that follow
 DEPTH = 0.004  # of the distance, towards or away from a single camera
 UNSEEN = 1.0  # metres, in frames that show too little
 ACCELERATION = 3.0  # metres a second squared, of the root on each axis
-TURNING = np.radians(3.0)  # that an angle of a leg may be off what was found
+TURNING = np.radians(3.0)  # that an angle of a leg may be off the estimate
 SHAKING = np.radians(400.0)  # a second squared, of that difference
 STANDING = 0.004  # metres that a foot which stands may move in a thirtieth of a second
-STRANGE = 4.0  # standard deviations from which on a place that was found is believed the less, the farther it is off
+STRANGE = 4.0  # standard deviations from the estimate beyond which a place is weighted down
 ROUNDS = 4  # of Gauss and Newton
 STEP = 1e-4  # radians: of a difference quotient
 WINDOW, OVERLAP = 900, 60  # frames that are solved for at once, and those that two windows share
@@ -152,26 +152,26 @@ LEGS = tuple(
 
 
 @dataclass(frozen=True, eq=False)
-class SeenFrames:
-    """How well each frame of a motion was seen."""
+class Visibility:
+    """Which frames of a motion are usable, and by which camera."""
 
     usable: NDArray[np.bool_]  # (T,)
     eyes: Array = field(repr=False)  # (T, 3) metres: where the only camera stands that sees it; NaN where several do
 
 
-def smooth_path(motion: Motion, seen: SeenFrames) -> Motion:
+def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
     """Return a motion whose root goes smoothly and whose feet do not slide where they stand.
 
     Only the root's way and the angles of the legs change. A motion of fewer than 3 frames is returned as it is.
     """
     if len(motion) < 3:
         return motion
-    motion = replace(motion, translations=_bridged(motion.translations, seen.usable))
+    motion = replace(motion, translations=_bridged(motion.translations, visibility.usable))
     poses, places = motion.poses.copy(), motion.translations.copy()
     for rows, kept in windows_over(len(motion), WINDOW, OVERLAP):
         part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
-        found = _window(part, SeenFrames(seen.usable[rows], seen.eyes[rows]))
-        poses[rows[kept]], places[rows[kept]] = found.poses[kept], found.translations[kept]
+        smooth = _window(part, Visibility(visibility.usable[rows], visibility.eyes[rows]))
+        poses[rows[kept]], places[rows[kept]] = smooth.poses[kept], smooth.translations[kept]
     return replace(motion, poses=poses, translations=places)
 
 
@@ -196,15 +196,15 @@ def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
     return np.column_stack([np.interp(np.arange(len(places)), known, line) for line in places[known].T])
 
 
-def _window(motion: Motion, seen: SeenFrames) -> Motion:
-    """Return a motion smooth_path: first its root alone, which tells who stands, then the legs as well."""
-    smooth = _solved(motion, seen, np.zeros((len(motion), 2), dtype=bool))
-    stands = standing_feet(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, seen.eyes)
-    return _solved(motion, seen, stands)
+def _window(motion: Motion, visibility: Visibility) -> Motion:
+    """Return a smooth motion: first its root alone, which shows which foot stands, then the legs as well."""
+    smooth = _solved(motion, visibility, np.zeros((len(motion), 2), dtype=bool))
+    stands = standing_feet(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, visibility.eyes)
+    return _solved(motion, visibility, stands)
 
 
-def _solved(motion: Motion, seen: SeenFrames, stands: NDArray[np.bool_]) -> Motion:
-    """Return the motion of the least sum of squares, with what stands told."""
+def _solved(motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]) -> Motion:
+    """Return the motion of the least sum of squares, given which feet stand."""
     skeleton, fps, count = motion.skeleton, motion.fps, len(motion)
     angles = [angle for angle in LEGS if skeleton.free[angle]]
     root, legs = slice(0, 3), slice(3, 3 + len(angles))
@@ -212,7 +212,7 @@ def _solved(motion: Motion, seen: SeenFrames, stands: NDArray[np.bool_]) -> Moti
     poses, places = motion.poses.copy(), motion.translations.copy()
     for _ in range(ROUNDS):
         squares = Squares.of(*change.shape)
-        add_root(squares, motion, seen, ACROSS, change[:, root])
+        add_root(squares, motion, visibility, ACROSS, change[:, root])
         squares.add(legs, np.eye(len(angles)) / TURNING**2, change[:, legs] / TURNING**2)
         squares.add_bends(legs, change[:, legs], fps**2 / SHAKING)
         add_standing(squares, Motion(motion.name, skeleton, poses, places, fps), stands, angles)
@@ -222,13 +222,13 @@ def _solved(motion: Motion, seen: SeenFrames, stands: NDArray[np.bool_]) -> Moti
     return Motion(motion.name, skeleton, poses, places, fps)
 
 
-def add_root(squares: Squares, motion: Motion, seen: SeenFrames, deviation: float, moved: Array) -> None:
+def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation: float, moved: Array) -> None:
     """Add what is asked of a root, `moved` (T, 3) from where a motion has it: to be there, and to go smoothly.
 
     `deviation` is how many metres it may be off across the line of sight, and where no camera is alone in depth. The
     root's place is the first three numbers of each frame.
     """
-    root, precision = slice(0, 3), _root_precisions(motion, seen, deviation)
+    root, precision = slice(0, 3), _root_precisions(motion, visibility, deviation)
     off = np.einsum("ti,tij,tj->t", moved, precision, moved)
     precision /= (1.0 + off / STRANGE**2)[:, None, None]
     squares.add(root, precision, np.einsum("tij,tj->ti", precision, moved))
@@ -250,12 +250,12 @@ def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], an
         squares.add_steps(both, feet, ways, motion.fps / (30.0 * STANDING))
 
 
-def _root_precisions(motion: Motion, seen: SeenFrames, deviation: float) -> Array:
+def _root_precisions(motion: Motion, visibility: Visibility, deviation: float) -> Array:
     """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance."""
-    across = np.where(seen.usable, deviation, UNSEEN)
+    across = np.where(visibility.usable, deviation, UNSEEN)
     precise = np.eye(3) / across[:, None, None] ** 2
-    alone = np.isfinite(seen.eyes).all(axis=1)
-    sights = motion.translations[alone] - seen.eyes[alone]
+    alone = np.isfinite(visibility.eyes).all(axis=1)
+    sights = motion.translations[alone] - visibility.eyes[alone]
     far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
     sights = sights / far[:, None]
     along = np.maximum(DEPTH * far, across[alone])

@@ -25,7 +25,7 @@ from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import stream
 from posefit.tracking.smoothing.contours import fit_contours
-from posefit.tracking.smoothing.path import SeenFrames, smooth_path
+from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit.tracking.trajectory import cheaper, mean_cost, with_total_effort
 
 PASS_TOLERANCE = 1.125  # times what the pass before costs: a pass that costs more is not kept
@@ -84,9 +84,9 @@ def smoothed_frames(
     poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
     motion = Motion(scene.name, scene.body.skeleton, poses, places, scene.fps)
     usable = np.array([observation.usable for observation in scene.observations])
-    seen = SeenFrames(usable, np.array([_eye(scene, observation) for observation in scene.observations]))
-    motion, shape = fit_contours(scene, smooth_path(motion, seen), seen, shape, beta)
-    motion = smooth_path(motion, seen)  # contours pull at standing feet
+    visibility = Visibility(usable, np.array([_eye(scene, observation) for observation in scene.observations]))
+    motion, shape = fit_contours(scene, smooth_path(motion, visibility), visibility, shape, beta)
+    motion = smooth_path(motion, visibility)  # contours pull at standing feet
     scene = scene if shape is None else replace(scene, body=shape.body)
     smooth = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
     if shape is not None:
