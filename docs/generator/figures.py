@@ -94,9 +94,9 @@ CELL = {
     "evaluations": ("", "budget of a frame, in each track"),
     "translation": ("", "how the root's place is found: known, searched or aligned"),
     "first_pose": ("", "how the first pose is found: searched, or given"),
-    "tracks": ("", "how many tracks from different beginnings one was chosen of"),
-    "yaw_off_degrees": ("degrees", "by how much the first yaw that is told is off at most; 180 for none told"),
-    "body_off_percent": ("%", "by how much bones and radii that are told are off at most"),
+    "hypotheses": ("", "of how many tracks from different beginnings one was chosen"),
+    "yaw_off_degrees": ("degrees", "by how much the first known yaw is off at most; 180 for an unknown one"),
+    "body_off_percent": ("%", "by how much the known bones and radii are off at most"),
     "seed": ("", "the seed of the method"),
 }
 HEAD = "| {0} | unit | meaning |\n|---|---|---|"

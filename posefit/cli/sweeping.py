@@ -35,7 +35,7 @@ def sweep(
 
     PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment, and any number of
     them may work on one DIR: the same command goes on where it was.
-    Exit status 1 where cells were quarantined after three attempts, 130 where somebody stopped it.
+    Exit status 1 where cells were quarantined after three attempts, 130 where it was stopped.
     """
     from posefit.sweep import command
     from posefit.sweep.engines.engine import Limits
@@ -56,7 +56,7 @@ def sweep(
 
 
 def _next(lines: Iterator[str], as_json: bool) -> str:
-    """Return the next lines as one text, "" at their end; what a plugin prints meanwhile is none of them."""
+    """Return the next lines as one text, "" at their end; not mixed with what a plugin prints."""
     with results_alone() if as_json else nullcontext():
         return "\n".join(islice(lines, LINES))
 
@@ -67,18 +67,18 @@ def _next(lines: Iterator[str], as_json: bool) -> str:
 @click.option(
     "--serve", is_flag=True, help="Show the report on this machine alone while the sweep goes on; write none."
 )
-@click.option("--port", type=int, help="Of --serve, where it is shown; one that is free where nothing is said.")
+@click.option("--port", type=int, help="Of --serve; by default a free one.")
 @click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json: bool, **others: Any) -> None:
-    """Write what a sweep to DIR found, of tracks or of single searches, as one page that any browser opens, offline.
+    """Write the results of a sweep to DIR as one page that any browser opens, offline.
 
-    Without --out it prints who leads and the leaderboard, as it does with it, and writes no page.
+    Without --out it prints which method leads and the leaderboard, and writes no page.
 
-    It may be written while the sweep goes on, of the cells that are done. With --serve a page shows how far it is, what
-    failed and the report so far, and loads itself anew until Ctrl-C ends it.
+    It may be written while the sweep goes on, of the cells that are done. With --serve a page shows the progress, what
+    failed and the report so far, and reloads itself until Ctrl-C ends it.
     """
     if serve:
         given = {"out": out, **others, "json": as_json or None}
@@ -89,13 +89,13 @@ def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json:
         raise click.UsageError("--port must be given with --serve, got it without")
     from posefit.report.write import leaderboard_lines, write_report
 
-    found = write_report(ledger, out, warn=say, **others)
-    for line in [json_line(found)] if as_json else leaderboard_lines(found):
+    summary = write_report(ledger, out, warn=say, **others)
+    for line in [json_line(summary)] if as_json else leaderboard_lines(summary):
         click.echo(line)
 
 
 def _serve(ledger: str, port: int) -> None:
-    """Show the report of a ledger until somebody presses Ctrl-C."""
+    """Show the report of a ledger until Ctrl-C."""
     from posefit.report.live import address_of, serving
 
     with suppress(KeyboardInterrupt), serving(ledger, port, say) as server:

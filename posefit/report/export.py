@@ -63,7 +63,7 @@ def logged_runs(ledger: "Ledger") -> Iterator[LoggedRun]:
             continue
         views = " ".join(f"{view:g}" for view in spec["view_degrees"])
         damage = "".join(f" {kind} {share:g}" for kind, share in sorted(spec["corruption"].items()))
-        more = {name: spec[name] for name in ("evaluations", "tracks", "version") if name in spec}
+        more = {name: spec[name] for name in ("evaluations", "hypotheses", "version") if name in spec}
         yield LoggedRun(
             spec["method"],
             {**spec["settings"], **more},

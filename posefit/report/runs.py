@@ -21,7 +21,7 @@ from posefit.uncertainty.calibration import BINS
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
-_METHOD_FIELDS = ("method", "settings", "evaluations", "tracks", "version")  # of a track's spec
+_METHOD_FIELDS = ("method", "settings", "evaluations", "hypotheses", "version")  # of a track's spec
 _NAMED_FIELDS = ("motion", "view_degrees", "corruption", "instance")  # that the name of a track's instance has
 _PROBLEM_FIELDS = ("function", "dimension", "instance", "suite")  # of a search's spec
 
@@ -234,8 +234,8 @@ def _variation(variant: Mapping[str, Any]) -> list[str]:
     if "budget" in variant:
         words = [f"{variant['budget']:g} evaluations for each dimension", f"infeasible: {variant['infeasible']}"]
     else:
-        tracks = variant["tracks"]
-        words = [f"{variant['evaluations']} evaluations", f"{tracks} {'track' if tracks == 1 else 'tracks'}"]
+        count = variant["hypotheses"]
+        words = [f"{variant['evaluations']} evaluations", f"{count} {'hypothesis' if count == 1 else 'hypotheses'}"]
     return [*settings_text(variant["settings"]), *words, *variant["version"].split(", ")]
 
 

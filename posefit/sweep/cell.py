@@ -96,8 +96,8 @@ class TrackCell(Cell):
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
     numbers what the cameras see of the motion, see `posefit.footage.instance`. `corruption` gives kinds of
     `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames without masks; the damage
-    follows from the instance, so that it is the same for every method and seed. `tracks` is how many times the motion
-    is tracked, see `posefit.tracking.restarts`. `files` holds the SHA-256 of every capture file that is read.
+    follows from the instance, so that it is the same for every method and seed. `hypotheses` is how many times the
+    motion is tracked, see `posefit.tracking.restarts`. `files` holds the SHA-256 of every capture file that is read.
 
     Of the person a method knows where they face at first, at most `yaw_off_degrees` off, nothing at 180; and their
     body, each bone's length and radii at most `body_off_percent` off. Both are drawn from the instance and the motion's
@@ -117,7 +117,7 @@ class TrackCell(Cell):
     evaluations: int = 2440
     translation: str = "known"
     first_pose: str = "searched"
-    tracks: int = 1
+    hypotheses: int = 1
     yaw_off_degrees: float = 0.0
     body_off_percent: float = 0.0
     seed: int = 0
@@ -140,7 +140,8 @@ class TrackCell(Cell):
     @property
     def kind(self) -> tuple[object, ...]:
         """What the time of a frame depends on."""
-        return self.method, str(self.settings), self.tracks, self.size, len(self.view_degrees), bool(self.corruption)
+        views, corrupted = len(self.view_degrees), bool(self.corruption)
+        return self.method, str(self.settings), self.hypotheses, self.size, views, corrupted
 
     @property
     def total_evaluations(self) -> int:
@@ -161,12 +162,12 @@ class TrackCell(Cell):
         from posefit.tracking.pipeline import track_scene
 
         for path, digest in self.files.items():
-            if (found := digest_of(path)) != digest:
-                raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {found[:8]}")
+            if (present := digest_of(path)) != digest:
+                raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}")
         scene = cell_scene(self)
         training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
         same = {name: getattr(self, name) for name in ("method", "evaluations", "translation", "first_pose", "seed")}
-        options = TrackOptions(settings=settings_text(self.settings), hypotheses=self.tracks, **same)
+        options = TrackOptions(settings=settings_text(self.settings), hypotheses=self.hypotheses, **same)
         result = track_scene(scene, training, options)
         truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
         errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
@@ -234,13 +235,13 @@ class SearchCell(Cell):
         from posefit.suites.running import run_on
 
         problem = suite(self.suite, self.function, self.instance, self.dimension, infeasible=self.infeasible)  # type: ignore[arg-type]
-        found = run_on(problem, self.method, self.settings, evaluations=self.evaluations, seed=self.seed)
+        run = run_on(problem, self.method, self.settings, evaluations=self.evaluations, seed=self.seed)
         row = {
-            "cost": found.cost,
-            "best_known": found.best_known,
+            "cost": run.cost,
+            "best_known": run.best_known,
             "evaluations_used": problem.evaluations,
             "dimensions": problem.dimension,
-            "trace": {"evaluations": [int(used) for used in found.evaluations], "cost": found.costs.tolist()},
+            "trace": {"evaluations": [int(used) for used in run.evaluations], "cost": run.costs.tolist()},
             "warnings": [],
         }
         return CellResult(row, b"")
@@ -341,14 +342,14 @@ def settings_text(settings: Mapping[str, Any]) -> list[str]:
     return [f"{name}={setting_text(value)}" for name, value in settings.items()]
 
 
-def anytime_trace(found: "list[Frame]") -> dict[str, list[float]]:
+def anytime_trace(frames: "list[Frame]") -> dict[str, list[float]]:
     """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
 
-    A frame that spent fewer keeps its last cost; frames that were held do not count. There are at most 64 points.
+    A frame that spent fewer keeps its last cost; frames without a search do not count. There are at most 64 points.
     """
     import numpy as np
 
-    searched = [frame for frame in found if len(frame.history)]
+    searched = [frame for frame in frames if len(frame.history)]
     if not searched:
         return {"evaluations": [], "cost": []}
     spent = [_spent(frame) for frame in searched]
@@ -387,18 +388,18 @@ def _joint_errors_mm(truth: "Array", estimate: "Array") -> "Array":
     return 1e3 * joint_distances(truth, estimate).mean(axis=0)
 
 
-def _mode_reliability(found: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:
+def _mode_reliability(frames: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:
     """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
     import numpy as np
 
     from posefit.uncertainty.calibration import reliability
     from posefit.uncertainty.modes import likeliest_is_right
 
-    frames = [(frame.modes, joints) for frame, joints in zip(found, truth, strict=True) if frame.modes]
-    if not frames:
+    weighed = [(frame.modes, joints) for frame, joints in zip(frames, truth, strict=True) if frame.modes]
+    if not weighed:
         return []
-    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in frames])
-    likely = np.array([max(mode.weight for mode in modes) for modes, _ in frames])
+    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed])
+    likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
     return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]
 
 

@@ -1,4 +1,4 @@
-"""Checks a cell's spec, so that nothing wrong with it is found only after hours."""
+"""Checks a cell's spec, so that no mistake in it is reported only after hours."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
@@ -269,7 +269,7 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "evaluations": _whole(1),
     "translation": _one_of(*TRANSLATIONS),
     "first_pose": _one_of("searched", "given"),
-    "tracks": _whole(1),
+    "hypotheses": _whole(1),
     "yaw_off_degrees": _between(0.0, ALL_AROUND),
     "body_off_percent": _between(0.0, MAX_BODY_OFF),
     "seed": _whole(0),

@@ -55,7 +55,7 @@ class BegunPlan:
 
 
 class Ledger:
-    """Reads a ledger, whoever writes to it meanwhile. Raises ValueError where the folder is no ledger."""
+    """Reads a ledger, also while drivers write to it. Raises ValueError where the folder is no ledger."""
 
     def __init__(self, path: str | Path, say: Callable[[str], None] | None = None) -> None:
         self.path = Path(path)

@@ -68,7 +68,7 @@ DIGEST_BYTES = 32  # of a key
 
 
 class Plan:
-    """The cells of a sweep, made as they are asked for; no two are alike."""
+    """The cells of a sweep, made as they are asked for; no two are equal."""
 
     def __init__(self, *parts: Product | Sequence[Cell]) -> None:
         self._parts = parts

@@ -85,9 +85,9 @@ class Product:
             fields = {name: getattr(cell, name) for name in NAMES}
             for n, entries in self._separate.items():
                 fields |= entries[chosen[n]][0]
-            found = TrackCell(**fields)
-            vars(found)["key"] = key.hex()  # its cached property
-            yield found
+            whole = TrackCell(**fields)
+            vars(whole)["key"] = key.hex()  # its cached property
+            yield whole
 
     def digests(self) -> Iterator[bytes]:
         """Yield the key of each cell, as 32 bytes."""
@@ -106,17 +106,17 @@ class Product:
     def _common(self, chosen: tuple[int, ...]) -> tuple[TrackCell, list[str]]:
         """Return a cell with the crossed fields of some entries, and its fields as JSON."""
         crossed = tuple([-1 if n in self._separate else k for n, k in enumerate(chosen)])
-        found = self._known.get(crossed)
-        if found is None:
+        known = self._known.get(crossed)
+        if known is None:
             spec: dict[str, Any] = {}
             for entries, k in zip(self._lists, chosen, strict=True):
                 spec |= entries[k]
             cell = self._make(spec)
-            found = cell, [_piece(name, getattr(cell, name)) for name in NAMES]
+            known = cell, [_piece(name, getattr(cell, name)) for name in NAMES]
             if len(self._known) >= CACHED:
                 self._known.clear()
-            self._known[crossed] = found
-        return found
+            self._known[crossed] = known
+        return known
 
 
 def _piece(name: str, value: Any) -> str:

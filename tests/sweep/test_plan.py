@@ -196,12 +196,12 @@ def test_a_digest_changes_with_every_source_and_data_file_but_not_with_those_tha
     source_digest.cache_clear()
 
 
-def test_a_cell_follows_so_many_tracks() -> None:
+def test_a_cell_has_so_many_hypotheses() -> None:
     spec = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
-    one, three = (run_cell(cell_of({**spec, "tracks": tracks})).row for tracks in (1, 3))
+    one, three = (run_cell(cell_of({**spec, "hypotheses": count})).row for count in (1, 3))
     assert three["evaluations_used"] == 3 * one["evaluations_used"] == 3 * 2 * 80
     assert three["trace"]["evaluations"][-1] == 3 * one["trace"]["evaluations"][-1]
-    assert three["spec"]["tracks"] == 3
+    assert three["spec"]["hypotheses"] == 3
 
 
 def test_a_cell_is_restored_from_its_rows_spec() -> None:
@@ -321,16 +321,22 @@ def test_a_product_gives_the_cells_and_keys_that_its_specs_give_one_by_one() -> 
         ],
         "corruptions": [{}, {"dropped": 0.5, "holes": 0.25}],
         "motions": ["walk", {"motion": "run", "train": ["walk-a"], "size": [80, 60]}],
-        "views": [45, [0, 90.5], {"view_degrees": 90, "tracks": 3}, {"view_degrees": 91, "tracks": 1}],
+        "views": [45, [0, 90.5], {"view_degrees": 90, "hypotheses": 3}, {"view_degrees": 91, "hypotheses": 1}],
         "instances": 2,
     }
-    defaults = {"frames": 5, "tracks": 2, "translation": "searched", "settings": {"sapso.cooling": 0.9}}
+    defaults = {"frames": 5, "hypotheses": 2, "translation": "searched", "settings": {"sapso.cooling": 0.9}}
     plan = Plan.of({"defaults": defaults, "product": lists})
     expected = []
     for seed, damage, motion, view, instance, chosen in product(
         lists["seeds"], lists["corruptions"], lists["motions"], lists["views"], range(2), lists["methods"]
     ):
-        spec: dict[str, Any] = {"frames": 5, "tracks": 2, "translation": "searched", "seed": seed, "instance": instance}
+        spec: dict[str, Any] = {
+            "frames": 5,
+            "hypotheses": 2,
+            "translation": "searched",
+            "seed": seed,
+            "instance": instance,
+        }
         spec |= {"corruption": damage, **(view if isinstance(view, dict) else {"view_degrees": view})}
         spec |= chosen if isinstance(chosen, dict) else {"method": chosen, "settings": {"sapso.cooling": 0.9}}
         spec |= motion if isinstance(motion, dict) else {"motion": motion}

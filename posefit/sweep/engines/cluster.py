@@ -14,10 +14,10 @@ from posefit.sweep.engines.child import called
 from posefit.sweep.engines.engine import EngineError, Limits, Outcome, Run, text_of
 
 PATIENCE = 30.0  # seconds to wait for a scheduler, or for workers, that are not there
-CONNECTING = 5.0  # seconds for one try
-ARRIVING = 10.0  # seconds for a result that is ready to come over
+CONNECT_SECONDS = 5.0  # for one try
+RESULT_SECONDS = 10.0  # for a result that is ready to come over
 LOOPBACK = "127.0.0.1"
-LOOK = 1.0  # seconds between two looks at which workers there are
+POLL_SECONDS = 1.0  # between two checks which workers there are
 
 
 @dataclass
@@ -26,7 +26,7 @@ class _Sent:
 
     cell: Cell
     worker: str  # the address that it was sent to
-    missed: int = 0  # how often this worker was looked for in vain
+    missed: int = 0  # checks in a row at which the worker was gone
 
 
 class Cluster:
@@ -54,7 +54,7 @@ class Cluster:
         self._address = scheduler if self._local is None else self._local.scheduler_address
         self._running: dict[Any, _Sent] = {}
         self._idle: list[str] = []
-        self._looked = 0.0
+        self._checked = 0.0
         self._woken = threading.Event()
         self._client: Any = None
         try:
@@ -66,12 +66,12 @@ class Cluster:
     def window(self) -> int:
         """Return how many workers there are, once there are any."""
         until = time.monotonic() + self._patience
-        self._look()
+        self._check_workers()
         while not self._idle and not self._running:
             if time.monotonic() > until:
                 raise EngineError(f"scheduler {self._address} must have workers, got none for {self._patience:g} s")
-            time.sleep(LOOK)
-            self._look()
+            time.sleep(POLL_SECONDS)
+            self._check_workers()
         return len(self._idle) + len(self._running)
 
     def submit(self, cell: Cell) -> None:
@@ -89,7 +89,7 @@ class Cluster:
         self._woken.clear()
         if self._client.status != "running":
             return self._lost()
-        self._look()
+        self._check_workers()
         outcomes = [self._outcome(future) for future in tuple(self._running)]
         return [outcome for outcome in outcomes if outcome is not None]
 
@@ -98,18 +98,18 @@ class Cluster:
         for future in self._running:
             future.release()
         if self._client is not None:
-            self._client.close(timeout=CONNECTING)
+            self._client.close(timeout=CONNECT_SECONDS)
         if self._local is not None:
-            self._local.close(timeout=CONNECTING)
+            self._local.close(timeout=CONNECT_SECONDS)
 
     def _outcome(self, future: Any) -> Outcome | None:
         """Return what became of a cell, if anything has."""
         sent = self._running[future]
         try:
             if future.status == "finished":
-                ended = Outcome(sent.cell, *future.result(timeout=ARRIVING))
+                ended = Outcome(sent.cell, *future.result(timeout=RESULT_SECONDS))
             elif future.status == "error":
-                ended = self._unrun(sent, future.exception(timeout=ARRIVING))
+                ended = self._unrun(sent, future.exception(timeout=RESULT_SECONDS))
             elif sent.missed > 1:
                 ended = self._unrun(sent, None)
             else:
@@ -124,7 +124,7 @@ class Cluster:
         if finished:
             self._idle.append(sent.worker)
         else:
-            self._looked = 0.0  # the worker may be gone
+            self._checked = 0.0  # the worker may be gone
         return ended
 
     def _unrun(self, sent: _Sent, error: BaseException | None) -> Outcome:
@@ -140,26 +140,26 @@ class Cluster:
         self._connect()
         return lost
 
-    def _look(self) -> None:
-        """See which workers there are, once a second."""
-        if time.monotonic() - self._looked < LOOK:
+    def _check_workers(self) -> None:
+        """Check which workers there are, once a second."""
+        if time.monotonic() - self._checked < POLL_SECONDS:
             return
         try:
             present = set(self._client.nthreads())
         except (OSError, TimeoutError, self._distributed.CancelledError):
-            return  # the next `wait` sees to it
+            return  # the next `wait` handles it
         for sent in self._running.values():
             sent.missed = 0 if sent.worker in present else sent.missed + 1
         self._idle = sorted(present - {sent.worker for sent in self._running.values()})
-        self._looked = time.monotonic()
+        self._checked = time.monotonic()
 
     def _connect(self) -> None:
         until = time.monotonic() + self._patience
         while True:
             if self._client is not None:
-                self._client.close(timeout=CONNECTING)
+                self._client.close(timeout=CONNECT_SECONDS)
             try:
-                limit = min(CONNECTING, self._patience)
+                limit = min(CONNECT_SECONDS, self._patience)
                 self._client = self._distributed.Client(self._address, timeout=limit, set_as_default=False)
                 if self._local is not None:
                     self._client.register_plugin(_plugin(self._distributed))
@@ -168,22 +168,22 @@ class Cluster:
                 if isinstance(error, ValueError) or time.monotonic() > until:
                     cause = " ".join(str(error).split())
                     raise EngineError(f"scheduler must be one that answers, got {self._address}: {cause}") from None
-                time.sleep(min(LOOK, self._patience))
+                time.sleep(min(POLL_SECONDS, self._patience))
 
     def _wake(self, _: Any) -> None:
         self._woken.set()
 
 
 def _local(distributed: Any, workers: int, dashboard: bool) -> Any:
-    """Return a cluster of worker processes on this machine, one thread each, which nobody reaches from elsewhere."""
+    """Return a cluster of worker processes on this machine, one thread each, unreachable from elsewhere."""
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     import dask
 
-    told: dict[str, Any] = {"distributed.scheduler.allowed-failures": 0}  # attempts are counted by the ledger
+    settings: dict[str, Any] = {"distributed.scheduler.allowed-failures": 0}  # attempts are counted by the ledger
     if not dashboard:
-        told |= {f"distributed.{one}.http.routes": [] for one in ("scheduler", "worker")}
-    with dask.config.set(told):
+        settings |= {f"distributed.{one}.http.routes": [] for one in ("scheduler", "worker")}
+    with dask.config.set(settings):
         return distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
