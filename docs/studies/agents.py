@@ -337,7 +337,7 @@ def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> li
         space = made.space(world.learned)
         searching = factory(space, np.random.default_rng([seed, number]), **planned(factory, {}, evaluations))
         problem = made.scenery(0).problem(space)
-        found.append(minimise(problem.evaluate, searching, evaluations, told=True).cost)
+        found.append(minimise(problem.evaluate, searching, evaluations, budget_known=True).cost)
     return found
 
 

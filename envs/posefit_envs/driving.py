@@ -104,7 +104,7 @@ def drive(
     if isinstance(optimiser, str):
         optimiser = _optimiser(objective.spaces()[0], optimiser, seed, evaluations, settings)
     try:
-        return minimise(objective.costs, optimiser, evaluations, told=True)
+        return minimise(objective.costs, optimiser, evaluations, budget_known=True)
     except BudgetError as mistake:
         raise error.Error(str(mistake)) from None
 

@@ -99,7 +99,7 @@ def refined(
         away = (proposals**2).sum(axis=1) + ((proposals - begin) ** 2).sum(axis=1)
         return np.asarray(cost(space.poses(proposals)) + 0.5 * pull * REACH**2 * away)
 
-    found = minimise(evaluate, make(space, rng), evaluations, told=True)
+    found = minimise(evaluate, make(space, rng), evaluations, budget_known=True)
     if float(evaluate(begin[None])[0]) <= found.cost:
         return space.poses(begin[None])[0], found.evaluations + 1
     return space.poses(found.proposal[None])[0], found.evaluations + 1

@@ -123,7 +123,7 @@ class Search:
         def posterior(proposals: Array) -> Array:  # in units of cost, less a constant
             return np.asarray(problem.evaluate(proposals) + doubt * (proposals**2).sum(axis=1))
 
-        best = minimise(posterior, optimiser, budget, told=True)
+        best = minimise(posterior, optimiser, budget, budget_known=True)
         pose, place = problem.decode(best.proposal[None])
         best_state = encode(pose, place)[0]
 

@@ -1,4 +1,4 @@
-"""What an optimiser may know of the space it searches, and ways to draw from it that always end."""
+"""The box that an optimiser searches, as far as it knows it, and functions on it; those that draw always end."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,8 +11,8 @@ from posefit.uncertainty.landscape import displacement as displacement
 from posefit.uncertainty.landscape import wrap as wrap
 
 REDRAWS = 100  # Interpretation S7
-MANY = 8  # ours: after the first, so many redraws are made at once
-STEPS = 32  # ours: how finely `repair` looks along its line
+BATCH = 8  # ours: after the first, so many redraws are made at once
+REPAIR_STEPS = 32  # ours: points that `repair` tries along its line
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +95,15 @@ def _drawn(space: Space, start: Start | None, rng: np.random.Generator, count: i
     if start is not None and space.feasible(start.mean[None])[0]:
         drawn[wanted] = start.mean
         return drawn
-    found = np.setdiff1d(np.arange(count), wanted)
-    if not len(found):
+    feasible = np.setdiff1d(np.arange(count), wanted)
+    if not len(feasible):
         return None
-    drawn[wanted] = drawn[rng.choice(found, len(wanted))]
+    drawn[wanted] = drawn[rng.choice(feasible, len(wanted))]
     return drawn
 
 
 def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array:
-    """Return proposals (count, d) from the start or uniform, in the box, whatever the prior finds of them."""
+    """Return proposals (count, d) from the start or uniform, in the box, whatever the prior says of them."""
     if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
     drawn = wrap(space, rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
@@ -119,7 +119,7 @@ def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: 
 def sample_normal(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:
     """Return a normal draw (n, d) around each of n feasible means, standard deviations `spread` (d,) or (n, d).
 
-    A coordinate that leaves the box is folded back into it, as at a mirror; what the prior finds infeasible is redrawn
+    A coordinate that leaves the box is folded back into it, as at a mirror; what the prior refuses is redrawn
     at most 100 times and then stays at its mean.
     """
     spread = np.broadcast_to(spread, means.shape)
@@ -127,14 +127,14 @@ def sample_normal(space: Space, rng: np.random.Generator, means: Array, spread: 
     broken = np.flatnonzero(~space.feasible(drawn))
     left = REDRAWS - 1
     while left > 0 and len(broken):
-        many = min(left, MANY)
+        many = min(left, BATCH)
         rows = np.repeat(broken, many)
         again = fold(space, means[rows] + spread[rows] * rng.standard_normal((len(rows), means.shape[1])))
         works = space.feasible(again).reshape(-1, many)
-        mended = works.any(axis=1)
-        first = many * np.flatnonzero(mended) + works[mended].argmax(axis=1)
-        drawn[broken[mended]] = again[first]
-        broken, left = broken[~mended], left - many
+        repaired = works.any(axis=1)
+        first = many * np.flatnonzero(repaired) + works[repaired].argmax(axis=1)
+        drawn[broken[repaired]] = again[first]
+        broken, left = broken[~repaired], left - many
     drawn[broken] = means[broken]
     return drawn
 
@@ -148,17 +148,16 @@ def fold(space: Space, proposals: Array) -> Array:
 def repair(space: Space, proposals: Array, home: Array) -> Array:
     """Return proposals (n, d), each infeasible one moved towards the feasible point `home` (d,) until it is feasible.
 
-    It becomes the farthest of 32 evenly spaced points on the line between them, so this always ends.
+    It becomes the farthest feasible one of 32 evenly spaced points on the line between them.
     """
-    mended = np.clip(wrap(space, np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
-    mended = np.where(np.isfinite(mended), mended, home)
-    broken = np.flatnonzero(~space.feasible(mended))
+    repaired = np.clip(wrap(space, np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
+    repaired = np.where(np.isfinite(repaired), repaired, home)
+    broken = np.flatnonzero(~space.feasible(repaired))
     if len(broken):
-        way = displacement(space, home, mended[broken])
-        shares = np.arange(STEPS - 1, 0, -1) / STEPS
+        way = displacement(space, home, repaired[broken])
+        shares = np.arange(REPAIR_STEPS - 1, 0, -1) / REPAIR_STEPS
         line = np.clip(wrap(space, home + shares[:, None, None] * way), -1.0, 1.0)
         works = space.feasible(line.reshape(-1, space.dimensions)).reshape(line.shape[:2])
         farthest = line[works.argmax(axis=0), np.arange(len(broken))]
-        found: NDArray[np.bool_] = np.asarray(works.any(axis=0))
-        mended[broken] = np.where(found[:, None], farthest, home)
-    return mended
+        repaired[broken] = np.where(np.asarray(works.any(axis=0))[:, None], farthest, home)
+    return repaired

@@ -1,4 +1,4 @@
-"""The usual checks of a plugin's settings, so that every plugin words its refusals alike."""
+"""Checks of settings and arguments, whose errors have one wording."""
 
 import math
 from collections.abc import Iterable

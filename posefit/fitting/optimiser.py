@@ -36,12 +36,12 @@ class Filter(Optimiser, Protocol):
 
 
 class Niching(Optimiser, Protocol):
-    """An optimiser that looks for several optima, and can tell them apart."""
+    """An optimiser that searches for several optima and separates them."""
 
     def modes(self) -> Array:
         """Return the proposals (k, d) that it takes for optima of their own, the best first.
 
-        They are among those that it was told the costs of; k is at least 1 once it was told some.
+        They are among those passed to `tell`; k is at least 1 after the first `tell`.
         """
         ...
 
@@ -53,8 +53,8 @@ class Niching(Optimiser, Protocol):
 # ask it to beat chance.
 OptimiserFactory = Callable[..., Optimiser]
 
-# What an optimiser does when the next frame comes: it is built anew to start around the prediction, SAPSO (6), (7); it
-# is a `Filter`, built once, and carries its particles; or it is built anew and starts anywhere.
+# What becomes of an optimiser in the next frame: a new one starts around the prediction, SAPSO (6), (7); the same
+# one, a `Filter`, carries its particles on; or a new one starts anywhere.
 NextFrame = Literal["start", "carry", "forget"]
 
 
@@ -65,9 +65,9 @@ def finite_costs(costs: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """What a search found."""
+    """The result of a search."""
 
-    proposal: Array  # (d,) the best one seen
+    proposal: Array  # (d,) the best one
     cost: float
     evaluations: int
     history: Array = field(repr=False)  # (populations,) best cost so far after each population
@@ -83,7 +83,7 @@ def populations(
 ) -> Iterator[tuple[Array, Array]]:
     """Yield each population (n, d) that an optimiser proposes, with its costs (n,): the loop that every search is.
 
-    The optimiser is told the costs when the next population is asked for. The search ends when it proposes none, or
+    The optimiser learns the costs before its next population is asked for. The search ends when it proposes none, or
     one that would go over the budget, which is not evaluated. Raises BudgetError where the first one does, and
     TypeError where `evaluate` returns anything else than an array of costs (n,).
     """
@@ -101,24 +101,23 @@ def populations(
 
 
 def minimise(
-    evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluations: int, *, told: bool = False
+    evaluate: Callable[[Array], Array], optimiser: Optimiser, evaluations: int, *, budget_known: bool = False
 ) -> Minimum:
-    """Return the best proposal an optimiser finds within a budget of whole populations.
+    """Return the best proposal of a search within a budget of whole populations.
 
     `evaluate` gives the costs (n,) of proposals (n, d). A population that would go over `evaluations` is not
-    evaluated. A cost that is nan never counts as best. Where an optimiser ends its search before half of the budget is
-    spent, a warning says so, unless it was `told` the budget when it was built: the schedules of some follow it.
-    Raises BudgetError where the budget does not hold one
-    population, and ValueError where every cost is nan.
+    evaluated. A cost that is nan never counts as best. A warning is given where an optimiser ends its search before
+    half of the budget is used, unless it was built with the budget, `budget_known`: the schedules of some follow it.
+    Raises BudgetError where the budget does not hold one population, and ValueError where every cost is nan.
     """
-    found = minimum_of(populations(optimiser, evaluate, evaluations))
-    if not told and 2 * found.evaluations < evaluations:
+    best = minimum_of(populations(optimiser, evaluate, evaluations))
+    if not budget_known and 2 * best.evaluations < evaluations:
         warnings.warn(
-            f"the optimiser ended its search after {found.evaluations} of {evaluations} evaluations: if its schedule "
+            f"the optimiser ended its search after {best.evaluations} of {evaluations} evaluations: if its schedule "
             "follows the budget, build it with it, as factory(space, rng, evaluations=...) or iterations=...",
             stacklevel=2,
         )
-    return found
+    return best
 
 
 def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:

@@ -1,4 +1,4 @@
-"""The build of one person: factors on the bone lengths and radii of a body, found from a few frames with the poses."""
+"""The build of one person: factors on the bone lengths and radii of a body, fitted to a few frames with the poses."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -75,7 +75,7 @@ class Shape:
     factors: Array = field(repr=False)  # (17,) in the order of `NAMES`
     spread: Array = field(repr=False)  # (17,) standard deviation of the factors over resampled frames
     cost: float  # mean over the frames
-    height: float | None = None  # metres that it was made to stand; None where frames told it
+    height: float | None = None  # metres that it was made to stand; None where it was fitted
 
 
 def fit_shape(
@@ -89,10 +89,10 @@ def fit_shape(
     aligned: bool = True,
     resamples: int = 4,
 ) -> Shape:
-    """Return the shape that fits all observations best, found in turns with their poses.
+    """Return the shape that fits all observations best, fitted in turns with their poses.
 
     `follow` tracks the observations with a body. With a `height` in metres the person stands so tall; one camera alone
-    does not see how large somebody is. Where poses are `aligned`, so are those of every body that is tried. `spread`
+    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. `spread`
     is bootstrapped: it comes from `resamples` fits to frames drawn with replacement.
     """
     factors = np.ones(len(NAMES))
@@ -115,7 +115,7 @@ class _Frames:
     base: Body
     cameras: Sequence[Camera]
     observations: Sequence[Observation]
-    found: Sequence[Frame]
+    frames: Sequence[Frame]
     height: float | None
     aligned: bool
 
@@ -123,7 +123,7 @@ class _Frames:
         """Return the mean mismatch over the chosen frames."""
         body, total = shaped(self.base, factors, self.height), 0.0
         for k in chosen.tolist():
-            pose, translation = self.found[k].pose[None], self.found[k].translation[None]
+            pose, translation = self.frames[k].pose[None], self.frames[k].translation[None]
             silhouettes = self.observations[k].silhouettes
             if self.aligned:
                 translation = align(body, self.cameras, silhouettes, pose, translation)

@@ -259,7 +259,7 @@ class SynthesisTracker:
                 continue
             optimiser = self._ready(optimiser, space, rng)
             problem = self.problem(space, observation)
-            best = minimise(problem.evaluate, optimiser, task.evaluations, told=True)
+            best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
             follower.commit(best.proposal)
             latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
             yield latest

@@ -65,7 +65,7 @@ def run_on(
     with plugin_errors(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):
         optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
     guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", None, evaluations)
-    minimise(problem.evaluate, guarded, evaluations, told=True)
+    minimise(problem.evaluate, guarded, evaluations, budget_known=True)
     if not len(problem.trace[0]):
         raise ValueError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")
     return SuiteRun(

@@ -369,7 +369,7 @@ def next_frame(case: OptimiserCase) -> str:
 
 @checklist
 def modes(case: OptimiserCase) -> str:
-    """The method modes returns proposals whose costs it was told, the best first."""
+    """The method modes returns proposals that were passed to tell, the best first."""
     space = Toy(3, ball)
     optimiser = case.build(space)
     if not hasattr(optimiser, "modes"):
@@ -380,7 +380,7 @@ def modes(case: OptimiserCase) -> str:
     expect(len(returned), "after twelve populations, modes must return at least one proposal, got (0, 3)")
     rows = {row.tobytes() for row in known}
     unknown = sum(row.tobytes() not in rows for row in np.asarray(returned))
-    expect(not unknown, f"modes must return proposals that it was told, got {unknown} others")
+    expect(not unknown, f"modes must return proposals that tell got, got {unknown} others")
     values = sphere(returned)
     expect((np.diff(values) >= 0.0).all(), "modes must return the best first, got a dearer one before a cheaper")
     lowest = float(sphere(known).min())

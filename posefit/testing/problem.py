@@ -24,7 +24,7 @@ def walking_angles() -> Array:
 
 @lru_cache(maxsize=1)
 def pose_problem() -> PoseProblem:
-    """Return the problem: known translation, prior `pca`, seen from 45 degrees."""
+    """Return the problem: known translation, prior `pca`, viewed from 45 degrees."""
     motion = built_in.motion("walk", frames=1)
     body = Body.of(motion.skeleton)
     prior = registry().prior("pca")().fit(walking_angles())

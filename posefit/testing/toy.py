@@ -11,7 +11,7 @@ from posefit.fitting.box import Start
 
 Rule = Callable[[Array], NDArray[np.bool_]]
 
-TARGET = 0.3  # every coordinate of where `sphere` is least: not the centre, which is too easily found
+TARGET = 0.3  # every coordinate of where `sphere` is least: not the centre, which is too easy
 
 
 def anywhere(proposals: Array) -> NDArray[np.bool_]:

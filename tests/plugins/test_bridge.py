@@ -39,7 +39,7 @@ def bridges() -> int:
 
 
 def test_a_library_is_asked_and_told_until_it_ends() -> None:
-    best = minimise(sphere, Bridged(Toy(3), np.random.default_rng(0), climbs), 10_000, told=True)
+    best = minimise(sphere, Bridged(Toy(3), np.random.default_rng(0), climbs), 10_000, budget_known=True)
     assert best.evaluations == 100
     assert best.cost < 2.0
 

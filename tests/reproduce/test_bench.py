@@ -36,7 +36,7 @@ class Line:
 def test_a_stopwatch_ends_a_search_after_its_populations() -> None:
     line = Line()
     watch = Stopwatch(line, 4)
-    found = minimise(lambda proposals: np.ones(len(proposals)), watch, 10**9, told=True)
+    found = minimise(lambda proposals: np.ones(len(proposals)), watch, 10**9, budget_known=True)
     assert (found.evaluations, watch.proposals, line.told) == (12, 12, 12)
     assert watch.seconds > 0.0
 

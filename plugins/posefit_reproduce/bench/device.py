@@ -118,7 +118,7 @@ def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -
 
     def search(where: PoseProblem) -> float:
         optimiser = SAPSO(where.space, np.random.default_rng(0), population_size=particles, iterations=iterations)
-        return minimise(where.evaluate, optimiser, particles * (iterations + 1), told=True).cost
+        return minimise(where.evaluate, optimiser, particles * (iterations + 1), budget_known=True).cost
 
     costs = {name: search(where) for name, where in (("device", there), ("cpu", problem))}
     seconds = _fastest({"device": lambda: search(there), "cpu": lambda: search(problem)})

@@ -94,7 +94,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
 
     def frame(seed: int) -> None:
         optimiser = SAPSO(alone.space, np.random.default_rng(seed), population_size=PARTICLES, iterations=ITERATIONS)
-        minimise(alone.evaluate, optimiser, PARTICLES * (ITERATIONS + 1), told=True)
+        minimise(alone.evaluate, optimiser, PARTICLES * (ITERATIONS + 1), budget_known=True)
 
     jobs: dict[str, Callable[[], object]] = {
         "one": lambda: alone.evaluate(proposals),

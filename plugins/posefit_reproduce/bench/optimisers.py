@@ -88,11 +88,11 @@ def _ask_and_tell(space: SearchSpace, offer: Offer) -> float:
         if offer.next_frame == "carry":
             watch = Stopwatch(optimiser)
             for _ in range(populations):
-                minimise(_distance, watch, sys.maxsize, told=True)
+                minimise(_distance, watch, sys.maxsize, budget_known=True)
                 watch.advance(space)
         else:
             watch = Stopwatch(optimiser, populations)
-            minimise(_distance, watch, sys.maxsize, told=True)
+            minimise(_distance, watch, sys.maxsize, budget_known=True)
         fastest = min(fastest, watch.seconds / watch.proposals)
         if time.perf_counter() - began > PATIENCE:
             break
