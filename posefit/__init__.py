@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from posefit.geometry.skeleton import Skeleton as Skeleton
     from posefit.motion.motion import Motion as Motion
     from posefit.silhouette.mask import Silhouette as Silhouette
-    from posefit.suites.front import Suite as Suite
-    from posefit.suites.front import suite as suite
     from posefit.suites.problem import Problem as Problem
+    from posefit.suites.problem import Suite as Suite
+    from posefit.suites.problem import suite as suite
     from posefit.tracking.front import Fit as Fit
     from posefit.tracking.front import fit as fit
     from posefit.tracking.front import track as track
@@ -60,8 +60,7 @@ _HOMES = {
     "fitting.problem": ("PoseProblem",),
     "fitting.space": ("SearchSpace",),
     "fitting.tracker": ("Frame", "Observation", "SynthesisTracker", "Task", "Tracker"),
-    "suites.front": ("Suite", "suite"),
-    "suites.problem": ("Problem",),
+    "suites.problem": ("Problem", "Suite", "suite"),
     "tracking.front": ("Fit", "fit", "track"),
     "tracking.summary": ("Track",),
     "footage.segmentation": ("Extraction",),

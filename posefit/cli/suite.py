@@ -1,6 +1,7 @@
 """`posefit suite`."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -13,16 +14,31 @@ if TYPE_CHECKING:
 
 NAME = "posefit-2026.1"
 
+F = TypeVar("F", bound=Callable[..., Any])
 
-def _instances(default: str) -> Any:
-    return click.option(
-        "--instances",
-        callback=parsed_by(text_range),
-        default=default,
-        show_default=True,
-        metavar="A:B",
-        help="A to B - 1.",
-    )
+
+def _problem_options(instances: str) -> Callable[[F], F]:
+    """Return a decorator that adds the options which select problems."""
+
+    def decorate(command: F) -> F:
+        for option in (
+            click.option(
+                "--instances",
+                callback=parsed_by(text_range),
+                default=instances,
+                show_default=True,
+                metavar="A:B",
+                help="A to B - 1.",
+            ),
+            click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9."),
+            click.option(
+                "--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each."
+            ),
+        ):
+            command = option(command)
+        return command
+
+    return decorate
 
 
 @click.group(invoke_without_command=True)
@@ -48,16 +64,7 @@ def suite(context: click.Context, as_json: bool) -> None:
 
 @suite.command("run")
 @click.argument("optimiser")
-@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
-@click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
-@click.option(
-    "--instances",
-    callback=parsed_by(text_range),
-    default="10000:10005",
-    show_default=True,
-    metavar="A:B",
-    help="A to B - 1.",
-)
+@_problem_options("10000:10005")
 @click.option("--budget", type=int, default=100, show_default=True, help="Evaluations for each dimension, as in plans.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
@@ -83,7 +90,7 @@ def suite_run(
     from posefit.files import check_new, check_place
     from posefit.fitting.check import whole
     from posefit.registry import registry
-    from posefit.suites.front import Suite
+    from posefit.suites.problem import Suite
     from posefit.suites.running import run_on
     from posefit.suites.tally import score_lines, suite_scores
 
@@ -122,7 +129,7 @@ def suite_run(
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
-    """Print what a sweep of a plan of single searches to DIR reached, by dimension, function and method."""
+    """Print the scores of a sweep of single searches in DIR, by dimension, function and method."""
     from posefit.files import check_new, check_place
     from posefit.suites.tally import score_lines, suite_scores
     from posefit.sweep.ledger import Ledger
@@ -131,32 +138,23 @@ def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     if iohprofiler is not None:
         check_new(iohprofiler)
         check_place(iohprofiler)
-    kept = Ledger(ledger, say)
-    runs = list(search_runs(kept))
+    results = Ledger(ledger, say)
+    runs = list(search_runs(results))
     scores = suite_scores(runs)
     if iohprofiler is not None:
         write_runs(runs, iohprofiler)
         say(f"written to {iohprofiler}: IOHprofiler's files")
-    if failed := len(kept.quarantined()):
+    if failed := len(results.quarantined()):
         say(f"{failed} {'cell' if failed == 1 else 'cells'} failed, left out of all figures")
     for line in [json_line([one.as_dict() for one in scores])] if as_json else score_lines(scores):
         click.echo(line)
 
 
 @suite.command("audit")
-@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
-@click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
-@click.option(
-    "--instances",
-    callback=parsed_by(text_range),
-    default="10000:10003",
-    show_default=True,
-    metavar="A:B",
-    help="A to B - 1.",
-)
+@_problem_options("10000:10003")
 @click.option("--method", "methods", multiple=True, help="Searches with the usual budget; repeatable.")
 @click.option("--times", type=int, default=100, show_default=True, help="How much longer CMA-ES searches; 0 for not.")
-@click.option("--write", metavar="FILE", help="New file of the best costs, as the suite has one.")
+@click.option("--write", metavar="FILE", help="New file of the best costs, as known.json of the suite.")
 @click.pass_context
 def suite_audit(
     context: click.Context,
@@ -167,13 +165,13 @@ def suite_audit(
     times: int,
     write: str | None,
 ) -> None:
-    """Search problems with each method, and check what is reported; exit status 1 where something is not true."""
+    """Search problems with each method, and check what is reported; exit status 1 where something is wrong."""
     import json
 
     from posefit.files import check_new, check_place, new_file
     from posefit.fitting.check import whole
     from posefit.suites.audit import METHODS, audit_lines, audited, known_json
-    from posefit.suites.front import Suite
+    from posefit.suites.problem import Suite
 
     with results_alone():
         whole("times", times, 0)
@@ -205,14 +203,14 @@ def _numbers(instances: tuple[int | None, int | None]) -> range:
 def write_runs(runs: "list[SuiteRun]", out: str) -> None:
     """Write runs to a new folder, as IOHprofiler has them.
 
-    Among the settings of a run is what became of infeasible proposals and, where a dimension has several budgets, the
-    budget. Both have names of several words, which no optimiser's setting can have.
+    The settings of a run include its way with infeasible proposals and, where a dimension has several budgets, the
+    budget. Both have names of several words, which no optimiser's setting has.
     """
     from posefit.report.export import LoggedRun, write_iohprofiler
     from posefit.suites.functions import suite_function
     from posefit.suites.tally import budgets_differ
 
-    def settings(run: "SuiteRun") -> dict[str, Any]:
+    def settings_of(run: "SuiteRun") -> dict[str, Any]:
         budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
         return {**run.settings, "infeasible proposals": run.infeasible, **budget}
 
@@ -221,7 +219,7 @@ def write_runs(runs: "list[SuiteRun]", out: str) -> None:
         (
             LoggedRun(
                 run.method,
-                settings(run),
+                settings_of(run),
                 f"f{run.function} {suite_function(run.function).name}",
                 run.dimension,
                 run.instance,

@@ -7,10 +7,9 @@
 
 | looking for | file |
 |---|---|
-| one problem by its numbers, many to go through | front.py |
-| what a problem is: calls, counts, budgets, targets, what is not feasible | problem.py |
+| one problem by its numbers, many to go through; calls, counts, budgets, targets, best known costs | problem.py |
 | which functions, dimensions and instances there are | functions.py |
-| what an instance is of each function | instances.py |
-| the boxes that are searched, and how they were learned | boxes.py, make_boxes.py |
-| the best costs that are known | known.py |
+| the instances of each function | instances.py |
+| the boxes that are searched, and the script that made them | boxes.py, make_boxes.py |
+| an optimiser on a problem; scores of runs; checks of what methods report | running.py, tally.py, audit.py |
 """

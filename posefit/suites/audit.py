@@ -1,8 +1,8 @@
-"""Whether methods report what is true, and the best costs that anybody finds.
+"""Checks of what methods report on a suite, and the best costs they reach.
 
-Every method of a list searches each problem at its usual budget. What it reports is then counted again, from the
-proposal alone and against cameras and silhouettes made anew; and it may not be below the optimum. The strongest of
-them, which is CMA-ES, searches once more with a hundred times the budget: the best cost of all is the best known.
+Every method of a list searches each problem at its usual budget. The cost of its best proposal is then computed again,
+against new cameras and silhouettes; and it may not be below the optimum. The strongest method, CMA-ES, searches once
+more with a hundred times the budget: the best cost of all is the best known.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,47 +11,46 @@ from typing import Any
 
 import numpy as np
 
-from posefit.suites.front import Suite, suite
 from posefit.suites.instances import suite_instance
-from posefit.suites.problem import Problem
+from posefit.suites.problem import Problem, Suite, suite
 from posefit.suites.running import run_on, usual_budget
 
 METHODS = ("random", "sapso", "pso", "cma", "annealed", "scipy")
-STRONGEST, TIMES = "cma", 100  # who searches longest, and how many times the usual budget
-NEAR = 1e-9  # how far a cost may be off, as it is rounded where it is added up in another order
+STRONGEST, TIMES = "cma", 100  # of the longest search, and its budget in usual ones
+TOLERANCE = 1e-9  # of a cost, whose terms are added in another order
 
 
 @dataclass(frozen=True)
 class Audited:
-    """What became of one problem."""
+    """The results of one problem."""
 
     problem: str
     truth_cost: float
-    found: dict[str, float]  # the best cost by method; `STRONGEST x TIMES` is the long search
-    faults: tuple[str, ...] = field(default=())  # what was not as it should be, in words
+    costs: dict[str, float]  # the best cost by method; `STRONGEST x TIMES` is the long search
+    faults: tuple[str, ...] = field(default=())  # what was wrong, in words
 
     @property
     def best(self) -> float:
         """The least cost of all, the truth's among them."""
-        return min(self.truth_cost, *self.found.values())
+        return min(self.truth_cost, *self.costs.values())
 
 
 def audited(problems: Suite, methods: Sequence[str] = METHODS, *, times: int = TIMES) -> Iterator[Audited]:
-    """Yield what becomes of each problem; with `times` of 0 nobody searches longer than usual."""
+    """Yield the results of each problem; with `times` of 0 there is no longer search."""
     for problem in problems:
-        found, faults = {}, []
+        costs, faults = {}, []
         plans = [(method, method, 1) for method in methods]
         for label, method, factor in [*plans, (f"{STRONGEST} x {times}", STRONGEST, times)][: len(plans) + bool(times)]:
             fresh = suite(problem.suite, problem.id_function, problem.instance, problem.dimension)
             run_on(fresh, method, evaluations=factor * usual_budget(problem.dimension))
-            found[label] = fresh.best_observed_fvalue1
+            costs[label] = fresh.best_observed_fvalue1
             faults += [f"{label}: {fault}" for fault in reported_faults(fresh)]
-        yield Audited(problem.id, problem.truth_cost, found, tuple(faults))
+        yield Audited(problem.id, problem.truth_cost, costs, tuple(faults))
 
 
 def reported_faults(problem: Problem) -> list[str]:
-    """Return what is not as it should be with the best proposal and the trace of a problem that was searched."""
-    made = suite_instance.__wrapped__(problem.id_function, problem.instance, problem.dimension)  # anew
+    """Return what is wrong with the best proposal and the trace of a problem that was searched."""
+    made = suite_instance.__wrapped__(problem.id_function, problem.instance, problem.dimension)  # not the cached one
     best, cost = problem.best[None], problem.best_observed_fvalue1
     poses, translations = made.posed.decode(best)
     shares = [
@@ -59,7 +58,7 @@ def reported_faults(problem: Problem) -> list[str]:
         for missed, spilled, both in (view[0].tolist() for view in made.posed.areas(poses, translations))
     ]
     faults = []
-    if abs((again := 100.0 * float(np.mean(shares))) - cost) > NEAR:
+    if abs((again := 100.0 * float(np.mean(shares))) - cost) > TOLERANCE:
         faults.append(f"the best proposal must cost what was reported, {cost!r}, got {again!r}")
     if not made.posed.space.feasible(best)[0]:
         faults.append("the best proposal must be feasible, got one that is not")
@@ -82,23 +81,23 @@ def known_costs(rows: Sequence[Audited]) -> dict[str, float]:
 
 def audit_lines(rows: Sequence[Audited]) -> list[str]:
     """Return the lines of a table, for a terminal: faults, and how far above the best of all each method ends."""
-    labels = list(rows[0].found)
+    labels = list(rows[0].costs)
     lines = [f"{'problem':38} {'truth':>8} {'best':>8}" + "".join(f" {label:>10}" for label in labels)]
     for row in rows:
         lines.append(
             f"{row.problem:38} {row.truth_cost:>8.3f} {row.best:>8.3f}"
-            + "".join(f" {row.found[label] - row.best:>+10.3f}" for label in labels)
+            + "".join(f" {row.costs[label] - row.best:>+10.3f}" for label in labels)
         )
-    medians = [np.median([row.found[label] - row.best for row in rows]) for label in labels]
+    medians = [np.median([row.costs[label] - row.best for row in rows]) for label in labels]
     lines.append(f"{'median above the best':56}" + "".join(f" {value:>+10.3f}" for value in medians))
     faults = [f"{row.problem}: {fault}" for row in rows for fault in row.faults]
     return [*lines, *faults, f"{len(rows)} problems, {len(rows) * len(labels)} searches, {len(faults)} faults"]
 
 
 def known_json(rows: Sequence[Audited], methods: Sequence[str], times: int) -> dict[str, Any]:
-    """Return what the file of known costs holds: who searched with which budgets, how many problems, the best costs.
+    """Return the contents of known.json: methods and budgets, the number of problems, the best costs.
 
-    `methods` and `times` are those of `audited`, which found the rows.
+    `methods` and `times` are those of `audited`.
     """
     usual = f"{', '.join(methods)} with the usual"
     return {

@@ -1,7 +1,7 @@
-"""The boxes that a suite searches: joint angles as few numbers, read from `boxes.npz` so that nobody learns them anew.
+"""The boxes that a suite searches: joint angles as few numbers, read from `boxes.npz`.
 
-A box never knows the person whose silhouette is sought. Of the ten people of the library seven are for training; for an
-instance of one of them, the box was learned from the six others. The three others are held out: their boxes were
+A box is never learned from the person in the silhouette. Of the ten people of the library seven are for training; for
+an instance of one of them, the box was learned from the six others. The three others are held out: their boxes were
 learned from the seven. `make_boxes.py` made the file. Its numbers are rounded, and sums are taken in one order, so that
 a proposal means the same pose on every machine.
 """
@@ -22,12 +22,12 @@ HELD_OUT_PEOPLE = ("16", "49", "135")
 TRAINING_PEOPLE = ("02", "05", "09", "14", "17", "29", "127")
 STEP = 1e-4  # radians, and what a stored component is a whole multiple of
 SIZES = (6, 13, 21, 37)  # components of the boxes of 9, 16, 24 and 40 dimensions
-NOBODY_ELSE = "held out"  # the name of the box learned from all people for training
+HELD_OUT_GROUP = "held out"  # the name of the box learned from all people for training
 
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What the file holds of one group of people."""
+    """The statistics of one group of people."""
 
     mean: Array  # (63,) radians
     components: Array = field(repr=False)  # (37, 63)
@@ -36,7 +36,7 @@ class Learned:
     reach: Array  # (4,) by `SIZES`: how far from the mean poses are, in spreads
     low: Array  # (63,) the range of each joint angle
     high: Array  # (63,)
-    order: NDArray[np.int64]  # (63,) joint angles, those that move the most first
+    order: NDArray[np.int64]  # (63,) joint angles by their variation, the largest first
 
 
 @lru_cache(maxsize=1)
@@ -51,15 +51,15 @@ def _stored() -> dict[str, Learned]:
 
 
 def learned_without(subject: str) -> Learned:
-    """Return what was learned from other people than this one, who is one of the library."""
-    return _stored()[subject if subject in TRAINING_PEOPLE else NOBODY_ELSE]
+    """Return the statistics of other people than this one of the library."""
+    return _stored()[subject if subject in TRAINING_PEOPLE else HELD_OUT_GROUP]
 
 
 class _Stored:
-    """What both kinds of box have in common: they are read, not learned."""
+    """A box that is read, not learned."""
 
     def fit(self, angles: Array, skeleton: object = None) -> NoReturn:  # noqa: ARG002, as of any prior
-        """Raise TypeError: a suite's box is what its file says."""
+        """Raise TypeError: a suite's box never changes."""
         raise TypeError("the box of a suite must stay as it is, got something to learn from")
 
     def save(self, path: str | Path) -> NoReturn:  # noqa: ARG002, as of any prior
@@ -83,7 +83,7 @@ class ComponentBox(_Stored):
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
         angles = np.tile(self.mean, (len(latents), 1))
-        for k, direction in enumerate(self.components):  # no matrix product: its last bits hang on the machine
+        for k, direction in enumerate(self.components):  # no matrix product: its last bits depend on the machine
             angles += latents[:, k, None] * direction
         return angles
 
@@ -137,9 +137,9 @@ SuiteBox = ComponentBox | AngleBox
 
 @lru_cache(maxsize=64)
 def box_without(subject: str, dimension: int, angles: bool) -> SuiteBox:
-    """Return the box of so many dimensions, the root's three among them, that never knew a person of the library."""
-    made: type[SuiteBox] = AngleBox if angles else ComponentBox
-    return made(learned_without(subject), dimension - 3)
+    """Return the box, learned without one person, of so many dimensions, the root's three among them."""
+    kind: type[SuiteBox] = AngleBox if angles else ComponentBox
+    return kind(learned_without(subject), dimension - 3)
 
 
 def is_upright(pose: Array) -> bool:

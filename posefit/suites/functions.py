@@ -1,4 +1,4 @@
-"""The functions of a suite, and which numbers and dimensions there are. None of this changes under one name."""
+"""The functions of a suite, and its numbers and dimensions. None of this changes under one name."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class SuiteFunction:
     number: int
     name: str
     summary: str
-    exact: bool  # whether the box holds a proposal of cost 0: what is seen was drawn from it
+    exact: bool  # whether the box holds a proposal of cost 0, as the silhouette is of one of its poses
     dimensions: tuple[int, ...] = (9, 16, 24, 40)
 
 

@@ -1,8 +1,8 @@
-"""Numbered instances: a person of the library, a pose, cameras, and what they see.
+"""Numbered instances: a person of the library, a pose, cameras, and their silhouettes.
 
 A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose; only the
 ambiguous one draws until a pose's mirror image is near enough. Instances below 10,000 are of seven people, the others
-of three whom nothing for training has ever seen.
+of three who are in no training data.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, SuiteBox, box_without, is_upright
 from posefit.suites.functions import TRAINING, suite_function
 
-SALT = 2026  # part of the seed of every instance
+RNG_STREAM = 2026  # part of the seed of every instance
 SIZE = (120, 160)  # pixels
 PLACE = np.array([0.0, 0.9, 0.0])  # metres: where the root is, and cameras aim
 NEAR = (3.5, np.radians(40.0))  # metres to a camera; radians it sees across the larger side
@@ -45,14 +45,14 @@ DIGITS = 4  # of a truth in the box, so that every machine has the same one
 
 @dataclass(frozen=True, eq=False)
 class SuiteInstance:
-    """What a problem of a suite is made of."""
+    """The person, the silhouettes and the box of a problem."""
 
     function: int
     number: int
     subject: str
     posed: PoseProblem = field(repr=False)
     box: SuiteBox = field(repr=False)
-    truth: Array = field(repr=False)  # (d,) the proposal whose pose was seen
+    truth: Array = field(repr=False)  # (d,) the proposal of the true pose
     truth_cost: float  # of that proposal; 0 where the function is exact
     decoy: Array | None = field(default=None, repr=False)  # (d,) of function 6, the mirrored pose
 
@@ -69,7 +69,7 @@ class SuiteInstance:
 @lru_cache(maxsize=256)
 def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
     """Return an instance; the same for the same numbers everywhere, which `checked_address` has checked."""
-    rng = np.random.default_rng([SALT, function, number])
+    rng = np.random.default_rng([RNG_STREAM, function, number])
     people = TRAINING_PEOPLE if number in TRAINING else HELD_OUT_PEOPLE
     subject = people[int(rng.integers(len(people)))]
     box = box_without(subject, dimension, angles=suite_function(function).name == "high-dimensional")
@@ -78,7 +78,7 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
 
 @dataclass(frozen=True, eq=False)
 class _Draft:
-    """What the makers of instances share."""
+    """An instance that is being made: its person, its box and its random numbers."""
 
     function: int
     number: int
@@ -102,13 +102,13 @@ class _Draft:
         """Return the box around a yaw in radians."""
         return SearchSpace(self.box, np.array([yaw, 0.0, 0.0]), ROOT_RANGE, PLACE)
 
-    def held(self, space: SearchSpace, poses: Array) -> Array:
+    def nearest(self, space: SearchSpace, poses: Array) -> Array:
         """Return the proposals (n, d) nearest to poses (n, 66), feasible, of few digits."""
         latents = self.box.within_reach(self.box.transform(poses[:, 3:]))
-        found = np.round(space.proposals(np.column_stack([poses[:, :3], latents])), DIGITS)
-        bad = ~space.feasible(found)
-        found[bad] = np.round(0.999 * found[bad], DIGITS)  # rounding took it out of the ellipsoid again
-        return np.asarray(found)
+        proposals = np.round(space.proposals(np.column_stack([poses[:, :3], latents])), DIGITS)
+        bad = ~space.feasible(proposals)
+        proposals[bad] = np.round(0.999 * proposals[bad], DIGITS)  # rounding moved it out of the ellipsoid
+        return np.asarray(proposals)
 
     def camera(self, azimuth: float, away: tuple[float, float] = NEAR) -> Camera:
         return Camera.around(PLACE, azimuth, away[0], SIZE, away[1])
@@ -133,14 +133,15 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
     space = draft.space(pose[0] + YAW_OFF * rng.uniform(-1.0, 1.0))
     azimuth = rng.uniform(-np.pi, np.pi)
     pose = _still(draft, pose)
-    truth = draft.held(space, pose[None])[0]
+    truth = draft.nearest(space, pose[None])[0]
     cameras = [draft.camera(azimuth + 0.5 * np.pi * k) for k in range(views)]
-    seen = space.decode(truth[None])[0][0]
-    return draft.made(PoseProblem(body, cameras, [_seen(body, camera, seen) for camera in cameras], space), truth)
+    pose = space.decode(truth[None])[0][0]
+    silhouettes = [_silhouette(body, camera, pose) for camera in cameras]
+    return draft.made(PoseProblem(body, cameras, silhouettes, space), truth)
 
 
 def _still(draft: _Draft, pose: Array) -> Array:
-    """Return a pose (66,) whose angles that nobody moves are drawn, so that the true ones are not the box's middle."""
+    """Return a pose (66,) with random values of the angles that are constant in the data, off the box's middle."""
     offs = draft.rng.uniform(-0.5, 0.5, 66)
     if draft.function != 7:
         return pose
@@ -156,11 +157,11 @@ def _next_frame(draft: _Draft) -> SuiteInstance:
     poses, body, rng = draft.poses(3), _person(draft), draft.rng
     space = draft.space(float(poses[1, 0]) + 0.25 * YAW_OFF * rng.uniform(-1.0, 1.0))
     camera = draft.camera(rng.uniform(-np.pi, np.pi))
-    before, last, truth = draft.held(space, poses)
-    step, seen = last - before, space.decode(truth[None])[0][0]
-    mean = draft.held(space, space.decode(np.clip(last + step, -1.0, 1.0)[None])[0])[0]
+    before, last, truth = draft.nearest(space, poses)
+    step, pose = last - before, space.decode(truth[None])[0][0]
+    mean = draft.nearest(space, space.decode(np.clip(last + step, -1.0, 1.0)[None])[0])[0]
     space = replace(space, start=Start(mean, np.abs(step) + SPREAD, step))
-    return draft.made(PoseProblem(body, [camera], [_seen(body, camera, seen)], space), truth)
+    return draft.made(PoseProblem(body, [camera], [_silhouette(body, camera, pose)], space), truth)
 
 
 def _corrupted(draft: _Draft) -> SuiteInstance:
@@ -173,7 +174,7 @@ def _corrupted(draft: _Draft) -> SuiteInstance:
 
 
 def _mismatched(draft: _Draft) -> SuiteInstance:
-    """Return a pose of the box, sought with a body that is not the person's."""
+    """Return a pose of the box, searched with a body that is not the person's."""
     made = _single(draft)
     return draft.made(replace(made.posed, body=varied(made.posed.body, MISMATCH_PERCENT, draft.rng)), made.truth)
 
@@ -189,11 +190,11 @@ def _ambiguous(draft: _Draft) -> SuiteInstance:
         space = draft.space(pose[0] + 0.5 * YAW_OFF * rng.uniform(-1.0, 1.0))
         side = rng.choice([-1.0, 1.0]) * 0.5 * np.pi + np.radians(10.0) * rng.uniform(-1.0, 1.0)
         camera = draft.camera(pose[0] + side, FAR)
-        truth = draft.held(space, pose[None])
-        seen = space.decode(truth)[0]
-        problem = PoseProblem(body, [camera], [_seen(body, camera, seen[0])], space)
-        decoy = draft.held(space, wrapped(reflected_poses(body.skeleton, seen, facing(camera, PLACE))))
-        joints = body.skeleton.joints(np.concatenate([seen, space.decode(decoy)[0]]), np.zeros((2, 3)))
+        truth = draft.nearest(space, pose[None])
+        true_pose = space.decode(truth)[0]
+        problem = PoseProblem(body, [camera], [_silhouette(body, camera, true_pose[0])], space)
+        decoy = draft.nearest(space, wrapped(reflected_poses(body.skeleton, true_pose, facing(camera, PLACE))))
+        joints = body.skeleton.joints(np.concatenate([true_pose, space.decode(decoy)[0]]), np.zeros((2, 3)))
         cost = float(problem.evaluate(decoy)[0])
         apart = 1e3 * float(np.linalg.norm(joints[0] - joints[1], axis=-1).mean()) >= APART_MM
         if best is None or cost + 100.0 * (not apart) < least:
@@ -213,7 +214,7 @@ def _aligned(draft: _Draft) -> SuiteInstance:
     )
 
 
-def _seen(body: Body, camera: Camera, pose: Array) -> Silhouette:
+def _silhouette(body: Body, camera: Camera, pose: Array) -> Silhouette:
     return Silhouette.of(project(body, camera, pose, PLACE))
 
 

@@ -2,7 +2,7 @@
 
     python -m posefit.suites.make_boxes
 
-The file of a suite is never made anew: its numbers would change. This says how it was made.
+The file of a suite is never replaced: its numbers would change. This documents how it was made.
 """
 
 from pathlib import Path
@@ -13,15 +13,15 @@ from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in, recorded
-from posefit.suites.boxes import NOBODY_ELSE, SIZES, STEP, TRAINING_PEOPLE, is_upright
+from posefit.suites.boxes import HELD_OUT_GROUP, SIZES, STEP, TRAINING_PEOPLE, is_upright
 
 BOX, ELLIPSOID = 0.99, 0.98  # quantiles of the poses learned: of each latent, and of the distance from the mean
 RANGE, MARGIN = 0.005, np.radians(5.0)  # of a joint angle: quantile left out at either end, and what is added then
-STILL = np.radians(10.0)  # to either side, of joint angles that nobody moves
+STILL = np.radians(10.0)  # to either side, of joint angles that are constant in the data
 
 
 def learned_from(poses: Array) -> dict[str, Array]:
-    """Return what the file holds of poses (n, 66), as whole multiples of `STEP`."""
+    """Return the statistics of poses (n, 66), as whole multiples of `STEP`."""
     angles = poses[:, 3:]
     mean = np.round(angles.mean(axis=0) / STEP) * STEP
     directions = np.linalg.svd(angles - mean, full_matrices=False)[2][: SIZES[-1]]
@@ -31,7 +31,7 @@ def learned_from(poses: Array) -> dict[str, Array]:
     spread = latents.std(axis=0)
     low, high = np.quantile(angles, [RANGE, 1.0 - RANGE], axis=0)
     moved = high > low
-    found = {
+    values = {
         "mean": mean,
         "components": components,
         "spread": spread,
@@ -42,7 +42,7 @@ def learned_from(poses: Array) -> dict[str, Array]:
         "low": np.where(moved, low - MARGIN, mean - STILL),
         "high": np.where(moved, high + MARGIN, mean + STILL),
     }
-    rounded = {name: np.round(value / STEP).astype(np.int32) for name, value in found.items()}
+    rounded = {name: np.round(value / STEP).astype(np.int32) for name, value in values.items()}
     return {**rounded, "order": np.argsort(-angles.std(axis=0), kind="stable").astype(np.int32)}
 
 
@@ -55,9 +55,12 @@ def _poses(subjects: tuple[str, ...]) -> Array:
 
 def main() -> None:
     """Write the file."""
-    groups = {name: tuple(one for one in TRAINING_PEOPLE if one != name) for name in (*TRAINING_PEOPLE, NOBODY_ELSE)}
-    found = [learned_from(_poses(people)) for people in groups.values()]
-    arrays = {name: np.stack([one[name] for one in found]) for name in found[0]}
+    groups = {
+        name: tuple(person for person in TRAINING_PEOPLE if person != name)
+        for name in (*TRAINING_PEOPLE, HELD_OUT_GROUP)
+    }
+    learned = [learned_from(_poses(people)) for people in groups.values()]
+    arrays = {name: np.stack([group[name] for group in learned]) for name in learned[0]}
     np.savez_compressed(Path(__file__).parent / "boxes.npz", names=np.array(list(groups)), **arrays)  # type: ignore[arg-type]
 
 

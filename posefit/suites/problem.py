@@ -1,31 +1,47 @@
-"""One problem of a suite, for anybody's loop: call it with proposals, and it counts, keeps the best and the trace.
+"""Problems of a suite, for any loop: call one with proposals, and it counts, keeps the best and the trace.
 
-Its attributes have the names that COCO's problems have, so that loops written for those run on it as they are.
+`suite` returns one by its numbers, `Suite` goes through many. A problem's attributes have the names of COCO's, so that
+loops written for those run on it as they are.
+
+The best known costs are in known.json, which `posefit suite audit --write` made. A cost of the file may fall in a later
+version, and problems may be added; none may rise or go. Nothing else of a suite ever changes.
 """
 
 import time
-from typing import Literal, final
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
+from importlib.resources import files
+from itertools import product
+from typing import Any, Literal, final
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space, Start, draw_population
 from posefit.fitting.check import one_of, positive, whole
-from posefit.reading import quoted
-from posefit.suites.functions import SuiteFunction
-from posefit.suites.instances import SuiteInstance
-from posefit.suites.known import best_known_of
+from posefit.reading import parsed_json, quoted
+from posefit.suites.functions import (
+    DIMENSIONS,
+    FUNCTIONS,
+    HELD_OUT,
+    SUITE,
+    SUITES,
+    SuiteFunction,
+    checked_address,
+    suite_function,
+)
+from posefit.suites.instances import SuiteInstance, suite_instance
 
 Infeasible = Literal["repair", "reject", "penalise"]
 INFEASIBLE: tuple[Infeasible, ...] = ("repair", "reject", "penalise")
 
 TARGETS = 2.0 ** np.arange(5.0, -2.25, -0.25)  # above the reference, 32 to 0.25: a pixel is about 0.03
-WEIGHT = 100.0  # cost of a half-side of the box that a penalised proposal is out of what is feasible
+PENALTY = 100.0  # cost of a half-side of the box between a penalised proposal and its repair
 EVALUATIONS = 100  # of the usual budget, for each dimension
 
 
 class BudgetSpentError(Exception):
-    """A problem was asked for more evaluations, or for longer, than its budget holds."""
+    """A call goes beyond the evaluations or the seconds of a problem's budget."""
 
 
 @final
@@ -35,13 +51,13 @@ class Problem:
     Call it with one proposal (d,) for a float, or with some (n, d) for an array (n,). Every proposal counts as one
     evaluation, whether it is feasible or not.
 
-    What is not feasible is out of the box, or no pose that people take: out of the ellipsoid of `posefit.suites.boxes`.
-    With `infeasible="repair"` such a proposal costs what the one costs that `repaired` gives for it; with "reject" its
-    cost is infinite; with "penalise" it is that of the repaired one, and 100 for each half-side of the box between the
-    two. It is the same for every method, whoever wrote it.
+    A proposal is infeasible outside the box, and outside the ellipsoid of `posefit.suites.boxes`, which holds the poses
+    that people take. With `infeasible="repair"` it costs as much as the proposal that `repaired` returns for it; with
+    "reject" its cost is infinite; with "penalise" it is the cost of the repaired one, and 100 for each half-side of the
+    box between the two.
 
-    `budget` is how many evaluations there may be, and `seconds` how long after the first a call may
-    begin: whatever goes beyond is not evaluated and raises BudgetSpentError. Without them there is no end.
+    `budget` is the largest number of evaluations, and `seconds` the time after the first in which a call may begin:
+    what goes beyond raises BudgetSpentError and is not evaluated. Without them there is no end.
     """
 
     number_of_objectives = 1
@@ -78,9 +94,9 @@ class Problem:
 
         Raises ValueError where the shape is another or a number is not finite, and BudgetSpentError.
         """
-        asked = self._checked(proposals)
-        costs = self._counted(asked.reshape(-1, self.dimension))
-        return float(costs[0]) if asked.ndim == 1 else costs
+        checked = self._checked(proposals)
+        costs = self._counted(checked.reshape(-1, self.dimension))
+        return float(costs[0]) if checked.ndim == 1 else costs
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), as `posefit.minimise` asks for them."""
@@ -92,7 +108,7 @@ class Problem:
 
     @property
     def space(self) -> Space:
-        """The box as posefit's own optimisers want it: `factory(problem.space, rng)`."""
+        """The box as posefit's own optimisers take it: `factory(problem.space, rng)`."""
         return self.made.posed.space
 
     @property
@@ -138,7 +154,7 @@ class Problem:
 
     @property
     def start(self) -> Start | None:
-        """Where a prediction says that the search should start, with its spread; None where there is none."""
+        """The predicted start of the search, with its spread; None without a prediction."""
         return self.space.start
 
     @property
@@ -147,7 +163,7 @@ class Problem:
         return np.zeros(self.dimension) if self.start is None else self.start.mean.copy()
 
     def initial_solution_proposal(self, restart: int = 0) -> Array:
-        """Return the proposal (d,) to start from at first, and others, drawn, for each restart."""
+        """Return the proposal (d,) to start from first, and a random one for each restart."""
         if not restart:
             return self.initial_solution
         drawn: Array = draw_population(self.space, np.random.default_rng([self.instance, restart]), 1)[0]
@@ -155,7 +171,7 @@ class Problem:
 
     @property
     def optimum(self) -> float | None:
-        """The least cost there is, where it is known: 0 where what is seen was drawn from the box. Else None."""
+        """The lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown."""
         return 0.0 if self.function.exact else None
 
     @property
@@ -165,9 +181,9 @@ class Problem:
 
     @property
     def best_known(self) -> float:
-        """The least cost that is known: the truth's, or what `posefit suite audit` found and the suite's file says."""
-        found = best_known_of(self.id)
-        return self.truth_cost if found is None else min(found, self.truth_cost)
+        """The lowest known cost: the truth's, or that of known.json."""
+        known = best_known_of(self.id)
+        return self.truth_cost if known is None else min(known, self.truth_cost)
 
     @property
     def targets(self) -> Array:
@@ -212,34 +228,130 @@ class Problem:
 
     def _checked(self, proposals: object) -> Array:
         try:
-            asked = np.asarray(proposals, dtype=np.float64)
+            checked = np.asarray(proposals, dtype=np.float64)
         except (TypeError, ValueError):
             raise ValueError(f"proposals must be numbers, got {quoted(proposals)}") from None
-        if asked.ndim not in (1, 2) or asked.shape[-1] != self.dimension:
+        if checked.ndim not in (1, 2) or checked.shape[-1] != self.dimension:
             d = self.dimension
-            raise ValueError(f"proposals must have shape ({d},) or (n, {d}), got {asked.shape}")
-        if not np.isfinite(asked).all():
+            raise ValueError(f"proposals must have shape ({d},) or (n, {d}), got {checked.shape}")
+        if not np.isfinite(checked).all():
             raise ValueError("proposals must be finite, got nan or infinity")
-        return asked
+        return checked
 
-    def _counted(self, asked: Array) -> Array:
-        """Return the costs (n,) of checked proposals (n, d), and take note of them."""
+    def _counted(self, checked: Array) -> Array:
+        """Return the costs (n,) of checked proposals (n, d), and count them."""
         if self._began is None:
             self._began = time.perf_counter()
-        if len(asked) > self.left:
-            raise BudgetSpentError(f"{self.id}: {self.left:g} of {self.budget} evaluations are left, got {len(asked)}")
+        if len(checked) > self.left:
+            raise BudgetSpentError(
+                f"{self.id}: {self.left:g} of {self.budget} evaluations are left, got {len(checked)}"
+            )
         if self._limit is not None and self.elapsed > self._limit:
             raise BudgetSpentError(f"{self.id}: its {self._limit:g} seconds are over")
-        allowed = self.space.feasible(asked)
-        mended = asked if allowed.all() else self.made.repaired(asked)
-        costs = self.made.posed.evaluate(mended)
+        allowed = self.space.feasible(checked)
+        repaired = checked if allowed.all() else self.made.repaired(checked)
+        costs = self.made.posed.evaluate(repaired)
         if self.infeasible == "reject":
             costs[~allowed] = np.inf
         elif self.infeasible == "penalise":
-            costs[~allowed] += WEIGHT * np.linalg.norm(asked - mended, axis=1)[~allowed]
+            costs[~allowed] += PENALTY * np.linalg.norm(checked - repaired, axis=1)[~allowed]
         for k in np.flatnonzero(costs < self.best_observed_fvalue1):
             if costs[k] < self.best_observed_fvalue1:
-                self.best_observed_fvalue1, self._best = float(costs[k]), mended[k].copy()
+                self.best_observed_fvalue1, self._best = float(costs[k]), repaired[k].copy()
                 self._steps.append((self.evaluations + int(k) + 1, self.best_observed_fvalue1))
-        self.evaluations += len(asked)
+        self.evaluations += len(checked)
         return costs
+
+
+def suite(
+    name: str = SUITE,
+    function: int = 1,
+    instance: int = 0,
+    dimension: int = 9,
+    *,
+    infeasible: Infeasible = "repair",
+    budget: int | None = None,
+    seconds: float | None = None,
+) -> Problem:
+    """Return a problem of a suite: the same for the same numbers on every machine, with nothing evaluated yet.
+
+    Instances below 10,000 are for training, those up to 19,999 are held out. `posefit.Suite` lists the functions and
+    their dimensions; `Problem` documents the other arguments. Raises ValueError where there is no such problem.
+    """
+    number, instance, dimension = checked_address(name, function, instance, dimension)
+    made = suite_instance(number, instance, dimension)
+    return Problem(name, suite_function(number), made, infeasible=infeasible, budget=budget, seconds=seconds)
+
+
+@final
+class Suite:
+    """Problems to go through, each made in its turn: `for problem in Suite(): ...`, as with COCO's.
+
+    By default that is each function in each of its dimensions, on fifteen held-out instances; dimensions that a
+    function does not have are passed over, and functions with none of them are `passed_over`. The order is by
+    dimension, function and instance. Raises ValueError for an unknown number, or where nothing is left.
+    """
+
+    def __init__(
+        self,
+        name: str = SUITE,
+        *,
+        functions: Sequence[int] | None = None,
+        dimensions: Sequence[int] = DIMENSIONS,
+        instances: Sequence[int] = HELD_OUT[:15],
+        infeasible: Infeasible = "repair",
+        budget: int | None = None,
+        seconds: float | None = None,
+    ) -> None:
+        one_of("suite", name, SUITES)
+        for what, numbers in (("functions", functions), ("dimensions", dimensions), ("instances", instances)):
+            if numbers is not None and not isinstance(numbers, Iterable):
+                raise ValueError(f"{what} must be a list of numbers, got {quoted(numbers)}")
+        chosen = FUNCTIONS if functions is None else [suite_function(number) for number in functions]
+        for dimension in dimensions:
+            one_of("dimension", dimension, DIMENSIONS)
+        self.passed_over = tuple(one for one in chosen if not set(dimensions) & set(one.dimensions))
+        self.name, self._infeasible, self._budget, self._seconds = name, infeasible, budget, seconds
+        self._addresses = [
+            checked_address(name, one.number, instance, dimension)
+            for dimension, one, instance in product(dimensions, chosen, instances)
+            if dimension in one.dimensions
+        ]
+        if not self._addresses:
+            raise ValueError(f"a suite must hold at least one problem, got none in {list(dimensions)} dimensions")
+
+    @property
+    def functions(self) -> tuple[SuiteFunction, ...]:
+        """The functions that problems are of, each with its number, name, summary and dimensions."""
+        numbers = {number for number, _, _ in self._addresses}
+        return tuple(one for one in FUNCTIONS if one.number in numbers)
+
+    def __len__(self) -> int:
+        return len(self._addresses)
+
+    def __getitem__(self, index: int) -> Problem:
+        function, instance, dimension = self._addresses[index]
+        return Problem(
+            self.name,
+            suite_function(function),
+            suite_instance(function, instance, dimension),
+            infeasible=self._infeasible,
+            budget=self._budget,
+            seconds=self._seconds,
+            index=index % len(self),
+        )
+
+    def __iter__(self) -> Iterator[Problem]:
+        return (self[index] for index in range(len(self)))
+
+
+@lru_cache(maxsize=1)
+def known_file() -> dict[str, Any]:
+    """Return the contents of known.json: how it was made, and `best`, a cost by a problem's id."""
+    contents: dict[str, Any] = parsed_json((files("posefit.suites") / "known.json").read_text(encoding="utf-8"))
+    return contents
+
+
+def best_known_of(problem: str) -> float | None:
+    """Return the best known cost of a problem by its id; None where it is unknown."""
+    return known_file()["best"].get(problem)  # type: ignore[no-any-return]

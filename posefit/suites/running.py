@@ -1,4 +1,4 @@
-"""An optimiser of a plugin on a problem of a suite, and what came of it."""
+"""An optimiser of a plugin on a problem of a suite."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,12 +13,12 @@ from posefit.fitting.validation import CheckedOptimiser, plugin_errors
 from posefit.registry import registry
 from posefit.suites.problem import EVALUATIONS, Problem
 
-SALT = 2027  # part of the seed of every search
+RNG_STREAM = 2027  # part of the seed of every search
 
 
 @dataclass(frozen=True, eq=False)
 class SuiteRun:
-    """What a method did with a problem."""
+    """The run of a method on a problem."""
 
     method: str
     settings: Mapping[str, Any]
@@ -26,8 +26,8 @@ class SuiteRun:
     dimension: int
     instance: int
     seed: int
-    budget: int  # evaluations that there could have been
-    infeasible: str  # what became of proposals that were not feasible: see `Problem`
+    budget: int  # of evaluations
+    infeasible: str  # the way with infeasible proposals: see `Problem`
     best_known: float
     targets: Array = field(repr=False)  # (t,) costs, falling
     evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
@@ -40,7 +40,7 @@ class SuiteRun:
 
 
 def usual_budget(dimension: int) -> int:
-    """Return the evaluations of a run where nobody says: a hundred for each dimension."""
+    """Return the default budget: a hundred evaluations for each dimension."""
     return EVALUATIONS * dimension
 
 
@@ -52,14 +52,14 @@ def run_on(
     evaluations: int | None = None,
     seed: int = 0,
 ) -> SuiteRun:
-    """Return what an optimiser, by its name, finds on a problem within a budget; the same for the same seed.
+    """Return the run of an optimiser, by its name, on a problem within a budget; the same for the same seed.
 
     Raises ValueError where there is no such optimiser or setting, where the budget does not hold one population, and
     where the plugin breaks a rule of optimisers; ImportError where a library it needs is not installed.
     """
     evaluations = usual_budget(problem.dimension) if evaluations is None else evaluations
     chosen, space = dict(chosen or {}), problem.space
-    rng = np.random.default_rng([SALT, seed, problem.id_function, problem.instance, problem.dimension])
+    rng = np.random.default_rng([RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension])
     factory = registry().optimiser(method)
     settings.check(method, factory, chosen)
     with plugin_errors(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):

@@ -1,6 +1,6 @@
-"""What runs on a suite come to, by method, function, dimension, budget and what became of infeasible proposals.
+"""Scores of runs on a suite: shares of targets, running times and costs.
 
-That is shares of targets, running times and costs. Only runs that are alike in all of these are taken together.
+Only runs with the same method, function, dimension, budget and way with infeasible proposals are taken together.
 
 Targets are an instance's own, from 32 to 0.25 above its best known cost. Hansen et al., COCO: a platform for comparing
 continuous optimizers in a black-box setting, 2021.
@@ -20,19 +20,19 @@ from posefit.suites.running import SuiteRun
 
 ALL = 0  # the number that stands for all functions together
 SHOWN = (16.0, 4.0, 1.0, 0.25)  # of the targets above the best known, those with an expected running time
-POINTS = (1, 3, 10, 30, 100, 300, 1000)  # evaluations for each dimension at which shares are told
+POINTS = (1, 3, 10, 30, 100, 300, 1000)  # evaluations for each dimension at which shares are reported
 
 
 @dataclass(frozen=True)
 class SuiteScore:
-    """What runs of one method with one budget on one function in one dimension come to."""
+    """The score of runs of one method with one budget on one function in one dimension."""
 
     method: str
     function: int
     name: str
     dimension: int
     budget: int  # evaluations that a run could have had
-    infeasible: str  # what became of proposals that were not feasible: see `posefit.suites.problem.Problem`
+    infeasible: str  # the way with infeasible proposals: see `posefit.suites.problem.Problem`
     runs: int
     above: float  # median of the best costs above the best known
     reached: float  # share of runs and targets, at the end
@@ -54,45 +54,42 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
     groups: dict[tuple[int, int, str, int, str], list[SuiteRun]] = {}
     for run in runs:
         for function in (run.function, ALL):
-            alike = run.dimension, function, method_name(run), run.budget, run.infeasible
-            groups.setdefault(alike, []).append(run)
+            key = run.dimension, function, method_name(run), run.budget, run.infeasible
+            groups.setdefault(key, []).append(run)
     if not groups:
         raise ValueError("runs must be at least one, got none")
-    there = {(dimension, function) for dimension, function, *_ in groups}
-    several = {dimension for dimension, _ in there if sum(other == dimension for other, _ in there) > 2}
-    found = [
-        _score(method, function, mine)
-        for (dimension, function, method, *_), mine in groups.items()
+    pairs = {(dimension, function) for dimension, function, *_ in groups}
+    several = {dimension for dimension, _ in pairs if sum(other == dimension for other, _ in pairs) > 2}
+    scores = [
+        _score(method, function, group)
+        for (dimension, function, method, *_), group in groups.items()
         if function != ALL or dimension in several
     ]
-    return sorted(found, key=_place)
-
-
-def _place(score: SuiteScore) -> tuple[object, ...]:
-    """Return what scores are sorted by."""
-    least = -score.reached, score.above
-    return score.dimension, score.function, *least, score.method, score.budget, score.infeasible
+    return sorted(
+        scores,
+        key=lambda one: (one.dimension, one.function, -one.reached, one.above, one.method, one.budget, one.infeasible),
+    )
 
 
 def method_name(run: SuiteRun) -> str:
-    """Return a run's method with what was set of it."""
-    told = ", ".join(f"{name}={value}" for name, value in sorted(run.settings.items()))
-    return f"{run.method} ({told})" if told else run.method
+    """Return a run's method with its settings."""
+    chosen = ", ".join(f"{name}={value}" for name, value in sorted(run.settings.items()))
+    return f"{run.method} ({chosen})" if chosen else run.method
 
 
-def budgets_differ(found: Sequence[SuiteRun] | Sequence[SuiteScore]) -> bool:
+def budgets_differ(results: Sequence[SuiteRun] | Sequence[SuiteScore]) -> bool:
     """Return whether in some dimension runs, or those behind scores, have several budgets."""
-    return len({(one.dimension, one.budget) for one in found}) > len({one.dimension for one in found})
+    return len({(one.dimension, one.budget) for one in results}) > len({one.dimension for one in results})
 
 
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
-    """Return the score of runs that are alike in all but their instances, seeds and functions."""
+    """Return the score of runs that differ only in their instances, seeds and functions."""
     dimension, budget = runs[0].dimension, runs[0].budget
     reached = np.array([hits((run.evaluations, run.costs), run.targets) for run in runs])
-    spent = np.array([run.evaluations[-1] for run in runs])
-    times = expected_running_time(reached, spent)
+    used = np.array([run.evaluations[-1] for run in runs])
+    times = expected_running_time(reached, used)
     points = [point for point in POINTS if point * dimension <= budget]
-    shares = attained(reached, [*(point * dimension for point in points), float(spent.max())])
+    shares = attained(reached, [*(point * dimension for point in points), float(used.max())])
     return SuiteScore(
         method,
         function,
@@ -131,7 +128,7 @@ def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
 
 
 def _labels(scores: Sequence[SuiteScore]) -> list[str]:
-    """Return how tables name the method of each score: with what else tells some of them apart."""
+    """Return the label of each score in tables: its method, and what else differs."""
     budgets, ways = budgets_differ(scores), len({one.infeasible for one in scores}) > 1
     return [
         one.method + f", {one.budget / one.dimension:g} x d" * budgets + f", {one.infeasible}" * ways for one in scores

@@ -231,7 +231,7 @@ class SearchCell(Cell):
 
     def measure(self) -> CellResult:
         """Search the problem."""
-        from posefit.suites.front import suite
+        from posefit.suites.problem import suite
         from posefit.suites.running import run_on
 
         problem = suite(self.suite, self.function, self.instance, self.dimension, infeasible=self.infeasible)  # type: ignore[arg-type]

@@ -5,22 +5,21 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pytest
 from click.testing import CliRunner
 
 import posefit
 from posefit.cli import main
 from posefit.suites.audit import METHODS, audited, reported_faults
-from posefit.suites.front import Suite
-from posefit.suites.known import best_known_of, known_file
+from posefit.suites.problem import Suite, best_known_of, known_file
 from posefit.suites.running import run_on
+from tests.cases import each
 
 
 def test_no_built_in_method_reports_below_the_optimum_or_another_cost_than_its_proposal_has() -> None:
     problems = Suite(functions=[1, 2, 4, 5, 8], dimensions=[9], instances=[10_001])
     rows = list(audited(problems, METHODS, times=0))
     assert len(rows) == 5
-    assert all(set(row.found) == set(METHODS) for row in rows)
+    assert all(set(row.costs) == set(METHODS) for row in rows)
     assert [fault for row in rows for fault in row.faults] == []
 
 
@@ -90,7 +89,7 @@ def test_a_proposal_of_the_audit_may_be_counted_from_its_numbers_alone() -> None
     assert np.abs(problem.best).max() <= 1.0
 
 
-@pytest.mark.parametrize(
+@each(
     ("words", "message"),
     [(["--times", "-1"], "times must be 0 or more, got -1"), (["--method", "sapsoo"], "optimiser must be one of")],
 )

@@ -20,6 +20,7 @@ from posefit.sweep.engines.engine import Outcome, Run
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan, search_cells
 from posefit.sweep.table import search_runs
+from tests.cases import each
 
 PLAN = """
 suite = "posefit-2026.1"
@@ -234,7 +235,7 @@ def test_a_sweep_runs_a_plan_of_searches_and_goes_on(tmp_path: Path) -> None:
     assert "4 of 4 cells done, 0 of them now" in run(*words).stdout
 
 
-@pytest.mark.parametrize(
+@each(
     ("words", "message"),
     [
         (["run", "sapsoo"], "optimiser must be one of .*, got 'sapsoo'; did you mean 'sapso'"),
@@ -268,14 +269,13 @@ def test_a_mistake_is_one_line_and_status_2(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
+@each(
     "words",
     [
         ["run", "random", "--function", 1, "--instances", "3:4", "--out"],
         ["audit", "--function", 1, "--instances", "3:4", "--times", 0, "--write"],
         ["table", "ledger", "--iohprofiler"],
     ],
-    ids=lambda words: words[0],
 )
 def test_a_link_that_leads_nowhere_is_refused_before_anything_runs(words: list[Any], tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "nothing")
@@ -284,7 +284,7 @@ def test_a_link_that_leads_nowhere_is_refused_before_anything_runs(words: list[A
     assert done.stderr == f"posefit: {tmp_path / 'link'}: expected a new name to write to, got one that exists\n"
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "message"),
     [
         ({"motions": ["walk"]}, "a plan of a suite must hold suite, methods, .*, got 'motions'"),

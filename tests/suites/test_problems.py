@@ -14,6 +14,7 @@ from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, box_without, 
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 from posefit.suites.instances import ATTEMPTS, suite_instance
 from posefit.suites.problem import BudgetSpentError, Problem
+from tests.cases import each
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
 
 ROWS = {tuple(row[:3]): row[3:] for row in json.loads(FILE.read_text("utf-8"))}
@@ -36,7 +37,7 @@ def test_the_numbers_are_what_they_were_when_the_suite_was_made() -> None:
         assert areas_of(*address) == areas, address
 
 
-@pytest.mark.parametrize("address", [(1, 17, 9), (3, 10_000, 40), (7, 19_999, 66)])
+@each("address", [(1, 17, 9), (3, 10_000, 40), (7, 19_999, 66)])
 def test_a_cost_is_a_ratio_of_whole_numbers_of_pixels(address: tuple[int, int, int]) -> None:
     shares = [
         [0.5 * missed / (missed + both) + 0.5 * spilled / (spilled + both) for missed, spilled, both in view]
@@ -46,7 +47,7 @@ def test_a_cost_is_a_ratio_of_whole_numbers_of_pixels(address: tuple[int, int, i
     assert costs == pytest.approx(100.0 * np.mean(shares, axis=0), abs=1e-12)
 
 
-@pytest.mark.parametrize("one", FUNCTIONS, ids=lambda one: one.name)
+@each("one", FUNCTIONS)
 def test_the_true_pose_is_in_the_box_and_the_optimum_where_it_is_known(one: object) -> None:
     for number in (1, 2, 10_001, 10_002):
         for dimension in one.dimensions:  # type: ignore[attr-defined]
@@ -238,7 +239,7 @@ def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
     assert suite[0] is not suite[0]  # nothing evaluated yet, each time
 
 
-@pytest.mark.parametrize(
+@each(
     ("address", "message"),
     [
         (("posefit-2025", 1, 0, 9), "suite must be one of posefit-2026.1, got 'posefit-2025'"),
@@ -261,7 +262,7 @@ def test_a_problem_that_there_is_not_is_named(address: tuple[object, ...], messa
         posefit.suite(*address)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
+@each(
     ("proposals", "message"),
     [
         ([0.0] * 8, r"proposals must have shape \(9,\) or \(n, 9\), got \(8,\)"),
@@ -278,7 +279,7 @@ def test_senseless_proposals_are_refused_and_not_counted(proposals: object, mess
     assert posed.evaluations == 0
 
 
-@pytest.mark.parametrize(
+@each(
     ("more", "message"),
     [
         ({"infeasible": "ignore"}, "infeasible must be one of repair, reject, penalise, got 'ignore'"),
@@ -298,7 +299,7 @@ def test_a_suite_without_problems_is_refused() -> None:
         posefit.Suite(dimensions=[10])
 
 
-@pytest.mark.parametrize("name", ["functions", "dimensions", "instances"])
+@each("name", ["functions", "dimensions", "instances"])
 def test_a_suite_of_one_number_instead_of_a_list_is_refused(name: str) -> None:
     with pytest.raises(ValueError, match=f"{name} must be a list of numbers, got 9"):
         posefit.Suite(**{name: 9})  # type: ignore[arg-type]
