@@ -113,7 +113,7 @@ def filmed_lines(told: dict[str, Any]) -> Iterator[str]:
 
 
 def filmed_figures(source: str | Path, roi: Box, frames: Range, seed: int) -> dict[str, Any]:
-    """Return what the track of a seed is worth: its overlap as a search of each frame finds it, its gait as steadied.
+    """Return what the track of a seed is worth: its overlap as a search of each frame finds it, its gait as smoothed.
 
     What is steady is fitted to the masks once more; and what is found in each frame goes to and fro in depth, so that
     it tells little of which way somebody goes in a moment.

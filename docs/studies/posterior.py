@@ -26,7 +26,7 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.motion import recorded
 from posefit.sweep.cell import cell_scene, settings_text
 from posefit.sweep.check import cell_of
-from posefit.tracking.modes import LEAST_COST
+from posefit.tracking.modes import MIN_COST
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.uncertainty.calibration import (
@@ -584,7 +584,7 @@ def _costs(tracks: Sequence[Kept]) -> tuple[Array, NDArray[np.bool_]]:
     """Return 1 and the logarithm of the cost of each frame (n, 2), and whether it is lost (n,)."""
     costs = np.concatenate([one.track.costs for one in tracks])
     off = np.concatenate([one.error for one in tracks]) > LOST_METRES
-    return np.column_stack([np.ones(len(costs)), np.log(np.maximum(costs, LEAST_COST))]), off
+    return np.column_stack([np.ones(len(costs)), np.log(np.maximum(costs, MIN_COST))]), off
 
 
 def posterior_lines(told: Mapping[str, Any]) -> Iterator[str]:
