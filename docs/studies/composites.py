@@ -13,9 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from composites_scene import (
-    ALWAYS,
     BEFORE,
-    PASSING,
     PLACES,
     SHOWS,
     SIZE,
@@ -34,7 +32,6 @@ from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
-from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.registry import registry
 from posefit.settings import parse_texts
 from posefit.silhouette.cost import project
@@ -42,7 +39,7 @@ from posefit.tracking.evaluation import LOST
 from posefit.tracking.front import track
 from posefit.tracking.summary import Track
 from posefit_reproduce.jobs import each
-from table import WORKERS, earlier, kept
+from table import WORKERS, earlier, kept, markdown
 
 Masks = NDArray[np.bool_]  # (views, T, height, width)
 
@@ -89,42 +86,7 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
         "said_unknown": _share(said["unknown_sides"][seen] == 1.0, said["unknown_sides"][seen]),
         "held": float(1.0 - np.array([row["usable"] for row in track.frames])[seen].mean()),
         "stature_cm": 100.0 * (body.stature - actor.body.stature),
-        **steadiness(true_joints, joints, seen, estimate.fps),
-        **_others(situation, joints, seen),
     }
-
-
-def steadiness(true_joints: Array, joints: Array, seen: NDArray[np.bool_], fps: float) -> dict[str, Any]:
-    """Return how joints accelerate and feet slide beside the truth's own, in the runs of frames that are seen.
-
-    A fitted foot slides while the true one stands, and, as anybody would see it, while it stands itself.
-    """
-    felt, true_felt = (acceleration(one, fps) for one in (joints, true_joints))
-    inner = seen & np.roll(seen, 1) & np.roll(seen, -1) & np.isfinite(felt)
-    stands = standing(true_joints, fps) & seen[:, None]
-    own = standing(joints, fps) & seen[:, None]
-    found = {
-        "slide_cm": slides(joints, stands),
-        "own_slide_cm": slides(joints, own),
-        "true_slide_cm": slides(true_joints, stands),
-    }
-    mean, true_mean = (float(one[inner].mean()) for one in (felt, true_felt))
-    return {
-        "acceleration": mean,
-        "true_acceleration": true_mean,
-        **{name: 100.0 * float(steps.mean()) if len(steps) else None for name, steps in found.items()},
-    }
-
-
-def _others(situation: Situation, joints: Array, seen: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return in what share of the frames somebody else is followed, where there is anybody else."""
-    if len(situation.actors) < 2:
-        return {}
-    away = [
-        np.where(actor.present, np.linalg.norm(joints[:, 0] - actor.motion.translations, axis=1), np.inf)
-        for actor in situation.actors
-    ]
-    return {"other_person": float((np.argmin(away, axis=0) > 0)[seen].mean())}
 
 
 def _body_iou(estimate: Motion, body: Body, situation: Situation, truth: Masks) -> float:
@@ -163,66 +125,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "said_lost": ("said lost %", 0, 100.0),
     "swapped": ("swapped %", 0, 100.0),
     "said_unknown": ("unknown %", 0, 100.0),
-    "acceleration": ("m/s2", 1, 1.0),
-    "true_acceleration": ("true m/s2", 1, 1.0),
-    "slide_cm": ("slide cm", 1, 1.0),
-    "own_slide_cm": ("own cm", 1, 1.0),
-    "true_slide_cm": ("true cm", 1, 1.0),
 }
-GROUPS = {"passing": PASSING, "always there": ALWAYS}
-COMPARED = ("mask_iou", "body_iou", "mpjpe_mm", "facing_right", "lost", "swapped", "acceleration", "own_slide_cm")
-
-
-def by_presence(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the means over rows of those who pass and of those who are always there, by extraction and cameras.
-
-    Of what was refused there are no figures; `refused` is how many rows that are.
-    """
-    found = []
-    for extraction, views in dict.fromkeys((row["extraction"], row["views"]) for row in rows):
-        for group, situations in GROUPS.items():
-            mine = [
-                row
-                for row in rows
-                if (row["extraction"], row["views"]) == (extraction, views) and row["situation"] in situations
-            ]
-            told = [row for row in mine if "refused" not in row]
-            if mine:
-                means = {name: _mean([row.get(name) for row in told]) for name in COMPARED}
-                counts = {"rows": len(mine), "refused": len(mine) - len(told)}
-                found.append({"extraction": extraction, "views": views, "group": group, **counts, **means})
-    return found
-
-
-def composites_lines(told: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a line a row, then one for each group of situations."""
-    names = [name for name in COLUMNS if any(name in row for row in told["rows"])]
-    yield f"{'situation':10} {'cameras':>7} {'extraction':10} {'seed':>4} " + _heads(names)
-    for row in told["rows"]:
-        start = f"{row['situation']:10} {row['views']:7} {row['extraction']:10} {row['seed']:4} "
-        yield start + (f" refused: {row['refused']}" if "refused" in row else _cells(row, names))
-    yield ""
-    yield f"{'means':12} {'cameras':>7} {'extraction':10} {'rows':>4} {'refused':>7} " + _heads(COMPARED)
-    for one in told["groups"]:
-        start = f"{one['group']:12} {one['views']:7} {one['extraction']:10} {one['rows']:4} {one['refused']:7} "
-        yield start + _cells(one, COMPARED)
-
-
-def _heads(names: Sequence[str]) -> str:
-    return " ".join(f"{COLUMNS[name][0]:>11}" for name in names)
-
-
-def _cells(row: Row, names: Sequence[str]) -> str:
-    return " ".join(f"{_shown(row.get(name), *COLUMNS[name][1:]):>11}" for name in names)
-
-
-def _shown(value: float | None, digits: int, factor: float) -> str:
-    return "-" if value is None else f"{factor * value:.{digits}f}"
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
 
 
 GIVEN = "mean"  # the extraction that is given pictures without anybody
@@ -250,7 +153,7 @@ def composites(
     quick: bool,
     rows: str | None,
     workers: int | None,
-) -> dict[str, Any]:
+) -> list[Row]:
     """Return a row of figures for each situation, number of cameras, extraction and seed.
 
     `rows` is a file for a row a line as they come; what it holds already is not measured again.
@@ -261,7 +164,7 @@ def composites(
     jobs = {shot: partial(measured, video, shot) for shot in shots if shot not in done}
     done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
     found = [done[shot] for shot in shots]
-    return {"rows": found, "groups": by_presence(found)}
+    return found
 
 
 def asked(
@@ -345,6 +248,20 @@ def _taken_out(videos: Sequence[Path], how: Extraction, frames: Any, folder: Pat
             masks.append(stored["masks"] > 0)
             usable.append(stored["usable"])
     return np.stack(masks), np.stack(usable)
+
+
+def composites_lines(found: Sequence[Row]) -> Iterator[str]:
+    """Yield the table of the rows."""
+    table = []
+    for row in found:
+        cells = [row["situation"], str(row["views"]), row["extraction"], str(row["seed"])]
+        for name, (_, digits, factor) in COLUMNS.items():
+            cells.append("-" if row.get(name) is None else f"{factor * row[name]:.{digits}f}")
+        table.append(cells)
+    yield from markdown(
+        ["situation", "cameras", "extraction", "seed", *(head for head, _, _ in COLUMNS.values())], table, 3
+    )
+    yield from (f"{row['situation']}, {row['extraction']}: {row['refused']}" for row in found if "refused" in row)
 
 
 @click.command(help=__doc__)

@@ -468,8 +468,6 @@ SHOWS = {
     "stands": "somebody who is always there and stands",
     "waves": "somebody who is always there and moves on the spot",
 }
-PASSING = ("through", "again", "back")  # one person, who is not always there
-ALWAYS = ("to and fro", "stands", "waves")
 
 
 def check_situation(name: str, views: int) -> None:

@@ -27,7 +27,6 @@ from posefit.sweep.engines.processes import Processes
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.tracking.measures import BASELINES, MEASURES
-from posefit_reproduce.columns import head_of, number
 
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)
@@ -69,6 +68,17 @@ def kept(path: str | None, ended: Iterator[tuple[K, Row]], count: int) -> Iterat
             with Path(path).open("a", encoding="utf-8") as file:
                 file.write(f"{json.dumps(row)}\n")
         yield key, row
+
+
+def head_of(name: str, which: str = "") -> str:
+    """Return the head of a figure's column: which of its values (such as median), its label, and its unit."""
+    measure = MEASURES[name]
+    return " ".join(word for word in (which, measure.label, measure.unit) if word)
+
+
+def number(name: str, value: float | None) -> str:
+    """Return a value with a figure's digits, in its unit."""
+    return MEASURES[name].number(value)
 
 
 def markdown(heads: Sequence[str], cells: Sequence[Sequence[str]], words: int = 1) -> Iterator[str]:

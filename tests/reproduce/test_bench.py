@@ -114,7 +114,7 @@ def test_mistakes_are_one_line_before_anything_is_timed(monkeypatch: pytest.Monk
 @pytest.mark.device
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_the_table_says_that_both_count_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(device, "ROUNDS", 1)
+    monkeypatch.setattr(kernel, "ROUNDS", 1)
     monkeypatch.setattr(device, "_name", lambda: "simulated")
     figures = device.device_figures("cuda", sizes=((24, 18),), poses=(1, 2), frame=(2, 1))
     assert [(case["poses"], case["equal"], case["proposals_differing"]) for case in figures["cases"]] == [

@@ -1,6 +1,5 @@
 """How fast is a GPU, and does it count the same? Beside the CPU in the same run: `posefit bench --device cuda`."""
 
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,7 +15,7 @@ from posefit.silhouette.cuda.device import check_device
 from posefit.silhouette.cuda.moving import moved_to
 from posefit.sweep.command import cores
 from posefit_reproduce.bench.experiment import seen_at
-from posefit_reproduce.bench.kernel import bench_problem
+from posefit_reproduce.bench.kernel import bench_problem, fastest
 from posefit_reproduce.bench.processor import processor
 from posefit_swarm.sapso import SAPSO
 
@@ -24,7 +23,6 @@ SIZES = ((320, 240), (1280, 720))
 POSES = (40, 4_000, 400_000)
 FRAME = (10_000, 9)  # particles and iterations: 100,000 evaluations with the first population
 DRAWN = 4_000  # to draw proposals that are poses takes long
-ROUNDS = 5  # of all jobs in turn; of each, the fastest run counts
 
 
 def device_figures(
@@ -74,7 +72,7 @@ def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
         "poses": lambda: areas(body, camera, seen, poses, places),
         "resident": resident,
     }
-    seconds = _fastest(jobs)
+    seconds = fastest(jobs)
     expected, found = problem.areas(poses, places)[0], areas(body, camera, seen, poses, places)
     away = np.abs(found - expected).max(axis=1)
     off = np.abs(there.evaluate(proposals) - problem.evaluate(proposals))
@@ -113,7 +111,7 @@ def _resident(problem: PoseProblem, poses: Any, places: Any) -> Callable[[], obj
 
 
 def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -> dict[str, Any]:
-    """Return the milliseconds of a search of one frame by SAPSO, its own share and the CPU's time of the same."""
+    """Return the milliseconds of a search of one frame by SAPSO, and the CPU's time of the same."""
     there = _on(problem, device)
 
     def search(where: PoseProblem) -> float:
@@ -121,34 +119,14 @@ def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -
         return minimise(where.evaluate, optimiser, particles * (iterations + 1), budget_known=True).cost
 
     costs = {name: search(where) for name, where in (("device", there), ("cpu", problem))}
-    seconds = _fastest({"device": lambda: search(there), "cpu": lambda: search(problem)})
+    seconds = fastest({"device": lambda: search(there), "cpu": lambda: search(problem)})
     return {
         "evaluations": particles * (iterations + 1),
         "ms": 1e3 * seconds["device"],
         "cpu_ms": 1e3 * seconds["cpu"],
-        "evaluations_ms": 1e3 * _evaluations(there, particles, iterations + 1),
         "cost": costs["device"],
         "cpu_cost": costs["cpu"],
     }
-
-
-def _evaluations(problem: PoseProblem, particles: int, populations: int) -> float:
-    """Return the seconds of as many populations without an optimiser that makes them."""
-    proposals = _proposals(problem, particles)
-    return populations * _fastest({"evaluate": lambda: problem.evaluate(proposals)})["evaluate"]
-
-
-def _fastest(jobs: Mapping[str, Callable[[], object]]) -> dict[str, float]:
-    """Return the fastest run of each job in seconds. They take turns; the first one compiles, and does not count."""
-    seconds = dict.fromkeys(jobs, np.inf)
-    for job in jobs.values():
-        job()
-    for _ in range(ROUNDS):
-        for name, job in jobs.items():
-            began = time.perf_counter()
-            job()
-            seconds[name] = min(seconds[name], time.perf_counter() - began)
-    return seconds
 
 
 def _megabytes() -> float:

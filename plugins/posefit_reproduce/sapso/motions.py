@@ -12,7 +12,6 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.footage.source import motion_of
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
-from posefit_reproduce.clips import clip_path
 from posefit_reproduce.sapso.numbers import TRAINING_FRAMES
 
 SIZE = (320, 240)  # pixels
@@ -83,3 +82,13 @@ def turned(motion: Motion, degrees: float) -> Motion:
     return Motion(
         f"{motion.name}, turning", motion.skeleton, poses, motion.translations[0] + bent.cumsum(axis=0), motion.fps
     )
+
+
+def clip_path(folder: str | Path | None, name: str) -> Path:
+    """Return the path of a clip in a folder of them. Raises ValueError where there is none."""
+    if folder is None:
+        raise ValueError(f"clips must be a folder of CMU clips such as {name}.amc, by --clips or POSEFIT_CMU, got none")
+    path = Path(folder) / f"{name}.amc"
+    if not path.is_file():
+        raise ValueError(f"clips must be a folder of CMU clips such as {name}.amc, got {folder}, which has none")
+    return path

@@ -9,7 +9,6 @@ from typing import Any
 
 from posefit.files import new_folder
 from posefit.version import __version__
-from posefit_reproduce.columns import head_of
 from posefit_reproduce.jobs import Progress
 from posefit_reproduce.vsmm.activities import film_of
 from posefit_reproduce.vsmm.experiment import SHOWN, WORKERS, repeat_patent
@@ -19,9 +18,9 @@ _COLUMNS = (
     ("hand_cm", "hand cm", 1),
     ("elbow_3d_cm", "elbow 3D", 1),
     ("hand_3d_cm", "hand 3D", 1),
-    ("mpjpe_mm", head_of("mpjpe_mm"), 0),
+    ("mpjpe_mm", "MPJPE mm", 0),
     ("error_degrees", "degrees", 2),
-    ("iou", head_of("iou"), 2),
+    ("iou", "IoU", 2),
     ("dominant_fraction", "dominant", 2),
     ("switch_delay_frames", "delay", 1),
     ("wrong_activations", "wrong act.", 1),
