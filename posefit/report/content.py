@@ -44,6 +44,7 @@ REASONS = 5  # of failures, the most frequent ones, that the first screen names
 MAX_SEEDS = 50  # that the facts list
 FEW_RUNS = 20  # of a method, below which intervals are called wide
 
+_NOT_WORSE = "Methods in bold are not shown to be worse than the best one."
 TRACK_SCORE = {  # what the first figure shows of methods, and the texts of the page that depend on it
     "name": "error",
     "label": "Errors in degrees",
@@ -53,7 +54,8 @@ TRACK_SCORE = {  # what the first figure shows of methods, and the texts of the 
     "better": "less",
     "alone": "one seed",  # in place of an interval
     "paired": "runs",
-    "caption": "Interquartile mean of a method's errors with its 95 % interval; dashed lines are baselines. ",
+    "caption": "Interquartile mean of a method's errors with its 95 % interval; dashed lines are baselines. "
+    f"{_NOT_WORSE}",
     "leaderboard": "Each figure is the interquartile mean of a method's runs; shares of frames and joints are means. "
     "Skill is 1 − error / baseline: 0 is no better than the baseline, which uses the true root and translation. ",
     "curves": "",
@@ -73,7 +75,6 @@ SEARCH_SCORE = {
     "dimension of the problem, all dimensions together: the empirical distribution of running times. A higher curve "
     "reaches more targets in the same time. The scale is the same for every function.",
 }
-_NOT_WORSE = "Methods in bold are not shown to be worse than the best one."
 
 
 def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str, Any]:
@@ -81,8 +82,7 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
     contest = contest_of(runs)
     header = _header(runs, contest)
     compared = {} if contest is None else _compared(contest)
-    own = _searches(contest) if runs.is_search else _tracks(ledger, runs, contest, compared, warn)
-    header["notes"] += own.pop("notes", [])
+    own = _searches(contest, compared) if runs.is_search else _tracks(ledger, runs, contest, compared, warn)
     warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
     nothing = "Every cell failed." if runs.failures else "No run has an error yet: there is nothing to compare."
     return {
@@ -144,11 +144,10 @@ def _tracks(
         **data,
         "sections": [name for name in sections if name not in absent or data[absent[name]]]
         + (["gallery", "author", "rows"] if runs.methods else []),
-        "notes": _track_notes(contest) if contest is not None else ["No run has an error: nothing can be compared."],
         "instances": instances,
         "columns": {name: COLUMNS[name].as_dict() for name in names},
         "baseline_names": BASELINES,
-        "score": {**TRACK_SCORE, "caption": TRACK_SCORE["caption"] + _NOT_WORSE},
+        "score": TRACK_SCORE,
         "rows": {**rows, "key": [key[:8] for key in runs.keys]},
         "seeds": [_exact(seed) for seed in runs.seeds],
         "heads": runs.heads,
@@ -192,7 +191,7 @@ def _drawn(contest: Contest) -> Contest:
     return contest.fewer(max(curves.POINTS, len(JOINTS)))
 
 
-def _searches(contest: Contest | None) -> dict[str, Any]:
+def _searches(contest: Contest | None, compared: dict[str, Any]) -> dict[str, Any]:
     """Return the data that only single searches have."""
     data = {
         "sections": [],
@@ -205,22 +204,17 @@ def _searches(contest: Contest | None) -> dict[str, Any]:
     evaluations = curves.search_grid(contest)
     charts = curves.search_curves(contest, evaluations)
     ends = [float(shares[-1]) for chart in charts for shares in chart["shares"]]
-    board = leaderboard(contest)
-    with_interval = any(row["low"] is not None and np.isfinite(row["low"]) for row in board)
-    caption = "Share of all runs and targets that a method reached" + (
-        " with the 95 % interval that other instances would give. "
-        if with_interval
-        else "; one instance of a function says nothing about others, so there are no intervals. "
-    )
-    caption += (
-        "The dashed line is random search. "
-        if baseline_rows(contest, board)
-        else "There is no baseline, for the plan has no random search. "
-    )
+    interval = "; one instance of a function says nothing about others, so there are no intervals."
+    if any(row["low"] is not None and np.isfinite(row["low"]) for row in compared["leaderboard"]):
+        interval = " with the 95 % interval that other instances would give."
+    baseline = "There is no baseline, for the plan has no random search."
+    if compared["baselines"]:
+        baseline = "The dashed line is random search."
+    caption = f"Share of all runs and targets that a method reached{interval} {baseline} {_NOT_WORSE}"
     return {
         **data,
         "sections": ["leaderboard", "curves", "times"],
-        "score": {**SEARCH_SCORE, "caption": caption + _NOT_WORSE},
+        "score": {**SEARCH_SCORE, "caption": caption},
         "evaluations": evaluations,
         "charts": [
             {
@@ -323,47 +317,37 @@ def _versions(runs: Runs) -> list[str]:
 
 
 def _notes(runs: Runs, contest: Contest | None) -> list[str]:
-    """Return the notes on what can be concluded that both kinds of runs have."""
+    """Return the notes on what can be concluded."""
     notes = []
-    if contest is not None and runs.is_search and contest.rows.size < len(runs):
-        notes.append(
-            f"Methods are compared on the {contest.rows.size:,} runs that all of them share; "
-            f"{counted(len(runs) - contest.rows.size, 'other')} of {len(runs):,} count nowhere."
-        )
-    apart = [] if contest is None else [name for m, name in enumerate(runs.methods) if m not in contest.methods]
-    if apart:
-        notes.append(
-            f"Too few runs in common with the others, so not compared: {'; '.join(apart)}. "
-            "Their rows of the leaderboard use their own runs."
-        )
-    budgets = {one["budget"] if runs.is_search else one["evaluations"] for one in runs.variants}
-    if len(budgets) > 1:
+    if contest is None:
+        notes.append("No run has an error: nothing can be compared.")
+    else:
+        (methods, instances, seeds), size = contest.rows.shape, contest.rows.size
+        if size < len(runs):
+            each = f"{counted(instances, 'instance')} with {counted(seeds, 'seed')} each"
+            notes.append(f"Methods are compared on the {size:,} of {len(runs):,} runs that all of them share: {each}.")
+        apart = [name for m, name in enumerate(runs.methods) if m not in contest.methods]
+        if apart:
+            notes.append(
+                f"Too few runs in common with the others, so not compared: {'; '.join(apart)}. "
+                "Their rows of the leaderboard use their own runs."
+            )
+        if not runs.is_search:
+            if seeds == 1:
+                notes.append("One seed says nothing about others: there are no intervals.")
+            elif size / methods < FEW_RUNS:
+                notes.append(f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide.")
+            if resamples(size) < 2000:
+                notes.append(f"So many runs have {resamples(size)} bootstrap resamples instead of 2,000.")
+            drawn = _drawn(contest).rows.shape
+            if drawn[1] * drawn[2] < instances * seeds:
+                notes.append(f"Curves and joints use {drawn[1]:,} instances with {drawn[2]:,} seeds each, not all.")
+    if len({one["budget"] if runs.is_search else one["evaluations"] for one in runs.variants}) > 1:
         notes.append("Budgets differ: compare methods of one budget only, as a longer search has lower costs.")
     if len({one.get("infeasible") for one in runs.variants}) > 1:
         notes.append("Infeasible proposals are treated differently: compare methods that treat them in the same way.")
     if len(_versions(runs)) > 1:
         notes.append("Commands run rows again if the same versions are installed.")
-    return notes
-
-
-def _track_notes(contest: Contest) -> list[str]:
-    """Return the notes on means, intervals and curves of tracks."""
-    notes = []
-    (methods, instances, seeds), size = contest.rows.shape, contest.rows.size
-    if size < len(contest.runs):
-        notes.append(
-            f"Means and intervals use the {size:,} runs that all methods share, {counted(instances, 'instance')} with "
-            f"{counted(seeds, 'seed')} each."
-        )
-    if seeds == 1:
-        notes.append("One seed says nothing about others: there are no intervals.")
-    elif size / methods < FEW_RUNS:
-        notes.append(f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide.")
-    if resamples(size) < 2000:
-        notes.append(f"So many runs have {resamples(size)} bootstrap resamples instead of 2,000.")
-    drawn = _drawn(contest).rows.shape
-    if drawn[1] * drawn[2] < instances * seeds:
-        notes.append(f"Curves and joints use {drawn[1]:,} instances with {drawn[2]:,} seeds each, not all.")
     return notes
 
 

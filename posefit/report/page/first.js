@@ -102,16 +102,9 @@ function examples() {
 // What failed and what is left out, with the reasons.
 function trouble() {
   const H = D.header;
+  const list = (items) => make("ul", {}, ...items.map((item) => make("li", {}, item)));
   const note = (kind, text, items, ...more) =>
-    $("trouble").append(
-      make(
-        "div",
-        { class: `note ${kind}` },
-        ...text,
-        make("ul", {}, ...items.map((item) => make("li", {}, item))),
-        ...more,
-      ),
-    );
+    $("trouble").append(make("div", { class: `note ${kind}` }, ...text, list(items), ...more));
   if (H.failed) {
     const by = Object.entries(H.failed_by).map(([method, count]) => `${method} ${whole(count)}`);
     const text = `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join(", ")}. `;

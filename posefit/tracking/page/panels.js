@@ -48,19 +48,10 @@ function pictureOf(uri) {
   return image.complete && image.naturalWidth ? image : null;
 }
 
-// Draws the film of a frame: all of it, coarse, and the part around the person.
-function photograph(pen, size, [box, near, coarse]) {
-  const [behind, person] = [pictureOf(coarse), pictureOf(near)];
-  if (behind) pen.drawImage(behind, 0, 0, size[0], size[1]);
-  if (person) pen.drawImage(person, ...box);
-}
-
-// The pen of a sheet as large as another canvas, for pictures that are put together before they are drawn there.
-function layer(canvas) {
-  const { width, height } = canvas;
-  const pen = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
-  pen.lineCap = pen.lineJoin = "round";
-  return pen;
+// Draws a picture of data into a box, once it is decoded.
+function drawPicture(pen, uri, ...box) {
+  const image = pictureOf(uri);
+  if (image) pen.drawImage(image, ...box);
 }
 
 // The body's middle and height in pixels of each camera and frame.
@@ -141,15 +132,13 @@ function agreement(pen, size, [box, uri], body) {
   pen.globalCompositeOperation = "source-over";
 }
 
-// The film, if it is shown.
-const filmed = () => (show.camera === 0 && D.film && $("with-film").checked ? D.film : null);
-
+// Paints the film, all of it coarse and the part around the person fine, and on it mask and body, put together first.
 function paintPicture() {
   const camera = D.cameras[show.camera];
   const canvas = $("picture");
   const { pen, width } = sheet(canvas, camera.size[1] / camera.size[0]);
   const scale = width / camera.size[0];
-  const film = filmed();
+  const film = show.camera === 0 && $("with-film").checked ? D.film : null;
   const masks = D.masks[show.camera];
   const body = $("with-body").checked;
   const masked = $("with-mask").checked;
@@ -160,9 +149,14 @@ function paintPicture() {
   pen.scale(factor, factor);
   pen.translate(-left, -top);
   const of = (strip) => strip.pictures[Math.min((frame * D.step) / strip.every, strip.pictures.length - 1)];
-  if (film) photograph(pen, camera.size, of(film));
+  if (film) {
+    const [box, near, coarse] = of(film);
+    drawPicture(pen, coarse, 0, 0, ...camera.size);
+    drawPicture(pen, near, ...box);
+  }
   const pixels = projected(camera, estimateAt(frame));
-  const over = layer(canvas);
+  const over = canvas.cloneNode().getContext("2d");
+  over.lineCap = over.lineJoin = "round";
   over.setTransform(pen.getTransform());
   const solid = solids(frame);
   if (masked) {
