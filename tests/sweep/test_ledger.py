@@ -2,6 +2,8 @@
 
 import errno
 import os
+import subprocess
+import sys
 import threading
 import zlib
 from dataclasses import replace
@@ -13,6 +15,7 @@ import pytest
 
 from posefit.sweep import log
 from posefit.sweep.cell import TrackCell
+from posefit.sweep.command import swept
 from posefit.sweep.drive import drive_cells
 from posefit.sweep.driver import ATTEMPTS, LOSSES, Driver, Lease, State
 from posefit.sweep.engines.engine import Outcome
@@ -192,8 +195,11 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_are_run_ag
         assert driver.ledger.version == "0.0.9 a1"
         assert driver.ledger.outdated() == 2
         assert drive_cells(cells(3), driver, Here(), print).ran == 3
+    said: list[str] = []
+    assert swept(cells(4), folder, Here(), said.append).ran == 1
+    assert said[0] == f"2 of the 5 rows in {folder} are of another version, and do not count here"
     ledger = Ledger(folder)
-    assert (len(ledger), ledger.outdated()) == (5, 2)
+    assert (len(ledger), ledger.outdated()) == (6, 2)
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
 
 
@@ -396,3 +402,15 @@ def test_many_drivers_may_make_the_same_ledger_at_once(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert not failed
+
+
+def test_a_system_without_flock_reads_ledgers(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger", 2)
+    code = (
+        "import sys; sys.modules['fcntl'] = None\n"
+        "import posefit.cli, posefit.sweep.command, posefit.report.write\n"
+        "from posefit.sweep.ledger import Ledger\n"
+        "print(len(list(Ledger(sys.argv[1]).rows())))"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(folder)], capture_output=True, text=True, check=True)
+    assert done.stdout == "2\n"
