@@ -16,8 +16,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
 from posefit.silhouette.corruption import corrupted
 from posefit.silhouette.cost import project
-from posefit.silhouette.cuda.device import check_device
-from posefit.silhouette.cuda.moving import moved_to
+from posefit.silhouette.cuda.device import check_device, moved_to
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 

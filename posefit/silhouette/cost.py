@@ -44,7 +44,7 @@ def areas(
     poses, translations = _checked(camera, silhouette, poses, translations)
     drawn.count_poses(len(poses), silhouette)
     if silhouette.device == "cuda":
-        from posefit.silhouette.cuda.counted import areas_on_device
+        from posefit.silhouette.cuda.areas import areas_on_device
 
         return areas_on_device(body, camera, silhouette, poses, translations)
     out = np.empty((len(poses), 3), dtype=np.int64)

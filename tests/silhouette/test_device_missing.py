@@ -8,8 +8,7 @@ import pytest
 
 from posefit.footage.scene import on_device, synthetic
 from posefit.motion import built_in
-from posefit.silhouette.cuda.device import check_device
-from posefit.silhouette.cuda.moving import moved_to
+from posefit.silhouette.cuda.device import check_device, moved_to
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene

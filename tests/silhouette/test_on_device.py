@@ -18,7 +18,7 @@ from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
 from posefit.registry import registry
 from posefit.silhouette.cost import areas, project
-from posefit.silhouette.cuda.moving import moved_to
+from posefit.silhouette.cuda.device import moved_to
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_silhouette
@@ -75,7 +75,7 @@ def test_a_pose_that_is_no_number_draws_nothing_and_spoils_no_other(body: Body, 
 
 
 def test_parts_on_their_way_are_put_together_in_order(body: Body, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("posefit.silhouette.cuda.counted.PART", 3)
+    monkeypatch.setattr("posefit.silhouette.cuda.areas.PART", 3)
     rng = np.random.default_rng(6)
     camera = Camera.around(np.zeros(3), 0.4, 3.0, (24, 20))
     assert_equals_the_cpu(body, camera, some_poses(rng, 13), rng.normal(0.0, 0.2, (13, 3)))

@@ -11,8 +11,7 @@ from posefit.fitting.box import draw_population
 from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import areas
-from posefit.silhouette.cuda.device import check_device
-from posefit.silhouette.cuda.moving import moved_to
+from posefit.silhouette.cuda.device import check_device, moved_to
 from posefit.sweep.command import cores
 from posefit_reproduce.bench.experiment import seen_at
 from posefit_reproduce.bench.kernel import bench_problem, fastest
@@ -102,8 +101,7 @@ def _resident(problem: PoseProblem, poses: Any, places: Any) -> Callable[[], obj
     """Return what counts poses that lie on the device already, as a library of them does, and copies their areas."""
     from numba import cuda
 
-    from posefit.silhouette.cuda.counted import launched
-    from posefit.silhouette.cuda.held import drawing_on_device
+    from posefit.silhouette.cuda.areas import drawing_on_device, launched
 
     drawing = drawing_on_device(problem.body, problem.cameras[0], problem.silhouettes)
     there, where = cuda.to_device(poses), cuda.to_device(places)

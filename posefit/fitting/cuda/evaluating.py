@@ -13,8 +13,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.cost import Areas
-from posefit.silhouette.cuda.counted import launched
-from posefit.silhouette.cuda.held import drawing_on_device
+from posefit.silhouette.cuda.areas import drawing_on_device, launched
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import Silhouette
 

@@ -1,8 +1,11 @@
-"""Whether a device is available, and the error where it is not."""
+"""Whether a device is available, and silhouettes on one."""
 
+from copy import copy
 from importlib.util import find_spec
 
 from posefit.errors import InputError
+from posefit.silhouette.drawn import belongs
+from posefit.silhouette.mask import Silhouette
 
 DEVICES = ("cpu", "cuda")
 
@@ -26,3 +29,16 @@ def _missing() -> str | None:
     if cuda.is_available():
         return None
     return "no driver of NVIDIA's that answers, or no GPU"
+
+
+def moved_to(silhouette: Silhouette, device: str) -> Silhouette:
+    """Return the silhouette on a device, "cpu" or "cuda": poses that are compared with it are drawn and counted there.
+
+    Raises ValueError where there is no such device.
+    """
+    check_device(device)
+    if device == silhouette.device:
+        return silhouette
+    moved = copy(silhouette)  # its borders, too, which a smaller picture has from a larger one
+    object.__setattr__(moved, "device", device)
+    return belongs(moved, silhouette)
