@@ -46,7 +46,7 @@ _DAMAGE = (
 )
 
 
-class _RefusedError(ValueError):
+class _RefusedError(InputError):
     """The file holds what is not read; the message says what."""
 
 

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from pluggy import HookspecMarker
 
+from posefit.errors import InputError
+
 if TYPE_CHECKING:
     import click
 
@@ -44,7 +46,7 @@ class ClaimedOrder:
 
     def __post_init__(self) -> None:
         if len(set(self.methods)) != len(self.methods) or len(self.methods) < 2:
-            raise ValueError(f"methods must be at least two that differ, got {', '.join(self.methods) or 'none'}")
+            raise InputError(f"methods must be at least two that differ, got {', '.join(self.methods) or 'none'}")
 
     @property
     def name(self) -> str:

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import displacement, wrap
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
@@ -196,13 +197,13 @@ def niche_instance(number: int) -> NicheInstance:
     Raises ValueError where the number is out of range.
     """
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < COUNT:
-        raise ValueError(f"instance must be a whole number from 0 to {COUNT - 1}, got {number!r}")
+        raise InputError(f"instance must be a whole number from 0 to {COUNT - 1}, got {number!r}")
     kind, rng = KINDS[number % len(KINDS)], np.random.default_rng([RNG_STREAM, number])
     for _ in range(ATTEMPTS):
         made = _attempt(int(number), kind, rng)
         if made is not None:
             return made
-    raise ValueError(f"instance {number} must succeed within {ATTEMPTS} draws, and did not")
+    raise InputError(f"instance {number} must succeed within {ATTEMPTS} draws, and did not")
 
 
 def niche_space() -> SearchSpace:
@@ -318,14 +319,14 @@ def best_apart(
     Weights go with exp(-cost / temperature). Raises ValueError where no cost is a number.
     """
     if not temperature > 0.0:
-        raise ValueError(f"temperature must be above 0, got {temperature}")
+        raise InputError(f"temperature must be above 0, got {temperature}")
     proposals, costs = np.asarray(proposals, dtype=np.float64), np.asarray(costs, dtype=np.float64)
     if proposals.ndim != 2 or costs.shape != (len(proposals),):
-        raise ValueError(f"costs must be one a proposal ({len(proposals)}), got shape {costs.shape}")
+        raise InputError(f"costs must be one a proposal ({len(proposals)}), got shape {costs.shape}")
     order = np.argsort(costs, kind="stable")
     order = order[np.isfinite(costs[order])][:CANDIDATES]
     if not len(order):
-        raise ValueError(f"costs must be numbers, got none among {len(costs)}")
+        raise InputError(f"costs must be numbers, got none among {len(costs)}")
     poses, translations = problem.decode(proposals[order])
     joints = problem.body.skeleton.joints(poses, np.zeros((len(poses), 3)))
     left = np.ones(len(order), dtype=bool)
@@ -396,7 +397,7 @@ def _nearest_known(distances: Array, level: float) -> NDArray[np.int64]:
     """Return the nearest known pose of each reported one (n,), -1 where none is within the level."""
     distances = np.asarray(distances, dtype=np.float64)
     if distances.ndim != 2 or not distances.shape[1]:
-        raise ValueError(f"distances must have shape (n, K), at least one known pose, got {distances.shape}")
+        raise InputError(f"distances must have shape (n, K), at least one known pose, got {distances.shape}")
     if not len(distances):
         return np.empty(0, dtype=np.int64)
     nearest = distances.argmin(axis=1)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, TypeVar, ge
 import pluggy
 
 from posefit import hooks
+from posefit.errors import InputError
 from posefit.hooks import PROJECT, ClaimedOrder
 from posefit.settings import Setting, settings_of
 from posefit.version import source_digest
@@ -134,7 +135,7 @@ class Registry:
         if family not in known:
             near = get_close_matches(family, known, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ValueError(f"{kind} must be one of {', '.join(sorted(known)) or 'none'}, got {name!r}{hint}")
+            raise InputError(f"{kind} must be one of {', '.join(sorted(known)) or 'none'}, got {name!r}{hint}")
         offer = known[family]
         if offer.needs is not None and offer.missing:
             needed, requirement = offer.needs
@@ -144,7 +145,7 @@ class Registry:
         if not colon:
             return offer
         if all(setting.name != "variant" for setting in offer.settings):
-            raise ValueError(f"{kind} must be {family}, which has no variants, got {name!r}")
+            raise InputError(f"{kind} must be {family}, which has no variants, got {name!r}")
         factory = partial(offer.factory, variant=variant)
         factory.__doc__ = offer.factory.__doc__
         return replace(offer, name=name, factory=factory)
@@ -214,7 +215,7 @@ def load(
         if plugin.state == "broken":
             message = f"plugin {plugin.name!r} of {plugin.distribution} {plugin.version} is left out: {plugin.cause}"
             if variables.get(STRICT, "0") not in ("", "0"):
-                raise ValueError(message)
+                raise InputError(message)
             warnings.warn(message, stacklevel=2)
         owners |= {label(offer): plugin.distribution for offer in plugin.offers}
     return tuple(plugins)
@@ -242,9 +243,9 @@ def _loaded(
         for hook in manager.get_hookcallers(module) or ():
             what = hook.name.removeprefix("posefit_register_")
             if what in APART and _registers(point.name) != what:
-                raise ValueError(f"the entry point of {hook.name} must end in -{what}, got {point.name!r}")
+                raise InputError(f"the entry point of {hook.name} must end in -{what}, got {point.name!r}")
             if what not in APART and _registers(point.name) != "methods":
-                raise ValueError(f"{point.name!r} must register {_registers(point.name)} alone, got {hook.name}")
+                raise InputError(f"{point.name!r} must register {_registers(point.name)} alone, got {hook.name}")
         for offer in collect(manager.hook, distribution, version):
             name = label(offer)
             if name in owners or name in offers:
@@ -301,11 +302,11 @@ def _methods(relay: Any, distribution: str, version: str) -> list[Offer]:
 
     def register(kind: Kind, name: str, factory: Callable[..., Any], **more: Any) -> None:
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise ValueError(f"a name must be letters, digits, _, + and -, got {name!r}")
+            raise InputError(f"a name must be letters, digits, _, + and -, got {name!r}")
         if not callable(factory):
             raise TypeError(f"{kind} {name!r} must be a factory that can be called, got {factory!r}")
         if more.get("next_frame", "start") not in get_args(NextFrame):
-            raise ValueError(f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}")
+            raise InputError(f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}")
         offers.append(Offer(kind, name, factory, distribution, version, **more))
 
     for kind in KINDS:

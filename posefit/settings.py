@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
+from posefit.errors import InputError
+
 HEADING = "Settings:"  # of a docstring's list of them
 _ENTRY = re.compile(r"(?P<name>[A-Za-z_]\w*)(?: \((?P<symbol>[^()]*)\))?: (?P<meaning>.*)")
 POPULATION_SIZE = 40  # where none is chosen: N of the SAPSO paper, section 5.2
@@ -81,7 +83,7 @@ def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) ->
     for name, value in given.items():
         setting = _known(plugin, name, known)
         if not accepts(setting.annotation, value):
-            raise ValueError(f"{plugin}.{name} must be {setting.type}, got {value!r}")
+            raise InputError(f"{plugin}.{name} must be {setting.type}, got {value!r}")
 
 
 def planned(
@@ -123,7 +125,7 @@ def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) ->
         setting = _known(plugin, name, known)
         readings = [value for value in _readings(text) if accepts(setting.annotation, value)]
         if not readings:
-            raise ValueError(f"{plugin}.{name} must be {setting.type}, got {text!r}")
+            raise InputError(f"{plugin}.{name} must be {setting.type}, got {text!r}")
         values[name] = readings[0]
     return values
 
@@ -137,7 +139,7 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
     for text in texts:
         setting, equals, value = text.partition("=")
         if not equals:
-            raise ValueError(f"--set must be SETTING=VALUE such as population_size=20, got {text!r}")
+            raise InputError(f"--set must be SETTING=VALUE such as population_size=20, got {text!r}")
         given[setting.rpartition(".")[2]] = value
     return parse(plugin, factory, given)
 
@@ -182,7 +184,7 @@ def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
         near = get_close_matches(name, known, 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         listed = f"one of {', '.join(known)}" if known else "none, it takes none"
-        raise ValueError(f"a setting of {plugin} must be {listed}, got {name!r}{hint}")
+        raise InputError(f"a setting of {plugin} must be {listed}, got {name!r}{hint}")
     return known[name]
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from posefit import minimise
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.evolution.strategy import Strategy, default_population_size
 from posefit.registry import registry
 from posefit.settings import planned
@@ -402,7 +403,7 @@ def normalised(costs: Array, chance: Array, best: Array) -> Array:
     """
     apart = chance - best >= LEAST_GAP
     if not apart.any():
-        raise ValueError(f"best known must lie below random search, got none of {len(best)} instances that do")
+        raise InputError(f"best known must lie below random search, got none of {len(best)} instances that do")
     return ((chance - costs) / np.where(apart, chance - best, 1.0))[:, apart]
 
 

@@ -14,6 +14,7 @@ import click
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Task
 from posefit.footage.scene import Rendered, synthetic
@@ -67,9 +68,9 @@ def subject(seed: int) -> Body:
 def builds(motion: str, subjects: int, workers: int | None, progress: Progress | None = None) -> dict[str, Any]:
     """Return by how many percent stature and limbs are off, before and after the fit, for every setup."""
     if subjects < 1:
-        raise ValueError(f"subjects must be at least 1, got {subjects}")
+        raise InputError(f"subjects must be at least 1, got {subjects}")
     if motion not in built_in.names():
-        raise ValueError(f"motion must be one of {', '.join(built_in.names())}, got {motion}")
+        raise InputError(f"motion must be one of {', '.join(built_in.names())}, got {motion}")
     keys = list(product(SETUPS, range(subjects)))
     found = each({(one.label, k): partial(_found, motion, one, k) for one, k in keys}, workers, progress)
     told: dict[str, Any] = {}

@@ -25,6 +25,7 @@ from composites_scene import (
     situation,
 )
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting import metrics
 from posefit.fitting.metrics import LOST_MM
 from posefit.footage.extract import extract
@@ -231,7 +232,7 @@ def extraction_named(text: str) -> Extraction:
     """
     name, *given = text.split() or [""]
     if not name:
-        raise ValueError(f"extraction must name a segmenter such as mixture, got {text!r}")
+        raise InputError(f"extraction must name a segmenter such as mixture, got {text!r}")
     offer = registry().offer("segmenter", name)
     settings = parse_texts(offer.name, offer.factory, given)
     if name == GIVEN:

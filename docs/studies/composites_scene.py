@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.footage.video import Video, VideoWriter
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import HALF
@@ -134,7 +135,7 @@ def check_video(path: str) -> Video:
     if count != frames:
         wanted, came = (f"{width}x{height}" for width, height in (FILMED, video.size))
         wanted, came = f"{wanted} pixels and {frames} frames", f"{came} and {count} frames" if count else f"{came}"
-        raise ValueError(f"{path}: expected the demonstration video of Sports2D, {wanted}, got {came}")
+        raise InputError(f"{path}: expected the demonstration video of Sports2D, {wanted}, got {came}")
     return video
 
 
@@ -473,9 +474,9 @@ SHOWS = {
 def check_situation(name: str, views: int) -> None:
     """Return nothing. Raises ValueError where there is no situation of that name, or none for so many cameras."""
     if name not in SHOWS:
-        raise ValueError(f"situation must be one of {', '.join(SHOWS)}, got {name!r}")
+        raise InputError(f"situation must be one of {', '.join(SHOWS)}, got {name!r}")
     if views not in PLACES:
-        raise ValueError(f"views must be one of {', '.join(map(str, PLACES))}, got {views}")
+        raise InputError(f"views must be one of {', '.join(map(str, PLACES))}, got {views}")
 
 
 def situation(name: str, views: int, seed: int) -> Situation:

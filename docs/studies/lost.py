@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from people import CHANGES, GROUPS, PAIRS, SIDES, TOLD, WALKS, Piece, Views
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.files import new_file
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.tracker import Observation
@@ -224,7 +225,7 @@ def judge(rows: Sequence[Row]) -> list[Predictions]:
     Raises ValueError where there are fewer than three: of the others, too, each is left out once.
     """
     if len(people := dict.fromkeys(row["subject"] for row in rows)) < 3:
-        raise ValueError(f"rows must be of three people or more, got those of {', '.join(people)}")
+        raise InputError(f"rows must be of three people or more, got those of {', '.join(people)}")
     known = [features(row) for row in rows]
     found: list[Predictions] = [Predictions(np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))] * len(rows)
     for his, others in _left_out(rows):
@@ -270,7 +271,7 @@ def _logistic(name: str, known: Array, came: Flags, signs: Sequence[str]) -> dic
     from sklearn.linear_model import LogisticRegression
 
     if came.all() or not came.any():
-        raise ValueError(
+        raise InputError(
             f"frames must be {name} and not {name}, to be told apart, got {int(came.sum())} of {len(came)}"
         )
     mean, spread = known.mean(axis=0), known.std(axis=0)
@@ -302,9 +303,9 @@ def lost(
     anybody again. `store` is a new file for the models that are fitted to all of them, for `exemplars` to read.
     """
     if store and quick:
-        raise ValueError("store must be asked for with all tracks, got --store with --quick")
+        raise InputError("store must be asked for with all tracks, got --store with --quick")
     if rows is not None and out is not None:
-        raise ValueError("out must be given for tracks that are followed, got --out with --rows")
+        raise InputError("out must be given for tracks that are followed, got --out with --rows")
     with new_file(out) if out else nullcontext() as file, new_file(store) if store else nullcontext() as kept:
         found = (
             [parsed_json(line) for line in read_text(rows, LARGEST).splitlines()]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import recorded
@@ -58,7 +59,7 @@ def main(root: Path) -> None:
     """Write recorded.npz beside this file. Raises ValueError where CMU30_DIR holds no subject."""
     files = sorted(root.glob("*.npz"), key=lambda path: int(path.stem))
     if not files:
-        raise ValueError(f"CMU30_DIR must hold one .npz a subject, got {root} without any")
+        raise InputError(f"CMU30_DIR must hold one .npz a subject, got {root} without any")
     skeletons: list[dict[str, Any]] = []
     names, owners, counts, gaps, numbers = [], [], [], [], []
     for path in files:
@@ -76,7 +77,7 @@ def main(root: Path) -> None:
         )
         with np.load(path) as stored:
             if float(stored["fps"]) != FPS:
-                raise ValueError(f"{path}: expected clips at {FPS:g} frames a second, got {float(stored['fps']):g}")
+                raise InputError(f"{path}: expected clips at {FPS:g} frames a second, got {float(stored['fps']):g}")
             clips = zip(stored["names"].tolist(), stored["lengths"].tolist(), strict=True)
             everything = np.column_stack([stored["poses"], stored["translations"]]).astype(np.float64)
         start = 0
@@ -87,7 +88,7 @@ def main(root: Path) -> None:
             steps = np.rint(values[rows] / STEP).astype(np.int64)
             changes = np.diff(steps, axis=0, prepend=0)
             if np.abs(changes).max() > np.iinfo(np.int16).max:
-                raise ValueError(f"{path}: expected poses that change little by little, got a jump in {name}")
+                raise InputError(f"{path}: expected poses that change little by little, got a jump in {name}")
             names.append(name)
             owners.append(len(skeletons) - 1)
             counts.append(len(rows))

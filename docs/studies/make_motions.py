@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.motion import built_in
@@ -248,7 +249,7 @@ def main(root: Path) -> None:
     needed = [f"{subject}/{subject}.asf" for subject in SUBJECTS] + [f"{clip.path}.amc" for clip in CLIPS.values()]
     for name in needed:
         if not (root / name).is_file():
-            raise ValueError(f"CMU_DIR must hold {name}, got {root} without it")
+            raise InputError(f"CMU_DIR must hold {name}, got {root} without it")
     bones = average([read_asf(root / subject / f"{subject}.asf") for subject in SUBJECTS])
     skeleton = Skeleton(
         "average",

@@ -14,6 +14,7 @@ import click
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.optimiser import populations
 from posefit.fitting.problem import PoseProblem
 from posefit.niching import (
@@ -53,9 +54,9 @@ def modes(
     Raises ValueError where there is no such method, and where a budget does not hold one population.
     """
     if not 1 <= instances <= COUNT - FIRST:
-        raise ValueError(f"instances must lie in 1 to {COUNT - FIRST}, got {instances}")
+        raise InputError(f"instances must lie in 1 to {COUNT - FIRST}, got {instances}")
     if evaluations < 1:
-        raise ValueError(f"evaluations must be at least 1, got {evaluations}")
+        raise InputError(f"evaluations must be at least 1, got {evaluations}")
     methods = tuple(dict.fromkeys(methods)) or METHODS
     for method in methods:
         parsed(method)
@@ -79,12 +80,12 @@ def parsed(method: str) -> tuple[str, int]:
     """
     match = _SEVERAL.fullmatch(method)
     if match is None:
-        raise ValueError(f"a method must be an optimiser such as cma, or cma*16 for 16 searches, got {method!r}")
+        raise InputError(f"a method must be an optimiser such as cma, or cma*16 for 16 searches, got {method!r}")
     name, count = match["name"], int(match["count"] or 1)
     if name not in (KNOWN, LIBRARY):
         registry().optimiser(name)
     elif count > 1:
-        raise ValueError(f"a method must be an optimiser to be made several times, got {method!r}")
+        raise InputError(f"a method must be an optimiser to be made several times, got {method!r}")
     return name, count
 
 

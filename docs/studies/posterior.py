@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from people import GROUPS as CLIPS
 from people import PAIRS, SIDES, TOLD, Piece, Views
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.files import new_file
 from posefit.fitting.metrics import LOST_MM
 from posefit.footage.training import training_clips, training_motions
@@ -213,7 +214,7 @@ def load_tracks(path: str) -> list[Followed]:
                 for k, one in enumerate(seen)
             ]
     except (OSError, KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"{path}: expected tracks that --out wrote, got {error}") from None
+        raise InputError(f"{path}: expected tracks that --out wrote, got {error}") from None
 
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -417,7 +418,7 @@ def posterior(
     frames of all tracks, `store` a new one .json for what was fitted to all people.
     """
     if again is not None and (quick or out):
-        raise ValueError(f"again must not be given beside {'--quick' if quick else '--out'}, got --again {again}")
+        raise InputError(f"again must not be given beside {'--quick' if quick else '--out'}, got --again {again}")
     with ExitStack() as stack:
         file, table = (stack.enter_context(new_file(path)) if path else None for path in (out, store))
         if again is not None:
@@ -432,7 +433,7 @@ def posterior(
         mine = [one for one in kept if one.track.seen.method == METHOD]
         people = list(dict.fromkeys(one.track.seen.clip.subject for one in mine))
         if len(people) < PEOPLE:
-            raise ValueError(f"tracks must be of {PEOPLE} people or more, got {len(people)}")
+            raise InputError(f"tracks must be of {PEOPLE} people or more, got {len(people)}")
         said = []
         for person in people:
             doubt = doubt_of([one for one in mine if one.track.seen.clip.subject != person])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space, displacement, draw_population, fold, repair, sample_normal
 from posefit_envs.instance import World, first_episode
 from posefit_envs.scales import log_cost, scaled, unscaled
@@ -82,7 +83,7 @@ def action_of(control: ControlAction) -> Array:
     ]
     action = np.array([*shares, *ranged, *amounts])
     if not (np.abs(action) <= 1.0).all():
-        raise ValueError(f"a control must lie in the range of actions, got {control}")
+        raise InputError(f"a control must lie in the range of actions, got {control}")
     return action
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.evolution.strategy import LAG, Strategy, default_population_size
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
@@ -83,7 +84,7 @@ class CMAES:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Adapt mean, step size and covariance, and restart where the search has come to an end."""
         if len(proposals) != self._population_size:
-            raise ValueError(f"tell must get a population of {self._population_size}, got {len(proposals)}")
+            raise InputError(f"tell must get a population of {self._population_size}, got {len(proposals)}")
         known, mean = finite_costs(costs), self._strategy.mean
         # the mean goes on past the end of a circle, and so must what it learns from
         round_trip = self._space.periodic.any()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry import symmetry
 from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.motion.motion import Motion
@@ -111,10 +112,10 @@ class Exemplars:
         single frame.
         """
         if not motions:
-            raise ValueError("exemplars must have motions to learn from, got none")
+            raise InputError("exemplars must have motions to learn from, got none")
         for motion in motions:
             if len(motion) < 2:
-                raise ValueError(f"{motion.name} must have at least 2 frames to be followed, got 1")
+                raise InputError(f"{motion.name} must have at least 2 frames to be followed, got 1")
         sources = [(motion, image) for image in (False, True)[: 1 + mirrored] for motion in motions]
 
         def clip(motion: Motion, image: bool) -> Motion:

@@ -9,6 +9,7 @@ import numpy as np
 
 from posefit import settings
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.tracker import Task
 from posefit.registry import registry
 from posefit_exemplars.beam import Steps, Transition, Transitions, transition_costs
@@ -69,15 +70,15 @@ def exemplars(
         ("pace", pace),
     ):
         if not 0.0 < value < math.inf:
-            raise ValueError(f"{name} must be above 0 and finite, got {value}")
+            raise InputError(f"{name} must be above 0 and finite, got {value}")
     for name, value in (("jump", jump), ("pull", pull), ("smoothing", smoothing)):
         if not 0.0 <= value < math.inf:
-            raise ValueError(f"{name} must be 0 or more and finite, got {value}")
+            raise InputError(f"{name} must be 0 or more and finite, got {value}")
     if task.evaluations < MIN_EVALUATIONS:
-        raise ValueError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
+        raise InputError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
     for name, count in (("lag", lag), ("samples", samples)):
         if count < 0:
-            raise ValueError(f"{name} must be 0 or more, got {count}")
+            raise InputError(f"{name} must be 0 or more, got {count}")
     power = temperature / posterior_temperature
     intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
     temperature /= intervals
@@ -106,11 +107,11 @@ def _named(name: str) -> Transitions:
     try:
         found = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError, ValueError) as error:
-        raise ValueError(
+        raise InputError(
             f"transitions must be clips or MODULE:FUNCTION that can be imported, got {name}: {error}"
         ) from None
     if not callable(found):
-        raise ValueError(f"transitions must name a function, got {name}, which is a {type(found).__name__}")
+        raise InputError(f"transitions must name a function, got {name}, which is a {type(found).__name__}")
     return cast(Transitions, found)
 
 
@@ -118,5 +119,5 @@ def _checked(transitions: Transitions, transition: Transition) -> Array:
     """Return the costs of a model of transitions. Raises ValueError where they are not one finite number a step."""
     costs, shape = np.asarray(transitions(transition), dtype=np.float64), (len(transition.before), len(transition.beam))
     if costs.shape != shape or not np.isfinite(costs).all():
-        raise ValueError(f"transitions must return finite costs of shape {shape}, got shape {costs.shape}")
+        raise InputError(f"transitions must return finite costs of shape {shape}, got shape {costs.shape}")
     return costs

@@ -19,6 +19,7 @@ from typing import Any, Self
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton, joint_distances
@@ -151,7 +152,7 @@ class LogisticModel:
         """Return the model that JSON holds. Raises ValueError where it uses unknown evidence."""
         unknown = sorted(set(held["weights"]) - set(NAMES))
         if unknown:
-            raise ValueError(f"weights must be of evidence that frames have, got {', '.join(unknown)}")
+            raise InputError(f"weights must be of evidence that frames have, got {', '.join(unknown)}")
         rows = [NAMES.index(name) for name in held["weights"]]
         return cls(rows, np.array(list(held["weights"].values()), dtype=np.float64), float(held["bias"]))
 

@@ -12,6 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.plugin import (
     Array,
     RegisterOptimiser,
@@ -49,7 +50,7 @@ class Nevergrad:
         at_least("evaluations", evaluations, 1)
         known = nevergrad.optimizers.registry
         if variant not in known:
-            raise ValueError(
+            raise InputError(
                 f"variant must be one of {len(known)} names such as TwoPointsDE, CMA, PSO, got {variant!r}"
             )
         self._space, self._home = space, draw_population(space, rng, 1)[0]
@@ -76,7 +77,7 @@ class Nevergrad:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Let the optimiser learn the costs (n,)."""
         if not self._asked:
-            raise ValueError("tell must follow ask, got costs before proposals")
+            raise InputError("tell must follow ask, got costs before proposals")
         with self._global:
             for candidate, cost in zip(self._asked, finite_costs(costs).tolist(), strict=True):
                 self._optimiser.tell(candidate, cost)

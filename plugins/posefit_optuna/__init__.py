@@ -13,6 +13,7 @@ from typing import Any, Literal, final, get_args
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.plugin import (
     Array,
     RegisterOptimiser,
@@ -73,7 +74,7 @@ class Optuna:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Let the study learn the costs (n,)."""
         if not self._trials:
-            raise ValueError("tell must follow ask, got costs before proposals")
+            raise InputError("tell must follow ask, got costs before proposals")
         for trial, cost in zip(self._trials, finite_costs(costs).tolist(), strict=True):
             self._study.tell(trial, cost)
         self._trials = []

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from posefit.archive import read_arrays
 from posefit.arrays import Array
+from posefit.errors import InputError
 
 LARGEST = 500_000_000  # bytes of a file, packed and unpacked; a space learned from 200,000 poses has 100 MB
 Shape = tuple[str | int, ...]
@@ -17,11 +18,11 @@ def angles_of(angles: Array, least: int) -> Array:
     """Return joint angles (T, 63) as float64. Raises ValueError where they are not, or fewer than `least` frames."""
     angles = np.asarray(angles, dtype=np.float64)
     if angles.ndim != 2 or angles.shape[1] != 63:
-        raise ValueError(f"angles must have shape (T, 63), got {angles.shape}")
+        raise InputError(f"angles must have shape (T, 63), got {angles.shape}")
     if len(angles) < least:
-        raise ValueError(f"angles must hold at least {least} frames, got {len(angles)}")
+        raise InputError(f"angles must hold at least {least} frames, got {len(angles)}")
     if not np.isfinite(angles).all():
-        raise ValueError(f"angles must be finite, got {np.count_nonzero(~np.isfinite(angles))} that are not")
+        raise InputError(f"angles must be finite, got {np.count_nonzero(~np.isfinite(angles))} that are not")
     return angles
 
 
@@ -35,7 +36,7 @@ def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Arra
     for name in shapes:
         if name not in stored or stored[name].dtype.kind not in "biuf":
             kind = "none" if name not in stored else f"one of {stored[name].dtype}"
-            raise ValueError(f"{path}: expected an .npz file with {', '.join(shapes)}, got {kind} for {name}")
+            raise InputError(f"{path}: expected an .npz file with {', '.join(shapes)}, got {kind} for {name}")
         arrays[name] = np.array(stored[name], dtype=np.float64)
     sizes: dict[str, int] = {}
     for name, shape in shapes.items():
@@ -45,9 +46,9 @@ def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Arra
                 sizes.setdefault(letter, size)
         wanted = tuple(sizes.get(one, 0) if isinstance(one, str) else one for one in shape)
         if came != wanted or not np.isfinite(arrays[name]).all():
-            raise ValueError(f"{path}: {name} must be finite and of shape {wanted}, got {came}")
+            raise InputError(f"{path}: {name} must be finite and of shape {wanted}, got {came}")
     if "low" in arrays and not (arrays["low"] <= arrays["high"]).all():
-        raise ValueError(f"{path}: low must be at most high, got some above it")
+        raise InputError(f"{path}: low must be at most high, got some above it")
     return arrays
 
 
@@ -55,5 +56,5 @@ def indices_of(path: str | Path, name: str, values: Array, count: int) -> NDArra
     """Return numbers of a file as indices into so many. Raises ValueError where one is none, or is there twice."""
     whole = (values == np.round(values)) & (values >= 0.0) & (values < count)
     if not whole.all() or len(np.unique(values)) != len(values):
-        raise ValueError(f"{path}: {name} must be different whole numbers from 0 to {count - 1}, got others")
+        raise InputError(f"{path}: {name} must be different whole numbers from 0 to {count - 1}, got others")
     return values.astype(np.intp)

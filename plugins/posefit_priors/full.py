@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.check import at_least, one_of
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import Shape, angles_of, indices_of, load_arrays
@@ -45,13 +46,13 @@ class Full:
         if self._limits == "asf":
             if skeleton is None or skeleton.limits is None:
                 name = "no skeleton" if skeleton is None else f"{skeleton.name}, whose file states none"
-                raise ValueError(
+                raise InputError(
                     f"limits must be training where the skeleton states no joint limits, got asf and {name}"
                 )
             low, high = np.minimum(low, skeleton.limits[:, 0]), np.maximum(high, skeleton.limits[:, 1])
         self.angles = np.flatnonzero(high > low)
         if not len(self.angles):
-            raise ValueError(f"angles must differ somewhere, got {len(angles)} equal frames")
+            raise InputError(f"angles must differ somewhere, got {len(angles)} equal frames")
         self.rest = angles.mean(axis=0)
         self.low, self.high = low[self.angles], high[self.angles]
         return self

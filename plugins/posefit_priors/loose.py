@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index, both
 from posefit_priors.arrays import indices_of, load_arrays
@@ -124,7 +125,7 @@ class Loose:
         prior._pca = PCA.load(path, "pca_")
         prior.loose = indices_of(path, "loose", arrays["loose"], len(prior._pca.mean))
         if (wanted := len(prior._pca.low) + len(prior.loose)) != len(arrays["low"]):
-            raise ValueError(f"{path}: low must be of shape ({wanted},), got {arrays['low'].shape}")
+            raise InputError(f"{path}: low must be of shape ({wanted},), got {arrays['low'].shape}")
         for name in ("angles_low", "angles_high", "low", "high"):
             setattr(prior, name, arrays[name])
         return prior

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
@@ -57,7 +58,7 @@ class PCA:
         check_components(components)
         at_least("clusters", clusters, 1)
         if not 0.0 < quantile <= 1.0:
-            raise ValueError(f"quantile must lie in 0 to 1, got {quantile}")
+            raise InputError(f"quantile must lie in 0 to 1, got {quantile}")
         at_least("seed", seed, 0)
         self._components, self._clusters, self._quantile, self._seed = components, clusters, quantile, seed
 
@@ -121,7 +122,7 @@ class PCA:
 def check_components(components: float) -> None:
     """Return nothing. Raises ValueError where it is neither a number of components nor a share of variance."""
     if not 0.0 < components < np.inf or (components >= 1 and components != int(components)):
-        raise ValueError(f"components must be a whole number or a share of variance below 1, got {components}")
+        raise InputError(f"components must be a whole number or a share of variance below 1, got {components}")
 
 
 def principal(centred: Array, components: float) -> tuple[Array, Array]:
@@ -133,7 +134,7 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
     """
     most = min(len(centred) - 1, centred.shape[1])
     if most < components:
-        raise ValueError(f"angles must hold at least {int(components) + 1} frames, got {len(centred)}")
+        raise InputError(f"angles must hold at least {int(components) + 1} frames, got {len(centred)}")
     _, spread, directions = np.linalg.svd(centred, full_matrices=False)  # SAPSO 2.1.2
     share = spread**2 / max(float((spread**2).sum()), np.finfo(float).tiny)
     kept = int(components) if components >= 1 else int(np.searchsorted(share.cumsum(), components)) + 1

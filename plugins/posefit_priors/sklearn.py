@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
 from posefit.reading import cut, parsed_json
@@ -55,7 +56,7 @@ class Transformed:
         at_least("components", components, 1)
         at_least("clusters", clusters, 1)
         if not 0.0 < quantile <= 1.0:
-            raise ValueError(f"quantile must lie in 0 to 1, got {quantile}")
+            raise InputError(f"quantile must lie in 0 to 1, got {quantile}")
         at_least("seed", seed, 0)
         self._variant, self._components, self._options = variant, components, options
         self._clusters, self._quantile, self._seed = clusters, quantile, seed
@@ -68,7 +69,7 @@ class Transformed:
         self._model.fit(self._angles)
         latents = self.transform(self._angles)
         if latents.ndim != 2 or latents.shape[1] < 1 or not np.isfinite(latents).all():
-            raise ValueError(f"variant must give finite latents (n, m), got {latents.shape} from {self._variant}")
+            raise InputError(f"variant must give finite latents (n, m), got {latents.shape} from {self._variant}")
         self._linear = _linear(self._model, latents.shape[1])
         self.low, self.high = latents.min(axis=0), latents.max(axis=0)
         self.centres = clustered(latents, self._clusters, self._seed)[0]
@@ -111,13 +112,13 @@ class Transformed:
         names = ("variant", "components", "options", "clusters", "quantile", "seed")
         letters = arrays["words"]
         if ((letters < 0) | (letters > 255)).any():
-            raise ValueError(f"{path}: words must be bytes, 0 to 255, got {letters.min():g} to {letters.max():g}")
+            raise InputError(f"{path}: words must be bytes, 0 to 255, got {letters.min():g} to {letters.max():g}")
         try:
             settings = dict(zip(names, parsed_json(letters.astype(np.uint8).tobytes().decode()), strict=True))
             return cls(**settings).fit(arrays["angles"])
         except Exception as error:  # whatever the transformer trips over, the file is to blame
             came = cut(" ".join(str(error).split()))
-            raise ValueError(f"{path}: expected the settings of a prior, got {came}") from None
+            raise InputError(f"{path}: expected the settings of a prior, got {came}") from None
 
 
 def _built(variant: str, components: int, options: str, seed: int) -> Any:
@@ -128,12 +129,12 @@ def _built(variant: str, components: int, options: str, seed: int) -> Any:
         if not isinstance(given, dict):
             raise TypeError(type(given).__name__)
     except (ValueError, TypeError) as error:
-        raise ValueError(f"options must be a JSON object, got {options!r} ({error})") from None
+        raise InputError(f"options must be a JSON object, got {options!r} ({error})") from None
     known = kind().get_params()
     usual = {"n_components": components, "random_state": seed, **DEFAULTS.get(variant, {})}
     unknown = sorted(set(given) - set(known))
     if unknown:
-        raise ValueError(f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}")
+        raise InputError(f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}")
     return kind(**{name: value for name, value in usual.items() if name in known} | given)
 
 
@@ -147,7 +148,7 @@ def _class(variant: str) -> Callable[..., Any]:
                 choices.append(name)
                 if name == variant:
                     return kind
-    raise ValueError(
+    raise InputError(
         f"variant must be a transformer with an inverse, such as {', '.join(sorted(choices))}, got {variant!r}"
     )
 
@@ -164,9 +165,9 @@ def _linear(model: Any, components: int) -> tuple[Array, Array] | None:
     try:
         images = np.asarray(model.inverse_transform(probe), dtype=np.float64)
     except (ValueError, AttributeError) as error:
-        raise ValueError(f"variant must have an inverse, got {type(model).__name__}: {error}") from None
+        raise InputError(f"variant must have an inverse, got {type(model).__name__}: {error}") from None
     if images.shape != (len(probe), 63):
-        raise ValueError(f"variant must give back 63 angles, got {images.shape[1:]} from {type(model).__name__}")
+        raise InputError(f"variant must give back 63 angles, got {images.shape[1:]} from {type(model).__name__}")
     matrix = images[1:-1] - images[0]
     if np.allclose(images[-1], images[0] + 0.5 * matrix.sum(axis=0), rtol=0.0, atol=1e-9):
         return writeable(matrix), writeable(images[0])

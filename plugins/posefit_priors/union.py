@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import angles_of, load_arrays
@@ -71,7 +72,7 @@ class Union:
         at_least("clusters", clusters, 1)
         positive("breadth", breadth)
         if not 0.0 < quantile <= 1.0:
-            raise ValueError(f"quantile must lie in 0 to 1, got {quantile}")
+            raise InputError(f"quantile must lie in 0 to 1, got {quantile}")
         at_least("seed", seed, 0)
         self._components, self._clusters, self._breadth = components, clusters, breadth
         self._quantile, self._seed = quantile, seed

@@ -12,6 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.plugin import (
     Array,
     RegisterOptimiser,
@@ -68,7 +69,7 @@ class PyCMA:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Let the strategy learn the costs (n,)."""
         if self._asked is None:
-            raise ValueError("tell must follow ask, got costs before proposals")
+            raise InputError("tell must follow ask, got costs before proposals")
         self._strategy.tell(self._asked, finite_costs(costs).tolist())
         self._asked = None
 

@@ -13,6 +13,7 @@ from typing import Any, Literal, final, get_args
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.plugin import (
     Array,
     RegisterOptimiser,
@@ -55,7 +56,7 @@ class Pymoo:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Let the algorithm learn the costs (n,)."""
         if self._asked is None:
-            raise ValueError("tell must follow ask, got costs before proposals")
+            raise InputError("tell must follow ask, got costs before proposals")
         self._learn(finite_costs(costs))
 
     def _begin(self) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import closing
 from typing import Any, TypeVar
 
+from posefit.errors import InputError
 from posefit.sweep.command import cores
 from posefit.sweep.engines.engine import Limits
 from posefit.sweep.engines.processes import Processes
@@ -41,7 +42,7 @@ def _ended(jobs: Mapping[K, Callable[[], T]], engine: Processes[tuple[K, Callabl
             running -= 1
             key = one.cell[0]
             if one.result is None:
-                raise ValueError(f"{key}: {one.reason}")
+                raise InputError(f"{key}: {one.reason}")
             yield key, one.result
 
 
@@ -51,10 +52,10 @@ def _called(job: tuple[K, Callable[[], T]]) -> T:
 
 def _check(workers: int | None) -> None:
     if workers is not None and workers < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
+        raise InputError(f"workers must be at least 1, got {workers}")
 
 
 def check_seeds(seeds: int) -> None:
     """Return nothing. Raises ValueError where it is no number of seeds."""
     if seeds < 1:
-        raise ValueError(f"seeds must be at least 1, got {seeds}")
+        raise InputError(f"seeds must be at least 1, got {seeds}")

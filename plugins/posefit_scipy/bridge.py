@@ -8,6 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.plugin import Array, Space, draw_population, finite_costs, repair
 
 LEAVE_SECONDS = 5.0  # how long to wait for a library to leave when its search is dropped
@@ -49,9 +50,9 @@ class Bridged:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Pass the costs (n,) on. Raises ValueError where there are no proposals, or another number of them."""
         if self._asked is None or self._channel is None:
-            raise ValueError("tell must follow ask, got costs before proposals")
+            raise InputError("tell must follow ask, got costs before proposals")
         if len(costs) != len(self._asked):
-            raise ValueError(f"tell must get {len(self._asked)} costs, got {len(costs)}")
+            raise InputError(f"tell must get {len(self._asked)} costs, got {len(costs)}")
         self._costs.append(finite_costs(costs))
         self._channel.costs.put(self._costs[-1])
         self._asked = self._channel.proposals()

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space
 from posefit.fitting.check import at_least, one_of, positive
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, inertia, speed_limits
@@ -59,9 +60,9 @@ class PSO:
         at_least("iterations", iterations, 1)
         one_of("velocity", velocity, ("constricted", "inertia", "original"))
         if not phi > 4.0:
-            raise ValueError(f"phi must be above 4, got {phi}")
+            raise InputError(f"phi must be above 4, got {phi}")
         if not inertia > 0.1:
-            raise ValueError(f"inertia must be above 0.1, got {inertia}")
+            raise InputError(f"inertia must be above 0.1, got {inertia}")
         at_least("acceleration", acceleration, 0.0)
         positive("alpha", alpha)
         at_least("redraws", redraws, 0)

@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space
 from posefit.fitting.check import at_least, between, one_of, positive
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, inertia, speed_limits
@@ -107,7 +108,7 @@ def _check(
     between("cooling", cooling, 0.0, 1.0)
     at_least("stop_temperature", stop_temperature, 0.0)
     if not first_inertia > 0.1:
-        raise ValueError(f"inertia must be above 0.1, got {first_inertia}")
+        raise InputError(f"inertia must be above 0.1, got {first_inertia}")
     at_least("acceleration", acceleration, 0.0)
     positive("alpha", alpha)
     at_least("redraws", redraws, 0)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population, extent
 from posefit_swarm.kernels import accept, accept_and_move, move, repair
 
@@ -121,7 +122,7 @@ class SwarmState:
     def _checked(self, proposals: Array, costs: Array) -> Array:
         """Return costs (n,). Raises ValueError where they, or the proposals, are not those of the population."""
         if proposals.shape != self.moved.shape or len(costs) != len(self.moved):
-            raise ValueError(f"tell must get the population of shape {self.moved.shape}, got {proposals.shape}")
+            raise InputError(f"tell must get the population of shape {self.moved.shape}, got {proposals.shape}")
         return writeable(costs)
 
     def _draws(self, particles: int, before: int = 0) -> Array:

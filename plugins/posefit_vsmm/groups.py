@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 
 SIZE_LIMIT = 100_000  # bytes
 
@@ -62,22 +63,22 @@ def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
     source = files("posefit_vsmm") / "groups.toml" if path is None else Path(path)
     if isinstance(source, Path):
         if not source.is_file():
-            raise ValueError(f"{source}: expected a file of groups, got none")
+            raise InputError(f"{source}: expected a file of groups, got none")
         if source.stat().st_size > SIZE_LIMIT:
-            raise ValueError(f"{source}: expected at most {SIZE_LIMIT} bytes, got {source.stat().st_size}")
+            raise InputError(f"{source}: expected at most {SIZE_LIMIT} bytes, got {source.stat().st_size}")
     label = "groups.toml" if path is None else str(path)
     try:
         values = tomllib.loads(source.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:  # bad UTF-8, bad TOML, endless nesting
-        raise ValueError(f"{label}: expected TOML with stay, groups and neighbours, got {error}") from None
+        raise InputError(f"{label}: expected TOML with stay, groups and neighbours, got {error}") from None
     if set(values) != {"stay", "groups", "neighbours"}:
-        raise ValueError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
+        raise InputError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
     stay = values["stay"]
     if not isinstance(stay, float) or not 0.0 < stay < 1.0:
-        raise ValueError(f"{label}: stay must be a number between 0 and 1, got {stay!r}")
+        raise InputError(f"{label}: stay must be a number between 0 and 1, got {stay!r}")
     groups, neighbours = (_lists(label, key, values[key], known) for key in ("groups", "neighbours"))
     if not groups or not all(groups.values()):
-        raise ValueError(f"{label}: groups must hold at least one group of at least one model, got {values['groups']}")
+        raise InputError(f"{label}: groups must hold at least one group of at least one model, got {values['groups']}")
     used = {model for mine in groups.values() for model in mine}
     for model in neighbours:
         _check(label, model, known)
@@ -86,7 +87,7 @@ def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
 
 def _lists(label: str, key: str, table: Any, known: Collection[str]) -> dict[str, tuple[str, ...]]:
     if not isinstance(table, dict) or not all(isinstance(mine, list) for mine in table.values()):
-        raise ValueError(f"{label}: {key} must be a table of lists of models, got {table!r}")
+        raise InputError(f"{label}: {key} must be a table of lists of models, got {table!r}")
     for mine in table.values():
         for model in mine:
             _check(label, model, known)
@@ -95,4 +96,4 @@ def _lists(label: str, key: str, table: Any, known: Collection[str]) -> dict[str
 
 def _check(label: str, model: Any, known: Collection[str]) -> None:
     if model not in known:
-        raise ValueError(f"{label}: a model must be one of {', '.join(known)}, got {model!r}")
+        raise InputError(f"{label}: a model must be one of {', '.join(known)}, got {model!r}")

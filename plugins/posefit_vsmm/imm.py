@@ -41,6 +41,7 @@ from typing import Protocol
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit_vsmm.kernels import minus, plus
 
 SMALLEST = 1e-12  # what an eigenvalue of a covariance is raised to where rounding made it less
@@ -129,9 +130,9 @@ class IMM:
     def __post_init__(self) -> None:
         count, matrix = len(self.models), np.asarray(self.transition, dtype=np.float64)
         if matrix.shape != (count, count):
-            raise ValueError(f"transition must have shape {(count, count)}, a row a model, got {matrix.shape}")
+            raise InputError(f"transition must have shape {(count, count)}, a row a model, got {matrix.shape}")
         if not ((matrix >= 0.0).all() and np.allclose(matrix.sum(axis=1), 1.0)):
-            raise ValueError(f"transition must hold probabilities whose rows sum to 1, got {matrix.tolist()}")
+            raise InputError(f"transition must hold probabilities whose rows sum to 1, got {matrix.tolist()}")
 
     def cycle(self, belief: Belief, measure: Callable[[Array], Measurement]) -> Belief:
         """Return the belief one frame later; `measure` returns the measurement for a state."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from posefit import settings as of_plugins
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import Start
 from posefit.fitting.optimiser import OptimiserFactory, minimise
 from posefit.fitting.problem import PoseProblem
@@ -165,9 +166,9 @@ def joined(
         groups: path of a TOML file of groups and neighbours; "" is the package's own. VSMM step 4, Interpretation V1.
     """
     if dimensions < 1:
-        raise ValueError(f"dimensions must be at least 1, got {dimensions}")
+        raise InputError(f"dimensions must be at least 1, got {dimensions}")
     if not weight > 0.0:
-        raise ValueError(f"weight must be above 0, got {weight}")
+        raise InputError(f"weight must be above 0, got {weight}")
     carried = library("identity")
     topology = read_topology(Path(groups) if groups else None, carried.names)
     switching = Switching(

@@ -14,6 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
 from posefit_vsmm import kernels
@@ -88,7 +89,7 @@ class Library:
 def library(shrink: Shrink = "identity") -> Library:
     """Return the models that the package carries. Raises ValueError for an unknown `shrink`."""
     if shrink not in get_args(Shrink):
-        raise ValueError(f"shrink must be one of {', '.join(get_args(Shrink))}, got {shrink!r}")
+        raise InputError(f"shrink must be one of {', '.join(get_args(Shrink))}, got {shrink!r}")
     stored: dict[str, Any] = json.loads((files("posefit_vsmm") / "models.json").read_text(encoding="utf-8"))
     models = {
         name: MotionModel(

@@ -12,6 +12,7 @@ from typing import Literal, final, get_args
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit_vsmm.groups import Topology
@@ -48,11 +49,11 @@ class Rules:
 
     def __post_init__(self) -> None:
         if self.smoothing < 1:
-            raise ValueError(f"smoothing must be at least 1, got {self.smoothing}")
+            raise InputError(f"smoothing must be at least 1, got {self.smoothing}")
         if not self.floor_degrees >= 0.0:
-            raise ValueError(f"floor_degrees must be 0 or more, got {self.floor_degrees}")
+            raise InputError(f"floor_degrees must be 0 or more, got {self.floor_degrees}")
         if self.dwell < 0:
-            raise ValueError(f"dwell must be 0 or more, got {self.dwell}")
+            raise InputError(f"dwell must be 0 or more, got {self.dwell}")
 
     def requested_group(self, points: Sequence[Array]) -> int | None:
         """Return which group, 0 to 2, the latest projected points (17, 2) ask for; None where it is no other."""
@@ -145,12 +146,12 @@ class SequentialTest:
 
     def __post_init__(self) -> None:
         if self.test not in get_args(Test):
-            raise ValueError(f"test must be one of {', '.join(get_args(Test))}, got {self.test!r}")
+            raise InputError(f"test must be one of {', '.join(get_args(Test))}, got {self.test!r}")
         for name in ("false_alarm", "miss"):
             if not 0.0 < getattr(self, name) < 0.5:
-                raise ValueError(f"{name} must be between 0 and 0.5, got {getattr(self, name)}")
+                raise InputError(f"{name} must be between 0 and 0.5, got {getattr(self, name)}")
         if self.longest < 1:
-            raise ValueError(f"longest must be at least 1, got {self.longest}")
+            raise InputError(f"longest must be at least 1, got {self.longest}")
 
 
 @final
@@ -209,7 +210,7 @@ class Switching:
     def __post_init__(self) -> None:
         for name, choices in (("structure", Structure), ("new", New)):
             if getattr(self, name) not in get_args(choices):
-                raise ValueError(f"{name} must be one of {', '.join(get_args(choices))}, got {getattr(self, name)!r}")
+                raise InputError(f"{name} must be one of {', '.join(get_args(choices))}, got {getattr(self, name)!r}")
 
 
 @final

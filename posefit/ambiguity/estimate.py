@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.alignment import align
 from posefit.fitting.check import finite_number, whole
 from posefit.fitting.shape import NAMES, shaped
@@ -166,7 +167,7 @@ def states_within(moment: Moment, poses: Array, within: float) -> States:
     rows, yaws, _ = _best(small, poses, np.tile(rows, EVERY), np.concatenate(beside), within + BLUR)
     rows, yaws, costs = _best(moment, poses, rows, yaws, within)
     if len(rows) > MAX_STATES:
-        raise ValueError(
+        raise InputError(
             f"within must be so little that at most {MAX_STATES:,} poses and yaws are left, got {within:g}, "
             f"which leaves {len(rows):,}"
         )
@@ -307,29 +308,29 @@ def body_of(folder: str | Path, body: Body) -> Body:
     """
     path = Path(folder) / SUMMARY
     if not path.is_file():
-        raise ValueError(f"{folder}: expected the folder of a track with its {SUMMARY}, got none")
+        raise InputError(f"{folder}: expected the folder of a track with its {SUMMARY}, got none")
     text = read_text(path, MAX_SUMMARY_BYTES)
     try:
         summary = parsed_json(text)
     except ValueError as error:
-        raise ValueError(f"{path}: expected a JSON object, got {error}") from None
+        raise InputError(f"{path}: expected a JSON object, got {error}") from None
     try:
         build = summary["body"] if isinstance(summary, Mapping) else None
         if not isinstance(build, Mapping):
-            raise ValueError("expected the build of a person, got none: it was not fitted")
+            raise InputError("expected the build of a person, got none: it was not fitted")
         factors_by_name = build["factors"]
         factors = np.array([_within(name, factors_by_name[name], BUILD_RANGE) for name in NAMES])
         return shaped(body, factors, _within("stature", build["stature"], HEIGHTS))
     except (ValueError, KeyError, TypeError) as error:
         message = f"expected {error.args[0]} in it, got none" if isinstance(error, KeyError) else str(error)
-        raise ValueError(f"{path}: {message}") from None
+        raise InputError(f"{path}: {message}") from None
 
 
 def _within(name: str, value: object, ends: tuple[float, float]) -> float:
     """Return a finite number between two ends. Raises ValueError otherwise."""
     number = finite_number(name, value)
     if not ends[0] <= number <= ends[1]:
-        raise ValueError(f"{name} must lie in {ends[0]:g} to {ends[1]:g}, got {number:g}")
+        raise InputError(f"{name} must lie in {ends[0]:g} to {ends[1]:g}, got {number:g}")
     return number
 
 
@@ -394,15 +395,15 @@ def ambiguity_of(
     """
     frame, threads = whole("frame", frame, 0), whole("threads", threads, 1)
     if not finite_number("within", within) >= 0.0:
-        raise ValueError(f"within must be 0 or more, got {within:g}")
+        raise InputError(f"within must be 0 or more, got {within:g}")
     if not finite_number("temperature", temperature) > 0.0:
-        raise ValueError(f"temperature must be above 0, got {temperature:g}")
+        raise InputError(f"temperature must be above 0, got {temperature:g}")
     if translation not in (None, "known", "aligned"):
-        raise ValueError(f"translation must be known or aligned, got {translation}")
+        raise InputError(f"translation must be known or aligned, got {translation}")
     sources = source if isinstance(source, Sequence) and not isinstance(source, str) else [source]
     motion = kind_of(sources[0]) == "motion"
     if not motion and translation == "known":
-        raise ValueError("translation must be aligned where only masks are given, got known")
+        raise InputError("translation must be aligned where only masks are given, got known")
     if motion and build is not None:
         raise useless_for("motion", "build", str(build), "footage")
     viewing = TrackOptions(**options)
@@ -434,12 +435,12 @@ def ambiguity_of(
 def _moment(scene: Scene, k: int, frame: int, translation: str | None, threads: int) -> Moment:
     """Return frame k of a scene, which users call `frame`. Raises ValueError where it shows no person."""
     if not k < scene.count:
-        raise ValueError(f"frame must lie in 0 to {scene.count - 1} of {scene.name}, got {frame}")
+        raise InputError(f"frame must lie in 0 to {scene.count - 1} of {scene.name}, got {frame}")
     observation = scene.observations[k]
     shown = any(silhouette.mask.any() for silhouette in observation.silhouettes)
     if not (observation.usable and shown):
         came = "one that shows too little of the person" if shown else "an empty mask"
-        raise ValueError(f"frame must show the person, got {came} in frame {frame} of {scene.name}")
+        raise InputError(f"frame must show the person, got {came} in frame {frame} of {scene.name}")
     known = scene.truth is not None and translation != "aligned"
     anchor = scene.anchor if observation.translation is None else np.asarray(observation.translation)
     return Moment(scene.body, scene.cameras, observation.silhouettes, anchor, known, threads)

@@ -11,6 +11,7 @@ import click
 from posefit.cli import plugins, suite, sweeping, tracking
 from posefit.cli.ambiguity import ambiguity
 from posefit.cli.motions import motions
+from posefit.errors import InputError
 from posefit.version import __version__
 
 MISTAKE = 2  # the exit status of a mistake, which is shown in one line
@@ -29,7 +30,7 @@ BUILT_IN = (
 
 
 class _Commands(click.Group):
-    """Knows plugins' commands, too, and turns the errors that users can make into one line on stderr."""
+    """Knows plugins' commands, too, and shows a user's mistakes in one line on stderr; other errors keep their traceback."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
         """Return the names of all commands: those of plugins come last."""
@@ -43,11 +44,11 @@ class _Commands(click.Group):
         """Run a command."""
         try:
             return super().invoke(context)
-        except click.UsageError as error:
-            click.echo(f"posefit: {' '.join(error.format_message().split())}", err=True)
-            context.exit(MISTAKE)
-        except (ValueError, FileNotFoundError, PermissionError, ImportError) as error:
-            click.echo(f"posefit: {' '.join(str(error).split())}", err=True)
+        except (click.UsageError, InputError, FileNotFoundError, PermissionError, ImportError) as error:
+            if context.params.get("debug"):
+                raise
+            message = error.format_message() if isinstance(error, click.UsageError) else str(error)
+            click.echo(f"posefit: {' '.join(message.split())}", err=True)
             context.exit(MISTAKE)
 
 
@@ -61,7 +62,8 @@ def _added() -> dict[str, click.Command]:
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="posefit")
-def main() -> None:
+@click.option("--debug", is_flag=True, help="Show the traceback of a mistake instead of one line.")
+def main(debug: bool) -> None:
     """Recover a person's 3D pose from silhouettes, by searching."""
 
 

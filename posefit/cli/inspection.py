@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from posefit.errors import InputError
 from posefit.hooks import ClaimedOrder
 from posefit.registry import BLOCK, KINDS, LOAD, STRICT, Offer, Plugin, Registry
 from posefit.settings import Setting, settings_in, without_settings
@@ -51,7 +52,7 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
         known = sorted({offer.name for offer in offers})
         near = get_close_matches(name, known, 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"plugin must be one of {', '.join(known)}, got {name!r}{hint}")
+        raise InputError(f"plugin must be one of {', '.join(known)}, got {name!r}{hint}")
     for offer in mine:
         text = getdoc(offer.factory) or ""
         said = settings_in(text)

@@ -7,6 +7,7 @@ import click
 
 from posefit.cli.options import parsed_by
 from posefit.cli.output import json_line, progress, results_alone, say
+from posefit.errors import InputError
 from posefit.tracking.options import text_range
 
 if TYPE_CHECKING:
@@ -196,7 +197,7 @@ def _numbers(instances: tuple[int | None, int | None]) -> range:
 
     first, last = instances[0] or 0, INSTANCES.stop if instances[1] is None else instances[1]
     if not 0 <= first < last <= INSTANCES.stop:
-        raise ValueError(f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}")
+        raise InputError(f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}")
     return range(first, last)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from string import Template
 from typing import Literal
 
+from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.hooks import PROJECT
 from posefit.registry import KINDS, Kind, command_plugins, registry
@@ -26,14 +27,14 @@ def write_plugin(
     be a plugin's, or the folder is there already.
     """
     if kind not in (*KINDS, COMMAND):
-        raise ValueError(f"kind must be one of {', '.join((*KINDS, COMMAND))}, got {kind!r}")
+        raise InputError(f"kind must be one of {', '.join((*KINDS, COMMAND))}, got {kind!r}")
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
-        raise ValueError(f"name must be small letters, digits, - and _, and begin with a letter, got {name!r}")
+        raise InputError(f"name must be small letters, digits, - and _, and begin with a letter, got {name!r}")
     if name in (known := _taken(kind, own)):
-        raise ValueError(f"name must be a new one, got {name!r}, which {known[name]} registers already")
+        raise InputError(f"name must be a new one, got {name!r}, which {known[name]} registers already")
     module = name.replace("-", "_")
     if (there := find_spec(f"{PROJECT}_{module}")) is not None:
-        raise ValueError(
+        raise InputError(
             f"name must make a new module, got {name!r}: its module {there.name} would hide the one of that name in "
             f"{there.origin or 'sys.path'}"
         )
@@ -59,7 +60,7 @@ def write_plugin(
     }
     target = Path(folder or f"posefit-{words['dashed']}")
     if target.exists():
-        raise ValueError(f"{target}: expected a new folder, got one that exists")
+        raise InputError(f"{target}: expected a new folder, got one that exists")
     target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
         for template, written in (

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.uncertainty.landscape import displacement as displacement
 from posefit.uncertainty.landscape import wrap as wrap
 
@@ -80,7 +81,7 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
     if drawn is None and space.start is not None:
         drawn = _drawn(space, None, rng, count)
     if drawn is None:
-        raise ValueError(f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws")
+        raise InputError(f"the prior must find some of its range feasible, got none in {REDRAWS} x {count} draws")
     return drawn
 
 

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.reading import quoted
 
 
 def at_least(name: str, value: float, least: float) -> None:
     """Return nothing. Raises ValueError where a number is below the least it may be, or is not finite."""
     if not (math.isfinite(value) and value >= least):
-        raise ValueError(f"{name} must be at least {least:g}, got {value}")
+        raise InputError(f"{name} must be at least {least:g}, got {value}")
 
 
 def between(name: str, value: float, low: float, high: float, *, ends: bool = True) -> None:
@@ -21,21 +22,21 @@ def between(name: str, value: float, low: float, high: float, *, ends: bool = Tr
     inside = low <= value <= high if ends else low < value < high
     if not inside:
         way = f"lie in {low:g} to {high:g}" if ends else f"lie between {low:g} and {high:g}"
-        raise ValueError(f"{name} must {way}, got {value}")
+        raise InputError(f"{name} must {way}, got {value}")
 
 
 def positive(name: str, value: float) -> None:
     """Return nothing. Raises ValueError where a number is not finite and above 0."""
     if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} must be above 0, got {value}")
+        raise InputError(f"{name} must be above 0, got {value}")
 
 
 def whole(name: str, value: object, least: int) -> int:
     """Return a whole number as an int. Raises ValueError where it is none, or below the least it may be."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise ValueError(f"{name} must be a whole number of at least {least}, got {quoted(value)}")
+        raise InputError(f"{name} must be a whole number of at least {least}, got {quoted(value)}")
     if value < least:
-        raise ValueError(f"{name} must be {f'at least {least}' if least else '0 or more'}, got {quoted(int(value))}")
+        raise InputError(f"{name} must be {f'at least {least}' if least else '0 or more'}, got {quoted(int(value))}")
     return int(value)
 
 
@@ -46,14 +47,14 @@ def finite_number(name: str, value: object) -> float:
     except OverflowError:  # a whole number of any size
         number = math.inf
     if not math.isfinite(number):
-        raise ValueError(f"{name} must be a finite number, got {quoted(value)}")
+        raise InputError(f"{name} must be a finite number, got {quoted(value)}")
     return number
 
 
 def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
     """Return two values. Raises ValueError where it is anything else; `what` says what was expected."""
     if not isinstance(value, tuple | list) or len(value) != 2:
-        raise ValueError(f"{name} must be {what}, got {quoted(value)}")
+        raise InputError(f"{name} must be {what}, got {quoted(value)}")
     return value[0], value[1]
 
 
@@ -61,4 +62,4 @@ def one_of(name: str, value: object, known: Iterable[object]) -> None:
     """Return nothing. Raises ValueError listing the choices where a value is none of them."""
     known = tuple(known)
     if value not in known:
-        raise ValueError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}")
+        raise InputError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}")

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, joint_distances
 from posefit.uncertainty.sides import nearer_mirrored
@@ -21,7 +22,7 @@ def pose_error_degrees(truth: Array, estimate: Array, dimensions: NDArray[np.boo
         dimensions = np.asarray(dimensions)
         if dimensions.shape != (ANGLES,) or dimensions.dtype != np.bool_ or not dimensions.any():
             came = f"{dimensions.dtype} of shape {dimensions.shape}, {np.count_nonzero(dimensions)} of them not 0"
-            raise ValueError(f"dimensions must be {ANGLES} booleans, at least one of them true, got {came}")
+            raise InputError(f"dimensions must be {ANGLES} booleans, at least one of them true, got {came}")
     difference = np.degrees(np.abs(wrapped(truth - estimate)))
     return np.asarray((difference if dimensions is None else difference[:, dimensions]).mean(axis=1))  # SAPSO (8)
 
@@ -76,7 +77,7 @@ def iou(areas: NDArray[np.int64]) -> Array:
     """Return the intersection over union (n,) of areas R, B, Y (n, 3); 1 where both are empty."""
     areas = np.asarray(areas)
     if areas.ndim != 2 or areas.shape[1] != 3:
-        raise ValueError(f"areas must have shape (n, 3), got {areas.shape}")
+        raise InputError(f"areas must have shape (n, 3), got {areas.shape}")
     total = areas.sum(axis=1)
     return np.asarray(np.where(total > 0, areas[:, 2] / np.maximum(total, 1), 1.0))
 
@@ -109,17 +110,17 @@ def skill(error: float, baseline: float) -> float | None:
 def _pair(name: str, truth: Array, other: Array, tail: tuple[int, ...]) -> tuple[Array, Array]:
     truth, other = np.asarray(truth, dtype=np.float64), np.asarray(other, dtype=np.float64)
     if truth.shape[1:] != tail or not len(truth):
-        raise ValueError(f"truth must have shape (T, {', '.join(map(str, tail))}), got {truth.shape}")
+        raise InputError(f"truth must have shape (T, {', '.join(map(str, tail))}), got {truth.shape}")
     if other.shape != truth.shape:
-        raise ValueError(f"{name} must have the truth's shape {truth.shape}, got {other.shape}")
+        raise InputError(f"{name} must have the truth's shape {truth.shape}, got {other.shape}")
     for label, values in (("truth", truth), (name, other)):
         if not np.isfinite(values).all():
-            raise ValueError(f"{label} must be finite, got {np.count_nonzero(~np.isfinite(values))} that are not")
+            raise InputError(f"{label} must be finite, got {np.count_nonzero(~np.isfinite(values))} that are not")
     return truth, other
 
 
 def _series(name: str, values: Array) -> Array:
     values = np.asarray(values, dtype=np.float64)
     if values.ndim != 1 or not len(values):
-        raise ValueError(f"{name} must have shape (T,), at least one frame, got {values.shape}")
+        raise InputError(f"{name} must have shape (T,), at least one frame, got {values.shape}")
     return values

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import Space
 
 WORST = 1e15  # few libraries bear nan, infinity or the square of 1e300
@@ -74,7 +75,7 @@ class Minimum:
     spent: NDArray[np.int64] = field(repr=False)  # (populations,) evaluations so far after each population
 
 
-class BudgetError(ValueError):
+class BudgetError(InputError):
     """A budget does not hold one population."""
 
 
@@ -136,5 +137,5 @@ def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
         history.append(cost)
         spent.append(used)
     if best is None or math.isnan(cost):
-        raise ValueError(f"costs must be numbers, got nan for all {used} proposals")
+        raise InputError(f"costs must be numbers, got nan for all {used} proposals")
     return Minimum(best, cost, used, np.array(history), np.array(spent))

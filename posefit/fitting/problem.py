@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.fitting.alignment import align
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
@@ -45,17 +46,17 @@ class PoseProblem:
 
     def __post_init__(self) -> None:
         if len(self.cameras) != len(self.silhouettes) or not self.cameras:
-            raise ValueError(f"silhouettes must be one a camera ({len(self.cameras)}), got {len(self.silhouettes)}")
+            raise InputError(f"silhouettes must be one a camera ({len(self.cameras)}), got {len(self.silhouettes)}")
         for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
             if silhouette.size != (camera.width, camera.height):
                 size = (camera.height, camera.width)
-                raise ValueError(f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}")
+                raise InputError(f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}")
         if not self.blank and not any(silhouette.mask.any() for silhouette in self.silhouettes):
-            raise ValueError("silhouettes must show a person, got an empty mask")
+            raise InputError("silhouettes must show a person, got an empty mask")
         if not 0.0 <= self.beta <= 1.0:
-            raise ValueError(f"beta must lie in 0 to 1, got {self.beta}")
+            raise InputError(f"beta must lie in 0 to 1, got {self.beta}")
         if self.threads < 1:
-            raise ValueError(f"threads must be at least 1, got {self.threads}")
+            raise InputError(f"threads must be at least 1, got {self.threads}")
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4)."""

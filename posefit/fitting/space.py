@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.fitting.box import Start
 from posefit.fitting.kernels import unpack_proposals, unpack_tilted, within
 from posefit.fitting.prior import Prior, Tilt
@@ -44,11 +45,11 @@ class SearchSpace:
 
     def __post_init__(self) -> None:
         if self.translation not in TRANSLATIONS:
-            raise ValueError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {self.translation!r}")
+            raise InputError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {self.translation!r}")
         for name in ("root_range", "translation_range"):
             reach = np.asarray(getattr(self, name))
             if reach.shape != (3,) or not (np.isfinite(reach).all() and (reach >= 0.0).all()):
-                raise ValueError(f"{name} must be 3 numbers of 0 or more, got {quoted(reach.tolist())}")
+                raise InputError(f"{name} must be 3 numbers of 0 or more, got {quoted(reach.tolist())}")
         low, high = np.asarray(self.prior.low), np.asarray(self.prior.high)
         middle, half = [self.root_centre, 0.5 * (low + high)], [self.root_range, 0.5 * (high - low)]
         if self.translation == "searched":
@@ -97,14 +98,14 @@ class SearchSpace:
         proposals = writeable(proposals)
         d, m = len(self.centre), len(self.prior.low)
         if proposals.shape[1:] != (d,):
-            raise ValueError(f"proposals must have shape (n, {d}), got {proposals.shape}")
+            raise InputError(f"proposals must have shape (n, {d}), got {proposals.shape}")
         n, first = len(proposals), d - m
         poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
         box, filled = (proposals, self.centre, self.half, self.anchor, first), (poses, translations, latents)
         tilt = self.tilt
         finite = unpack_proposals(*box, *filled) if tilt is None else unpack_tilted(*box, tilt.mean, *filled)
         if not finite:
-            raise ValueError("proposals must be finite, got nan or infinity")
+            raise InputError("proposals must be finite, got nan or infinity")
         poses[:, 3:] = self.prior.inverse_transform(latents)
         return poses, translations
 

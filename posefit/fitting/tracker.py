@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, displacement
 from posefit.fitting.check import between, one_of, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
@@ -61,7 +62,7 @@ class Frame:
 
     def __post_init__(self) -> None:
         if self.lost is not None and not 0.0 <= self.lost <= 1.0:
-            raise ValueError(f"lost of a frame must lie in 0 to 1, got {self.lost}")
+            raise InputError(f"lost of a frame must lie in 0 to 1, got {self.lost}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,15 +146,15 @@ class Prediction:
         if self.relocalise_gap is not None:
             whole("relocalise_gap", self.relocalise_gap, 0)
         if not self.spread >= 0.0:
-            raise ValueError(f"spread must be 0 or more, got {self.spread}")
+            raise InputError(f"spread must be 0 or more, got {self.spread}")
         for name in ("root_range_degrees", "translation_range"):
             if not (np.isfinite(getattr(self, name)).all() and np.min(getattr(self, name)) >= 0.0):
-                raise ValueError(f"{name} must be 0 or more to either side, got {getattr(self, name)}")
+                raise InputError(f"{name} must be 0 or more to either side, got {getattr(self, name)}")
         one_of("tilt", self.tilt, ("learned", "box"))
         if not 0.0 < self.tilt_share <= 1.0:
-            raise ValueError(f"tilt_share must be above 0 and at most 1, got {self.tilt_share}")
+            raise InputError(f"tilt_share must be above 0 and at most 1, got {self.tilt_share}")
         if not 0.0 <= self.tilt_margin_degrees < np.inf:
-            raise ValueError(f"tilt_margin_degrees must be 0 or more, got {self.tilt_margin_degrees}")
+            raise InputError(f"tilt_margin_degrees must be 0 or more, got {self.tilt_margin_degrees}")
         one_of("prediction", self.prediction, ("latest", "literal"))
         between("beta", self.beta, 0.0, 1.0)
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import BudgetError, Optimiser
 from posefit.fitting.prior import Prior
@@ -29,8 +30,8 @@ UNCOUNTED_POSES = 10  # ours: a frame may draw so many beyond its evaluations, a
 COST_TOLERANCE = 1e-6  # ours: costs are rounded where they are added up in another order
 
 
-class BrokenRuleError(ValueError):
-    """A plugin broke one of the rules that its kind has to keep."""
+class BrokenRuleError(InputError):
+    """A plugin broke one of the rules that its kind has to keep; it is shown in one line, as a mistake of its author."""
 
 
 class CheckedOptimiser:
@@ -106,7 +107,11 @@ def plugin_errors(
     try:
         with timed(limit):
             yield
-    except (BrokenRuleError, *passed):
+    except BrokenRuleError:
+        raise
+    except passed as error:
+        if isinstance(error, ValueError) and not isinstance(error, InputError):
+            raise InputError(str(error)) from error  # a plugin's own check of a setting
         raise
     except (Exception, SystemExit) as error:
         if limit is not None and isinstance(error, TimeoutError):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton, kind
 
 # Radii as shares of the bone's length: (where the bone starts, where it ends). Ours: read off an adult's build.
@@ -38,9 +39,9 @@ class Body:
     def __post_init__(self) -> None:
         radii = np.array(self.radii, dtype=np.float64)
         if radii.shape != (len(BONES), 2):
-            raise ValueError(f"radii must have shape {(len(BONES), 2)}, got {radii.shape}")
+            raise InputError(f"radii must have shape {(len(BONES), 2)}, got {radii.shape}")
         if not (np.isfinite(radii).all() and (radii >= 0.0).all()):
-            raise ValueError(f"radii must be finite and not negative, got {radii.min()} to {radii.max()}")
+            raise InputError(f"radii must be finite and not negative, got {radii.min()} to {radii.max()}")
         radii.setflags(write=False)
         object.__setattr__(self, "radii", radii)
 

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.camera import Camera
 from posefit.geometry.storage import Matrix, number_of, numbers_of, stored_values, xml_of
 from posefit.reading import cut, parsed_toml, quoted, read_text
@@ -87,7 +88,7 @@ def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     images most. Raises ValueError where `up` is none.
     """
     if up is not None and up not in TURNS:
-        raise ValueError(f"up must be one of x, y, z, got {up!r}")
+        raise InputError(f"up must be one of x, y, z, got {up!r}")
     placed = [one.rotation for one in calibrations if one.rotation is not None]
     if not placed or any(one.upright for one in calibrations):
         return np.eye(3)
@@ -101,7 +102,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     """Return the cameras of a calibration file, in its order. Raises ValueError naming the file and what is wrong."""
     path = Path(path)
     if not path.is_file():
-        raise ValueError(f"{path}: expected a calibration file, got nothing of that name")
+        raise InputError(f"{path}: expected a calibration file, got nothing of that name")
     text = read_text(path, LARGEST_FILE)
     try:
         calibrations = _reader(path, text)(path, text)
@@ -110,9 +111,9 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     except (ValueError, TypeError, KeyError, OverflowError, AttributeError, RecursionError, cv2.error) as error:
         cause = " ".join(str(error).split()) or type(error).__name__
         reason = cut(f"no {cause}" if isinstance(error, KeyError) else cause, MESSAGE)
-        raise ValueError(f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {reason}") from None
+        raise InputError(f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {reason}") from None
     if not calibrations:
-        raise ValueError(f"{path}: expected a calibration with a camera, got none")
+        raise InputError(f"{path}: expected a calibration with a camera, got none")
     return calibrations
 
 
@@ -126,7 +127,7 @@ def _reader(path: Path, text: str) -> Callable[[Path, str], list[Calibration]]:
         return _opencv
     if path.suffix.lower() == ".toml":
         return _toml
-    raise ValueError(
+    raise InputError(
         f"a file that is none of them, {path.suffix or 'without a suffix'}; OpenCV's YAML begins with %YAML"
     )
 
@@ -183,7 +184,7 @@ def _qualisys(_: Path, text: str) -> list[Calibration]:
 def _tag(camera: Any, name: str) -> Any:
     tag = camera.find(name)
     if tag is None:
-        raise ValueError(f"a camera without {name}")
+        raise InputError(f"a camera without {name}")
     return tag
 
 
@@ -192,14 +193,14 @@ def _opencv(path: Path, text: str) -> list[Calibration]:
     matrix = _matrix(values, "camera_matrix", "cameraMatrix", "K", "M")
     width, height = (_named(values, f"image_{name.lower()}", f"image{name}") for name in ("Width", "Height"))
     if matrix is None or width is None or height is None:
-        raise ValueError("one without camera_matrix, image_width and image_height")
+        raise InputError("one without camera_matrix, image_width and image_height")
     distortion = _matrix(values, "distortion_coefficients", "dist_coeffs", "distCoeffs", "distortion", "D")
     rotation = _matrix(values, "R", "rotation", "rvec")
     translation = _matrix(values, "T", "translation", "tvec")
     if rotation is not None and rotation.size == 3:
         rotation = _turned(rotation.reshape(3))
     if (rotation is None) != (translation is None):
-        raise ValueError("one with a rotation or a translation, but not both")
+        raise InputError("one with a rotation or a translation, but not both")
     return [
         Calibration(
             path.stem,
@@ -231,11 +232,11 @@ def _distortion(values: Any) -> Array:
     """Return OpenCV's numbers of a lens; none, or any number of zeros, is no distortion."""
     numbers = np.array(values, dtype=np.float64).reshape(-1)
     if not np.isfinite(numbers).all():
-        raise ValueError("a distortion that is not finite")
+        raise InputError("a distortion that is not finite")
     if not numbers.any():
         return np.zeros(4)
     if numbers.size not in DISTORTIONS:
-        raise ValueError(f"a distortion of {numbers.size} numbers")
+        raise InputError(f"a distortion of {numbers.size} numbers")
     return numbers
 
 
@@ -245,14 +246,14 @@ def _pinhole(focal: Array, centre: Array) -> Array:
 
 def _size(width: Any, height: Any) -> tuple[int, int]:
     if not (float(width).is_integer() and float(height).is_integer() and width >= 1 and height >= 1):
-        raise ValueError(f"an image size of {width} x {height}")
+        raise InputError(f"an image size of {width} x {height}")
     return int(width), int(height)
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> Array:
     numbers = np.asarray(values, dtype=np.float64)
     if numbers.shape != shape or not np.isfinite(numbers).all():
-        raise ValueError(f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should be")
+        raise InputError(f"{quoted(numbers.tolist())} where finite numbers of shape {shape} should be")
     return numbers
 
 
@@ -261,5 +262,5 @@ def _orthonormal(rotation: Array) -> Array:
     left, _, right = np.linalg.svd(rotation)
     nearest = left @ right
     if np.linalg.det(nearest) < 0.0 or np.abs(nearest - rotation).max() > 1e-2:
-        raise ValueError(f"a rotation that is none: {quoted(rotation.tolist())}")
+        raise InputError(f"a rotation that is none: {quoted(rotation.tolist())}")
     return np.asarray(nearest)

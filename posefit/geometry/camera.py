@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 
 LARGEST_SIDE = 16_384  # pixels
 FIELD_OF_VIEW = math.radians(40.0)  # across the larger side; our guess for an unknown camera
@@ -30,21 +31,21 @@ class Camera:
         for name in ("width", "height"):
             side = getattr(self, name)
             if isinstance(side, bool) or not isinstance(side, int | np.integer) or not 1 <= side <= LARGEST_SIDE:
-                raise ValueError(f"{name} must be a whole number from 1 to {LARGEST_SIDE}, got {side!r}")
+                raise InputError(f"{name} must be a whole number from 1 to {LARGEST_SIDE}, got {side!r}")
             object.__setattr__(self, name, int(side))
         for name, shape in (("focal", (2,)), ("centre", (2,)), ("rotation", (3, 3)), ("translation", (3,))):
             try:
                 value = np.array(getattr(self, name), dtype=np.float64)
             except (TypeError, ValueError, OverflowError):
-                raise ValueError(f"{name} must be numbers of shape {shape}, got {getattr(self, name)!r}") from None
+                raise InputError(f"{name} must be numbers of shape {shape}, got {getattr(self, name)!r}") from None
             if value.shape != shape or not np.isfinite(value).all():
-                raise ValueError(f"{name} must be finite numbers of shape {shape}, got {value.tolist()}")
+                raise InputError(f"{name} must be finite numbers of shape {shape}, got {value.tolist()}")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         if (self.focal <= 0.0).any():
-            raise ValueError(f"focal must be positive, got {self.focal.tolist()}")
+            raise InputError(f"focal must be positive, got {self.focal.tolist()}")
         if not _turns(self.rotation):
-            raise ValueError(f"rotation must be orthonormal and right-handed, got {self.rotation.tolist()}")
+            raise InputError(f"rotation must be orthonormal and right-handed, got {self.rotation.tolist()}")
 
     @property
     def position(self) -> Array:
@@ -66,9 +67,9 @@ class Camera:
         pi/2 is world +x. `field_of_view` is the angle across the image's larger side.
         """
         if not (math.isfinite(distance) and distance >= 0.0):
-            raise ValueError(f"distance must be 0 or more metres, got {distance}")
+            raise InputError(f"distance must be 0 or more metres, got {distance}")
         if not 0.0 < field_of_view < math.pi:
-            raise ValueError(f"field_of_view must lie between 0 and pi radians, got {field_of_view}")
+            raise InputError(f"field_of_view must lie between 0 and pi radians, got {field_of_view}")
         sine, cosine = math.sin(azimuth), math.cos(azimuth)
         rotation = np.array([[cosine, 0.0, -sine], [0.0, -1.0, 0.0], [-sine, 0.0, -cosine]])
         focal = 0.5 * max(size) / math.tan(0.5 * field_of_view)
@@ -107,23 +108,23 @@ class Camera:
         """Return the camera of a file written by `to_json`. Raises ValueError naming the file and the key."""
         path = Path(path)
         if path.stat().st_size > 1_000_000:
-            raise ValueError(f"{path}: expected a camera file of at most 1 MB, got {path.stat().st_size} bytes")
+            raise InputError(f"{path}: expected a camera file of at most 1 MB, got {path.stat().st_size} bytes")
         try:
             values = json.loads(path.read_text(encoding="utf-8"))
         except (ValueError, RecursionError) as error:  # bad UTF-8, bad JSON, endless digits, endless nesting
-            raise ValueError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {error}") from None
+            raise InputError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {error}") from None
         if not isinstance(values, dict) or set(values) != set(_KEYS):
             keys = sorted(values) if isinstance(values, dict) else type(values).__name__
-            raise ValueError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {keys}")
+            raise InputError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {keys}")
         try:
             matrix = np.array(values["camera_from_world"], dtype=np.float64)
             if matrix.shape != (4, 4) or matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
-                raise ValueError(f"camera_from_world must be 4 x 4 with last row 0 0 0 1, got {matrix.tolist()}")
+                raise InputError(f"camera_from_world must be 4 x 4 with last row 0 0 0 1, got {matrix.tolist()}")
             return cls(
                 values["width"], values["height"], values["focal"], values["centre"], matrix[:3, :3], matrix[:3, 3]
             )
         except (TypeError, ValueError, OverflowError) as error:
-            raise ValueError(f"{path}: {error}") from None
+            raise InputError(f"{path}: {error}") from None
 
 
 def _turns(matrix: Array) -> bool:

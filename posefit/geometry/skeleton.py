@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.geometry import kernels
 
 _TREE = """
@@ -130,13 +131,13 @@ class Skeleton:
         for name, shape in shapes.items():
             value = np.array(getattr(self, name), dtype=np.float64)
             if value.shape != shape:
-                raise ValueError(f"{name} must have shape {shape}, got {value.shape}")
+                raise InputError(f"{name} must have shape {shape}, got {value.shape}")
             if not np.isfinite(value).all():
-                raise ValueError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
+                raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         if self.limits is not None and (self.limits[:, 0] > self.limits[:, 1]).any():
-            raise ValueError("limits must not be reversed, got a lowest angle above the highest")
+            raise InputError("limits must not be reversed, got a lowest angle above the highest")
 
     @cached_property
     def lengths(self) -> Array:
@@ -167,11 +168,11 @@ class Skeleton:
         """
         poses = np.asarray(poses, dtype=np.float64)
         if poses.ndim < 1 or poses.shape[-1] != ANGLES:
-            raise ValueError(f"poses must have shape (..., {ANGLES}), got {poses.shape}")
+            raise InputError(f"poses must have shape (..., {ANGLES}), got {poses.shape}")
         lead = poses.shape[:-1]
         where = np.zeros((*lead, 3)) if translations is None else np.asarray(translations, dtype=np.float64)
         if where.shape != (*lead, 3):
-            raise ValueError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
+            raise InputError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
         flat = writeable(poses.reshape(-1, ANGLES))
         positions = kernels.joint_positions(self.chain, flat, writeable(where.reshape(-1, 3)))
         return np.asarray(positions).reshape(*lead, len(JOINTS), 3)

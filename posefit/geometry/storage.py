@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.reading import parsed_json, quoted
 
 LARGEST_YAML = 500_000  # characters: PyYAML reads some 100,000 a second
@@ -34,12 +35,12 @@ class Matrix:
         shape = tuple(_count(side) for side in (self.sides if isinstance(self.sides, list) else [self.sides])[:4])
         match = _TYPE.fullmatch(str(self.type))
         if match is None:
-            raise ValueError(f"a matrix of the type {quoted(self.type)}")
+            raise InputError(f"a matrix of the type {quoted(self.type)}")
         channels = int(match[1] or 1)
         numbers = numbers_of(self.numbers)
         shape = shape if channels == 1 else (*shape, channels)
         if numbers.size != math.prod(shape):
-            raise ValueError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
+            raise InputError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
         if match[2] in _ROUNDED:
             numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
         return numbers.reshape(shape)
@@ -50,7 +51,7 @@ def stored_values(text: str) -> dict[str, Any]:
     start = text.lstrip()[:1]
     values = _xml(text) if start == "<" else parsed_json(text) if start == "{" else _yaml(text)
     if not isinstance(values, dict):
-        raise ValueError(f"a file without names, {quoted(values)}")
+        raise InputError(f"a file without names, {quoted(values)}")
     return {str(name): _value(value) for name, value in values.items()}
 
 
@@ -61,7 +62,7 @@ def numbers_of(value: Any) -> Array:
     rows = value if isinstance(value, list) else [value]
     flat = [one for row in rows[: NUMBERS + 1] for one in (row[: NUMBERS + 1] if isinstance(row, list) else [row])]
     if len(flat) > NUMBERS:
-        raise ValueError(f"a matrix of more than {NUMBERS} numbers")
+        raise InputError(f"a matrix of more than {NUMBERS} numbers")
     numbers = np.array([number_of(one) for one in flat], dtype=np.float64)
     if rows and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows):
         return numbers.reshape(len(rows), -1)
@@ -71,18 +72,18 @@ def numbers_of(value: Any) -> Array:
 def number_of(value: Any) -> float:
     """Return a number, which may be written as YAML writes it. Raises ValueError where it is none."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"{quoted(value)} where a number should be")
+        raise InputError(f"{quoted(value)} where a number should be")
     text = value.lower().replace(".inf", "inf").replace(".nan", "nan") if isinstance(value, str) else value
     try:
         return float(text)
     except (ValueError, OverflowError):
-        raise ValueError(f"{quoted(value)} where a number should be") from None
+        raise InputError(f"{quoted(value)} where a number should be") from None
 
 
 def _count(value: Any) -> int:
     number = number_of(value)
     if not 1.0 <= number <= NUMBERS or number != int(number):
-        raise ValueError(f"a matrix with {quoted(value)} rows or columns")
+        raise InputError(f"a matrix with {quoted(value)} rows or columns")
     return int(number)
 
 
@@ -100,20 +101,20 @@ def _yaml(text: str) -> Any:
     import yaml
 
     if len(text) > LARGEST_YAML:
-        raise ValueError(f"YAML of {len(text)} characters, more than {LARGEST_YAML}")
+        raise InputError(f"YAML of {len(text)} characters, more than {LARGEST_YAML}")
     # OpenCV writes %YAML:1.0 where the directive is %YAML 1.0
     text = re.sub(r"\A\s*%YAML[^\n]*\n", "", text)
     try:
         return yaml.load(text, Loader=yaml.BaseLoader)
     except (yaml.YAMLError, RecursionError) as error:
         reason = " ".join(str(error).split()) or "brackets that are nested too deeply"
-        raise ValueError(f"YAML that is broken: {reason}") from None
+        raise InputError(f"YAML that is broken: {reason}") from None
 
 
 def _xml(text: str) -> dict[str, Any]:
     root = xml_of(text)
     if root.tag != "opencv_storage":
-        raise ValueError(f"XML of {quoted(root.tag)}")
+        raise InputError(f"XML of {quoted(root.tag)}")
     return {one.tag: _content(one) for one in root}
 
 
@@ -134,6 +135,6 @@ def xml_of(text: str) -> Any:
     try:
         return fromstring(text, forbid_dtd=True)
     except DefusedXmlException:
-        raise ValueError("an XML file with a document type, which is not read") from None
+        raise InputError("an XML file with a document type, which is not read") from None
     except (ParseError, ValueError, RecursionError) as error:  # ValueError: an encoding that contradicts the text's
-        raise ValueError(f"XML that is broken: {error}") from None
+        raise InputError(f"XML that is broken: {error}") from None

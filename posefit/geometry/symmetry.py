@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles, wrapped
@@ -70,7 +71,7 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
     cross, and the silhouette is nearly the same whichever of them is in front.
     """
     if limbs not in _BONES:
-        raise ValueError(f"limbs must be one of {', '.join(_BONES)}, got {limbs!r}")
+        raise InputError(f"limbs must be one of {', '.join(_BONES)}, got {limbs!r}")
     return _exchanged(skeleton, poses, _BONES[limbs])
 
 

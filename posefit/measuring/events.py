@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import rotation_from_root_angles
 from posefit.measuring.centres import PLACES
 from posefit.measuring.segments import FORWARDS, SIDES
@@ -40,7 +41,7 @@ def gait_events(motion: Motion) -> GaitEvents:
     Raises ValueError where there are too few frames a second.
     """
     if motion.fps < SLOWEST:
-        raise ValueError(f"fps must be at least {SLOWEST:g} to find the events of gait, got {motion.fps:g}")
+        raise InputError(f"fps must be at least {SLOWEST:g} to find the events of gait, got {motion.fps:g}")
     joints = motion.skeleton.joints(motion.poses, motion.translations)[:, :, ::2]
     joints = low_pass(joints, CUTOFF, motion.fps)
     facing = rotation_from_root_angles(motion.poses[:, :3]) @ FORWARDS

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import (
     joint_angles_from_rotation,
     root_angles_from_rotation,
@@ -154,7 +155,7 @@ def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METR
     unit = unit_length("metres_per_unit", metres_per_unit)
     lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)
     if lost > 1e-9:
-        raise ValueError(f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one")
+        raise InputError(f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one")
     spans, columns, targets = _layout(motion.skeleton)
     values = np.zeros((len(motion), max(stop for _, stop in spans.values())))
     values[:, :3] = motion.translations / unit

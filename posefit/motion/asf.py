@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Channels, Skeleton, angle_index
 from posefit.reading import SHOWN, check_size, cut
@@ -28,7 +29,7 @@ def mistake(path: Path, line: int, expected: str, got: str) -> ValueError:
 def unit_length(name: str, value: float) -> float:
     """Return a value that must be positive and finite. Raises ValueError with its name otherwise."""
     if not (np.isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} must be a positive number, got {value}")
+        raise InputError(f"{name} must be a positive number, got {value}")
     return float(value)
 
 
@@ -223,7 +224,7 @@ def _check_tree(path: Path, lines: list[_Line], bones: Iterable[str]) -> None:
     known = {"root", *bones}
     for name in BONES:
         if name not in known:
-            raise ValueError(f"{path}: the skeleton needs bone {name!r}, which this file does not define")
+            raise InputError(f"{path}: the skeleton needs bone {name!r}, which this file does not define")
     parents: dict[str, tuple[str, _Line]] = {}
     for line in lines[1:]:
         if line.key in ("begin", "end") and len(line.words) == 1:

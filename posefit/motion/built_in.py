@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.motion.motion import LONGEST, Motion
@@ -71,13 +72,13 @@ def motion(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0
     """
     angles, series, period, pace = _model(name)
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 1:
-        raise ValueError(f"frames must be a whole number of at least 1, got {quoted(frames)}")
+        raise InputError(f"frames must be a whole number of at least 1, got {quoted(frames)}")
     if frames > LONGEST:
-        raise ValueError(f"frames must be at most {LONGEST}, got {quoted(frames)}")
+        raise InputError(f"frames must be at most {LONGEST}, got {quoted(frames)}")
     if not (np.isfinite(fps) and fps > 0.0 and np.isfinite(speed) and speed > 0.0):
-        raise ValueError(f"fps and speed must be positive, got {fps} and {speed}")
+        raise InputError(f"fps and speed must be positive, got {fps} and {speed}")
     if not np.isfinite(phase):
-        raise ValueError(f"phase must be finite, got {phase}")
+        raise InputError(f"phase must be finite, got {phase}")
     times = np.arange(frames) * speed / fps
     turns = 2.0 * np.pi * np.outer(times / period + phase, np.arange(1, series.shape[1] // 2 + 1))
     values = np.column_stack([np.ones(frames), np.cos(turns), np.sin(turns)]) @ series.T
@@ -103,7 +104,7 @@ def _check(name: str) -> None:
     if name not in names():
         near = get_close_matches(name[:SHOWN], names(), 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(
+        raise InputError(
             "motion must be a file, a folder, a recorded one that posefit motions lists, or one of "
             f"{', '.join(names())}, got {quoted(name)}{hint}"
         )

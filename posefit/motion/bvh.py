@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import (
     angles_about,
     joint_angles_from_rotation,
@@ -77,7 +78,7 @@ def read_bvh(path: str | Path, *, metres_per_unit: float = 1.0) -> Motion:
     nodes = {node.name: node for node in bvh.nodes if not node.is_end_site()}
     missing = [f"{bone} ({NAMES[bone]})" for bone in JOINTS if not {bone, NAMES[bone]} & nodes.keys()]
     if missing:
-        raise ValueError(f"{path}: expected a BVH file with all 27 joints, got one without {', '.join(missing)}")
+        raise InputError(f"{path}: expected a BVH file with all 27 joints, got one without {', '.join(missing)}")
     chosen = [nodes[NAMES[bone] if NAMES[bone] in nodes else bone] for bone in JOINTS]
     offsets = _offsets(path, chosen) * unit
     skeleton = Skeleton(path.stem, offsets, np.tile(np.eye(3), (len(BONES), 1, 1)), CHANNELS)
@@ -109,15 +110,15 @@ def _parsed(path: Path) -> Any:
     except (OSError, MemoryError):
         raise
     except Exception as error:  # whatever the library trips over, the file is to blame
-        raise ValueError(
+        raise InputError(
             f"{path}: expected a BVH file, got one that pybvh cannot read: {cut(str(error), 200)}"
         ) from error
     for values in (bvh.root_pos, bvh.joint_angles, np.array([node.offset for node in bvh.nodes])):
         if not (np.abs(values) < LARGEST).all():
-            raise ValueError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
+            raise InputError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
     if not FRAME_TIMES[0] <= bvh.frame_time <= FRAME_TIMES[1]:
         low, high = FRAME_TIMES
-        raise ValueError(f"{path}: expected a positive frame time, {low:g} to {high:g} s, got {bvh.frame_time:g}")
+        raise InputError(f"{path}: expected a positive frame time, {low:g} to {high:g} s, got {bvh.frame_time:g}")
     return bvh
 
 
@@ -150,19 +151,19 @@ def _offsets(path: Path, nodes: list[Any]) -> Array:
         if parent is not expected:
             wanted = f"right under {expected.name!r}" if expected else "as the ROOT"
             got = f"it under {parent.name!r}" if parent else "it as the ROOT"
-            raise ValueError(f"{path}: expected joint {nodes[joint].name!r} {wanted}, got {got}")
+            raise InputError(f"{path}: expected joint {nodes[joint].name!r} {wanted}, got {got}")
     near = SAME_PLACE * max(float(np.linalg.norm(node.offset)) for node in nodes[1:])
     offsets = np.zeros((len(nodes), 3))  # of the root, too: its children must start where it is
     for joint, node in enumerate(nodes):
         below = [nodes[child] for child, above in enumerate(PARENTS) if above == joint] or node.children[:1]
         if not below:
-            raise ValueError(f"{path}: expected an End Site under joint {node.name!r}, got none")
+            raise InputError(f"{path}: expected an End Site under joint {node.name!r}, got none")
         offsets[joint] = below[0].offset if joint > 0 else 0.0
         for child in below:
             if np.abs(child.offset - offsets[joint]).max() > near:
                 where = " ".join(f"{value:g}" for value in offsets[joint])
                 got = " ".join(f"{value:g}" for value in child.offset)
-                raise ValueError(f"{path}: expected joint {child.name!r} at OFFSET {where}, got {got}")
+                raise InputError(f"{path}: expected joint {child.name!r} at OFFSET {where}, got {got}")
     return offsets[1:]
 
 

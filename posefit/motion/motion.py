@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.reading import quoted
@@ -29,15 +30,15 @@ class Motion:
         for name, columns in (("poses", ANGLES), ("translations", 3)):
             value = np.array(getattr(self, name), dtype=np.float64)
             if value.ndim != 2 or value.shape[1] != columns:
-                raise ValueError(f"{name} must have shape (frames, {columns}), got {value.shape}")
+                raise InputError(f"{name} must have shape (frames, {columns}), got {value.shape}")
             if not np.isfinite(value).all():
-                raise ValueError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
+                raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         if len(self.poses) < 1:
-            raise ValueError("poses must hold at least 1 frame, got 0")
+            raise InputError("poses must hold at least 1 frame, got 0")
         if len(self.translations) != len(self.poses):
-            raise ValueError(f"translations must have shape {(len(self.poses), 3)}, got {self.translations.shape}")
+            raise InputError(f"translations must have shape {(len(self.poses), 3)}, got {self.translations.shape}")
         object.__setattr__(self, "fps", _rate(self.fps))
 
     def __len__(self) -> int:
@@ -46,7 +47,7 @@ class Motion:
     def frames(self, start: int, stop: int) -> "Motion":
         """Return frames start to stop - 1 as a motion. Raises ValueError where that leaves the clip or is empty."""
         if not 0 <= start < stop <= len(self):
-            raise ValueError(f"frames must be 0 <= start < stop <= {len(self)}, got start {start} and stop {stop}")
+            raise InputError(f"frames must be 0 <= start < stop <= {len(self)}, got start {start} and stop {stop}")
         return Motion(self.name, self.skeleton, self.poses[start:stop], self.translations[start:stop], self.fps)
 
     def resampled(self, fps: float) -> "Motion":
@@ -63,7 +64,7 @@ class Motion:
         last = len(self) - 1
         if last / ratio >= LONGEST:
             came = f"{last / ratio:.3g} frames at {fps:g} fps"
-            raise ValueError(f"{self.name} must have at most {LONGEST} frames when it is resampled, got {came}")
+            raise InputError(f"{self.name} must have at most {LONGEST} frames when it is resampled, got {came}")
         # in frames of this motion; the last time may be off by rounding
         times = np.minimum(np.arange(int(last / ratio + SAME_TIME) + 1) * ratio, last)
         if last == 0:
@@ -88,7 +89,7 @@ class Motion:
 
 def _rate(fps: float) -> float:
     if not 0.0 < fps < np.inf:
-        raise ValueError(f"fps must be a positive number, got {quoted(fps)}")
+        raise InputError(f"fps must be a positive number, got {quoted(fps)}")
     if not RATES[0] <= fps <= RATES[1]:
-        raise ValueError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(fps)}")
+        raise InputError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(fps)}")
     return float(fps)

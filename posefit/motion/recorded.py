@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.motion.motion import Motion
@@ -115,7 +116,7 @@ def is_recorded(name: object) -> bool:
 def clip(name: str) -> RecordedClip:
     """Return the clip of a name such as 16_15. Raises ValueError where there is none."""
     if not is_recorded(name):
-        raise ValueError(f"a recorded motion must be one that posefit motions lists, got {quoted(name)}")
+        raise InputError(f"a recorded motion must be one that posefit motions lists, got {quoted(name)}")
     return _stored()[name]
 
 
@@ -127,10 +128,10 @@ def clips(only: Iterable[str] = (), without: Iterable[str] = ()) -> Sequence[Rec
     only, without = tuple(only), tuple(without)
     for subject in (*only, *without):
         if subject not in subjects():
-            raise ValueError(f"a subject of the library must be one of {', '.join(subjects())}, got {quoted(subject)}")
+            raise InputError(f"a subject of the library must be one of {', '.join(subjects())}, got {quoted(subject)}")
     chosen = [one for one in _stored().values() if one.subject not in without and (not only or one.subject in only)]
     if not chosen:
-        raise ValueError("the library must keep at least one person, got all left out")
+        raise InputError("the library must keep at least one person, got all left out")
     return chosen
 
 
@@ -147,7 +148,7 @@ def named(name: str) -> Sequence[RecordedClip]:
     _, colon, listed = name.partition(":")
     people = [one.strip() for one in listed.split(",")] if colon else []
     if not is_library(name) or "" in people or "-" in people:
-        raise ValueError(f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}")
+        raise InputError(f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}")
     return clips([one for one in people if one[0] != "-"], [one[1:] for one in people if one[0] == "-"])
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from posefit.errors import InputError
 from posefit.files import new_file, new_folder
 from posefit.geometry.skeleton import ANGLES
 from posefit.statistics.profiles import Trace, trace
@@ -158,21 +159,21 @@ def _grouped(runs: Iterable[LoggedRun]) -> dict[tuple[str, str], list[LoggedRun]
         named = f"{run.method} on {run.problem}, instance {run.instance}, seed {run.seed}"
         for name, value, least in (("dimension", run.dimension, 1), ("instance", run.instance, 0)):
             if not least <= value <= MAX_NUMBER:
-                raise ValueError(f"{named}: {name} must lie in {least} to {MAX_NUMBER}, got {value}")
+                raise InputError(f"{named}: {name} must lie in {least} to {MAX_NUMBER}, got {value}")
         try:
             used, _ = trace(run.evaluations, run.costs)
         except ValueError as error:
-            raise ValueError(f"{named}: {error}") from None
+            raise InputError(f"{named}: {error}") from None
         if (used % 1.0).any():
-            raise ValueError(f"{named}: evaluations must be whole numbers, got {used[used % 1.0 > 0.0][0]:g}")
+            raise InputError(f"{named}: evaluations must be whole numbers, got {used[used % 1.0 > 0.0][0]:g}")
         key = run.method, json.dumps(dict(run.settings), sort_keys=True, default=str)
         one = (*key, run.problem, run.dimension, run.instance, run.seed)
         if one in names:
-            raise ValueError(f"runs must differ in method, settings, problem, instance or seed, got two of {named}")
+            raise InputError(f"runs must differ in method, settings, problem, instance or seed, got two of {named}")
         names.add(one)
         groups.setdefault(key, []).append(run)
     if not groups:
-        raise ValueError("runs must be at least one, got none")
+        raise InputError("runs must be at least one, got none")
     return dict(sorted(groups.items()))
 
 
@@ -208,7 +209,7 @@ def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
     """
     table = list(rows)
     if not table:
-        raise ValueError("rows must be at least one, got none")
+        raise InputError("rows must be at least one, got none")
     with new_file(path) as building, building.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(dict.fromkeys(name for row in table for name in row)), restval="")
         writer.writeheader()
@@ -228,7 +229,7 @@ def latex_table(header: Sequence[str], rows: Iterable[Sequence[str | float | Non
     table = [list(row) for row in rows]
     for row in table:
         if len(row) != len(header):
-            raise ValueError(f"rows must have {len(header)} cells, as the header has, got {len(row)}")
+            raise InputError(f"rows must have {len(header)} cells, as the header has, got {len(row)}")
     numbers = [bool(table) and not any(isinstance(row[k], str) for row in table) for k in range(len(header))]
     lines = [[latex(name) for name in header], *([_cell(cell, digits) for cell in row] for row in table)]
     body = [" & ".join(cells) + r" \\" for cells in lines]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.files import new_file, new_folder
 from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import COLUMNS
@@ -40,7 +41,7 @@ def check_figure(path: str | Path) -> None:
     """Raise ImportError without matplotlib, and ValueError where a figure of that name cannot be written."""
     _library("figure")
     if Path(path).suffix.lower() not in FORMATS:
-        raise ValueError(f"{path}: expected a figure that ends in {', '.join(FORMATS)}, got {Path(path).suffix!r}")
+        raise InputError(f"{path}: expected a figure that ends in {', '.join(FORMATS)}, got {Path(path).suffix!r}")
 
 
 def save(figure: "Figure", path: str | Path) -> None:
@@ -231,7 +232,7 @@ def write_figures(runs: Runs, path: str | Path) -> None:
     """
     contest = contest_of(runs)
     if contest is None:
-        raise ValueError("figures must be of runs with errors, got none")
+        raise InputError("figures must be of runs with errors, got none")
     names = [runs.methods[m] for m in contest.methods]
     errors, evaluations = contest.of("error"), grid(contest)
     figures: dict[str, Figure] = {}

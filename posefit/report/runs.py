@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import COLUMNS, FIGURES, TABLE_FIGURES
 from posefit.report.repeat import LAST_FIELDS, command_head, repeat_command
@@ -83,7 +84,7 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
             table.add(row)
     if table is None:
         if not may_be_empty:
-            raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+            raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
         table = _Table(False)
     return table.runs(ledger.version, quarantined)
 
@@ -95,7 +96,7 @@ def _checked(ledger: "Ledger", quarantined: Sequence[Mapping[str, Any]]) -> Iter
         for row in rows:
             kinds.add(is_search(row["spec"]))
             if len(kinds) > 1:
-                raise ValueError(
+                raise InputError(
                     f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one"
                 )
             yield row

@@ -5,6 +5,7 @@ from math import comb
 from pathlib import Path
 from typing import Any
 
+from posefit.errors import InputError
 from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.report.content import data_of
@@ -46,7 +47,7 @@ def write_report(
         for name, place in (("figures", figures), ("iohprofiler", iohprofiler)):
             if place is not None:
                 table = f": posefit suite table {ledger.path} --iohprofiler" if name == "iohprofiler" else ""
-                raise ValueError(f"--{name} must be given with a sweep of tracks, got one of single searches{table}")
+                raise InputError(f"--{name} must be given with a sweep of tracks, got one of single searches{table}")
     data = data_of(ledger, runs, warn)
     if out is not None:
         with replaced_file(out, MARK.encode()) as building:
@@ -122,13 +123,13 @@ def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:
 def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> None:
     """Raise ValueError where something could not be written."""
     if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
-        raise ValueError(f"--out must be a file that ends in .html, got {out}")
+        raise InputError(f"--out must be a file that ends in .html, got {out}")
     if out is not None and not replaceable(Path(out), MARK.encode()):
-        raise ValueError(f"{out}: expected a new name or an earlier report, got something else")
+        raise InputError(f"{out}: expected a new name or an earlier report, got something else")
     places = [place for place in (out, *others) if place is not None]
     for place in places:
         if Path(place).resolve() == ledger.resolve() or places.count(place) > 1:
-            raise ValueError(f"{place}: expected a place of its own for each of what is written, got it twice")
+            raise InputError(f"{place}: expected a place of its own for each of what is written, got it twice")
     for other in others:
         if other is not None:
             check_new(other)

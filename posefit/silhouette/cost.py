@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
@@ -67,11 +68,11 @@ def _checked(camera: Camera, silhouette: Silhouette, poses: Array, translations:
     poses, translations = writeable(poses), writeable(translations)
     n = len(poses)
     if poses.ndim != 2 or poses.shape[1] != ANGLES:
-        raise ValueError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
+        raise InputError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
     if translations.shape != (n, 3):
-        raise ValueError(f"translations must have shape {(n, 3)}, got {translations.shape}")
+        raise InputError(f"translations must have shape {(n, 3)}, got {translations.shape}")
     if silhouette.mask.shape != (camera.height, camera.width):
-        raise ValueError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
+        raise InputError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
     return poses, translations
 
 
@@ -141,7 +142,7 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
     """Return the mask (height, width) of one body, pose (66,), root at translation (3,)."""
     if np.shape(pose) != (ANGLES,) or np.shape(translation) != (3,):
         came = f"{np.shape(pose)} and {np.shape(translation)}"
-        raise ValueError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
+        raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
     drawn.count_poses(1)
     bits = kernels.draw_bits(
         body.skeleton.chain,

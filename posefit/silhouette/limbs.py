@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posefit.arrays import Array, Bits, writeable
+from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS, check_limbs, rows_of, turns_of
@@ -38,12 +39,12 @@ class LimbPoses:
     def __post_init__(self) -> None:
         check_limbs(self.limbs)
         if np.shape(self.pose) != (ANGLES,):
-            raise ValueError(f"pose must have shape ({ANGLES},), got {np.shape(self.pose)}")
+            raise InputError(f"pose must have shape ({ANGLES},), got {np.shape(self.pose)}")
         if len(self.candidates) != len(self.limbs):
-            raise ValueError(f"candidates must be one array a limb ({len(self.limbs)}), got {len(self.candidates)}")
+            raise InputError(f"candidates must be one array a limb ({len(self.limbs)}), got {len(self.candidates)}")
         for name, poses in zip(self.limbs, self.candidates, strict=True):
             if np.ndim(poses) != 2 or np.shape(poses)[1] != ANGLES or not len(poses):
-                raise ValueError(f"candidates of {name!r} must have shape (K, {ANGLES}), got {np.shape(poses)}")
+                raise InputError(f"candidates of {name!r} must have shape (K, {ANGLES}), got {np.shape(poses)}")
 
     @property
     def counts(self) -> tuple[int, ...]:
@@ -64,10 +65,10 @@ class LimbPoses:
         chosen = np.asarray(combinations)
         if chosen.ndim != 2 or chosen.shape[1] != len(self.limbs) or chosen.dtype.kind not in "iu":
             came = f"shape {chosen.shape} of {chosen.dtype}"
-            raise ValueError(f"combinations must be whole numbers of shape (m, {len(self.limbs)}), got {came}")
+            raise InputError(f"combinations must be whole numbers of shape (m, {len(self.limbs)}), got {came}")
         if len(chosen) and (chosen.min() < 0 or (chosen.max(axis=0) >= self.counts).any()):
             came = f"{chosen.min(axis=0).tolist()} to {chosen.max(axis=0).tolist()}"
-            raise ValueError(f"combinations must lie in 0 to the limbs' candidates {self.counts}, got {came}")
+            raise InputError(f"combinations must lie in 0 to the limbs' candidates {self.counts}, got {came}")
         return np.ascontiguousarray(chosen, dtype=np.int64)
 
     def parts(self) -> tuple[Array, NDArray[np.bool_]]:
@@ -102,7 +103,7 @@ class LimbMasks:
     def draw(cls, body: Body, camera: Camera, poses: LimbPoses, translation: Array) -> Self:
         """Return the masks of poses with their root at translation (3,)."""
         if np.shape(translation) != (3,):
-            raise ValueError(f"translation must have shape (3,), got {np.shape(translation)}")
+            raise InputError(f"translation must have shape (3,), got {np.shape(translation)}")
         each, theirs = poses.parts()
         radii = np.where(theirs[:, :, None], body.radii, HIDDEN)
         radii.setflags(write=False)  # as a body's are: numba would compile another kernel
@@ -129,7 +130,7 @@ class LimbMasks:
         chosen = self.poses.checked(combinations)
         if silhouette.size != (self.camera.width, self.camera.height):
             size = (self.camera.height, self.camera.width)
-            raise ValueError(f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}")
+            raise InputError(f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}")
         drawn.count_poses(len(chosen), silhouette)
         # side by side those that share their first limbs, which then stay as they are
         order = np.argsort(chosen @ np.cumprod((1.0, *self.poses.counts[:0:-1]))[::-1])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Bits
+from posefit.errors import InputError
 from posefit.silhouette.rasteriser import STRIP_PIXELS, strips_and_words
 
 Mask = NDArray[np.bool_]  # (height, width)
@@ -49,10 +50,10 @@ class Silhouette:
         """
         values = np.asarray(mask)
         if values.ndim != 2 or 0 in values.shape:
-            raise ValueError(f"mask must have shape (height, width), got {values.shape}")
+            raise InputError(f"mask must have shape (height, width), got {values.shape}")
         known = np.ones(values.shape, dtype=bool) if valid is None else np.asarray(valid) != 0
         if known.shape != values.shape:
-            raise ValueError(f"valid must have the mask's shape {values.shape}, got {known.shape}")
+            raise InputError(f"valid must have the mask's shape {values.shape}, got {known.shape}")
         return cls((values != 0) & known, known)
 
     @property

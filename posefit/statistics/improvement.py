@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.statistics.intervals import LEVEL, RESAMPLES, check_bootstrap
 from posefit.statistics.pairing import finite
 
@@ -50,7 +51,7 @@ def improvement_interval(
     one = finite("first", first, ("instances", "seeds"))
     other = finite("second", second, ("instances", "seeds"))
     if one.shape != other.shape:
-        raise ValueError(f"second must have the shape of first, {one.shape}, got {other.shape}")
+        raise InputError(f"second must have the shape of first, {one.shape}, got {other.shape}")
     check_bootstrap(resamples, level)
     instances, seeds = one.shape
     wins = (one[:, :, None] < other[:, None, :]) + 0.5 * (one[:, :, None] == other[:, None, :])

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import trim_mean
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.statistics.pairing import finite
 
 TRIMMED = 0.25  # share of the runs left out at either end
@@ -98,6 +99,6 @@ def _estimate(runs: Array) -> tuple[Array, Array]:
 def check_bootstrap(resamples: int, level: float) -> None:
     """Raise ValueError where an interval of that level cannot be read off so many resamples."""
     if resamples < MIN_RESAMPLES:
-        raise ValueError(f"resamples must be at least {MIN_RESAMPLES}, got {resamples}")
+        raise InputError(f"resamples must be at least {MIN_RESAMPLES}, got {resamples}")
     if not 0.0 < level < 1.0:
-        raise ValueError(f"level must lie between 0 and 1, got {level}")
+        raise InputError(f"level must lie between 0 and 1, got {level}")

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
+from posefit.errors import InputError
 from posefit.statistics.intervals import LEVEL
 from posefit.statistics.pairing import finite
 
@@ -31,7 +32,7 @@ def mean_interval(values: ArrayLike, strata: ArrayLike, clusters: ArrayLike, *, 
     array = finite("values", values, ("n",))
     kinds, drawn = np.asarray(strata), np.asarray(clusters)
     if kinds.shape != array.shape or drawn.shape != array.shape:
-        raise ValueError(f"strata and clusters must have shape {array.shape}, got {kinds.shape} and {drawn.shape}")
+        raise InputError(f"strata and clusters must have shape {array.shape}, got {kinds.shape} and {drawn.shape}")
     value = float(array.mean())
     variances, freedoms = [], []
     for kind in np.unique(kinds):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 
 Row = tuple[str, Hashable, int, float]  # method, instance, seed, error
 MIN_SHARE = 0.5  # of the runs of all methods but one, that are shared with it; below, it does not take part
@@ -44,19 +45,19 @@ def paired(rows: Iterable[Row]) -> Paired:
         if (method, one, seed) not in table
     ]
     if missing:
-        raise ValueError(
+        raise InputError(
             f"runs must be there of every method, instance and seed, got none of {_named(missing[0])} "
             f"({len(missing)} missing in all)"
         )
     counts = {one: len(seeds[one]) for one in instances}
     if len(set(counts.values())) > 1:
         few, many = min(counts, key=lambda one: counts[one]), max(counts, key=lambda one: counts[one])
-        raise ValueError(
+        raise InputError(
             f"instances must have the same number of seeds, got {counts[few]} of {few} and {counts[many]} of {many}"
         )
     for key, error in table.items():
         if not np.isfinite(error):
-            raise ValueError(f"errors must be finite, got {error} of {_named(key)}")
+            raise InputError(f"errors must be finite, got {error} of {_named(key)}")
     errors = [[[table[method, one, seed] for seed in seeds[one]] for one in instances] for method in methods]
     return Paired(methods, instances, tuple(seeds.values()), np.array(errors))
 
@@ -97,7 +98,7 @@ def _complete(table: Mapping[tuple[str, Hashable, int], float], methods: Sequenc
         if method == methods[0] and all(np.isfinite(table.get((one, instance, seed), np.nan)) for one in methods)
     ]
     if not blocks:
-        raise ValueError(f"methods must share an instance and a seed to be compared, got none of {', '.join(methods)}")
+        raise InputError(f"methods must share an instance and a seed to be compared, got none of {', '.join(methods)}")
     return blocks
 
 
@@ -107,9 +108,9 @@ def finite(name: str, values: ArrayLike, dimensions: tuple[str, ...], least: tup
     least = least or (1,) * len(dimensions)
     if array.ndim != len(dimensions) or any(n < m for n, m in zip(array.shape, least, strict=True)):
         needed = f", at least {least}" if max(least) > 1 else ""
-        raise ValueError(f"{name} must have shape ({', '.join(dimensions)}){needed}, got {array.shape}")
+        raise InputError(f"{name} must have shape ({', '.join(dimensions)}){needed}, got {array.shape}")
     if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} that are not")
+        raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} that are not")
     return array
 
 
@@ -118,10 +119,10 @@ def _table(rows: Iterable[Row]) -> tuple[dict[tuple[str, Hashable, int], float],
     for method, instance, seed, error in rows:
         if (method, instance, seed) in table:
             twice = _named((method, instance, seed))
-            raise ValueError(f"runs must differ in method, instance or seed, got two of {twice}")
+            raise InputError(f"runs must differ in method, instance or seed, got two of {twice}")
         table[method, instance, seed] = float(error)
     if not table:
-        raise ValueError("runs must be at least one, got none")
+        raise InputError("runs must be at least one, got none")
     return table, tuple(dict.fromkeys(method for method, _, _ in table))
 
 

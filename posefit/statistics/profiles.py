@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.statistics.pairing import finite
 
 TARGETS = 51
@@ -21,11 +22,11 @@ def trace(evaluations: ArrayLike, costs: ArrayLike) -> Trace:
     """Return an anytime trace as two arrays (k,), or raise ValueError where it is none."""
     used, best = finite("evaluations", evaluations, ("k",)), finite("costs", costs, ("k",))
     if used.shape != best.shape:
-        raise ValueError(f"costs must be one for each of {len(used)} evaluations, got {len(best)}")
+        raise InputError(f"costs must be one for each of {len(used)} evaluations, got {len(best)}")
     if used[0] < 1.0 or (np.diff(used) <= 0.0).any():
-        raise ValueError(f"evaluations must rise from at least 1, got {_listed(used)}")
+        raise InputError(f"evaluations must rise from at least 1, got {_listed(used)}")
     if (np.diff(best) > 0.0).any():
-        raise ValueError(f"costs must be the best so far and never rise, got {_listed(best)}")
+        raise InputError(f"costs must be the best so far and never rise, got {_listed(best)}")
     return used, best
 
 
@@ -36,7 +37,7 @@ def costs_at(run: Trace, evaluations: ArrayLike) -> Array:
     """
     grid = finite("evaluations", evaluations, ("p",))
     if grid.min() < run[0][0]:
-        raise ValueError(f"evaluations must be at least {run[0][0]:g}, where the trace starts, got {grid.min():g}")
+        raise InputError(f"evaluations must be at least {run[0][0]:g}, where the trace starts, got {grid.min():g}")
     return np.asarray(run[1][np.searchsorted(run[0], grid, side="right") - 1])
 
 
@@ -47,7 +48,7 @@ def common_grid(traces: Iterable[Trace], points: int = TARGETS) -> Array:
     """
     ends = np.array([(used[0], used[-1]) for used, _ in traces])
     if not len(ends) or points < 2:
-        raise ValueError(f"traces must be at least one and points at least 2, got {len(ends)} and {points}")
+        raise InputError(f"traces must be at least one and points at least 2, got {len(ends)} and {points}")
     return np.unique(np.rint(np.geomspace(ends[:, 0].max(), max(ends[:, 1].max(), ends[:, 0].max()), points)))
 
 
@@ -58,7 +59,7 @@ def targets(traces: Iterable[Trace], count: int = TARGETS) -> Array:
     """
     ends = np.array([(best[0], best[-1]) for _, best in traces])
     if not len(ends) or count < 1:
-        raise ValueError(f"traces and targets must be at least one, got {len(ends)} and {count}")
+        raise InputError(f"traces and targets must be at least one, got {len(ends)} and {count}")
     high, low = max(ends[:, 0].max(), LEAST_TARGET), max(ends[:, 1].min(), LEAST_TARGET)
     costs = np.geomspace(high, low, count)
     costs[-1] = low if count > 1 else high  # to the last bit, so that the best run reaches the last target
@@ -79,7 +80,7 @@ def attained(hits: ArrayLike, evaluations: ArrayLike) -> Array:
     """
     times, grid = np.sort(np.asarray(hits, dtype=np.float64), axis=None), finite("evaluations", evaluations, ("p",))
     if not len(times) or np.isnan(times).any():
-        raise ValueError(f"hits must be numbers or inf, got {np.count_nonzero(np.isnan(times))} nan of {len(times)}")
+        raise InputError(f"hits must be numbers or inf, got {np.count_nonzero(np.isnan(times))} nan of {len(times)}")
     return np.searchsorted(times, grid, side="right") / len(times)
 
 
@@ -91,10 +92,10 @@ def expected_running_time(hits: ArrayLike, evaluations: ArrayLike) -> Array:
     """
     times, used = np.asarray(hits, dtype=np.float64), finite("evaluations", evaluations, ("runs",))
     if times.ndim != 2 or len(times) != len(used):
-        raise ValueError(f"hits must have shape ({len(used)}, targets), got {times.shape}")
+        raise InputError(f"hits must have shape ({len(used)}, targets), got {times.shape}")
     late = np.isfinite(times) & (times > used[:, None])
     if np.isnan(times).any() or late.any():
-        raise ValueError(
+        raise InputError(
             "hits must be within a run's evaluations or inf, got " + ("a later one" if late.any() else "nan")
         )
     reached = np.isfinite(times)
@@ -122,7 +123,7 @@ def ratios(errors: ArrayLike) -> Array:
     """
     array = finite("errors", errors, ("methods", "instances", "seeds"))
     if array.min() <= 0.0:
-        raise ValueError(f"errors must be above 0 to be compared by ratio, got {array.min():g}")
+        raise InputError(f"errors must be above 0 to be compared by ratio, got {array.min():g}")
     return np.asarray(array / array.min(axis=0))
 
 

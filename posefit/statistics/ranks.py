@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.statistics.pairing import finite
 
 LEVEL = 0.05  # of significance
@@ -57,7 +58,7 @@ def friedman(errors: ArrayLike, level: float = LEVEL) -> Ranking:
     blocks = array.reshape(len(array), -1).T
     n, k = blocks.shape
     if n < 2:
-        raise ValueError(f"blocks, instances times seeds, must be at least 2, got {n}")
+        raise InputError(f"blocks, instances times seeds, must be at least 2, got {n}")
     ranks = stats.rankdata(blocks, axis=1)
     mean = np.asarray(ranks.mean(axis=0), dtype=np.float64)
     # Conover's form, in which ties lessen the spread of the ranks that the statistic is measured by.
@@ -95,7 +96,7 @@ def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) 
     chosen = list(combinations(range(len(array)), 2)) if pairs is None else list(pairs)
     for pair in chosen:
         if len({*pair}) != 2 or not all(0 <= m < len(array) for m in pair):
-            raise ValueError(f"pairs must be of two different methods of 0 to {len(array) - 1}, got {pair}")
+            raise InputError(f"pairs must be of two different methods of 0 to {len(array) - 1}, got {pair}")
     differences = [(array[first] - array[second]).ravel() for first, second in chosen]
     p_values = np.array([_signed_rank(one) for one in differences])
     return [
@@ -131,7 +132,7 @@ def compact_letters(count: int, apart: Iterable[tuple[int, int]]) -> list[str]:
     groups = [frozenset(range(count))]
     for first, second in apart:
         if first == second or not {first, second} <= set(range(count)):
-            raise ValueError(f"apart must be of two different methods of 0 to {count - 1}, got {(first, second)}")
+            raise InputError(f"apart must be of two different methods of 0 to {count - 1}, got {(first, second)}")
         split = {
             part
             for group in groups
@@ -146,4 +147,4 @@ def compact_letters(count: int, apart: Iterable[tuple[int, int]]) -> list[str]:
 
 def _check(level: float) -> None:
     if not 0.0 < level < 1.0:
-        raise ValueError(f"level must lie between 0 and 1, got {level}")
+        raise InputError(f"level must lie between 0 and 1, got {level}")

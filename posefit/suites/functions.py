@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
 from posefit.reading import quoted
 
@@ -42,7 +43,7 @@ FUNCTIONS = (
 def suite_function(number: object) -> SuiteFunction:
     """Return the function of a number. Raises ValueError where there is none."""
     if not _among(number, range(1, len(FUNCTIONS) + 1)):
-        raise ValueError(f"function must be a whole number from 1 to {len(FUNCTIONS)}, got {quoted(number)}")
+        raise InputError(f"function must be a whole number from 1 to {len(FUNCTIONS)}, got {quoted(number)}")
     return next(one for one in FUNCTIONS if one.number == number)
 
 
@@ -52,10 +53,10 @@ def checked_address(name: object, function: object, instance: object, dimension:
     chosen = suite_function(function)
     number = whole("instance", instance, 0)
     if number not in INSTANCES:
-        raise ValueError(f"instance must be at most {INSTANCES[-1]}, got {number}")
+        raise InputError(f"instance must be at most {INSTANCES[-1]}, got {number}")
     if not _among(dimension, chosen.dimensions):
         known = ", ".join(map(str, chosen.dimensions))
-        raise ValueError(f"dimension of function {chosen.number} must be one of {known}, got {quoted(dimension)}")
+        raise InputError(f"dimension of function {chosen.number} must be one of {known}, got {quoted(dimension)}")
     return chosen.number, number, int(dimension)  # type: ignore[call-overload]
 
 

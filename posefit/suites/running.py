@@ -8,6 +8,7 @@ import numpy as np
 
 from posefit import settings
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.optimiser import BudgetError, minimise
 from posefit.fitting.validation import CheckedOptimiser, plugin_errors
 from posefit.registry import registry
@@ -67,7 +68,7 @@ def run_on(
     guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", None, evaluations)
     minimise(problem.evaluate, guarded, evaluations, budget_known=True)
     if not len(problem.trace[0]):
-        raise ValueError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")
+        raise InputError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")
     return SuiteRun(
         method,
         chosen,

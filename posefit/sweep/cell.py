@@ -163,7 +163,7 @@ class TrackCell(Cell):
 
         for path, digest in self.files.items():
             if (present := digest_of(path)) != digest:
-                raise ValueError(f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}")
+                raise InputError(f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}")
         scene = cell_scene(self)
         training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
         same = {name: getattr(self, name) for name in ("method", "evaluations", "translation", "first_pose", "seed")}
@@ -255,13 +255,13 @@ def run_cell(cell: Cell) -> CellResult:
     began = time.perf_counter()
     for planned in cell.version.split(", "):
         if installed := other_version(planned):
-            raise ValueError(f"a worker must have {planned}, got {installed}")
+            raise InputError(f"a worker must have {planned}, got {installed}")
     result = cell.measure()
     row = {"key": cell.key, "spec": cell.spec, "status": "done", **result.row, "seconds": time.perf_counter() - began}
     try:
         json.dumps(row, allow_nan=False)
     except ValueError:
-        raise ValueError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
+        raise InputError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
     return replace(result, row=row)
 
 

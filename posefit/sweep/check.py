@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.fitting.space import TRANSLATIONS
 from posefit.fitting.tracker import Prediction
 from posefit.footage.masks import FPS
@@ -37,24 +38,24 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     """
     for name in spec:
         if name not in FIELDS:
-            raise ValueError(f"a cell must say {', '.join(FIELDS)}, got {quoted(name)}{_nearest(name, FIELDS)}")
+            raise InputError(f"a cell must say {', '.join(FIELDS)}, got {quoted(name)}{_nearest(name, FIELDS)}")
     for name in ("method", "motion"):
         if name not in spec:
-            raise ValueError(f"a cell must say its {name}, got none")
+            raise InputError(f"a cell must say its {name}, got none")
     values = checked(spec)
     offers = _offers(values["method"])
     texts = tuple(settings_text(values.get("settings", {})))
     settings = _settings(values["method"], texts)
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
-        raise ValueError(f"train must not contain the motion itself, got {values['motion']}")
+        raise InputError(f"train must not contain the motion itself, got {values['motion']}")
     files = {path: digest for one in (values["motion"], *train) for path, digest in _files(one)}
     version = version_of(offer.origin for offer in offers)
     cell = TrackCell(**{**values, "settings": dict(settings), "train": train, "files": files, "version": version})
     if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
-        raise ValueError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
+        raise InputError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
     if files.get(cell.motion) and cell.frames > (length := _length(cell.motion, cell.fps)):
-        raise ValueError(f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}")
+        raise InputError(f"frames must be at most {length}, the length of {cell.motion}, got {cell.frames}")
     return cell
 
 
@@ -80,11 +81,11 @@ def _offers(method: str) -> tuple[Offer, ...]:
     known = registry().offers
     if tracker not in known["tracker"] and tracker.partition(":")[0] in known["optimiser"]:
         hint = f"; did you mean {quoted(f'{tracker}@pca')}?"
-        raise ValueError(f"method must be a tracker or OPTIMISER@PRIOR, got {quoted(tracker)}{hint}")
+        raise InputError(f"method must be a tracker or OPTIMISER@PRIOR, got {quoted(tracker)}{hint}")
     if tracker.partition(":")[0] not in known["tracker"]:
         trackers = ", ".join(sorted(known["tracker"])) or "of which there are none"
         near = _nearest(tracker, [*known["tracker"], *(f"{name}@pca" for name in known["optimiser"])])
-        raise ValueError(f"method must be a tracker ({trackers}) or OPTIMISER@PRIOR, got {quoted(tracker)}{near}")
+        raise InputError(f"method must be a tracker ({trackers}) or OPTIMISER@PRIOR, got {quoted(tracker)}{near}")
     return (registry().offer("tracker", tracker),)
 
 
@@ -95,7 +96,7 @@ def _settings(method: str, texts: tuple[str, ...]) -> dict[str, Any]:
     for text in texts:
         if text.partition(".")[0] not in names_of(method):
             known = ", ".join(names_of(method))
-            raise ValueError(f"settings must be of {known}, which {cut(method)} uses, got {quoted(text)}")
+            raise InputError(f"settings must be of {known}, which {cut(method)} uses, got {quoted(text)}")
     places: dict[str, tuple[str, Any]] = {} if tracker else {"tracker": ("tracker", Prediction)}
     for offer in _offers(method):
         family = offer.name.partition(":")[0]
@@ -150,14 +151,14 @@ def _nearest(name: str, known: Sequence[str]) -> str:
 
 def _name(field: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
-        raise ValueError(f"{field} must be a name, got {quoted(value)}")
+        raise InputError(f"{field} must be a name, got {quoted(value)}")
     return value
 
 
 def _motion(field: str, value: Any) -> str:
     name = _name(field, value)
     if name not in built_in.names() and not recorded.is_recorded(name) and Path(name).suffix.lower() not in MOTIONS:
-        raise ValueError(
+        raise InputError(
             f"{field} must be an .amc file, a .bvh file or one of {', '.join(built_in.names())}, "
             f"got {quoted(name)}{_nearest(name, built_in.names())}"
         )
@@ -166,7 +167,7 @@ def _motion(field: str, value: Any) -> str:
 
 def _motions(field: str, value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
-        raise ValueError(f"{field} must be a list of motions, got {quoted(value)}")
+        raise InputError(f"{field} must be a list of motions, got {quoted(value)}")
     return tuple(_learned_from(field, one) for one in value)
 
 
@@ -181,27 +182,27 @@ def _learned_from(field: str, value: Any) -> str:
 def _views(field: str, value: Any) -> tuple[float, ...]:
     views = value if isinstance(value, list | tuple) else [value]
     if not views:
-        raise ValueError(f"{field} must be at least one angle, got none")
+        raise InputError(f"{field} must be at least one angle, got none")
     return tuple(_number(field, view) for view in views)
 
 
 def _number(field: str, value: Any, low: float = -np.inf, high: float = np.inf) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{field} must be a finite number, got {quoted(value)}")
+        raise InputError(f"{field} must be a finite number, got {quoted(value)}")
     try:
         number = float(value)
     except OverflowError:  # a whole number of any size
         number = np.inf
     if not np.isfinite(number):
-        raise ValueError(f"{field} must be a finite number, got {quoted(value)}")
+        raise InputError(f"{field} must be a finite number, got {quoted(value)}")
     if not low <= number <= high:
-        raise ValueError(f"{field} must lie in {low:g} to {high:g}, got {value}")
+        raise InputError(f"{field} must lie in {low:g} to {high:g}, got {value}")
     return number
 
 
 def _rate(field: str, value: Any) -> float:
     if (rate := _number(field, value)) <= 0.0:
-        raise ValueError(f"{field} must be a positive number, got {value}")
+        raise InputError(f"{field} must be a positive number, got {value}")
     return _number(field, rate, *RATES)
 
 
@@ -212,7 +213,7 @@ def _between(low: float, high: float) -> Callable[[str, Any], float]:
 def _whole(least: int) -> Callable[[str, Any], int]:
     def check(field: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > MAX_BITS:
-            raise ValueError(f"{field} must be a whole number of at least {least}, got {quoted(value)}")
+            raise InputError(f"{field} must be a whole number of at least {least}, got {quoted(value)}")
         return value
 
     return check
@@ -221,17 +222,17 @@ def _whole(least: int) -> Callable[[str, Any], int]:
 def _size(field: str, value: Any) -> tuple[int, int]:
     sides = list(value) if isinstance(value, list | tuple) else []
     if len(sides) != 2 or not all(type(side) is int and 1 <= side <= MAX_SIDE for side in sides):
-        raise ValueError(f"{field} must be [width, height] in pixels, up to {MAX_SIDE}, got {quoted(value)}")
+        raise InputError(f"{field} must be [width, height] in pixels, up to {MAX_SIDE}, got {quoted(value)}")
     return sides[0], sides[1]
 
 
 def _corruption(field: str, value: Any) -> dict[str, float]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}")
+        raise InputError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}")
     kinds = (*CORRUPTIONS, DROPPED)
     for kind in value:
         if kind not in kinds:
-            raise ValueError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{_nearest(kind, kinds)}")
+            raise InputError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{_nearest(kind, kinds)}")
     strengths = {kind: _number(f"{field} {kind}", value[kind], 0.0, 1.0) for kind in sorted(value)}
     return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
 
@@ -239,7 +240,7 @@ def _corruption(field: str, value: Any) -> dict[str, float]:
 def flattened(field: str, value: Any) -> dict[str, Any]:
     """Return settings whose names are NAME.SETTING, of a table that may hold a table for each NAME."""
     if not isinstance(value, Mapping):
-        raise ValueError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}")
+        raise InputError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}")
     flat: dict[str, Any] = {}
     for name, inner in value.items():
         flat |= {f"{name}.{one}": what for one, what in inner.items()} if isinstance(inner, Mapping) else {name: inner}
@@ -249,7 +250,7 @@ def flattened(field: str, value: Any) -> dict[str, Any]:
 def _one_of(*choices: str) -> Callable[[str, Any], str]:
     def check(field: str, value: Any) -> str:
         if value not in choices:
-            raise ValueError(f"{field} must be one of {', '.join(choices)}, got {quoted(value)}")
+            raise InputError(f"{field} must be one of {', '.join(choices)}, got {quoted(value)}")
         return str(value)
 
     return check

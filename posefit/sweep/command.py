@@ -9,6 +9,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from posefit.errors import InputError
 from posefit.sweep.cell import run_cell
 from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of
 from posefit.sweep.driver import Driver
@@ -120,12 +121,12 @@ def engine(where: Where, run: Run = run_cell) -> Callable[[], Engine]:
     places = (("workers", where.workers), ("scheduler", where.scheduler), ("dask-local", where.dask_local))
     given = [name for name, value in places if value]
     if len(given) > 1:
-        raise ValueError(f"--{given[0]} must not be given with --{given[1]}: cells run in one place")
+        raise InputError(f"--{given[0]} must not be given with --{given[1]}: cells run in one place")
     for name, value in (("workers", where.workers), ("dask-local", where.dask_local)):
         if value is not None and value < 1:
-            raise ValueError(f"--{name} must be at least 1, got {value}")
+            raise InputError(f"--{name} must be at least 1, got {value}")
     if where.dask_dashboard and where.dask_local is None:
-        raise ValueError("--dask-dashboard must be given with --dask-local, whose workers it shows, got it without")
+        raise InputError("--dask-dashboard must be given with --dask-local, whose workers it shows, got it without")
 
     def start() -> Engine:
         if where.scheduler is not None or where.dask_local is not None:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 
+from posefit.errors import InputError
 from posefit.sweep.cell import Cell
 from posefit.sweep.driver import Driver, Lease, State
 from posefit.sweep.engines.engine import Engine, Outcome
@@ -49,9 +50,9 @@ def drive_cells(
             sweep.run()
     except OSError as error:
         reason = f"{driver.ledger.path}: expected room to write to, got {error.strerror or error}"
-        raise ValueError(f"{reason}; {sweep.safe}") from error
+        raise InputError(f"{reason}; {sweep.safe}") from error
     except ValueError as error:
-        raise ValueError(f"{error}; {sweep.safe}") from error
+        raise InputError(f"{error}; {sweep.safe}") from error
     finally:
         sweep.leave()
     return sweep.tally

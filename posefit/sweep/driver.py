@@ -20,6 +20,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Self
 
+from posefit.errors import InputError
 from posefit.files import create_once, replaced_file
 from posefit.reading import parsed_json
 from posefit.sweep.cell import Cell, CellResult
@@ -65,7 +66,7 @@ class Driver:
         try:
             self._log = Writer(self.ledger.path / ROWS)
         except OSError as error:
-            raise ValueError(
+            raise InputError(
                 f"{self.ledger.path}: expected a folder that can be written to, got {error.strerror}"
             ) from None
         self._tidy()
@@ -77,7 +78,7 @@ class Driver:
         try:
             self._log.close()
         except OSError as error:  # only a disk that takes rows and then loses them
-            raise ValueError(
+            raise InputError(
                 f"{self.ledger.path}: expected its latest rows to reach the disk, got {error.strerror}; the same "
                 "command runs again what is missing"
             ) from None
@@ -210,7 +211,7 @@ class Driver:
         if name in self._dead:
             return False
         if held["host"] != socket.gethostname() and (local := on_one_machine(self.ledger.path)):
-            raise ValueError(
+            raise InputError(
                 f"{self.ledger.path}: expected a disk whose locks other machines see, got {local}, and {held['host']} "
                 "has begun cells: mount it with locks; or let one machine work on it, and remove from leases/ what "
                 "another one left there"

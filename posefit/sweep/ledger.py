@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from posefit.errors import InputError
 from posefit.files import create_once, replaced_file
 from posefit.reading import cut, parsed_json, quoted, read_text
 from posefit.sweep.cell import other_version
@@ -182,7 +183,7 @@ class Ledger:
             self.refresh()
             return self.row(key)
         if entry is None or entry[0] != key:
-            raise ValueError(f"{self.path / ROWS / name}: the row of cell {key[:8]} must be whole, got a damaged one")
+            raise InputError(f"{self.path / ROWS / name}: the row of cell {key[:8]} must be whole, got a damaged one")
         row: dict[str, Any] = json.loads(entry[1])
         return row
 
@@ -199,7 +200,7 @@ class Ledger:
         path = (self.path / ROWS / self._places[key][0]).with_suffix(JOINTS)
         data = joints_at(path, start, length)
         if zlib.crc32(data) != checksum:
-            raise ValueError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
+            raise InputError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             return dict(stored)
 
@@ -252,30 +253,30 @@ def create(path: Path) -> None:
     """Make a folder a ledger, if it is none yet. Raises ValueError where it cannot be one."""
     try:
         if path.exists() and not path.is_dir():
-            raise ValueError(f"{path}: expected a folder for the ledger, got a file")
+            raise InputError(f"{path}: expected a folder for the ledger, got a file")
         if not (path / INDEX).exists():
             names = sorted(entry.name for entry in os.scandir(path)) if path.is_dir() else []
             # another driver may be making the same ledger
             if strange := [name for name in names if name not in FOLDERS and not name.lstrip(".").startswith(INDEX)]:
-                raise ValueError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
+                raise InputError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
             for name in FOLDERS:
                 (path / name).mkdir(parents=True, exist_ok=True)
             create_once(path / INDEX, {"format": FORMAT})
     except OSError as error:
-        raise ValueError(f"{path}: expected a folder that can be written to, got {error.strerror}") from None
+        raise InputError(f"{path}: expected a folder that can be written to, got {error.strerror}") from None
     _check_format(path)
 
 
 def _check_format(path: Path) -> None:
     """Raise ValueError where a folder is no ledger."""
     if os.path.isfile(path):
-        raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got a file")
+        raise InputError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got a file")
     try:
         form = parsed_json(read_text(path / INDEX, MAX_INDEX_BYTES))["format"]
     except FileNotFoundError:
-        raise ValueError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None
+        raise InputError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None
     except (ValueError, KeyError, TypeError) as error:
         reason = str(error).removeprefix(f"{path / INDEX}: ")
-        raise ValueError(f"{path / INDEX}: expected the index of a ledger, got {cut(reason)}") from None
+        raise InputError(f"{path / INDEX}: expected the index of a ledger, got {cut(reason)}") from None
     if form != FORMAT:
-        raise ValueError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")
+        raise InputError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")

@@ -41,6 +41,7 @@ from typing import Any, Self
 import numpy as np
 
 from posefit import settings
+from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
 from posefit.reading import SHOWN, parsed_toml, quoted, read_text
 from posefit.registry import registry
@@ -76,10 +77,10 @@ class Plan:
         for digest in chain.from_iterable(_digests(part) for part in parts):
             self._digests += digest
         if not self._digests:
-            raise ValueError("a plan must hold at least one cell, got none")
+            raise InputError("a plan must hold at least one cell, got none")
         if twice := _repeated(bytes(self._digests)):
             cell = next(cell for cell in self if cell.key == twice)
-            raise ValueError(f"the cells of a plan must differ, got {cell} twice")
+            raise InputError(f"the cells of a plan must differ, got {cell} twice")
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
@@ -91,7 +92,7 @@ class Plan:
         try:
             return cls.of(parsed_toml(text))
         except ValueError as error:
-            raise ValueError(f"{path}: {error}") from None
+            raise InputError(f"{path}: {error}") from None
 
     @classmethod
     def of(cls, tables: Mapping[str, Any]) -> Self:
@@ -104,14 +105,14 @@ class Plan:
             return cls(search_cells(tables))
         for name in tables:
             if name not in TABLES:
-                raise ValueError(f"a plan must hold {', '.join(TABLES)}, got {quoted(name)}")
+                raise InputError(f"a plan must hold {', '.join(TABLES)}, got {quoted(name)}")
         defaults = _mapping("defaults", tables.get("defaults", {}))
         for name in defaults:
             if name not in FIELDS:
-                raise ValueError(f"defaults must be of {', '.join(FIELDS)}, got {quoted(name)}")
+                raise InputError(f"defaults must be of {', '.join(FIELDS)}, got {quoted(name)}")
         listed = tables.get("cells", [])
         if not isinstance(listed, list | tuple):
-            raise ValueError(f"cells must be a list of tables, got {quoted(listed)}")
+            raise InputError(f"cells must be a list of tables, got {quoted(listed)}")
         fitting = _Shared(defaults)
 
         def make(spec: Mapping[str, Any]) -> TrackCell:
@@ -142,10 +143,10 @@ def plan_text(path: str | Path) -> str:
         try:
             return sys.stdin.read(MAX_BYTES).removeprefix("\ufeff")
         except UnicodeDecodeError:
-            raise ValueError(f"{INPUT}: expected a plan in UTF-8, got other bytes") from None
+            raise InputError(f"{INPUT}: expected a plan in UTF-8, got other bytes") from None
     if not Path(path).is_file():
         what = "a folder" if Path(path).is_dir() else "no file of that name"
-        raise ValueError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {what}")
+        raise InputError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {what}")
     return read_text(path, MAX_BYTES, "a plan in TOML")
 
 
@@ -169,7 +170,7 @@ class _Shared:
     def check(self) -> None:
         """Raise ValueError where no cell used one of them."""
         if self._unused:
-            raise ValueError(
+            raise InputError(
                 f"defaults.settings must be of the plan's methods, got {next(iter(self._unused))!r}, which none uses"
             )
 
@@ -184,10 +185,10 @@ def _lists(tables: Any) -> list[Entries] | None:
     named = _mapping("product", tables)
     for name in named:
         if name not in LISTS:
-            raise ValueError(f"product must hold {', '.join(LISTS)}, got {quoted(name)}")
+            raise InputError(f"product must hold {', '.join(LISTS)}, got {quoted(name)}")
     entries = [_entries(name, named[name]) for name in sorted(named, key=lambda name: name == "methods")]
     if (count := prod(len(one) for one in entries)) > MAX_CELLS:
-        raise ValueError(f"product must hold at most {MAX_CELLS:,} cells, got {count:,}")
+        raise InputError(f"product must hold at most {MAX_CELLS:,} cells, got {count:,}")
     return entries
 
 
@@ -214,19 +215,19 @@ def _entries(name: str, values: Any) -> Entries:
     if field in ("instance", "seed") and type(values) is int:
         if values > MAX_CELLS:
             shown = f"{values:,}" if values < 10**SHOWN else quoted(values)
-            raise ValueError(f"product.{name} must be at most {MAX_CELLS:,}, got {shown}")
+            raise InputError(f"product.{name} must be at most {MAX_CELLS:,}, got {shown}")
         values = range(values)
     if not isinstance(values, list | tuple | range):
-        raise ValueError(f"product.{name} must be a list, got {quoted(values)}")
+        raise InputError(f"product.{name} must be a list, got {quoted(values)}")
     if not values:
-        raise ValueError(f"product.{name} must hold at least one, got none: an empty product has no cells")
+        raise InputError(f"product.{name} must hold at least one, got none: an empty product has no cells")
     whole = field == "corruption"  # whose value is itself a table
     return Entries(field, values, whole)
 
 
 def _mapping(name: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a table, got {quoted(value)}")
+        raise InputError(f"{name} must be a table, got {quoted(value)}")
     return dict(value)
 
 
@@ -238,7 +239,7 @@ def search_cells(tables: Mapping[str, Any]) -> list[SearchCell]:
     """
     for name in tables:
         if name not in SEARCH_FIELDS:
-            raise ValueError(f"a plan of a suite must hold {', '.join(SEARCH_FIELDS)}, got {quoted(name)}")
+            raise InputError(f"a plan of a suite must hold {', '.join(SEARCH_FIELDS)}, got {quoted(name)}")
     suite = tables["suite"]
     one_of("suite", suite, SUITES)
     infeasible = tables.get("infeasible", INFEASIBLE[0])
@@ -255,19 +256,19 @@ def search_cells(tables: Mapping[str, Any]) -> list[SearchCell]:
     seeds = [whole("seeds", one, 0) for one in _numbers("seeds", tables.get("seeds", 1), 0)]
     lists = (dimensions, functions, instances, seeds, budgets, methods)
     if (count := prod(map(len, lists))) > MAX_CELLS:
-        raise ValueError(f"a plan must hold at most {MAX_CELLS:,} cells, got {count:,}")
+        raise InputError(f"a plan must hold at most {MAX_CELLS:,} cells, got {count:,}")
     cells = []
     for dimension, function, instance, seed, budget, (method, chosen, version) in product(*lists):
         if dimension in function.dimensions:
             number, instance, dimension = checked_address(suite, function.number, instance, dimension)
             evaluations = budget * dimension
             if (size := settings.population(registry().optimiser(method), chosen, evaluations)) > evaluations:
-                raise ValueError(f"evaluations must hold one population of {size}, got {evaluations} of {method}")
+                raise InputError(f"evaluations must hold one population of {size}, got {evaluations} of {method}")
             cells.append(
                 SearchCell(method, suite, number, dimension, instance, evaluations, chosen, infeasible, seed, version)
             )
     if not cells:
-        raise ValueError(f"a plan must hold at least one cell, got none in {list(dimensions)} dimensions")
+        raise InputError(f"a plan must hold at least one cell, got none in {list(dimensions)} dimensions")
     return cells
 
 
@@ -276,10 +277,10 @@ def _method(value: Any) -> tuple[str, dict[str, Any], str]:
     table = dict(value) if isinstance(value, Mapping) else {"method": value}
     for name in table:
         if name not in ("method", "settings"):
-            raise ValueError(f"an entry of methods must hold method and settings, got {quoted(name)}")
+            raise InputError(f"an entry of methods must hold method and settings, got {quoted(name)}")
     method, chosen = table.get("method"), table.get("settings", {})
     if not isinstance(method, str) or not isinstance(chosen, Mapping):
-        raise ValueError(f"an entry of methods must be a name, or a table of a name and settings, got {quoted(value)}")
+        raise InputError(f"an entry of methods must be a name, or a table of a name and settings, got {quoted(value)}")
     offer = registry().offer("optimiser", method)
     settings.check(method, offer.factory, chosen)
     return method, dict(chosen), version_of([offer.origin])
@@ -287,7 +288,7 @@ def _method(value: Any) -> tuple[str, dict[str, Any], str]:
 
 def _listed(name: str, values: Any) -> list[Any]:
     if not isinstance(values, list | tuple) or not values:
-        raise ValueError(f"{name} must be a list of at least one, got {quoted(values)}")
+        raise InputError(f"{name} must be a list of at least one, got {quoted(values)}")
     return list(values)
 
 
@@ -295,6 +296,6 @@ def _numbers(name: str, values: Any, first: int) -> list[Any]:
     """Return the numbers of a list, or so many from the first on."""
     if isinstance(values, int) and not isinstance(values, bool):
         if not 1 <= values <= MAX_CELLS:
-            raise ValueError(f"{name} must be a list, or a whole number from 1 to {MAX_CELLS:,}, got {quoted(values)}")
+            raise InputError(f"{name} must be a list, or a whole number from 1 to {MAX_CELLS:,}, got {quoted(values)}")
         return list(range(first, first + values))
     return _listed(name, values)

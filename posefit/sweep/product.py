@@ -11,6 +11,7 @@ from itertools import combinations, product
 from math import prod
 from typing import Any, overload
 
+from posefit.errors import InputError
 from posefit.sweep.cell import TrackCell, json_of
 from posefit.sweep.check import FIELDS, checked
 
@@ -67,7 +68,7 @@ class Product:
     def __init__(self, lists: Sequence[Sequence[Entry]], make: Callable[[Entry], TrackCell]) -> None:
         for one, other in combinations(lists, 2):
             if twice := {name for entry in one for name in entry} & {name for entry in other for name in entry}:
-                raise ValueError(f"product must say {min(twice)} in one list, got it in two")
+                raise InputError(f"product must say {min(twice)} in one list, got it in two")
         self._lists, self._make = lists, make
         separate = set(FIELDS) - set(CROSSED)
         self._separate = {

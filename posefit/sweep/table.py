@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SuiteRun
@@ -88,11 +89,11 @@ def search_runs(ledger: "Ledger") -> Iterator[SuiteRun]:
     count = 0
     for row in ledger.rows():
         if not is_search(row["spec"]):
-            raise ValueError(f"{ledger.path}: expected a ledger of single searches, got one of tracks: posefit report")
+            raise InputError(f"{ledger.path}: expected a ledger of single searches, got one of tracks: posefit report")
         count += 1
         yield search_run(row)
     if not count:
-        raise ValueError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+        raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:

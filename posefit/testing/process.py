@@ -20,6 +20,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from posefit import testing
+from posefit.errors import InputError
 from posefit.limits import memory
 from posefit.testing import results
 from posefit.testing.results import Check, Report, Result, not_run
@@ -66,7 +67,7 @@ def _converse(process: "subprocess.Popen[bytes]", label: str, done: list[Result]
         line, _, rest = rest.partition(b"\n")
         message: dict[str, Any] = json.loads(line)
         if "mistake" in message:
-            raise ValueError(message["mistake"])
+            raise InputError(message["mistake"])
         if "checks" in message:
             names, label = message["checks"], message["label"]
         elif "begins" in message:
@@ -84,7 +85,7 @@ def _converse(process: "subprocess.Popen[bytes]", label: str, done: list[Result]
         how = f"exit status {status}" if status >= 0 else signal.Signals(-status).name
         end = f"it must not end the program, got {how}"
     if names is None:
-        raise ValueError(f"{label}: it must load in a process of its own; {end}")
+        raise InputError(f"{label}: it must load in a process of its own; {end}")
     finished = {result.name for result in done}
     done.append(Result(running or next(name for name in names if name not in finished), "failed", end))
     return names, label
@@ -152,7 +153,7 @@ def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> 
     names = [check.name for check in checks]
     for rule in only:
         if rule not in names:
-            raise ValueError(f"--only must be one of {', '.join(names)}, got {rule!r}")
+            raise InputError(f"--only must be one of {', '.join(names)}, got {rule!r}")
     return offer.label, [check for check in checks if not only or check.name in only]
 
 

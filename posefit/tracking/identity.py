@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from posefit.errors import InputError
+
 SHOWN = 80  # characters of a value in a message
 PIECE = 1 << 20  # bytes of a file that are read at a time
 
@@ -90,4 +92,4 @@ def _content(path: Path) -> Any:
                 digest.update(piece)
         return digest.hexdigest()
     except OSError as error:
-        raise ValueError(f"{path}: expected a file that can be read, got {error.strerror}") from None
+        raise InputError(f"{path}: expected a file that can be read, got {error.strerror}") from None

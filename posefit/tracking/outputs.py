@@ -12,6 +12,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
+from posefit.errors import InputError
 from posefit.files import Unfinished, other_entries
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
@@ -85,12 +86,12 @@ class OutputFolder:
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
         if self.path.exists() and not self.path.is_dir():
-            raise ValueError(f"{self.path}: expected a folder to write to, got a file")
+            raise InputError(f"{self.path}: expected a folder to write to, got a file")
         if self.path.exists() and not force:
-            raise ValueError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
+            raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
         if self.path.exists() and (others := other_entries(self.path, _MINE)):
             came = f"one with {cut(others[0])}"
-            raise ValueError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
+            raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
         self._recorded = 0
         self._place = self._same() if resume else None
 
@@ -98,14 +99,14 @@ class OutputFolder:
         """Return the folder of the track that goes on: the latest with the same arguments."""
         left = Unfinished.interrupted(self.path)
         if not left:
-            raise ValueError(f"{self.path}: expected a track that was interrupted to resume, got none")
+            raise InputError(f"{self.path}: expected a track that was interrupted to resume, got none")
         others = [difference(one.info, self._spec) for one in left]
         place = left[others.index(None)] if None in others else None
         for one in left:
             if one is not place:
                 one.close()
         if place is None:
-            raise ValueError(f"{self.path}: {others[0]}")
+            raise InputError(f"{self.path}: {others[0]}")
         return place
 
     def __enter__(self) -> Self:
@@ -117,7 +118,7 @@ class OutputFolder:
                 self._place = Unfinished.begin(self.path, arguments)
             self._building = self._place.path
         except OSError as error:
-            raise ValueError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
+            raise InputError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
@@ -128,7 +129,7 @@ class OutputFolder:
             except OSError as taken:
                 self._place.close()
                 where = f"{taken.strerror}; the results are in {self._building}"
-                raise ValueError(f"{self.path}: expected its name to be free, got {where}") from None
+                raise InputError(f"{self.path}: expected its name to be free, got {where}") from None
             (self.path / _RECORD).unlink(missing_ok=True)
             return
         kept = ""
@@ -140,9 +141,9 @@ class OutputFolder:
         else:
             self._place.remove(_MINE)
         if isinstance(error, OSError):
-            raise ValueError(f"{self.path}: expected room to write to, got {error.strerror or error}{kept}") from error
-        if kept and isinstance(error, ValueError):
-            raise ValueError(f"{error}{kept}") from error
+            raise InputError(f"{self.path}: expected room to write to, got {error.strerror or error}{kept}") from error
+        if kept and isinstance(error, InputError):
+            raise InputError(f"{error}{kept}") from error
         if kept:
             self._say(kept[2:])
 

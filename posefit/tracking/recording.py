@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import BONES, PARENTS, SIDES, Skeleton
@@ -36,9 +37,9 @@ def check_recording(path: str | Path) -> None:
     """Raise ImportError without the library, and ValueError where the recording may not be written."""
     _library()
     if Path(path).exists():
-        raise ValueError(f"{path}: expected a new file for the recording, got one that exists")
+        raise InputError(f"{path}: expected a new file for the recording, got one that exists")
     if not Path(path).resolve().parent.is_dir():
-        raise ValueError(f"{path}: expected a folder to write the recording to, got none of that name")
+        raise InputError(f"{path}: expected a folder to write the recording to, got none of that name")
 
 
 def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Frame]) -> None:

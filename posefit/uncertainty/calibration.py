@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, JOINTS
 
 LEVELS = (0.5, 0.8, 0.95)  # of intervals
@@ -41,16 +42,16 @@ class Recalibration:
             expected += (len(JOINTS) if name.startswith("joint") else ANGLES,)
             value = np.asarray(getattr(self, name), dtype=np.float64)
             if value.shape != expected:
-                raise ValueError(f"{name} must have shape {expected}, got {value.shape}")
+                raise InputError(f"{name} must have shape {expected}, got {value.shape}")
             if not (np.isfinite(value).all() and value.min() >= 0.0):
-                raise ValueError(f"{name} must be finite and 0 or more, got {value.min():g} to {value.max():g}")
+                raise InputError(f"{name} must be finite and 0 or more, got {value.min():g} to {value.max():g}")
             object.__setattr__(self, name, value)
         if not 0.0 <= self.second_side <= 1.0:
-            raise ValueError(f"second_side must lie in 0 to 1, got {self.second_side}")
+            raise InputError(f"second_side must lie in 0 to 1, got {self.second_side}")
         if not 0.0 < self.sharpness < np.inf:
-            raise ValueError(f"sharpness must be above 0 and finite, got {self.sharpness}")
+            raise InputError(f"sharpness must be above 0 and finite, got {self.sharpness}")
         if not 0.0 <= self.none <= 1.0:
-            raise ValueError(f"none must lie in 0 to 1, got {self.none}")
+            raise InputError(f"none must lie in 0 to 1, got {self.none}")
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it; its names are those that it is made from."""
@@ -70,12 +71,12 @@ def conformal_factor(scores: Sequence[Array], level: float) -> float:
     share within it is at least the level. Raises ValueError where there are too few clips for that.
     """
     if not scores or any(not len(one) for one in scores):
-        raise ValueError("scores must be of one clip or more, each with one score or more")
+        raise InputError("scores must be of one clip or more, each with one score or more")
     if not 0.0 < level < 1.0:
-        raise ValueError(f"level must be between 0 and 1, got {level}")
+        raise InputError(f"level must be between 0 and 1, got {level}")
     clips = len(scores)
     if level > clips / (clips + 1):
-        raise ValueError(
+        raise InputError(
             f"clips must be at least {int(np.ceil(level / (1.0 - level) - 1e-9))} for a level of {level}, got {clips}"
         )
     values = np.concatenate([np.asarray(one, dtype=np.float64) for one in scores])
@@ -136,7 +137,7 @@ def kept_errors(errors: Array, doubts: Array, shares: Sequence[float]) -> Array:
 def _paired(name: str, values: Array, others: Array | NDArray[np.bool_]) -> tuple[Array, Array]:
     values, others = np.asarray(values, dtype=np.float64), np.asarray(others, dtype=np.float64)
     if values.ndim != 1 or not len(values) or others.shape != values.shape:
-        raise ValueError(
+        raise InputError(
             f"{name} must have as many entries as there are values, 1 or more, got {others.shape} for {values.shape}"
         )
     return values, others

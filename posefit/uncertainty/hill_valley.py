@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.uncertainty.landscape import Landscape, displacement, wrap
 
 
@@ -60,7 +61,7 @@ def valleys(landscape: Landscape, proposals: Array, costs: Array, *, tolerance: 
     finite.
     """
     if not np.isfinite(costs).all():
-        raise ValueError(f"costs must be finite, got {costs[~np.isfinite(costs)][0]}")
+        raise InputError(f"costs must be finite, got {costs[~np.isfinite(costs)][0]}")
     count, dimensions = proposals.shape
     order = np.argsort(costs, kind="stable")
     pairs, probes = _pairs(landscape, proposals, order, edge_length(dimensions, max(count, 1)), least)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.uncertainty.kernels import log_parts, log_sums
 from posefit.uncertainty.landscape import Box, wrap
 
@@ -34,13 +35,13 @@ class NormalMixture:
 
     def __post_init__(self) -> None:
         if self.centres.shape != self.spreads.shape:
-            raise ValueError(f"spreads must have shape {self.centres.shape}, got {self.spreads.shape}")
+            raise InputError(f"spreads must have shape {self.centres.shape}, got {self.spreads.shape}")
         for name in ("centres", "spreads"):
             object.__setattr__(self, name, writeable(getattr(self, name)))
         if not (self.spreads > 0.0).all() or not (self.spreads <= WIDEST).all():
-            raise ValueError(f"spreads must be above 0 and at most {WIDEST}, got {self.spreads.ravel()[:3]}")
+            raise InputError(f"spreads must be above 0 and at most {WIDEST}, got {self.spreads.ravel()[:3]}")
         if not (0.0 < self.broad < 1.0 if len(self.centres) else self.broad == 1.0):
-            raise ValueError(f"broad must lie between 0 and 1, and be 1 without centres, got {self.broad}")
+            raise InputError(f"broad must lie between 0 and 1, and be 1 without centres, got {self.broad}")
 
     def draw(self, box: Box, rng: np.random.Generator, count: int) -> tuple[Array, float]:
         """Return feasible proposals (count, d), and which share of all that were drawn was feasible.
@@ -56,7 +57,7 @@ class NormalMixture:
                 break
             more = min(count, (count - total) * tried // max(total, 1) + SPARE)
         if not total:
-            raise ValueError(f"the box must be feasible somewhere, got nothing in {REDRAWS} x {count} draws")
+            raise InputError(f"the box must be feasible somewhere, got nothing in {REDRAWS} x {count} draws")
         drawn = np.concatenate(accepted)
         return (drawn if total >= count else drawn[rng.integers(0, total, count)])[:count], total / tried
 

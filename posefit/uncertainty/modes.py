@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, Skeleton, joint_distances
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.kernels import mean_distances
@@ -54,15 +55,15 @@ class Posterior:
         for name, shape in (("poses", (count, ANGLES)), ("translations", (count, 3)), ("weights", (count,))):
             value = np.asarray(getattr(self, name), dtype=np.float64)
             if value.shape != shape or not count:
-                raise ValueError(f"{name} of a posterior must have shape {shape}, got {value.shape}")
+                raise InputError(f"{name} of a posterior must have shape {shape}, got {value.shape}")
             if not np.isfinite(value).all():
-                raise ValueError(
+                raise InputError(
                     f"{name} of a posterior must be finite, got {np.isfinite(value).sum()} of {value.size}"
                 )
             object.__setattr__(self, name, value)
         total, least = float(self.weights.sum()), float(self.weights.min())
         if least < 0.0 or not total > 0.0:
-            raise ValueError(
+            raise InputError(
                 f"weights of a posterior must be 0 or more, not all 0, got {least:g} or more, sum {total:g}"
             )
         object.__setattr__(self, "weights", self.weights / total)
@@ -135,7 +136,7 @@ def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: floa
     Tracks are similar as poses are in `modes_of`, by the mean over frames. Raises ValueError where rows are no tracks.
     """
     if not posteriors or any(not one.coherent or len(one) != len(posteriors[0]) for one in posteriors):
-        raise ValueError("posteriors must be coherent, of one length and at least one, to be tracks")
+        raise InputError("posteriors must be coherent, of one length and at least one, to be tracks")
     distances = np.mean([_distances(skeleton.joints(one.poses)) for one in posteriors], axis=0)
     weights = np.mean([one.weights for one in posteriors], axis=0)
     return [

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.uncertainty.hill_valley import valleys
 from posefit.uncertainty.landscape import Box, Landscape, displacement
 from posefit.uncertainty.mixture import WIDEST, NormalMixture
@@ -113,7 +114,7 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
         chosen.append(proposals[rows])
         known.append(costs[rows])
     if not sum(map(len, known)):
-        raise ValueError(f"searches must meet a finite cost, got none in {len(searched)} searches")
+        raise InputError(f"searches must meet a finite cost, got none in {len(searched)} searches")
     return np.concatenate(chosen), np.concatenate(known)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
+from posefit.errors import InputError
 from posefit.uncertainty.kernels import accept_moves, covariance_within, effective, longest_step, random_walk
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.mixture import NormalMixture
@@ -54,11 +55,11 @@ def tempered(
     makes no sense, or where nothing is feasible.
     """
     if not temperature > 0.0:
-        raise ValueError(f"temperature must be above 0, got {temperature}")
+        raise InputError(f"temperature must be above 0, got {temperature}")
     if not (chain >= 2 and particles >= 2 * chain):
-        raise ValueError(f"particles must be at least 2 chains of 2 or more, got {particles} and chains of {chain}")
+        raise InputError(f"particles must be at least 2 chains of 2 or more, got {particles} and chains of {chain}")
     if not 0.0 < survival < 1.0:
-        raise ValueError(f"survival must lie between 0 and 1, got {survival}")
+        raise InputError(f"survival must lie between 0 and 1, got {survival}")
     before, moved = landscape.evaluations, particles // chain * (chain - 1)
     proposals, share = start.draw(landscape.box, rng, particles)
     costs, starts = landscape.costs(proposals), start.log_density(landscape.box, proposals)
@@ -114,7 +115,7 @@ def reweighed(rises: Array, step: float) -> tuple[Array, float]:
     """
     highest = rises.max()
     if highest == -np.inf:
-        raise ValueError(f"costs must be finite somewhere, got infinite ones for all {len(rises)} proposals")
+        raise InputError(f"costs must be finite somewhere, got infinite ones for all {len(rises)} proposals")
     weights = np.exp(step * (rises - highest))
     return np.asarray(weights / weights.sum()), float(step * highest + np.log(weights.mean()))
 

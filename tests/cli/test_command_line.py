@@ -15,6 +15,7 @@ from click.testing import CliRunner, Result
 
 import posefit
 from posefit.cli import main
+from posefit.errors import InputError
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
@@ -554,3 +555,16 @@ def test_following_a_motion_loads_no_library_for_what_it_can_do_itself(tmp_path:
     )
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert ran.stdout.splitlines()[-1] == "[]"
+
+
+def test_a_mistake_is_one_line_and_a_fault_of_the_program_is_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert fails("track", "wlak").startswith("posefit: motion must be")
+    shown = run("--debug", "track", "wlak")
+    assert isinstance(shown.exception, InputError)
+
+    def broken(*_: object, **__: object) -> None:
+        raise ValueError("operands could not be broadcast together")
+
+    monkeypatch.setattr("posefit.tracking.front.track_scene", broken)
+    fault = run("track", "walk", "--frames", "0:1")
+    assert type(fault.exception) is ValueError

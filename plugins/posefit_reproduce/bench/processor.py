@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from posefit.errors import InputError
 from posefit.reading import quoted
 
 # Sixteen numbers of 32 bits, each shifted by another: every set of instructions has its own way to do it.
@@ -51,7 +52,7 @@ def check_named() -> None:
     code = "import sys; from posefit_reproduce.bench.processor import instructions; instructions(sys.argv[1])"
     tried = subprocess.run([sys.executable, "-c", code, name], capture_output=True, text=True, check=False)
     if tried.returncode or "not a recognized processor" in tried.stderr:
-        raise ValueError(f"NUMBA_CPU_NAME must name a processor of {platform.machine()}, got {quoted(name)}")
+        raise InputError(f"NUMBA_CPU_NAME must name a processor of {platform.machine()}, got {quoted(name)}")
 
 
 def _own_name() -> str:

@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from posefit.cli.output import json_line, say
+from posefit.errors import InputError
 
 
 @click.command("bench")
@@ -25,7 +26,7 @@ def bench_command(threads: int | None, follow: int | None, device: str | None, a
     chosen = {"--threads": threads, "--follow": follow, "--device": device}
     options = [name for name, value in chosen.items() if value is not None]
     if len(options) > 1:
-        raise ValueError(f"bench must have one of --threads, --follow and --device, got {' and '.join(options)}")
+        raise InputError(f"bench must have one of --threads, --follow and --device, got {' and '.join(options)}")
     check_named()
     if device is not None:
         check_device(device)

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.tracker import Frame
 from posefit.geometry.skeleton import PARENTS
 from posefit.silhouette.foreground import Image
@@ -34,7 +35,7 @@ def patent_figures(seen: Film, frames: Sequence[Frame], folder: Path) -> list[st
         figure.savefig(folder / name, dpi=130)
     stills = "figure-9-joints.png"
     if not cv2.imwrite(str(folder / stills), film_stills(seen, frames, told)):
-        raise ValueError(f"{folder / stills}: expected to write a picture, got nothing written")
+        raise InputError(f"{folder / stills}: expected to write a picture, got nothing written")
     return [stills, *figures]
 
 

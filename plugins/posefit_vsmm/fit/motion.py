@@ -17,6 +17,7 @@ from sklearn.cluster import KMeans
 from sklearn.covariance import LedoitWolf
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, INNER, MIRROR, angle_index
 from posefit.motion import built_in
@@ -207,7 +208,7 @@ def main(root: Path) -> None:
     identity = np.vstack([np.zeros((3, STATE - 3)), np.eye(STATE - 3)])
     for clip in (clip for teaching in TEACHINGS.values() for clip in (*teaching.fitted, teaching.kept)):
         if not (root / f"{clip.path}.amc").is_file():
-            raise ValueError(f"CMU_DIR must hold {clip.path}.amc, got {root} without it")
+            raise InputError(f"CMU_DIR must hold {clip.path}.amc, got {root} without it")
     for name, teaching in TEACHINGS.items():
         clips = [recorded(root, clip) for clip in teaching.fitted]
         clips += [moving(built_in.motion(one, frames=DRAWN, fps=AMC_FPS)) for one in teaching.drawn]

@@ -7,6 +7,7 @@ import numpy as np
 from numba import cuda
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.cuda.decoding import THREADS, decode_on_device
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
@@ -30,7 +31,7 @@ def areas_of_proposals(
 ) -> list[Areas]:
     """Return R, B, Y (n, 3) of proposals (n, d) in each view. Raises ValueError where a proposal is not finite."""
     if not np.isfinite(proposals).all():
-        raise ValueError("proposals must be finite, got nan or infinity")
+        raise InputError("proposals must be finite, got nan or infinity")
     counts = [np.empty((len(proposals), 3), dtype=np.int64) for _ in silhouettes]
     drawings = [
         drawing_on_device(body, camera, silhouette) for camera, silhouette in zip(cameras, silhouettes, strict=True)

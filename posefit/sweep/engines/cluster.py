@@ -9,6 +9,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from posefit.errors import InputError
 from posefit.sweep.cell import Cell, run_cell
 from posefit.sweep.engines.child import called
 from posefit.sweep.engines.engine import EngineError, Limits, Outcome, Run, text_of
@@ -177,7 +178,7 @@ class Cluster:
 def _local(distributed: Any, workers: int, dashboard: bool) -> Any:
     """Return a cluster of worker processes on this machine, one thread each, unreachable from elsewhere."""
     if workers < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
+        raise InputError(f"workers must be at least 1, got {workers}")
     import dask
 
     settings: dict[str, Any] = {"distributed.scheduler.allowed-failures": 0}  # attempts are counted by the ledger

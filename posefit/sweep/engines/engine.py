@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
+from posefit.errors import InputError
 from posefit.sweep.cell import Cell, CellResult
 
 J = TypeVar("J")  # a job: a cell, or whatever else its function takes
@@ -25,7 +26,7 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("seconds", "gigabytes"):
             if not getattr(self, name) > 0.0:
-                raise ValueError(f"the limit of {name} must be above 0, got {getattr(self, name)}")
+                raise InputError(f"the limit of {name} must be above 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Engine(Protocol):
         ...
 
 
-class EngineError(ValueError):
+class EngineError(InputError):
     """An engine cannot go on."""
 
 

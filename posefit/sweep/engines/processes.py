@@ -4,6 +4,7 @@ from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Generic
 
+from posefit.errors import InputError
 from posefit.sweep.engines.child import Children
 from posefit.sweep.engines.engine import Ended, J, Limits, R
 
@@ -13,7 +14,7 @@ class Processes(Generic[J, R]):
 
     def __init__(self, workers: int, limits: Limits, run: Callable[[J], R]) -> None:
         if workers < 1:
-            raise ValueError(f"workers must be at least 1, got {workers}")
+            raise InputError(f"workers must be at least 1, got {workers}")
         self._workers, self._limits, self._run = workers, limits, run
         self._children, self._threads = Children(), ThreadPoolExecutor(workers)
         self._running: dict[Future[tuple[R | None, str | None, bool]], J] = {}
