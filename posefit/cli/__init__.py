@@ -30,7 +30,7 @@ BUILT_IN = (
 
 
 class _Commands(click.Group):
-    """Knows plugins' commands, too, and shows a user's mistakes in one line on stderr; other errors keep their traceback."""
+    """Has plugins' commands, too, and shows a user's mistakes in one line on stderr; other errors have a traceback."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
         """Return the names of all commands: those of plugins come last."""

@@ -31,7 +31,7 @@ COST_TOLERANCE = 1e-6  # ours: costs are rounded where they are added up in anot
 
 
 class BrokenRuleError(InputError):
-    """A plugin broke one of the rules that its kind has to keep; it is shown in one line, as a mistake of its author."""
+    """A plugin broke one of the rules that its kind has to keep; it is shown in one line, as a user's mistake."""
 
 
 class CheckedOptimiser:

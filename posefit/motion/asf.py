@@ -21,9 +21,9 @@ ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
 _FINGERS = {"lfingers": "lhand", "lthumb": "lwrist", "rfingers": "rhand", "rthumb": "rwrist"}
 
 
-def mistake(path: Path, line: int, expected: str, got: str) -> ValueError:
+def mistake(path: Path, line: int, expected: str, got: str) -> InputError:
     """Return the error of a file's line; what came is quoted, and cut where it is long."""
-    return ValueError(f"{path}:{line}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
+    return InputError(f"{path}:{line}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
 
 
 def unit_length(name: str, value: float) -> float:
@@ -43,7 +43,7 @@ class _Line:
     def key(self) -> str:
         return self.words[0].lower()
 
-    def mistake(self, expected: str, got: str | None = None) -> ValueError:
+    def mistake(self, expected: str, got: str | None = None) -> InputError:
         return mistake(self.path, self.number, expected, repr(" ".join(self.words)) if got is None else got)
 
     def numbers(self, count: int, more: int = 0) -> list[float]:

@@ -106,7 +106,7 @@ class LivePage:
                     self._seconds = monotonic() - began
                     self._ready = began + (1.0 + REST_FACTOR) * self._seconds
             if self._failure:
-                raise ValueError(self._failure)
+                raise InputError(self._failure)
             return self._page
 
     def _make(self, began: float) -> str:

@@ -17,6 +17,7 @@ from typing import Any, Literal, final
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, draw_population
 from posefit.fitting.check import one_of, positive, whole
 from posefit.reading import parsed_json, quoted
@@ -209,7 +210,7 @@ class Problem:
     def best(self) -> Array:
         """The best proposal (d,) so far, repaired where it was not feasible. Raises ValueError before there is one."""
         if self._best is None:
-            raise ValueError(f"{self.id} must have been evaluated, got {self.evaluations} evaluations and no cost")
+            raise InputError(f"{self.id} must have been evaluated, got {self.evaluations} evaluations and no cost")
         return self._best.copy()
 
     @property
@@ -230,12 +231,12 @@ class Problem:
         try:
             checked = np.asarray(proposals, dtype=np.float64)
         except (TypeError, ValueError):
-            raise ValueError(f"proposals must be numbers, got {quoted(proposals)}") from None
+            raise InputError(f"proposals must be numbers, got {quoted(proposals)}") from None
         if checked.ndim not in (1, 2) or checked.shape[-1] != self.dimension:
             d = self.dimension
-            raise ValueError(f"proposals must have shape ({d},) or (n, {d}), got {checked.shape}")
+            raise InputError(f"proposals must have shape ({d},) or (n, {d}), got {checked.shape}")
         if not np.isfinite(checked).all():
-            raise ValueError("proposals must be finite, got nan or infinity")
+            raise InputError("proposals must be finite, got nan or infinity")
         return checked
 
     def _counted(self, checked: Array) -> Array:
@@ -306,7 +307,7 @@ class Suite:
         one_of("suite", name, SUITES)
         for what, numbers in (("functions", functions), ("dimensions", dimensions), ("instances", instances)):
             if numbers is not None and not isinstance(numbers, Iterable):
-                raise ValueError(f"{what} must be a list of numbers, got {quoted(numbers)}")
+                raise InputError(f"{what} must be a list of numbers, got {quoted(numbers)}")
         chosen = FUNCTIONS if functions is None else [suite_function(number) for number in functions]
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
@@ -318,7 +319,7 @@ class Suite:
             if dimension in one.dimensions
         ]
         if not self._addresses:
-            raise ValueError(f"a suite must hold at least one problem, got none in {list(dimensions)} dimensions")
+            raise InputError(f"a suite must hold at least one problem, got none in {list(dimensions)} dimensions")
 
     @property
     def functions(self) -> tuple[SuiteFunction, ...]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.statistics.profiles import attained, expected_running_time, hits
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
@@ -57,7 +58,7 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
             key = run.dimension, function, method_name(run), run.budget, run.infeasible
             groups.setdefault(key, []).append(run)
     if not groups:
-        raise ValueError("runs must be at least one, got none")
+        raise InputError("runs must be at least one, got none")
     pairs = {(dimension, function) for dimension, function, *_ in groups}
     several = {dimension for dimension, _ in pairs if sum(other == dimension for other, _ in pairs) > 2}
     scores = [

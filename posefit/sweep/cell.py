@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from posefit.errors import InputError
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:

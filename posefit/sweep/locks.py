@@ -9,6 +9,8 @@ import os
 import re
 from pathlib import Path
 
+from posefit.errors import InputError
+
 MOUNTS = Path("/proc/self/mountinfo")
 # of kinds of file systems, the options with which their locks stay on one machine; "" for always
 LOCAL = {
@@ -71,8 +73,8 @@ def on_one_machine(path: Path, mounts: Path = MOUNTS) -> str | None:
     return reason
 
 
-def _useless(path: Path, what: str) -> ValueError:
-    return ValueError(
+def _useless(path: Path, what: str) -> InputError:
+    return InputError(
         f"{path.parent.parent}: expected a disk that keeps locks (flock), got {what}; without them it is unknown "
         "which sweep lives"
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.footage.masks import Range
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.source import motion_of
@@ -87,8 +88,8 @@ def turned(motion: Motion, degrees: float) -> Motion:
 def clip_path(folder: str | Path | None, name: str) -> Path:
     """Return the path of a clip in a folder of them. Raises ValueError where there is none."""
     if folder is None:
-        raise ValueError(f"clips must be a folder of CMU clips such as {name}.amc, by --clips or POSEFIT_CMU, got none")
+        raise InputError(f"clips must be a folder of CMU clips such as {name}.amc, by --clips or POSEFIT_CMU, got none")
     path = Path(folder) / f"{name}.amc"
     if not path.is_file():
-        raise ValueError(f"clips must be a folder of CMU clips such as {name}.amc, got {folder}, which has none")
+        raise InputError(f"clips must be a folder of CMU clips such as {name}.amc, got {folder}, which has none")
     return path
