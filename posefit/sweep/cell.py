@@ -384,9 +384,11 @@ def _joints(motion: "Motion | None") -> "Array":
 
 def _joint_errors_mm(truth: "Array", estimate: "Array") -> "Array":
     """Return each joint's mean distance (27,) in millimetres, both roots at one point, as in `mpjpe_mm`."""
+    import numpy as np
+
     from posefit.geometry.skeleton import joint_distances
 
-    return 1e3 * joint_distances(truth, estimate).mean(axis=0)
+    return np.asarray(1e3 * joint_distances(truth, estimate).mean(axis=0))
 
 
 def _mode_reliability(frames: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:
