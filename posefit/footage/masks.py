@@ -61,7 +61,7 @@ def undistorted(masks: PackedMasks, maps: tuple[Any, Any]) -> PackedMasks:
     for k in range(len(masks)):
         bent = masks.silhouette(k)
         for planes, plane in ((straight, bent.mask), (valid, bent.valid)):
-            planes[k] = np.packbits(cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST))
+            planes[k] = np.packbits(cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) != 0)
     return replace(masks, masks=straight, valid=valid)
 
 

@@ -75,7 +75,7 @@ def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMa
             if values.shape != shape:
                 raise InputError(f"{file}: mask must have shape {shape}, got {values.shape}")
             counts.add(values, soft)
-            stored.append((spool.write(zlib.compress(np.ascontiguousarray(values), 1)), values.dtype))
+            stored.append((spool.write(zlib.compress(values.tobytes(), 1)), values.dtype))
         is_person, size = counts.classifier(label, path), (shape[1], shape[0])
         masks = empty_planes(len(chosen), size)
         spool.seek(0)

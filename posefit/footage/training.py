@@ -48,10 +48,10 @@ def _check_memory(poses: int, fps: float) -> None:
 
 def _clips(source: Source, asf: str | Path | None, followed: Source | None) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
-        others = [one for one in recorded.named(source) if one.name != _stem(followed)]
-        if not others:
+        clips = [clip for clip in recorded.named(source) if clip.name != _stem(followed)]
+        if not clips:
             raise InputError(f"train must hold another clip than the source, got {source} for {followed}")
-        yield from (SourceClip.of_recorded(one) for one in others)
+        yield from (SourceClip.of_recorded(clip) for clip in clips)
     elif not isinstance(source, Motion) and Path(source).is_dir():
         paths = sorted(path for path in Path(source).iterdir() if path.suffix.lower() in MOTIONS and path.is_file())
         if not paths:

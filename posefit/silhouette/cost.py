@@ -90,8 +90,8 @@ def pose_costs(
     The cost is the mean over the views of which something is known. Each view is counted on its silhouette's device.
     """
     views = zip(cameras, silhouettes, strict=True)
-    counts = np.stack([areas(body, *view, poses, translations, threads) for view in views])
-    return mean_cost(counts, silhouettes, beta), counts
+    counts = [areas(body, *view, poses, translations, threads) for view in views]
+    return mean_cost(counts, silhouettes, beta), counts[0][None] if len(counts) == 1 else np.stack(counts)
 
 
 def mean_cost(counts: Areas | Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:

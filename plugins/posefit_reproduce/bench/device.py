@@ -103,9 +103,9 @@ def _resident(problem: PoseProblem, poses: Any, places: Any) -> Callable[[], obj
 
     from posefit.silhouette.cuda.areas import drawing_on_device, launched
 
-    drawing = drawing_on_device(problem.body, problem.cameras[0], problem.silhouettes)
+    drawing = drawing_on_device(problem.body, problem.cameras[0], problem.silhouettes[0])
     there, where = cuda.to_device(poses), cuda.to_device(places)
-    return lambda: launched(drawing, there, where, 1).copy_to_host()
+    return lambda: launched(drawing, there, where).copy_to_host()
 
 
 def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -> dict[str, Any]:
