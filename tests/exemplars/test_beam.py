@@ -29,6 +29,7 @@ from posefit_exemplars.beam import (
     transition_costs,
 )
 from posefit_exemplars.exemplars import Exemplars, about_vertical
+from tests.cases import cases
 
 STEPS = Steps(0.03, np.radians(8.0), 12.0, 0.01, 0.03, 0.008)
 SECONDS = 1.0 / 30.0
@@ -59,54 +60,60 @@ def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Ar
 
 
 @pytest.mark.pure
-@pytest.mark.parametrize("limit", [np.inf, 3.0])
-def test_each_pose_is_reached_by_its_cheapest_step(limit: float) -> None:
-    rng = np.random.default_rng(0)
-    ahead = rng.normal(size=(3, 5, 8)).astype(np.float32)
-    ways, totals = rng.random((3, 5)), rng.random(5)
-    codes = rng.normal(size=(20, 8)).astype(np.float32)
-    bounds = np.array([0, 4, 9, 9, 15, 20])  # one group is empty
-    rows, near = np.array([0, 2, 3]), rng.integers(0, 4, (5, 2))  # nobody looks at the last group
-    least, owners, touched = np.full(20, np.inf), np.zeros(20, dtype=np.int64), np.zeros(20, dtype=np.int64)
-    count = kernels.cheapest_steps(ahead, ways, totals, rows, near, codes, bounds, 0.25, limit, least, owners, touched)
-    twin = np.full((5, 20), np.inf)
-    for r in rows:
-        for k in range(20):
-            if any(bounds[g] <= k < bounds[g + 1] for g in near[r]):
-                away = [((ahead[s, r] - codes[k]) ** 2).sum() for s in range(3)]
-                twin[r, k] = min(totals[r] + ways[s, r] + 0.25 * away[s] for s in range(3))
-    best = twin.min(axis=0)
-    found = np.flatnonzero(best < limit)
-    assert 0 < len(found) < 20
-    assert sorted(touched[:count].tolist()) == found.tolist()
-    np.testing.assert_allclose(least[found], best[found], rtol=1e-5)
-    np.testing.assert_array_equal(owners[found], twin.argmin(axis=0)[found])
+def test_each_pose_is_reached_by_its_cheapest_step() -> None:
+    for limit in cases([np.inf, 3.0]):
+        rng = np.random.default_rng(0)
+        ahead = rng.normal(size=(3, 5, 8)).astype(np.float32)
+        ways, totals = rng.random((3, 5)), rng.random(5)
+        codes = rng.normal(size=(20, 8)).astype(np.float32)
+        bounds = np.array([0, 4, 9, 9, 15, 20])  # one group is empty
+        rows, near = np.array([0, 2, 3]), rng.integers(0, 4, (5, 2))  # nobody looks at the last group
+        least, owners, touched = np.full(20, np.inf), np.zeros(20, dtype=np.int64), np.zeros(20, dtype=np.int64)
+        count = kernels.cheapest_steps(
+            ahead, ways, totals, rows, near, codes, bounds, 0.25, limit, least, owners, touched
+        )
+        twin = np.full((5, 20), np.inf)
+        for r in rows:
+            for k in range(20):
+                if any(bounds[g] <= k < bounds[g + 1] for g in near[r]):
+                    away = [((ahead[s, r] - codes[k]) ** 2).sum() for s in range(3)]
+                    twin[r, k] = min(totals[r] + ways[s, r] + 0.25 * away[s] for s in range(3))
+        best = twin.min(axis=0)
+        found = np.flatnonzero(best < limit)
+        assert 0 < len(found) < 20
+        assert sorted(touched[:count].tolist()) == found.tolist()
+        np.testing.assert_allclose(least[found], best[found], rtol=1e-5)
+        np.testing.assert_array_equal(owners[found], twin.argmin(axis=0)[found])
 
 
-@pytest.mark.parametrize("known", [False, True])
-def test_a_step_costs_what_the_slow_twin_says(small: Exemplars, known: bool) -> None:
-    root = np.array([0.0, 0.0, 0.05]) if known else None
-    before = beam([3, 11, 25], [0.1, 0.1, 2.0], [0.0, 2.5, 1.0])
-    found = next_states(small, before, SECONDS, STEPS, MOST, root)
-    steps = costs_of_steps(small, before, root) + before.totals[:, None]
-    codes, turned, _ = small.after(before.states, SECONDS)
-    twin: dict[tuple[int, int], float] = {}
-    for row in range(3):
-        for state in range(len(small)):
-            for turn in (-TURN, 0.0, TURN):
-                facing = np.array([before.yaws[row] + turned[row] + turn])
-                place = state, int(bins_of(facing)[0])
-                cost = steps[row, state] + 0.5 * (turn / STEPS.turning) ** 2
-                twin[place] = min(twin.get(place, np.inf), cost)
-    mine = dict(zip(zip(found.states.tolist(), bins_of(found.yaws).tolist(), strict=True), found.totals, strict=True))
-    assert len(mine) == len(found)
-    for place, cost in mine.items():
-        assert cost == pytest.approx(twin[place], rel=1e-4, abs=1e-3)
-    assert min(mine.values()) == pytest.approx(min(twin.values()), abs=1e-3)
-    for row in range(3):  # what a clip does next is among the found
-        following = int(squared_distances(codes[row : row + 1], small.codes).argmin())
-        assert following in found.states
-    assert found.totals.max() < before.totals.min() + STEPS.jump + MAX_EXCESS_COST + 0.5 * (TURN / STEPS.turning) ** 2
+def test_a_step_costs_what_the_slow_twin_says(small: Exemplars) -> None:
+    for known in cases([False, True]):
+        root = np.array([0.0, 0.0, 0.05]) if known else None
+        before = beam([3, 11, 25], [0.1, 0.1, 2.0], [0.0, 2.5, 1.0])
+        found = next_states(small, before, SECONDS, STEPS, MOST, root)
+        steps = costs_of_steps(small, before, root) + before.totals[:, None]
+        codes, turned, _ = small.after(before.states, SECONDS)
+        twin: dict[tuple[int, int], float] = {}
+        for row in range(3):
+            for state in range(len(small)):
+                for turn in (-TURN, 0.0, TURN):
+                    facing = np.array([before.yaws[row] + turned[row] + turn])
+                    place = state, int(bins_of(facing)[0])
+                    cost = steps[row, state] + 0.5 * (turn / STEPS.turning) ** 2
+                    twin[place] = min(twin.get(place, np.inf), cost)
+        mine = dict(
+            zip(zip(found.states.tolist(), bins_of(found.yaws).tolist(), strict=True), found.totals, strict=True)
+        )
+        assert len(mine) == len(found)
+        for place, cost in mine.items():
+            assert cost == pytest.approx(twin[place], rel=1e-4, abs=1e-3)
+        assert min(mine.values()) == pytest.approx(min(twin.values()), abs=1e-3)
+        for row in range(3):  # what a clip does next is among the found
+            following = int(squared_distances(codes[row : row + 1], small.codes).argmin())
+            assert following in found.states
+        assert (
+            found.totals.max() < before.totals.min() + STEPS.jump + MAX_EXCESS_COST + 0.5 * (TURN / STEPS.turning) ** 2
+        )
 
 
 def test_a_step_says_where_it_came_from_and_leads(small: Exemplars) -> None:
@@ -186,26 +193,24 @@ def test_a_root_strays_more_easily_along_the_line_of_sight_than_across_it() -> N
     np.testing.assert_allclose(both, np.log(1.5), rtol=1e-6)
 
 
-@pytest.mark.parametrize("known", [False, True])
-def test_between_two_beams_a_step_costs_what_the_twin_says_and_never_more_than_a_jump(
-    small: Exemplars, known: bool
-) -> None:
-    root = np.array([0.0, 0.01, 0.04]) if known else None
-    eye = np.array([3.0, 1.0, 0.0])
-    before = beam([3, 11, 25], [0.1, 6.2, 2.0], [0.0, 2.5, 1.0])
-    after = beam([4, 12, 26, 3], [0.15, -0.1, 2.1, 0.1], [0.0] * 4, np.full((4, 3), 0.02))
-    found = transition_costs(Transition(small, before, after, SECONDS, root, eye), steps=STEPS)
-    _, turned, ways = small.after(before.states, SECONDS)
-    twin = costs_of_steps(small, before, root)[:, after.states]
-    for i in range(3):
-        for j in range(4):
-            twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / STEPS.turning) ** 2
-            if root is None:
-                went = before.places[i] + about_vertical(ways[i : i + 1], before.yaws[i : i + 1])
-                twin[i, j] += root_deviation_costs(after.places[j : j + 1], went, eye, STEPS)[0]
-    np.testing.assert_allclose(found, np.minimum(twin, STEPS.jump), rtol=1e-3, atol=1e-3)
-    assert found.max() == STEPS.jump
-    assert found[0, 0] < 8.0  # the clip goes on
+def test_between_two_beams_a_step_costs_what_the_twin_says_and_never_more_than_a_jump(small: Exemplars) -> None:
+    for known in cases([False, True]):
+        root = np.array([0.0, 0.01, 0.04]) if known else None
+        eye = np.array([3.0, 1.0, 0.0])
+        before = beam([3, 11, 25], [0.1, 6.2, 2.0], [0.0, 2.5, 1.0])
+        after = beam([4, 12, 26, 3], [0.15, -0.1, 2.1, 0.1], [0.0] * 4, np.full((4, 3), 0.02))
+        found = transition_costs(Transition(small, before, after, SECONDS, root, eye), steps=STEPS)
+        _, turned, ways = small.after(before.states, SECONDS)
+        twin = costs_of_steps(small, before, root)[:, after.states]
+        for i in range(3):
+            for j in range(4):
+                twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / STEPS.turning) ** 2
+                if root is None:
+                    went = before.places[i] + about_vertical(ways[i : i + 1], before.yaws[i : i + 1])
+                    twin[i, j] += root_deviation_costs(after.places[j : j + 1], went, eye, STEPS)[0]
+        np.testing.assert_allclose(found, np.minimum(twin, STEPS.jump), rtol=1e-3, atol=1e-3)
+        assert found.max() == STEPS.jump
+        assert found[0, 0] < 8.0  # the clip goes on
 
 
 def test_a_turn_costs_as_much_to_the_left_as_to_the_right(small: Exemplars) -> None:

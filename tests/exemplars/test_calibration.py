@@ -14,6 +14,7 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.calibration import evidence, recalibrated, stored_calibration
 from posefit_exemplars.factory import exemplars
 from posefit_exemplars.frame_costs import FrameCosts
+from tests.cases import cases
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
 SKELETON = average_skeleton()
@@ -79,14 +80,14 @@ def test_the_greater_the_doubt_the_likelier_no_mode_is_right() -> None:
     assert recalibrated(drawn(0.1), np.zeros(66), 5.0, Shown()).recalibration.none > 0.0  # type: ignore[arg-type, union-attr]
 
 
-@pytest.mark.parametrize("views", [(45.0,), (45.0, 135.0)])
-def test_twins_cost_what_the_mirrored_and_each_reflected_pose_costs(views: tuple[float, ...]) -> None:
-    walk = walk_of(built_in.motion("walk-a", frames=1), views)
-    look, pose, place = FrameCosts(walk.task, walk.seen[0]), walk.motion.poses[0], walk.motion.translations[0]
-    skeleton = walk.motion.skeleton
-    turned = [reflected_poses(skeleton, pose[None], facing(camera, place)) for camera in walk.task.cameras]
-    for cost, twin in zip(look.twins(pose, place), [mirrored_poses(skeleton, pose[None]), *turned], strict=True):
-        assert cost == pytest.approx(look.measured(twin[0], place)[0])
+def test_twins_cost_what_the_mirrored_and_each_reflected_pose_costs() -> None:
+    for views in cases([(45.0,), (45.0, 135.0)]):
+        walk = walk_of(built_in.motion("walk-a", frames=1), views)
+        look, pose, place = FrameCosts(walk.task, walk.seen[0]), walk.motion.poses[0], walk.motion.translations[0]
+        skeleton = walk.motion.skeleton
+        turned = [reflected_poses(skeleton, pose[None], facing(camera, place)) for camera in walk.task.cameras]
+        for cost, twin in zip(look.twins(pose, place), [mirrored_poses(skeleton, pose[None]), *turned], strict=True):
+            assert cost == pytest.approx(look.measured(twin[0], place)[0])
 
 
 def test_twins_of_who_is_seen_from_the_side_cost_little_and_by_a_second_camera_more() -> None:

@@ -1,5 +1,6 @@
 """A tracker's frames: when they come, what they cost, and what happens where nothing is seen."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -10,37 +11,38 @@ import pytest
 from posefit.motion import built_in
 from posefit.registry import registry
 from posefit_exemplars.factory import MIN_EVALUATIONS, exemplars
+from tests.cases import cases
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
 
-@pytest.mark.parametrize("lag", [0, 2, 15, 40])
-def test_a_pose_is_told_so_many_frames_later(walker: Walk, lag: int) -> None:
-    taken = 0
+def test_a_pose_is_told_so_many_frames_later(walker: Walk) -> None:
+    for lag in cases([0, 2, 15, 40]):
+        taken = 0
 
-    def stream() -> Iterator[Any]:
-        nonlocal taken
-        for observation in walker.seen:
-            taken += 1
-            yield observation
+        def stream() -> Iterator[Any]:
+            nonlocal taken
+            for observation in walker.seen:
+                taken += 1
+                yield observation
 
-    tracker = exemplars(walker.told(evaluations=MIN_EVALUATIONS), lag=lag)
-    assert tracker.lag == lag
-    late = [taken - given for given, _ in enumerate(tracker.track(stream(), np.random.default_rng(0)), 1)]
-    count = len(walker.seen)
-    assert late == [min(lag, count - given) for given in range(1, count + 1)]
+        tracker = exemplars(walker.told(evaluations=MIN_EVALUATIONS), lag=lag)
+        assert tracker.lag == lag
+        late = [taken - given for given, _ in enumerate(tracker.track(stream(), np.random.default_rng(0)), 1)]
+        count = len(walker.seen)
+        assert late == [min(lag, count - given) for given in range(1, count + 1)]
 
 
-@pytest.mark.parametrize(("translation", "far"), [("known", 90.0), ("aligned", 130.0)])
-def test_nothing_seen_for_a_while_is_bridged_by_the_motion(walker: Walk, translation: str, far: float) -> None:
-    seen = [replace(one, usable=not 8 <= k < 14) for k, one in enumerate(walker.seen)]
-    if translation == "aligned":
-        seen = [replace(one, translation=None) for one in seen]
-    empty = [one if one.usable else replace(one, silhouettes=EMPTY) for one in seen]
-    tracker = exemplars(walker.told(translation=translation, evaluations=2440))
-    frames, same = (list(tracker.track(what, np.random.default_rng(0))) for what in (seen, empty))
-    assert [k for k, frame in enumerate(frames) if frame.evaluations == 1] == list(range(8, 14))
-    assert walker.off(frames)[8:].max() < far  # and he is found again
-    np.testing.assert_array_equal([frame.pose for frame in same], [frame.pose for frame in frames])
+def test_nothing_seen_for_a_while_is_bridged_by_the_motion(walker: Walk) -> None:
+    for translation, far in cases([("known", 90.0), ("aligned", 130.0)]):
+        seen = [replace(one, usable=not 8 <= k < 14) for k, one in enumerate(walker.seen)]
+        if translation == "aligned":
+            seen = [replace(one, translation=None) for one in seen]
+        empty = [one if one.usable else replace(one, silhouettes=EMPTY) for one in seen]
+        tracker = exemplars(walker.told(translation=translation, evaluations=2440))
+        frames, same = (list(tracker.track(what, np.random.default_rng(0))) for what in (seen, empty))
+        assert [k for k, frame in enumerate(frames) if frame.evaluations == 1] == list(range(8, 14))
+        assert walker.off(frames)[8:].max() < far  # and he is found again
+        np.testing.assert_array_equal([frame.pose for frame in same], [frame.pose for frame in frames])
 
 
 def test_an_empty_silhouette_that_should_say_something_ends_nothing(walker: Walk) -> None:
@@ -49,17 +51,14 @@ def test_an_empty_silhouette_that_should_say_something_ends_nothing(walker: Walk
     assert walker.off(frames).max() < 120.0
 
 
-@pytest.mark.parametrize("usable", [False, True])
-@pytest.mark.parametrize("translation", ["known", "aligned"])
-def test_somebody_who_is_not_there_at_first_is_followed_from_when_he_is(
-    walker: Walk, usable: bool, translation: str
-) -> None:
-    seen = [replace(one, silhouettes=EMPTY, usable=usable) if k < 3 else one for k, one in enumerate(walker.seen)]
-    if translation == "aligned":
-        seen = [replace(one, translation=None) for one in seen]
-    frames = list(exemplars(walker.told(translation=translation), lag=3).track(seen, np.random.default_rng(0)))
-    assert all(np.isfinite(frame.pose).all() for frame in frames)
-    assert walker.off(frames)[10:].max() < 150.0
+def test_somebody_who_is_not_there_at_first_is_followed_from_when_he_is(walker: Walk) -> None:
+    for translation, usable in cases(itertools.product(["known", "aligned"], [False, True])):
+        seen = [replace(one, silhouettes=EMPTY, usable=usable) if k < 3 else one for k, one in enumerate(walker.seen)]
+        if translation == "aligned":
+            seen = [replace(one, translation=None) for one in seen]
+        frames = list(exemplars(walker.told(translation=translation), lag=3).track(seen, np.random.default_rng(0)))
+        assert all(np.isfinite(frame.pose).all() for frame in frames)
+        assert walker.off(frames)[10:].max() < 150.0
 
 
 def test_nobody_at_all_is_a_track_nevertheless(walker: Walk) -> None:
@@ -76,37 +75,37 @@ def test_a_root_that_is_suddenly_a_thousand_kilometres_away_ends_nothing(walker:
     np.testing.assert_array_equal(frames[1].translation, gone.translation)
 
 
-@pytest.mark.parametrize("budget", [MIN_EVALUATIONS, 1000, 2440])
-@pytest.mark.parametrize("first", ["searched", "given"])
-@pytest.mark.parametrize("size", [(160, 120), (60, 45)])
-def test_the_budget_holds_and_small_pictures_count_by_their_pixels(budget: int, first: str, size: Any) -> None:
-    motion = built_in.motion("walk-a", frames=3)
-    walk = walk_of(motion, size=size)
-    given = {"first_pose": motion.poses[0, 3:]} if first == "given" else {}
-    frames = list(exemplars(walk.told(evaluations=budget, **given)).track(walk.seen, np.random.default_rng(0)))
-    used = [frame.evaluations for frame in frames]
-    assert max(used) <= budget
-    assert max(used) > 0.5 * budget
+def test_the_budget_holds_and_small_pictures_count_by_their_pixels() -> None:
+    for size, first, budget in cases(
+        itertools.product([(160, 120), (60, 45)], ["searched", "given"], [MIN_EVALUATIONS, 1000, 2440])
+    ):
+        motion = built_in.motion("walk-a", frames=3)
+        walk = walk_of(motion, size=size)
+        given = {"first_pose": motion.poses[0, 3:]} if first == "given" else {}
+        frames = list(exemplars(walk.told(evaluations=budget, **given)).track(walk.seen, np.random.default_rng(0)))
+        used = [frame.evaluations for frame in frames]
+        assert max(used) <= budget
+        assert max(used) > 0.5 * budget
 
 
-@pytest.mark.parametrize("views", [(0.0, 90.0), (0.0, 45.0, 90.0, 135.0)])
-def test_the_budget_holds_for_the_twins_of_several_cameras(views: tuple[float, ...]) -> None:
-    walk = walk_of(built_in.motion("walk-a", frames=2), views)
-    for refiner in ("none", "pso", "cma"):
-        tracker = exemplars(walk.told(evaluations=MIN_EVALUATIONS), refiner=refiner, lag=0)
-        frames = list(tracker.track(walk.seen, np.random.default_rng(0)))
-        assert max(frame.evaluations for frame in frames) <= MIN_EVALUATIONS
+def test_the_budget_holds_for_the_twins_of_several_cameras() -> None:
+    for views in cases([(0.0, 90.0), (0.0, 45.0, 90.0, 135.0)]):
+        walk = walk_of(built_in.motion("walk-a", frames=2), views)
+        for refiner in ("none", "pso", "cma"):
+            tracker = exemplars(walk.told(evaluations=MIN_EVALUATIONS), refiner=refiner, lag=0)
+            frames = list(tracker.track(walk.seen, np.random.default_rng(0)))
+            assert max(frame.evaluations for frame in frames) <= MIN_EVALUATIONS
 
 
-@pytest.mark.parametrize("name", ["none", "pso", "sapso", "annealed", "particle", "scipy"])
-def test_any_optimiser_of_the_registry_searches_within_the_budget(walker: Walk, name: str) -> None:
-    if name != "none":
-        assert registry().optimiser(name)
-    for budget in (MIN_EVALUATIONS, 1000):
-        tracker = exemplars(walker.told(evaluations=budget), refiner=name, lag=1)
-        frames = list(tracker.track(walker.seen[:2], np.random.default_rng(0)))
-        assert max(frame.evaluations for frame in frames) <= budget
-        assert walker.off(frames).max() < 300.0
+def test_any_optimiser_of_the_registry_searches_within_the_budget(walker: Walk) -> None:
+    for name in cases(["none", "pso", "sapso", "annealed", "particle", "scipy"]):
+        if name != "none":
+            assert registry().optimiser(name)
+        for budget in (MIN_EVALUATIONS, 1000):
+            tracker = exemplars(walker.told(evaluations=budget), refiner=name, lag=1)
+            frames = list(tracker.track(walker.seen[:2], np.random.default_rng(0)))
+            assert max(frame.evaluations for frame in frames) <= budget
+            assert walker.off(frames).max() < 300.0
 
 
 def test_too_small_a_budget_is_refused(walker: Walk) -> None:

@@ -30,6 +30,7 @@ from posefit_exemplars.lost_model import (
     stored_classifier,
     with_failure_probabilities,
 )
+from tests.cases import cases
 from tests.exemplars.conftest import EMPTY, Walk
 
 EVEN = LogisticModel([], np.empty(0), 0.0)  # says a half of everything
@@ -133,12 +134,12 @@ def test_a_frame_in_which_nobody_is_seen_has_no_cost_and_no_twins_of_its_own(wal
     assert [frame.lost for frame in frames] == [0.5] * 2
 
 
-@pytest.mark.parametrize(("least", "unknown"), [(0.4, True), (0.6, False)])
-def test_sides_are_unknown_from_the_probability_on_that_is_held(walker: Walk, least: float, unknown: bool) -> None:
-    frame = next(with_failure_probabilities([frame_of(walker)], walker.task, replace(WAVERING, unknown=least)))
-    assert frame.details["exchanged"] == 0.5
-    assert frame.posterior is not None
-    assert unknown_sides(walker.motion.skeleton, frame.posterior, frame.pose) == unknown
+def test_sides_are_unknown_from_the_probability_on_that_is_held(walker: Walk) -> None:
+    for least, unknown in cases([(0.4, True), (0.6, False)]):
+        frame = next(with_failure_probabilities([frame_of(walker)], walker.task, replace(WAVERING, unknown=least)))
+        assert frame.details["exchanged"] == 0.5
+        assert frame.posterior is not None
+        assert unknown_sides(walker.motion.skeleton, frame.posterior, frame.pose) == unknown
 
 
 def test_nobody_says_where_no_tracks_are_drawn(walker: Walk) -> None:

@@ -14,6 +14,7 @@ from posefit_exemplars.beam import Beam, Steps, Transition, transition_costs
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.factory import exemplars
 from posefit_exemplars.window import FrameStates, SampledPaths, Sampler, frame_states
+from tests.cases import cases
 from tests.exemplars.conftest import Walk
 
 FRAMES, WAYS, PROBLEMS, NOISE = 6, 9, 600, 0.1  # metres
@@ -147,8 +148,8 @@ def test_ways_are_drawn_through_frames_that_show_nothing(walker: Walk) -> None:
     assert all(one.posterior is not None and len(one.posterior) == 24 for one in found)
 
 
-@pytest.mark.parametrize(("name", "value"), [("samples", -1), ("posterior_temperature", 0.0)])
-def test_settings_that_cannot_be_are_estimated(walker: Walk, name: str, value: float) -> None:
-    expected = "0 or more" if name == "samples" else "above 0 and finite"
-    with pytest.raises(ValueError, match=f"{name} must be {expected}, got {value}"):
-        exemplars(walker.told(), **{name: value})  # type: ignore[arg-type]
+def test_settings_that_cannot_be_are_estimated(walker: Walk) -> None:
+    for name, value in cases([("samples", -1), ("posterior_temperature", 0.0)]):
+        expected = "0 or more" if name == "samples" else "above 0 and finite"
+        with pytest.raises(ValueError, match=f"{name} must be {expected}, got {value}"):
+            exemplars(walker.told(), **{name: value})  # type: ignore[arg-type]

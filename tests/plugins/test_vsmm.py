@@ -26,6 +26,7 @@ from posefit_vsmm.joined import Search, joined
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.state import decode, encode
 from posefit_vsmm.tracker import MAX_BLIND_FRAMES, vsmm
+from tests.cases import cases
 
 SIZE = (200, 240)
 NAMES = ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
@@ -71,10 +72,10 @@ def iou(frames: list[Frame]) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factory", [vsmm, joined])
-def test_it_keeps_the_rules_of_a_tracker(factory: Any) -> None:
-    result = check_tracker(factory)
-    assert result, str(result)
+def test_it_keeps_the_rules_of_a_tracker() -> None:
+    for factory in cases([vsmm, joined]):
+        result = check_tracker(factory)
+        assert result, str(result)
 
 
 def test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it() -> None:
@@ -110,15 +111,15 @@ def test_both_are_registered() -> None:
 # ------------------------------------------------------------------------------------------------------- bad input
 
 
-@pytest.mark.parametrize("gap", [1, 10])
-def test_a_short_gap_is_coasted_through(gap: int) -> None:
-    task, observations = seen()
-    for k in range(15, 15 + gap):
-        observations[k] = blank(observations[k])
-    frames = follow(task, observations)
-    assert not any(frame.details["lost"] for frame in frames)
-    assert [frame.evaluations for frame in frames[1:]] == [1] * (len(frames) - 1)  # no fresh estimation
-    assert iou(frames)[-8:].mean() > 0.5
+def test_a_short_gap_is_coasted_through() -> None:
+    for gap in cases([1, 10]):
+        task, observations = seen()
+        for k in range(15, 15 + gap):
+            observations[k] = blank(observations[k])
+        frames = follow(task, observations)
+        assert not any(frame.details["lost"] for frame in frames)
+        assert [frame.evaluations for frame in frames[1:]] == [1] * (len(frames) - 1)  # no fresh estimation
+        assert iou(frames)[-8:].mean() > 0.5
 
 
 def test_after_a_long_gap_the_track_is_lost_and_found_again() -> None:
@@ -212,49 +213,47 @@ def test_a_file_of_groups_that_is_not_there_is_one_line_and_status_2(tmp_path: P
     assert result.output.splitlines()[-1] == "posefit: no.toml: expected a file of groups, got none"
 
 
-@pytest.mark.parametrize(
-    ("setting", "said"),
-    [
-        ("structure=some", "structure must be"),
-        ("new=old", "new must be"),
-        ("test=coin", "test must be"),
-        ("false_alarm=0.7", "false_alarm must be between 0 and 0.5, got 0.7"),
-        ("miss=0.0", "miss must be between 0 and 0.5, got 0.0"),
-        ("smoothing=0", "smoothing must be at least 1, got 0"),
-        ("dwell=-1", "dwell must be 0 or more, got -1"),
-        ("floor_degrees=-1.0", "floor_degrees must be 0 or more, got -1.0"),
-        ("longest=0", "longest must be at least 1, got 0"),
-        ("shrink=half", "shrink must be"),
-    ],
-)
-def test_a_senseless_setting_is_one_line_and_status_2(setting: str, said: str) -> None:
-    result = CliRunner().invoke(main, ["track", "walk", "--method", "vsmm", "--set", f"vsmm.{setting}"])
-    assert result.exit_code == 2
-    assert said in result.output.splitlines()[-1]
+def test_a_senseless_setting_is_one_line_and_status_2() -> None:
+    for setting, said in cases(
+        [
+            ("structure=some", "structure must be"),
+            ("new=old", "new must be"),
+            ("test=coin", "test must be"),
+            ("false_alarm=0.7", "false_alarm must be between 0 and 0.5, got 0.7"),
+            ("miss=0.0", "miss must be between 0 and 0.5, got 0.0"),
+            ("smoothing=0", "smoothing must be at least 1, got 0"),
+            ("dwell=-1", "dwell must be 0 or more, got -1"),
+            ("floor_degrees=-1.0", "floor_degrees must be 0 or more, got -1.0"),
+            ("longest=0", "longest must be at least 1, got 0"),
+            ("shrink=half", "shrink must be"),
+        ]
+    ):
+        result = CliRunner().invoke(main, ["track", "walk", "--method", "vsmm", "--set", f"vsmm.{setting}"])
+        assert result.exit_code == 2
+        assert said in result.output.splitlines()[-1]
 
 
-@pytest.mark.parametrize("setting", ["dimensions=0", "weight=0.0", "optimiser=spaso"])
-def test_a_senseless_setting_of_the_joined_tracker_is_one_line(setting: str) -> None:
-    result = CliRunner().invoke(main, ["track", "walk", "--method", "sapso+vsmm", "--set", f"sapso+vsmm.{setting}"])
-    assert result.exit_code == 2
-    assert f"{setting.split('=')[0]} must be" in result.output.splitlines()[-1]
+def test_a_senseless_setting_of_the_joined_tracker_is_one_line() -> None:
+    for setting in cases(["dimensions=0", "weight=0.0", "optimiser=spaso"]):
+        result = CliRunner().invoke(main, ["track", "walk", "--method", "sapso+vsmm", "--set", f"sapso+vsmm.{setting}"])
+        assert result.exit_code == 2
+        assert f"{setting.split('=')[0]} must be" in result.output.splitlines()[-1]
 
 
 # ------------------------------------------------------------------------------------------------------------ whole
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        {"structure": "all"},
-        {"smoothing": 1, "floor_degrees": 0.0, "dwell": 0, "new": "patent", "test": "patent"},
-        {"shrink": "zero"},
-    ],
-)
 @pytest.mark.slow
-def test_the_patents_own_form_runs(settings: dict[str, Any]) -> None:
-    task, observations = seen(frames=60)
-    follow(task, observations, **settings)
+def test_the_patents_own_form_runs() -> None:
+    for settings in cases(
+        [
+            {"structure": "all"},
+            {"smoothing": 1, "floor_degrees": 0.0, "dwell": 0, "new": "patent", "test": "patent"},
+            {"shrink": "zero"},
+        ]
+    ):
+        task, observations = seen(frames=60)
+        follow(task, observations, **settings)
 
 
 @pytest.mark.slow

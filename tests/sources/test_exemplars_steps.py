@@ -12,6 +12,7 @@ from posefit.motion.built_in import average_skeleton
 from posefit_exemplars.beam import Beam, Steps, Transition, transition_costs
 from posefit_exemplars.exemplars import Exemplars, groups
 from posefit_exemplars.window import FrameStates, frame_states, state_weights, viterbi_state
+from tests.cases import cases
 
 SIZES = (3, 4, 2, 3, 4)  # states of each frame: 288 ways
 
@@ -53,32 +54,32 @@ def shares(costs: dict[tuple[int, ...], float], frame: int) -> Array:
     return found / found.sum()
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_state_is_as_likely_as_all_ways_to_it_together(seed: int) -> None:  # RABINER1989 (forward)
-    one = model(seed)
-    for k, frame in enumerate(one.frames):
-        np.testing.assert_allclose(frame.forward, shares(ways(one, k + 1), k), rtol=1e-5)
+def test_a_state_is_as_likely_as_all_ways_to_it_together() -> None:  # RABINER1989 (forward)
+    for seed in cases([0, 1, 2]):
+        one = model(seed)
+        for k, frame in enumerate(one.frames):
+            np.testing.assert_allclose(frame.forward, shares(ways(one, k + 1), k), rtol=1e-5)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do(seed: int) -> None:  # RABINER1989 (backward)
-    one = model(seed)
-    for first in range(len(SIZES)):
-        for count in range(first + 1, len(SIZES) + 1):
-            np.testing.assert_allclose(
-                state_weights(one.frames[first:count]), shares(ways(one, count), first), rtol=1e-5
-            )
+def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do() -> None:  # RABINER1989 (backward)
+    for seed in cases([0, 1, 2]):
+        one = model(seed)
+        for first in range(len(SIZES)):
+            for count in range(first + 1, len(SIZES) + 1):
+                np.testing.assert_allclose(
+                    state_weights(one.frames[first:count]), shares(ways(one, count), first), rtol=1e-5
+                )
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_the_way_that_is_told_is_the_cheapest_of_all(seed: int) -> None:  # RABINER1989 (Viterbi)
-    one = model(seed)
-    for count in range(1, len(SIZES) + 1):
-        costs = ways(one, count)
-        best = min(costs, key=lambda way: costs[way])
-        assert [viterbi_state(one.frames[k:count]) for k in range(count)] == list(best)
-        each = [min(cost for way, cost in costs.items() if way[-1] == row) for row in range(SIZES[count - 1])]
-        np.testing.assert_allclose(one.frames[count - 1].beam.totals, np.array(each) - min(each), atol=1e-12)
+def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (Viterbi)
+    for seed in cases([0, 1, 2]):
+        one = model(seed)
+        for count in range(1, len(SIZES) + 1):
+            costs = ways(one, count)
+            best = min(costs, key=lambda way: costs[way])
+            assert [viterbi_state(one.frames[k:count]) for k in range(count)] == list(best)
+            each = [min(cost for way, cost in costs.items() if way[-1] == row) for row in range(SIZES[count - 1])]
+            np.testing.assert_allclose(one.frames[count - 1].beam.totals, np.array(each) - min(each), atol=1e-12)
 
 
 def test_exemplars_are_poses_of_the_clips_that_lie_apart() -> None:  # TOYAMA2001 (exemplars)

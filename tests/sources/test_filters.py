@@ -11,6 +11,7 @@ from posefit.testing.toy import Toy, ball, sphere
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle
 from posefit_filters.weighting import sharpness, survival, systematic, weigh
+from tests.cases import cases
 
 
 def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (likelihood)
@@ -71,12 +72,12 @@ def test_survival_is_the_effective_share_of_particles() -> None:  # DEUTSCHER200
     assert survival(-np.log([0.6, 0.3, 0.1]), 1.0) == pytest.approx(0.724638, abs=1e-6)
 
 
-@pytest.mark.parametrize("wanted", [0.1, 0.3, 0.5, 0.9])
-def test_beta_lets_the_wanted_share_survive(wanted: float) -> None:  # DEUTSCHER2005 (beta)
-    costs = np.random.default_rng(0).exponential(5.0, 300)
-    beta = sharpness(costs, wanted)
-    assert survival(costs, beta) == pytest.approx(wanted, abs=1e-9)
-    assert sharpness(10.0 * costs, wanted) == pytest.approx(beta / 10.0)  # the cost's own scale does not matter
+def test_beta_lets_the_wanted_share_survive() -> None:  # DEUTSCHER2005 (beta)
+    for wanted in cases([0.1, 0.3, 0.5, 0.9]):
+        costs = np.random.default_rng(0).exponential(5.0, 300)
+        beta = sharpness(costs, wanted)
+        assert survival(costs, beta) == pytest.approx(wanted, abs=1e-9)
+        assert sharpness(10.0 * costs, wanted) == pytest.approx(beta / 10.0)  # the cost's own scale does not matter
 
 
 def test_beta_has_an_answer_where_no_share_can_be_had() -> None:  # DEUTSCHER2005 (beta)

@@ -8,6 +8,7 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.evolution.strategy import Constants, Strategy, default_population_size
+from tests.cases import cases
 
 # Six proposals in two dimensions, worked by hand. mu = 3 and ln 3.5 - ln i is:
 RAW = np.array([1.252763, 0.559616, 0.154151, -0.133531, -0.356675, -0.538997])
@@ -166,21 +167,23 @@ def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -
 
 
 @pytest.mark.pure
-@pytest.mark.parametrize("far", [0.0, 5.0])
-def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step(far: float) -> None:  # HANSEN2016 (47)
-    one = learnt(far=far)
-    h, rates, w = heeded(one), EIGHT.rates, EIGHT.weights
-    lengths = np.linalg.norm(one.y @ one.root, axis=1)
-    rank_mu = sum(
-        wi * (1.0 if wi >= 0.0 else 3.0 / long**2) * np.outer(yi, yi)
-        for wi, yi, long in zip(w, one.y, lengths, strict=True)
-    )
-    kept = 1.0 + rates.c_1 * (1.0 - h) * rates.c_c * (2.0 - rates.c_c) - rates.c_1 - rates.c_mu * w.sum()
-    expected = (
-        kept * one.before["covariance"] + rates.c_1 * np.outer(one.after.path, one.after.path) + rates.c_mu * rank_mu
-    )
-    np.testing.assert_allclose(one.after.covariance, expected, rtol=1e-7, atol=1e-12)
-    assert (one.after.covariance == one.after.covariance.T).all()
+def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step() -> None:  # HANSEN2016 (47)
+    for far in cases([0.0, 5.0]):
+        one = learnt(far=far)
+        h, rates, w = heeded(one), EIGHT.rates, EIGHT.weights
+        lengths = np.linalg.norm(one.y @ one.root, axis=1)
+        rank_mu = sum(
+            wi * (1.0 if wi >= 0.0 else 3.0 / long**2) * np.outer(yi, yi)
+            for wi, yi, long in zip(w, one.y, lengths, strict=True)
+        )
+        kept = 1.0 + rates.c_1 * (1.0 - h) * rates.c_c * (2.0 - rates.c_c) - rates.c_1 - rates.c_mu * w.sum()
+        expected = (
+            kept * one.before["covariance"]
+            + rates.c_1 * np.outer(one.after.path, one.after.path)
+            + rates.c_mu * rank_mu
+        )
+        np.testing.assert_allclose(one.after.covariance, expected, rtol=1e-7, atol=1e-12)
+        assert (one.after.covariance == one.after.covariance.T).all()
 
 
 def test_eq_48_the_population_is_4_plus_3_ln_d() -> None:  # HANSEN2016 (48)

@@ -1,5 +1,6 @@
 """One test for each step of hill-valley clustering: by hand, and against a slow one that tests pair after pair."""
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -10,6 +11,7 @@ from posefit.fitting.box import displacement, wrap
 from posefit.testing.toy import Toy
 from posefit.uncertainty.hill_valley import edge_length, same_valley, valleys
 from posefit.uncertainty.landscape import Landscape
+from tests.cases import cases
 
 
 def two_holes(proposals: Array) -> Array:
@@ -57,14 +59,14 @@ def slow(cost: Callable[[Array], Array], space: Toy, proposals: Array, costs: Ar
     return clusters
 
 
-@pytest.mark.parametrize(("probes", "one"), [(1, False), (2, False), (4, False)])
-def test_a_hill_between_two_points_parts_them(probes: int, one: bool) -> None:  # URSEM1999 (hill valley)
-    points = np.array([[-0.5], [0.5], [-0.4], [0.9]])
-    costs = two_holes(points)
-    landscape = Landscape(Toy(1), two_holes)
-    pairs, counts = np.array([[0, 1], [0, 2], [1, 3]]), np.array([probes] * 3)
-    np.testing.assert_array_equal(same_valley(landscape, points, costs, pairs, counts), [one, True, True])
-    assert landscape.evaluations == 3 * probes
+def test_a_hill_between_two_points_parts_them() -> None:  # URSEM1999 (hill valley)
+    for probes, one in cases([(1, False), (2, False), (4, False)]):
+        points = np.array([[-0.5], [0.5], [-0.4], [0.9]])
+        costs = two_holes(points)
+        landscape = Landscape(Toy(1), two_holes)
+        pairs, counts = np.array([[0, 1], [0, 2], [1, 3]]), np.array([probes] * 3)
+        np.testing.assert_array_equal(same_valley(landscape, points, costs, pairs, counts), [one, True, True])
+        assert landscape.evaluations == 3 * probes
 
 
 def test_a_hill_is_only_seen_where_it_is_probed() -> None:
@@ -125,37 +127,34 @@ def test_a_point_joins_the_nearest_better_one_that_no_hill_parts_it_from() -> No
     np.testing.assert_array_equal(found.lowest, [0, 1])
 
 
-@pytest.mark.parametrize(
-    ("cost", "dimensions", "wrapping"),
-    [(two_holes, 1, 0), (two_holes, 2, 0), (eggs, 1, 0), (eggs, 2, 0), (turning, 1, 1), (turning, 2, 1)],
-)
-@pytest.mark.parametrize("least", [1, 3])
-def test_clusters_are_those_of_one_test_after_the_other(
-    cost: Callable[[Array], Array], dimensions: int, wrapping: int, least: int
-) -> None:
-    space = Toy(dimensions, wrapping=wrapping)
-    for seed in range(5):
-        points = np.random.default_rng(seed).uniform(-1.0, 1.0, (40, dimensions))
+def test_clusters_are_those_of_one_test_after_the_other() -> None:
+    for least, (cost, dimensions, wrapping) in cases(
+        itertools.product(
+            [1, 3], [(two_holes, 1, 0), (two_holes, 2, 0), (eggs, 1, 0), (eggs, 2, 0), (turning, 1, 1), (turning, 2, 1)]
+        )
+    ):
+        space = Toy(dimensions, wrapping=wrapping)
+        for seed in range(5):
+            points = np.random.default_rng(seed).uniform(-1.0, 1.0, (40, dimensions))
+            costs = cost(points)
+            found = valleys(Landscape(space, cost), points, costs, least=least)
+            theirs = slow(cost, space, points, costs, least)
+            mine = [set(np.flatnonzero(found.labels == k).tolist()) for k in range(len(found.lowest))]
+            assert mine == theirs
+            np.testing.assert_array_equal(found.lowest, [min(one, key=lambda i: costs[i]) for one in theirs])
+
+
+def test_known_basins_are_found() -> None:
+    for cost, dimensions, wrapping, count in cases(
+        [(two_holes, 1, 0, 2), (two_holes, 2, 0, 2), (eggs, 1, 0, 3), (eggs, 2, 0, 9), (turning, 1, 1, 2)]
+    ):
+        points = np.random.default_rng(0).uniform(-1.0, 1.0, (400, dimensions))
         costs = cost(points)
-        found = valleys(Landscape(space, cost), points, costs, least=least)
-        theirs = slow(cost, space, points, costs, least)
-        mine = [set(np.flatnonzero(found.labels == k).tolist()) for k in range(len(found.lowest))]
-        assert mine == theirs
-        np.testing.assert_array_equal(found.lowest, [min(one, key=lambda i: costs[i]) for one in theirs])
-
-
-@pytest.mark.parametrize(
-    ("cost", "dimensions", "wrapping", "count"),
-    [(two_holes, 1, 0, 2), (two_holes, 2, 0, 2), (eggs, 1, 0, 3), (eggs, 2, 0, 9), (turning, 1, 1, 2)],
-)
-def test_known_basins_are_found(cost: Callable[[Array], Array], dimensions: int, wrapping: int, count: int) -> None:
-    points = np.random.default_rng(0).uniform(-1.0, 1.0, (400, dimensions))
-    costs = cost(points)
-    good = costs < np.median(costs)
-    found = valleys(Landscape(Toy(dimensions, wrapping=wrapping), cost), points[good], costs[good])
-    assert len(found.lowest) == count
-    # the best of each lies near the bottom: costs are 0 there, and 1 or 2 on the lowest hill
-    assert costs[good][found.lowest].max() < 0.3
+        good = costs < np.median(costs)
+        found = valleys(Landscape(Toy(dimensions, wrapping=wrapping), cost), points[good], costs[good])
+        assert len(found.lowest) == count
+        # the best of each lies near the bottom: costs are 0 there, and 1 or 2 on the lowest hill
+        assert costs[good][found.lowest].max() < 0.3
 
 
 def test_no_point_and_one_point_have_no_hills() -> None:

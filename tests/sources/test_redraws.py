@@ -10,6 +10,7 @@ from posefit.testing.toy import Toy
 from posefit_swarm import kernels
 from posefit_swarm import swarm as swarm_module
 from posefit_swarm.swarm import SwarmState, speed_limits
+from tests.cases import cases
 
 OMEGA, ACCELERATION = 0.9, 2.0
 REACH = 0.5  # the largest speed
@@ -73,16 +74,14 @@ def test_redrawing_coordinates_has_the_distribution_of_redrawing_particles() -> 
     assert np.abs(np.corrcoef(apart.T)[np.triu_indices(3, 1)]).max() < 0.06
 
 
-@pytest.mark.parametrize(("redraws", "failing"), [(0, 0.9), (1, 0.81), (4, 0.59049), (20, 0.109419)])
-def test_a_coordinate_is_redrawn_as_often_as_asked_and_no_oftener(
-    redraws: int, failing: float
-) -> None:  # Interpretation S7
-    moved, stuck = redrawn(*particle(SELDOM), 4000, redraws)
-    # where coordinates are not redrawn by themselves, none is stopped: the particle as a whole may be redrawn
-    failed = moved[:, 0] == 1.0 if redraws else moved[:, 0] > 1.0
-    deviation = np.sqrt(failing * (1.0 - failing) / 4000)
-    assert failed.mean() == pytest.approx(failing, abs=3.5 * deviation)  # 0.9^(1 + redraws)
-    np.testing.assert_array_equal(stuck, failed if redraws else False)
+def test_a_coordinate_is_redrawn_as_often_as_asked_and_no_oftener() -> None:  # Interpretation S7
+    for redraws, failing in cases([(0, 0.9), (1, 0.81), (4, 0.59049), (20, 0.109419)]):
+        moved, stuck = redrawn(*particle(SELDOM), 4000, redraws)
+        # where coordinates are not redrawn by themselves, none is stopped: the particle as a whole may be redrawn
+        failed = moved[:, 0] == 1.0 if redraws else moved[:, 0] > 1.0
+        deviation = np.sqrt(failing * (1.0 - failing) / 4000)
+        assert failed.mean() == pytest.approx(failing, abs=3.5 * deviation)  # 0.9^(1 + redraws)
+        np.testing.assert_array_equal(stuck, failed if redraws else False)
 
 
 def test_a_particle_that_is_out_whatever_is_drawn_is_not_redrawn_at_all() -> None:  # Interpretation S7

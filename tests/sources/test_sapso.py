@@ -22,6 +22,7 @@ from posefit.silhouette.cost import areas, mismatch, project
 from posefit_priors.pca import PCA
 from posefit_swarm import kernels, sapso, swarm
 from posefit_swarm.sapso import SAPSO
+from tests.cases import cases
 
 ROOT = Path(__file__).parents[2]
 TAGS = (
@@ -77,17 +78,17 @@ def walk() -> Array:
     return np.concatenate([built_in.motion(style).poses[:, 3:] for style in ("walk-a", "walk-b", "walk-c")])
 
 
-@pytest.mark.parametrize("tag", TAGS)
-def test_every_equation_and_step_has_one_home(tag: str) -> None:
-    pattern = re.compile(rf"# SAPSO {re.escape(tag)}(?![\w.(]| \w)")
-    homes = [
-        f"{path.relative_to(ROOT)}:{number}"
-        for folder in ("posefit", "plugins")
-        for path in sorted((ROOT / folder).rglob("*.py"))
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
-        if pattern.search(line)
-    ]
-    assert len(homes) == 1, homes
+def test_every_equation_and_step_has_one_home() -> None:
+    for tag in cases(TAGS):
+        pattern = re.compile(rf"# SAPSO {re.escape(tag)}(?![\w.(]| \w)")
+        homes = [
+            f"{path.relative_to(ROOT)}:{number}"
+            for folder in ("posefit", "plugins")
+            for path in sorted((ROOT / folder).rglob("*.py"))
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+            if pattern.search(line)
+        ]
+        assert len(homes) == 1, homes
 
 
 # Section 2
@@ -342,23 +343,23 @@ def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:
             assert space.feasible(proposals).all()
 
 
-@pytest.mark.parametrize("rand", ["dimension", "scalar"])
-def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border(rand: Any) -> None:  # Interpretation S7
-    space = line_space()
-    optimiser = SAPSO(space, Fixed(1.0), population_size=2, redraws=0, alpha=1.0, rand=rand)
-    optimiser._swarm.position[:], optimiser._swarm.best[:] = 0.9, 0.9
-    optimiser._swarm.velocity[:] = 0.5
-    optimiser._swarm.move(0.9, 2.0, np.full(4, 0.9))
-    np.testing.assert_array_equal(optimiser._swarm.moved, 1.0)
-    np.testing.assert_array_equal(optimiser._swarm.velocity, 0.0)
+def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border() -> None:  # Interpretation S7
+    for rand in cases(["dimension", "scalar"]):
+        space = line_space()
+        optimiser = SAPSO(space, Fixed(1.0), population_size=2, redraws=0, alpha=1.0, rand=rand)
+        optimiser._swarm.position[:], optimiser._swarm.best[:] = 0.9, 0.9
+        optimiser._swarm.velocity[:] = 0.5
+        optimiser._swarm.move(0.9, 2.0, np.full(4, 0.9))
+        np.testing.assert_array_equal(optimiser._swarm.moved, 1.0)
+        np.testing.assert_array_equal(optimiser._swarm.velocity, 0.0)
 
 
-@pytest.mark.parametrize(("cool", "expected"), [("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))])
-def test_a1_2e_cools_once_an_iteration_or_once_an_acceptance(cool: Any, expected: float) -> None:  # Interpretation S6
-    optimiser = SAPSO(line_space(), np.random.default_rng(0), population_size=4, iterations=9, cool=cool)
-    for _ in range(4):  # a flat cost: every move is accepted
-        optimiser.tell(optimiser.ask(), np.zeros(4))
-    assert optimiser._temperature == pytest.approx(expected)
+def test_a1_2e_cools_once_an_iteration_or_once_an_acceptance() -> None:  # Interpretation S6
+    for cool, expected in cases([("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))]):
+        optimiser = SAPSO(line_space(), np.random.default_rng(0), population_size=4, iterations=9, cool=cool)
+        for _ in range(4):  # a flat cost: every move is accepted
+            optimiser.tell(optimiser.ask(), np.zeros(4))
+        assert optimiser._temperature == pytest.approx(expected)
 
 
 def test_a1_2e_read_literally_the_swarm_freezes_in_3_to_5_iterations() -> None:  # Interpretation S6
@@ -375,17 +376,17 @@ def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
         assert (np.ptp(optimiser._swarm.moved) < 1e-12) == alike
 
 
-@pytest.mark.parametrize("kind", ["kept", "zeroed"])
-def test_s11_a_refused_move_keeps_or_loses_its_velocity(kind: Any) -> None:
-    optimiser = SAPSO(
-        line_space(), Fixed(1.0), population_size=1, iterations=2, rejected_velocity=kind, acceleration=0.0
-    )
-    optimiser.tell(optimiser.ask(), np.array([0.0]))
-    before = optimiser._swarm.velocity.copy()
-    optimiser._swarm.position[:] = 0.0
-    optimiser.tell(optimiser.ask(), np.array([50.0]))
-    omega = swarm.inertia(1, 2, 0.9)
-    np.testing.assert_allclose(optimiser._swarm.velocity, omega * before if kind == "kept" else 0.0)
+def test_s11_a_refused_move_keeps_or_loses_its_velocity() -> None:
+    for kind in cases(["kept", "zeroed"]):
+        optimiser = SAPSO(
+            line_space(), Fixed(1.0), population_size=1, iterations=2, rejected_velocity=kind, acceleration=0.0
+        )
+        optimiser.tell(optimiser.ask(), np.array([0.0]))
+        before = optimiser._swarm.velocity.copy()
+        optimiser._swarm.position[:] = 0.0
+        optimiser.tell(optimiser.ask(), np.array([50.0]))
+        omega = swarm.inertia(1, 2, 0.9)
+        np.testing.assert_allclose(optimiser._swarm.velocity, omega * before if kind == "kept" else 0.0)
 
 
 # Section 4

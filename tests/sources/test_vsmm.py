@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
 from posefit_vsmm.imm import IMM, Belief, Manifold, Measurement, positive_definite, start, update
+from tests.cases import cases
 
 STEP, SIGMA = 1.0, 20.0  # seconds between measurements, metres of noise in each
 TRANSITION = np.array([[0.95, 0.05], [0.10, 0.90]])
@@ -253,14 +254,13 @@ def test_a_single_model_is_a_kalman_filter_and_a_model_that_nothing_leads_to_sta
     assert np.isfinite(after.states).all()
 
 
-@pytest.mark.parametrize(
-    ("transition", "message"),
-    [
-        (np.eye(3), r"transition must have shape \(2, 2\), a row a model, got \(3, 3\)"),
-        (np.full((2, 2), 0.4), "transition must hold probabilities whose rows sum to 1"),
-        (np.array([[1.5, -0.5], [0.0, 1.0]]), "transition must hold probabilities"),
-    ],
-)
-def test_a_transition_that_is_none_is_named(transition: Array, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        IMM(MODELS, transition)
+def test_a_transition_that_is_none_is_named() -> None:
+    for transition, message in cases(
+        [
+            (np.eye(3), r"transition must have shape \(2, 2\), a row a model, got \(3, 3\)"),
+            (np.full((2, 2), 0.4), "transition must hold probabilities whose rows sum to 1"),
+            (np.array([[1.5, -0.5], [0.0, 1.0]]), "transition must hold probabilities"),
+        ]
+    ):
+        with pytest.raises(ValueError, match=message):
+            IMM(MODELS, transition)

@@ -13,6 +13,7 @@ from posefit.uncertainty import smc
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.mixture import NormalMixture
 from posefit.uncertainty.smc import next_step, reweighed, systematic_rows, tempered
+from tests.cases import cases
 
 
 @dataclass(frozen=True)
@@ -97,22 +98,22 @@ def test_a_comb_keeps_each_row_as_often_as_its_weight_asks() -> None:
     np.testing.assert_array_equal(systematic_rows(np.array([0.1, 0.9, 0.0]), 0.999, 2), [1, 1])
 
 
-@pytest.mark.parametrize("broad", [0.2, 0.7])
-def test_a_start_has_the_density_that_it_draws_from(broad: float) -> None:
-    start = NormalMixture(np.array([[-0.9, 0.2], [0.5, -0.8]]), np.array([[0.2, 0.1], [0.4, 0.3]]), broad)
-    space = Toy(2, wrapping=1)
-    drawn, share = start.draw(space, np.random.default_rng(0), 4000)
-    assert share == 1.0
-    # the mean of 1 / density over draws is the box's share, which is all of it
-    assert np.exp(-start.log_density(space, drawn)).mean() == pytest.approx(1.0, abs=0.06)
-    grid = (np.arange(200) + 0.5) / 100.0 - 1.0
-    x, y = np.meshgrid(grid, grid)
-    density = np.exp(start.log_density(space, np.stack([x.ravel(), y.ravel()], axis=1)))
-    assert density.mean() == pytest.approx(1.0, abs=1e-3)
-    # by hand, far from where anything is cut off or wraps
-    alone = NormalMixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 0.5)
-    here = 0.5 + 0.5 * 4.0 * multivariate_normal([0.0, 0.0], 0.01).pdf([0.1, -0.1])
-    assert np.exp(alone.log_density(space, np.array([[0.1, -0.1]])))[0] == pytest.approx(here)
+def test_a_start_has_the_density_that_it_draws_from() -> None:
+    for broad in cases([0.2, 0.7]):
+        start = NormalMixture(np.array([[-0.9, 0.2], [0.5, -0.8]]), np.array([[0.2, 0.1], [0.4, 0.3]]), broad)
+        space = Toy(2, wrapping=1)
+        drawn, share = start.draw(space, np.random.default_rng(0), 4000)
+        assert share == 1.0
+        # the mean of 1 / density over draws is the box's share, which is all of it
+        assert np.exp(-start.log_density(space, drawn)).mean() == pytest.approx(1.0, abs=0.06)
+        grid = (np.arange(200) + 0.5) / 100.0 - 1.0
+        x, y = np.meshgrid(grid, grid)
+        density = np.exp(start.log_density(space, np.stack([x.ravel(), y.ravel()], axis=1)))
+        assert density.mean() == pytest.approx(1.0, abs=1e-3)
+        # by hand, far from where anything is cut off or wraps
+        alone = NormalMixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 0.5)
+        here = 0.5 + 0.5 * 4.0 * multivariate_normal([0.0, 0.0], 0.01).pdf([0.1, -0.1])
+        assert np.exp(alone.log_density(space, np.array([[0.1, -0.1]])))[0] == pytest.approx(here)
 
 
 def test_a_start_is_cut_off_at_the_sides_and_wraps_around_where_they_meet() -> None:
@@ -179,27 +180,26 @@ def test_what_costs_infinitely_much_weighs_nothing() -> None:
         )
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"temperature": 0.0}, "temperature must be above 0, got 0.0"),
-        ({"particles": 10}, "particles must be at least 2 chains of 2 or more, got 10 and chains of 8"),
-        ({"chain": 1}, "particles must be at least 2 chains of 2 or more, got 2048 and chains of 1"),
-        ({"survival": 1.0}, "survival must lie between 0 and 1, got 1.0"),
-    ],
-)
-def test_settings_that_make_no_sense_are_refused(given: dict[str, Any], said: str) -> None:
-    settings = {"temperature": 1.0, **given}
-    with pytest.raises(ValueError, match=said):
-        tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), rng=np.random.default_rng(0), **settings)
-    with pytest.raises(ValueError, match="spreads must be above 0 and at most 0.5"):
-        NormalMixture(np.zeros((1, 2)), np.zeros((1, 2)), 0.2)
-    with pytest.raises(ValueError, match="spreads must have shape"):
-        NormalMixture(np.zeros((1, 2)), np.ones((1, 1)), 0.2)
-    with pytest.raises(ValueError, match="broad must lie between 0 and 1"):
-        NormalMixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 1.0)
-    with pytest.raises(ValueError, match="the box must be feasible somewhere"):
-        NormalMixture.anywhere(1).draw(Toy(1, lambda x: x[:, 0] > 2.0), np.random.default_rng(0), 4)
+def test_settings_that_make_no_sense_are_refused() -> None:
+    for given, said in cases(
+        [
+            ({"temperature": 0.0}, "temperature must be above 0, got 0.0"),
+            ({"particles": 10}, "particles must be at least 2 chains of 2 or more, got 10 and chains of 8"),
+            ({"chain": 1}, "particles must be at least 2 chains of 2 or more, got 2048 and chains of 1"),
+            ({"survival": 1.0}, "survival must lie between 0 and 1, got 1.0"),
+        ]
+    ):
+        settings = {"temperature": 1.0, **given}
+        with pytest.raises(ValueError, match=said):
+            tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), rng=np.random.default_rng(0), **settings)
+        with pytest.raises(ValueError, match="spreads must be above 0 and at most 0.5"):
+            NormalMixture(np.zeros((1, 2)), np.zeros((1, 2)), 0.2)
+        with pytest.raises(ValueError, match="spreads must have shape"):
+            NormalMixture(np.zeros((1, 2)), np.ones((1, 1)), 0.2)
+        with pytest.raises(ValueError, match="broad must lie between 0 and 1"):
+            NormalMixture(np.zeros((1, 2)), np.full((1, 2), 0.1), 1.0)
+        with pytest.raises(ValueError, match="the box must be feasible somewhere"):
+            NormalMixture.anywhere(1).draw(Toy(1, lambda x: x[:, 0] > 2.0), np.random.default_rng(0), 4)
 
 
 def oracle(known: Known, particles: int, chain: int) -> tuple[Array, float]:
