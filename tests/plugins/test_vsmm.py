@@ -271,7 +271,7 @@ def test_two_cameras_are_better_than_one() -> None:
         found = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
         joints = [body.skeleton.joints(*one) for one in ((motion.poses, motion.translations), found)]
         errors.append(float(np.linalg.norm(joints[0] - joints[1], axis=2).mean()))
-    assert errors[1] < errors[0]
+    assert errors[1] < 0.6 * errors[0]  # 0.11 and 0.27 m
 
 
 def test_it_follows_motion_capture(cmu: Path) -> None:

@@ -231,11 +231,12 @@ def test_a_broken_tracker_is_named(factory: Any, rule: str, installed: Any) -> N
         posefit.track("walk", method="bad", **QUICK)
 
 
-def test_a_given_first_pose_starts_the_first_frame_around_it() -> None:
+def test_a_given_first_pose_starts_the_first_frame_around_it(seed: int) -> None:
     first = {
-        kind: posefit.track("walk-a", method="@full", first_pose=kind, **QUICK).frames[0]
+        kind: posefit.track("walk-a", method="@full", first_pose=kind, **{**QUICK, "seed": seed}).frames[0]
         for kind in ("searched", "given")
     }
+    # 1 to 3 and 17 to 22 degrees, whatever the seed
     assert first["given"]["error_degrees"] < 0.5 * first["searched"]["error_degrees"]
     assert first["given"]["error_degrees"] < 6.0
 
