@@ -6,7 +6,6 @@ from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, only_camera, pose_costs
 from posefit.silhouette.mask import Silhouette
@@ -22,53 +21,19 @@ class FrameCosts:
     """The silhouettes of one frame. `small` costs are of a picture with every fourth pixel of every fourth row."""
 
     def __init__(self, task: Task, observation: Observation) -> None:
-        self._task, self._observation = task, observation
+        self._task = task
+        self._full: Views = list(zip(task.cameras, observation.silhouettes, strict=True))
         sides = [side for camera in task.cameras for side in (camera.width, camera.height)]
-        self.factor = next((factor for factor in FACTORS if min(sides) >= factor * SMALL), 1)
-        self._small = [
-            (coarser_camera(camera, self.factor), coarser_silhouette(silhouette, self.factor))
-            for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True)
-        ]
-        self._full = list(zip(task.cameras, observation.silhouettes, strict=True))
-
-    @property
-    def root(self) -> Array | None:
-        """The known place of the root (3,), metres; None where it is unknown."""
-        known = self._observation.translation
-        if self._task.translation != "known" or known is None:
-            return None
-        return np.asarray(known, dtype=np.float64)
-
-    @property
-    def eye(self) -> Array | None:
-        """The place (3,) of the only camera that shows the person; None with several, which also show the depth."""
-        only = only_camera(self._task.cameras, self._observation.silhouettes)
-        return None if only is None else only.position
-
-    @property
-    def yaw(self) -> float | None:
-        """About which way the person faces, in radians; None where it is unknown."""
-        return self._observation.yaw
-
-    @property
-    def cameras(self) -> int:
-        """The number of cameras."""
-        return len(self._task.cameras)
-
-    @property
-    def usable(self) -> bool:
-        """Whether enough of the person is visible to learn from."""
-        return self._observation.usable
-
-    @property
-    def skeleton(self) -> Skeleton:
-        """The person's bones."""
-        return self._task.body.skeleton
-
-    @property
-    def share(self) -> float:
-        """The effort of a cost in the small picture, as a share of one at full size."""
-        return 1.0 / self.factor**2
+        factor = next((factor for factor in FACTORS if min(sides) >= factor * SMALL), 1)
+        self._small = [(coarser_camera(camera, factor), coarser_silhouette(one, factor)) for camera, one in self._full]
+        self.share = 1.0 / factor**2  # effort of a cost in the small picture, as a share of one at full size
+        self.skeleton, self.cameras = task.body.skeleton, len(task.cameras)
+        self.yaw, self.usable = observation.yaw, observation.usable
+        known = observation.translation if task.translation == "known" else None
+        self.root = None if known is None else np.asarray(known, dtype=np.float64)  # (3,) metres, where it is known
+        # (3,) where the only camera stands that shows the person; None with several, which also show the depth
+        only = only_camera(task.cameras, observation.silhouettes)
+        self.eye: Array | None = None if only is None else only.position
 
     def placed(self, poses: Array, places: Array) -> Array:
         """Return where poses (n, 66) stand (n, 3): where the root is known to be, or aligned, from `places` (n, 3)."""
@@ -89,7 +54,8 @@ class FrameCosts:
 
     def measured(self, pose: Array, place: Array) -> tuple[float, Areas]:
         """Return the cost of one pose, and its areas (views, 3)."""
-        costs, counts = pose_costs(self._task.body, *zip(*self._full, strict=True), pose[None], place[None])
+        cameras, silhouettes = zip(*self._full, strict=True)
+        costs, counts = pose_costs(self._task.body, cameras, silhouettes, pose[None], place[None])
         return float(costs[0]), counts[:, 0]
 
     def twins(self, pose: Array, place: Array) -> Array:

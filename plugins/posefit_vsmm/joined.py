@@ -1,6 +1,5 @@
 """`sapso+vsmm`: the motion models of `vsmm` predict where a swarm starts, and learn from what it finds."""
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
@@ -15,7 +14,7 @@ from posefit.fitting.box import Start
 from posefit.fitting.optimiser import OptimiserFactory, minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.registry import registry
@@ -23,8 +22,8 @@ from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import PLACED, Measurement
 from posefit_vsmm.motion import library
 from posefit_vsmm.state import ERROR, FIRST_BONE, YAW_PITCH_ROLL, Reliance, decode, encode, free_errors
-from posefit_vsmm.switching import Rules, SequentialTest, Switching
-from posefit_vsmm.tracker import Matcher, SearchResult, TrackFilter
+from posefit_vsmm.switching import Switching
+from posefit_vsmm.tracker import VSMM, Matcher, SearchResult
 
 STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
 
@@ -134,21 +133,6 @@ class Search:
         return SearchResult(pose[0], best.evaluations, measure)
 
 
-@dataclass(frozen=True, eq=False)
-class Joined:
-    """Follows a person with a `TrackFilter` whose every frame ends in a search."""
-
-    task: Task
-    switching: Switching = field(repr=False)
-    search: Search = field(repr=False)
-
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        """Yield a `Frame` for each observation; its `details` are those of the filter."""
-        course = TrackFilter(self.task, self.switching, rng, self.search)
-        for observation in observations:
-            yield course.frame(observation)
-
-
 def joined(
     task: Task,
     *,
@@ -156,7 +140,7 @@ def joined(
     dimensions: int = 16,
     weight: float = 0.25,
     groups: str = "",
-) -> Joined:
+) -> VSMM:
     """The motion models of `vsmm` predict where a swarm starts, and learn from what it finds.
 
     Settings:
@@ -171,8 +155,6 @@ def joined(
         raise InputError(f"weight must be above 0, got {weight}")
     carried = library("identity")
     topology = read_topology(Path(groups) if groups else None, carried.names)
-    switching = Switching(
-        library=carried, topology=topology, structure="variable", rules=Rules(), new="rerun", test=SequentialTest()
-    )
+    switching = Switching(library=carried, topology=topology)
     search = Search(task, carried.reliance, registry().optimiser(optimiser), dimensions, weight)
-    return Joined(task, switching, search)
+    return VSMM(task, switching, search)

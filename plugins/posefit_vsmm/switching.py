@@ -202,10 +202,10 @@ class Switching:
 
     library: Library
     topology: Topology
-    structure: Structure
-    rules: Rules
-    new: New
-    test: SequentialTest
+    structure: Structure = "variable"
+    rules: Rules = Rules()
+    new: New = "rerun"
+    test: SequentialTest = SequentialTest()
 
     def __post_init__(self) -> None:
         for name, choices in (("structure", Structure), ("new", New)):

@@ -304,12 +304,13 @@ class VSMM:
 
     task: Task
     switching: Switching = field(repr=False)
+    search: Searcher | None = field(default=None, repr=False)  # with one, every frame ends in a search
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        """Yield a `Frame` for each observation; its `details` tell models, probabilities, group and joints."""
-        course = TrackFilter(self.task, self.switching, rng)
+        """Yield a `Frame` for each observation; its `details` hold models, probabilities, group and joints."""
+        filtered = TrackFilter(self.task, self.switching, rng, self.search)
         for observation in observations:
-            yield course.frame(observation)
+            yield filtered.frame(observation)
 
 
 def vsmm(

@@ -61,6 +61,7 @@ def test_the_root_is_found_where_nobody_says_where_it_is(walker: Walk, seed: int
     assert off.max() < 150.0
 
 
+@pytest.mark.slow
 def test_an_unknown_walker_is_found_as_well_where_nobody_says_where_he_is(seed: int) -> None:
     known, found = (
         posefit.track(
@@ -77,6 +78,7 @@ def test_an_unknown_walker_is_found_as_well_where_nobody_says_where_he_is(seed: 
     assert found < known + 15.0
 
 
+@pytest.mark.slow
 def test_several_cameras_see_better_than_one(seed: int) -> None:
     one, two = (
         posefit.track(
