@@ -1,13 +1,45 @@
-"""Cases of one test: a loop in it, whose failure still names the case."""
+"""Tests that run a table of cases as one test: a failure names its case."""
 
-from collections.abc import Iterable, Iterator
-from typing import TypeVar
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
 
 Value = TypeVar("Value")
 
 
+def each(names: str | tuple[str, ...], cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator like `pytest.mark.parametrize` whose cases are one test; each has a `tmp_path` of its own."""
+    arguments = tuple(name.strip() for name in names.split(",")) if isinstance(names, str) else names
+    table = list(cases)
+
+    def decorate(test: Callable[..., None]) -> Callable[..., None]:
+        signature = inspect.signature(test)
+        fixtures = [one for name, one in signature.parameters.items() if name not in arguments]
+
+        @functools.wraps(test)
+        def run(**given: Any) -> None:
+            for number, case in enumerate(table):
+                own = dict(given)
+                if "tmp_path" in own:
+                    own["tmp_path"] = own["tmp_path"] / f"case-{number}"
+                    own["tmp_path"].mkdir()
+                values = (case,) if len(arguments) == 1 else case
+                try:
+                    test(**dict(zip(arguments, values, strict=True)), **own)
+                except BaseException as error:
+                    error.add_note(f"case {number}: {case!r}")
+                    raise
+
+        del run.__wrapped__  # type: ignore[attr-defined]
+        run.__signature__ = signature.replace(parameters=fixtures)  # type: ignore[attr-defined]
+        return run
+
+    return decorate
+
+
 def cases(values: Iterable[Value]) -> Iterator[Value]:
-    """Yield values, each printed: what pytest captured ends with the case that failed."""
+    """Yield the cases of a loop within a test, each printed: the output of a failure ends with its case."""
     for value in values:
         print(f"case {value!r}")
         yield value
