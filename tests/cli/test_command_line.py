@@ -218,9 +218,8 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     assert (out / "precious.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
+def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
+    for words, message in [
         (["wlak"], "did you mean 'walk'?"),
         (["16_999"], "motion must be a file, a folder, a recorded one that posefit motions lists, or one of walk, "),
         (["library"], "a recorded one that posefit motions lists, or one of walk, "),
@@ -248,11 +247,9 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
         (["walk", "--seed", "abc"], "'abc' is not a valid integer"),
         (["walk", "--wrong"], "No such option"),
         (["walk", "--seed", "-1"], "seed must be 0 or more, got -1"),
-    ],
-)
-def test_a_mistake_is_one_line_and_status_2(words: list[str], message: str, tmp_path: Path) -> None:
-    assert message in fails("track", *words, "--out", tmp_path / "out")
-    assert list(tmp_path.iterdir()) == []
+    ]:
+        assert message in fails("track", *words, "--out", tmp_path / "out")
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_bad_motion_files_are_refused(clip: tuple[Path, Path], tmp_path: Path) -> None:
@@ -455,17 +452,17 @@ def test_a_new_command_installs_offline_and_passes_its_own_test(tmp_path: Path) 
     assert "No such command 'how-far'" in left_out.stderr
 
 
-@pytest.mark.parametrize("taken", ["track", "bench"])
-def test_a_new_command_has_a_new_name(taken: str, tmp_path: Path) -> None:
-    said = fails("plugins", "new", taken, "--kind", "command", "--out", tmp_path / "x")
-    assert f"name must be a new one, got '{taken}', which posefit registers already" in said
+def test_a_new_command_has_a_new_name(tmp_path: Path) -> None:
+    for taken in ["track", "bench"]:
+        said = fails("plugins", "new", taken, "--kind", "command", "--out", tmp_path / "x")
+        assert f"name must be a new one, got '{taken}', which posefit registers already" in said
 
 
-@pytest.mark.parametrize("name", ["swarm", "reproduce", "envs"])
-def test_a_new_plugin_has_a_module_of_its_own(name: str, tmp_path: Path) -> None:
-    said = fails("plugins", "new", name, "--out", tmp_path / "x")
-    assert f"name must make a new module, got '{name}': its module posefit_{name} would hide the one" in said
-    assert not (tmp_path / "x").exists()
+def test_a_new_plugin_has_a_module_of_its_own(tmp_path: Path) -> None:
+    for name in ["swarm", "reproduce", "envs"]:
+        said = fails("plugins", "new", name, "--out", tmp_path / "x")
+        assert f"name must make a new module, got '{name}': its module posefit_{name} would hide the one" in said
+        assert not (tmp_path / "x").exists()
 
 
 @pytest.mark.parametrize(
@@ -505,9 +502,8 @@ def test_settings_are_given_by_plugin_and_name() -> None:
     assert settings["tracker"] == {"floor": 0.1, "root_range_degrees": [30, 10, 10]}
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_a_setting_that_makes_no_sense_is_one_line() -> None:
+    for text, message in [
         ("sapso", "--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
         ("sapso=3", "--set must be NAME.SETTING=VALUE"),
         ("pso.phi=4.2", "--set must name one of sapso, pca, tracker, which are in use here, got 'pso.phi=4.2'"),
@@ -516,10 +512,8 @@ def test_settings_are_given_by_plugin_and_name() -> None:
         ("sapso.cooling=2", "cooling must lie in 0 to 1, got 2"),
         ("sapso.cool=never", "sapso.cool must be iteration | acceptance, got 'never'"),
         ("tracker.floor=0", "floor must be above 0, got 0"),
-    ],
-)
-def test_a_setting_that_makes_no_sense_is_one_line(text: str, message: str) -> None:
-    assert message in fails("track", "walk", "--frames", "0:2", *QUICK, "--set", text)
+    ]:
+        assert message in fails("track", "walk", "--frames", "0:2", *QUICK, "--set", text)
 
 
 def test_evaluations_are_the_same_for_every_method() -> None:

@@ -35,9 +35,8 @@ def test_a_budget_is_particles_times_iterations_and_one_where_nothing_else_is_sa
     assert TrackOptions(population_size=10, evaluations=300).budget == 300
 
 
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
+def test_mistakes_are_named() -> None:
+    for settings, message in [
         ({"evaluations": 0}, "evaluations must be at least 1, got 0"),
         ({"evaluations": 100, "iterations": 4}, "evaluations and iterations must not both be given"),
         ({"evaluations": 30}, "evaluations must hold one population of 40, got 30"),
@@ -54,11 +53,11 @@ def test_a_budget_is_particles_times_iterations_and_one_where_nothing_else_is_sa
         ({"settings": {"sapso.coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),
         ({"settings": {"pca.components": "six"}}, "pca.components must be float, got 'six'"),
         ({"settings": {"tracker.flor": 1.0}}, "a setting of tracker must be one of .*did you mean 'floor'"),
-    ],
-)
-def test_mistakes_are_named(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        posefit.track("walk", **{**QUICK, **({"evaluations": None} if "iterations" in settings else {}), **settings})
+    ]:
+        with pytest.raises(ValueError, match=message):
+            posefit.track(
+                "walk", **{**QUICK, **({"evaluations": None} if "iterations" in settings else {}), **settings}
+            )
 
 
 def test_a_filter_carries_its_particles_and_the_others_are_built_anew(monkeypatch: Any) -> None:

@@ -82,35 +82,29 @@ def test_the_same_generator_tells_the_same() -> None:
     assert not np.array_equal(first.poses, tell(rng=np.random.default_rng(4)).poses)
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
+def test_numbers_that_make_no_sense_are_refused() -> None:
+    for given, said in [
         ({"searches": 0}, "searches must be at least 1, got 0"),
         ({"evaluations": 0}, "evaluations must be at least 1, got 0"),
         ({"share": 0.0}, "share must be above 0, got 0.0"),
         ({"temperature": 0.0}, "temperature must be above 0, got 0.0"),
-    ],
-)
-def test_numbers_that_make_no_sense_are_refused(given: dict[str, Any], said: str) -> None:
-    settings = {"evaluations": 400, "rng": np.random.default_rng(0), **given}
-    with pytest.raises(ValueError, match=said):
-        modes(pose_problem(), registry().optimiser("sapso"), **settings)
+    ]:
+        settings = {"evaluations": 400, "rng": np.random.default_rng(0), **given}
+        with pytest.raises(ValueError, match=said):
+            modes(pose_problem(), registry().optimiser("sapso"), **settings)
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
+def test_a_wrong_setting_of_the_tracker_is_one_clear_error() -> None:
+    for given, said in [
         ({"modes": -1}, "modes must be 0 or more, got -1"),
         ({"modes": 2.5}, "tracker.modes must be int, got 2.5"),
         ({"modes": 1, "modes_share": 0.0}, "modes_share must be above 0, got 0.0"),
         ({"modes": 1, "posterior_temperature": -1.0}, "posterior_temperature must be above 0, got -1.0"),
-    ],
-)
-def test_a_wrong_setting_of_the_tracker_is_one_clear_error(given: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        posefit.track(
-            "walk", frames=(0, 1), settings={f"tracker.{name}": value for name, value in given.items()}, **FEW
-        )
+    ]:
+        with pytest.raises(ValueError, match=said):
+            posefit.track(
+                "walk", frames=(0, 1), settings={f"tracker.{name}": value for name, value in given.items()}, **FEW
+            )
 
 
 @pytest.mark.parametrize(("share", "searches"), [(0.2, 0), (0.5, 1), (2.0, 3)])

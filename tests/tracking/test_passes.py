@@ -105,16 +105,13 @@ def test_more_passes_are_followed_where_they_are_asked_for() -> None:
     assert [frame.evaluations for frame in found.found] == [21] * len(WALK)
 
 
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
+def test_passes_that_make_no_sense_are_refused() -> None:
+    for settings, said in [
         ({"passes": 0}, "passes must be at least 1, got 0"),
         ({"passes": 2}, "passes must be 1 where a track is not smooth, got 2"),
-    ],
-)
-def test_passes_that_make_no_sense_are_refused(settings: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        posefit.track("walk", frames=(0, 2), **settings)
+    ]:
+        with pytest.raises(ValueError, match=said):
+            posefit.track("walk", frames=(0, 2), **settings)
 
 
 def test_a_command_that_asks_for_passes_of_what_is_not_steady_says_so_in_a_line() -> None:
