@@ -121,7 +121,7 @@ def filmed_figures(source: str | Path, roi: Box, frames: Range, seed: int) -> di
     video = Video.of(source)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "track"
-        method: dict[str, Any] = {"optimiser": "sapso", "prior": "loose", "steady": False, "seed": seed}
+        method: dict[str, Any] = {"method": "sapso@loose", "smooth": False, "seed": seed}
         result = track(source, extraction=Extraction(roi=roi), frames=frames, out=out, **method)
         camera = Camera.from_json(out / "camera.json")
         with np.load(out / "poses.npz") as stored:

@@ -133,7 +133,7 @@ class FailsToBuild(planted.Sound):
 def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
     factory: Any, rule: str | None, installed: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr(initialise, "COMPILING", 0.0)
+    monkeypatch.setattr(initialise, "COMPILE_SECONDS", 0.0)
     installed("optimiser", factory)
     settings = {**QUICK, "ask_seconds": 0.3} if factory is NeverReturns else QUICK
     if rule is not None:
