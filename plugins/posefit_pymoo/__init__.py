@@ -43,6 +43,7 @@ class Pymoo:
     ) -> None:
         at_least("population_size", population_size, 5)
         one_of("variant", variant, get_args(Variant))
+        self._asked: Any = None
         self._space, self._home = space, draw_population(space, rng, 1)[0]
         self._variant, self._population_size, self._seed = variant, population_size, int(rng.integers(2**63))
         self._begin()
@@ -70,7 +71,7 @@ class Pymoo:
         self._algorithm: Any = kind(pop_size=size, sampling=draw_population(self._space, rng, size))
         self._problem: Any = Problem(n_var=self._space.dimensions, n_obj=1, xl=-1.0, xu=1.0)
         self._algorithm.setup(self._problem, termination=NoTermination(), seed=int(rng.integers(2**31)))
-        self._asked: Any = None
+        self._asked = None
         self._costs: list[Array] = []  # of all populations so far
 
     def _learn(self, costs: Array) -> None:

@@ -304,10 +304,11 @@ def copies(case: OptimiserCase) -> None:
     def rest(optimiser: Optimiser) -> list[Array]:
         return [proposals for proposals, _ in case.steps(optimiser, SPACE, sphere, 3)]
 
-    for what, duplicate in (
-        ("a deep copy", copy.deepcopy),
-        ("a pickle", lambda optimiser: pickle.loads(pickle.dumps(optimiser))),
-    ):
+    duplicates: dict[str, Callable[[Optimiser], Optimiser]] = {
+        "a deep copy": copy.deepcopy,
+        "a pickle": lambda optimiser: pickle.loads(pickle.dumps(optimiser)),
+    }
+    for what, duplicate in duplicates.items():
         for count in (0, 2):
             optimiser = case.build(SPACE)
             for _ in case.steps(optimiser, SPACE, sphere, count):

@@ -114,8 +114,8 @@ def _process(kind: Any, name: str, settings: Sequence[str], only: Sequence[str])
         process.stdout.close()
 
 
-def _check() -> None:
-    """Check what standard input asks for."""
+def _check() -> int:
+    """Check what standard input asks for; return 0."""
     faulthandler.enable()
     out = os.fdopen(_stdout_kept_apart(), "w", encoding="utf-8")
     task = json.load(sys.stdin)
@@ -130,13 +130,14 @@ def _check() -> None:
         label, checks = _checks(task["kind"], task["name"], task["settings"], task["only"])
     except (ValueError, ImportError) as mistake:
         send(mistake=str(mistake))
-        return
+        return 0
     send(checks=[check.name for check in checks], label=label)
     with memory(GIGABYTES):
         for check in checks:
             send(begins=check.name)
             send(**vars(check.run()))
     send(ends=True)
+    return 0
 
 
 def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> tuple[str, list[Check]]:
@@ -180,4 +181,4 @@ def _stdout_kept_apart() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(_trace() if sys.argv[1:] == ["trace"] else _check())
+    sys.exit((_trace if sys.argv[1:] == ["trace"] else _check)())

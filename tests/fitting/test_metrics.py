@@ -1,7 +1,5 @@
 """Metrics by numbers worked by hand, and by law."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.geometry.rotation import rotation_from_joint_angles
-from posefit.geometry.skeleton import JOINTS, MIRROR, angle_index
+from posefit.geometry.skeleton import JOINTS, MIRROR
 from posefit.motion import built_in
 
 seeds = st.integers(0, 2**32 - 1)
@@ -32,18 +30,6 @@ def test_only_chosen_dimensions_count() -> None:
     assert metrics.pose_error_degrees(truth, estimate, chosen)[0] == pytest.approx(5.0)
 
 
-def test_one_joint_turned_by_22_degrees_is_a_geodesic_of_1() -> None:
-    truth, estimate = np.zeros((1, 66)), np.zeros((1, 66))
-    estimate[0, angle_index(JOINTS.index("lfemur")) + 1] = np.radians(22.0)
-    assert metrics.geodesic_degrees(truth, estimate)[0] == pytest.approx(1.0)
-
-
-def test_one_joint_27_mm_off_is_an_mpjpe_of_1(joints: Array) -> None:
-    moved = joints.copy()
-    moved[:, 5, 1] += 0.027
-    np.testing.assert_allclose(metrics.mpjpe_mm(joints, moved), 1.0)
-
-
 def test_mpjpe_ignores_where_the_root_is(joints: Array) -> None:
     np.testing.assert_allclose(metrics.mpjpe_mm(joints, joints + [1.0, 2.0, 3.0]), 0.0, atol=1e-9)
 
@@ -53,13 +39,6 @@ def test_pa_mpjpe_ignores_rotation_scale_and_place_but_no_reflection(joints: Arr
     np.testing.assert_allclose(metrics.pa_mpjpe_mm(joints, 1.7 * joints @ rotation.T + 3.0), 0.0, atol=1e-8)
     assert metrics.mpjpe_mm(joints, joints @ rotation.T).min() > 100.0
     assert metrics.pa_mpjpe_mm(joints, joints * [1.0, 1.0, -1.0]).min() > 10.0
-
-
-def test_pa_mpjpe_is_never_above_the_best_translation_alone(joints: Array) -> None:
-    noisy = joints + np.random.default_rng(0).normal(0.0, 0.05, joints.shape)
-    centred = [points - points.mean(axis=1, keepdims=True) for points in (joints, noisy)]
-    squared = 1e6 * ((centred[0] - centred[1]) ** 2).sum(axis=2).mean(axis=1)
-    assert (metrics.pa_mpjpe_mm(joints, noisy) <= np.sqrt(squared)).all()
 
 
 def test_iou_by_hand() -> None:
@@ -84,13 +63,6 @@ def test_skill_by_hand() -> None:
     assert metrics.skill(1.0, 4.0) == 0.75
     assert metrics.skill(4.0, 4.0) == 0.0
     assert metrics.skill(1.0, 0.0) is None
-
-
-def test_shapes_are_checked() -> None:
-    with pytest.raises(ValueError, match=r"truth must have shape \(T, 66\), got \(66,\)"):
-        metrics.pose_error_degrees(np.zeros(66), np.zeros(66))
-    with pytest.raises(ValueError, match=r"joints must have the truth's shape \(2, 27, 3\), got \(1, 27, 3\)"):
-        metrics.mpjpe_mm(np.zeros((2, 27, 3)), np.zeros((1, 27, 3)))
 
 
 def test_one_angle_66_degrees_off_is_an_error_of_1_degree() -> None:
@@ -227,17 +199,14 @@ def test_an_untrue_number_is_named() -> None:
             of_poses(poses, poses[:, 1:])
 
 
-@pytest.mark.parametrize(
-    ("dimensions", "came"),
-    [
+def test_dimensions_are_checked() -> None:
+    for dimensions, came in (
         (np.ones(65, bool), r"bool of shape \(65,\), 65 of them not 0"),
         (np.ones(66), r"float64 of shape \(66,\), 66 of them not 0"),
         (np.zeros(66, bool), r"bool of shape \(66,\), 0 of them not 0"),
-    ],
-)
-def test_dimensions_are_checked(dimensions: Any, came: str) -> None:
-    with pytest.raises(ValueError, match=f"dimensions must be 66 booleans, at least one of them true, got {came}"):
-        metrics.pose_error_degrees(np.zeros((1, 66)), np.zeros((1, 66)), dimensions)
+    ):
+        with pytest.raises(ValueError, match=f"dimensions must be 66 booleans, at least one of them true, got {came}"):
+            metrics.pose_error_degrees(np.zeros((1, 66)), np.zeros((1, 66)), dimensions)
 
 
 def test_sequences_and_areas_are_checked() -> None:

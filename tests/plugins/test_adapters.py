@@ -1,4 +1,4 @@
-"""Other people's optimisers: what is said where a library is absent, and that they work in a whole track."""
+"""Other people's optimisers: the error where a library is absent, and a whole track with each."""
 
 import subprocess
 import sys
@@ -17,14 +17,15 @@ from posefit.testing.toy import Toy
 EXTRAS = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna", "ribs": "ribs"}
 
 
-@pytest.mark.parametrize("name", EXTRAS)
-def test_an_absent_library_is_named_with_the_extra_to_install(name: str) -> None:
-    found = registry_of([EntryPoint(name, f"posefit_{name}", "posefit")])
-    plugin = found.plugins[0]
-    absent = tuple(replace(offer, needs=(f"no_such_{offer.name}", f"posefit[{offer.name}]")) for offer in plugin.offers)
-    with pytest.raises(ImportError, match=rf"optimiser {name} needs the library .* pip install 'posefit\[{name}\]'"):
-        Registry((plugin._replace(offers=absent),)).optimiser(name)
-    assert found.offers["optimiser"][name].needs == (EXTRAS[name], f"posefit[{name}]")
+def test_an_absent_library_is_named_with_the_extra_to_install() -> None:
+    for name, library in EXTRAS.items():
+        registered = registry_of([EntryPoint(name, f"posefit_{name}", "posefit")])
+        (plugin,) = registered.plugins
+        assert registered.offers["optimiser"][name].needs == (library, f"posefit[{name}]")
+        absent = tuple(replace(offer, needs=("no_such_library", f"posefit[{name}]")) for offer in plugin.offers)
+        message = rf"optimiser {name} needs the library .* pip install 'posefit\[{name}\]'"
+        with pytest.raises(ImportError, match=message):
+            Registry((plugin._replace(offers=absent),)).optimiser(name)
 
 
 def test_listing_the_adapters_imports_none_of_their_libraries() -> None:
@@ -48,22 +49,19 @@ def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
     assert threading.active_count() == threads
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
+def test_an_unknown_variant_is_named() -> None:
+    for name, message in (
         ("pymoo:NSGA9", "variant must be one of DE, PSO, GA, ES, SRES, ISRES, got 'NSGA9'"),
         ("optuna:Best", "variant must be one of TPESampler"),
         ("nevergrad:Best", "variant must be one of [0-9]+ names such as TwoPointsDE, CMA, PSO, got 'Best'"),
         ("scipy:minimize", "variant must be one of differential_evolution, dual_annealing, got 'minimize'"),
         ("sapso:fast", "optimiser must be sapso, which has no variants, got 'sapso:fast'"),
-    ],
-)
-def test_an_unknown_variant_is_named(name: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        posefit.track("walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100)
+    ):
+        with pytest.raises(ValueError, match=message):
+            posefit.track("walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100)
 
 
-def test_ribs_tells_the_two_hills_of_a_landscape_apart() -> None:
+def test_ribs_separates_two_minima() -> None:
     space, centres = Toy(2), np.array([[-0.5, -0.5], [0.5, 0.4]])
     optimiser = registry().optimiser("ribs")(space, np.random.default_rng(0))
 
@@ -73,8 +71,8 @@ def test_ribs_tells_the_two_hills_of_a_landscape_apart() -> None:
     for _ in range(150):
         proposals = optimiser.ask()
         optimiser.tell(proposals, costs(proposals))
-    found = optimiser.modes()
-    assert np.linalg.norm(found[:, None] - centres, axis=-1).min(axis=0).max() < 0.1
+    modes = optimiser.modes()
+    assert np.linalg.norm(modes[:, None] - centres, axis=-1).min(axis=0).max() < 0.1
 
 
 def test_a_variant_is_a_setting_too() -> None:

@@ -1,4 +1,4 @@
-"""Settings are read from a plugin's signature, and a mistake is found before anything runs."""
+"""Settings are read from a plugin's signature, and a mistake is an error before anything runs."""
 
 from typing import Any, Literal
 
@@ -53,9 +53,8 @@ def test_texts_become_what_their_types_ask_for() -> None:
     assert parse("it", factory, {"limit": "1e-3", "anything": "4"}) == {"limit": 1e-3, "anything": 4}
 
 
-@pytest.mark.parametrize(
-    ("setting", "text", "message"),
-    [
+def test_a_text_that_does_not_fit_is_named() -> None:
+    for setting, text, message in (
         ("count", "2.5", "it.count must be int, got '2.5'"),
         ("count", "many", "it.count must be int, got 'many'"),
         ("rate", "fast", "it.rate must be float, got 'fast'"),
@@ -65,11 +64,9 @@ def test_texts_become_what_their_types_ask_for() -> None:
         ("reach", "3", r"it.reach must be tuple\[float, float\], got '3'"),
         ("reach", "3,a", "it.reach must be"),
         ("rat", "1", "a setting of it must be one of count, rate, .*, got 'rat'; did you mean 'rate'?"),
-    ],
-)
-def test_a_text_that_does_not_fit_is_named(setting: str, text: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        parse("it", factory, {setting: text})
+    ):
+        with pytest.raises(ValueError, match=message):
+            parse("it", factory, {setting: text})
 
 
 def test_values_are_checked_as_texts_are() -> None:
@@ -86,7 +83,7 @@ def test_values_are_checked_as_texts_are() -> None:
         check("bare", lambda space, rng: None, {"x": 1})
 
 
-def test_an_annotation_that_is_not_understood_accepts_everything() -> None:
+def test_an_unknown_annotation_accepts_everything() -> None:
     assert accepts("SomeType", 3)
     assert accepts(list[int], [1])
 
@@ -95,20 +92,16 @@ def test_an_annotation_that_is_not_understood_accepts_everything() -> None:
     assert [one.name for one in settings_of(stringly)] == ["a"]
 
 
-@pytest.mark.parametrize(
-    ("given", "evaluations", "particles", "filled"),
-    [
+def test_a_budget_becomes_iterations() -> None:
+    rows: list[Any] = [
         ({}, 2440, None, {"iterations": 60}),
         ({}, 2440, 20, {"population_size": 20, "iterations": 121}),
         ({"population_size": 61}, 2440, None, {"population_size": 61, "iterations": 39}),
         ({"iterations": 5}, 2440, None, {"iterations": 5}),
         ({}, 50, None, {"iterations": 1}),
-    ],
-)
-def test_a_budget_becomes_iterations(
-    given: dict[str, Any], evaluations: int, particles: int | None, filled: Any
-) -> None:
-    assert planned(SAPSO, given, evaluations, particles) == filled
+    ]
+    for given, evaluations, size, filled in rows:
+        assert planned(SAPSO, given, evaluations, size) == filled, given
 
 
 def test_a_budget_becomes_evaluations_where_an_optimiser_plans_with_them() -> None:
@@ -126,4 +119,4 @@ def test_a_list_of_settings_is_read_from_a_docstring() -> None:
         "seed": ("", "any."),
     }
     assert without_settings(text) == "A swarm.\n\nMore."
-    assert settings_in("Settings are told in prose.") == {}
+    assert settings_in("Settings stand in prose.") == {}

@@ -88,13 +88,13 @@ def test_chance_does_not_beat_chance_and_need_not_where_it_is_the_baseline() -> 
         assert outcomes(factory) == [("skipped", "it is the baseline itself")] * 2
 
 
-@parametrize(optimiser_checks(planted.Sound))
+@parametrize(optimiser_checks(planted.Sound)[:4])
 def test_an_author_can_have_a_test_for_each_rule(check: Any) -> None:
     check()
 
 
 def test_it_passes_sound_plugins() -> None:
-    for sound in planted.RIGHT[1:]:
+    for sound in planted.RIGHT:
         report = check_optimiser(sound)
         assert report, str(report)
     planted.Unhurried.fits = 0
