@@ -10,7 +10,7 @@ from posefit.sweep.command import cores
 from posefit.sweep.engines.engine import Limits
 from posefit.sweep.engines.processes import Processes
 
-PATIENCE = 0.2  # seconds between two looks at whether somebody wants to stop
+PATIENCE = 0.2  # seconds between checks for an interruption
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 Say = Callable[[str], None]
@@ -27,8 +27,8 @@ def each(jobs: Mapping[K, Callable[[], T]], workers: int | None, progress: Progr
     engine: Processes[tuple[K, Callable[[], T]], T] = Processes(min(workers or cores(), len(jobs)), Limits(), _called)
     with closing(engine):
         ended = _ended(jobs, engine)
-        found = dict(progress(ended, len(jobs)) if progress else ended)
-    return {key: found[key] for key in jobs}
+        results = dict(progress(ended, len(jobs)) if progress else ended)
+    return {key: results[key] for key in jobs}
 
 
 def _ended(jobs: Mapping[K, Callable[[], T]], engine: Processes[tuple[K, Callable[[], T]], T]) -> Iterator[tuple[K, T]]:

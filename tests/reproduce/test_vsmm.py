@@ -15,7 +15,7 @@ from posefit.motion import built_in
 from posefit_reproduce.vsmm import activities
 from posefit_reproduce.vsmm.activities import film_of
 from posefit_reproduce.vsmm.experiment import METHODS, PatentTrack, follow_film
-from posefit_reproduce.vsmm.switches import ModelsTold, switching_figures, told_by
+from posefit_reproduce.vsmm.switches import ModelState, model_states, switching_figures
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_reproduce_says_what_seeds_must_be() -> None:
     assert result.output.splitlines()[-1] == "posefit: seeds must be at least 1, got 0"
 
 
-def told(film: activities.Film, probability: float = 0.9, **changes: Any) -> list[ModelsTold]:
+def states(film: activities.Film, probability: float = 0.9, **changes: Any) -> list[ModelState]:
     """Return what a tracker tells that is always right and has one group an activity."""
     groups = {one.label: tuple(sorted(one.models)) for one in activities.ACTIVITIES}
     every = []
@@ -82,13 +82,13 @@ def told(film: activities.Film, probability: float = 0.9, **changes: Any) -> lis
         shares = np.full(len(groups[name]), (1.0 - probability) / max(len(groups[name]) - 1, 1))
         shares[0] = probability
         nothing = np.empty(0)
-        one = ModelsTold(groups, name, None, groups[name], shares, False, 0, 0.001, 0.002, nothing, nothing)
+        one = ModelState(groups, name, None, groups[name], shares, False, 0, 0.001, 0.002, nothing, nothing)
         every.append(replace(one, **changes))
     return every
 
 
 def test_a_tracker_that_is_always_right_makes_no_mistake(film: activities.Film) -> None:
-    figures = switching_figures(film, told(film))
+    figures = switching_figures(film, states(film))
     assert figures["dominant_fraction"] == figures["right_model_fraction"] == 1.0
     assert figures["switch_delays_frames"] == [0, 0, 0]
     assert figures["wrong_activations"] == figures["wrong_terminations"] == figures["activations"] == 0
@@ -96,7 +96,7 @@ def test_a_tracker_that_is_always_right_makes_no_mistake(film: activities.Film) 
 
 
 def test_a_group_that_never_changes_is_late_by_whole_activities(film: activities.Film) -> None:
-    right = told(film)
+    right = states(film)
     # waving and striding shares the model `walk` with stepping; jumping jacks, 140 frames, and squat, 60, do not
     figures = switching_figures(film, [right[0]] * len(right))
     assert figures["switch_delays_frames"] == [0, 140, 60]
@@ -104,7 +104,7 @@ def test_a_group_that_never_changes_is_late_by_whole_activities(film: activities
 
 
 def test_a_newcomer_without_a_right_model_is_a_wrong_activation(film: activities.Film) -> None:
-    every = told(film)
+    every = states(film)
     every[5] = replace(every[5], newcomer="squat")
     figures = switching_figures(film, every)
     assert (figures["activations"], figures["wrong_activations"]) == (1, 1)
@@ -112,7 +112,7 @@ def test_a_newcomer_without_a_right_model_is_a_wrong_activation(film: activities
 
 def test_a_tracker_without_models_tells_nothing(film: activities.Film) -> None:
     frame = Frame(np.zeros(66), np.zeros(3), 0.0, np.zeros((1, 3), dtype=np.int64), 1, 0.0, np.zeros(1))
-    assert told_by([frame]) == []
+    assert model_states([frame]) == []
     assert switching_figures(film, []) == {}
 
 

@@ -46,7 +46,7 @@ def device_figures(
 
 
 def device_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what `device_figures` found as lines of text."""
+    """Yield `device_figures` as lines of text."""
     yield f"{figures['gpu']} beside {figures['threads']} threads of {figures['cpu']}"
     names = ("cpu", "proposals", "poses", "resident")
     yield f"{'size':>10} {'poses':>8} " + " ".join(f"{name + ' /s':>13}" for name in names) + "  areas"
@@ -63,20 +63,20 @@ def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
     proposals = _proposals(problem, count)
     poses, places = problem.decode(proposals)
     there = _on(problem, device)
-    body, camera, seen = there.body, there.cameras[0], there.silhouettes[0]
+    body, camera, observed = there.body, there.cameras[0], there.silhouettes[0]
     resident = _resident(there, poses, places)
     jobs: dict[str, Callable[[], object]] = {
         "cpu": lambda: problem.areas(poses, places),
         "proposals": lambda: there.evaluate(proposals),
-        "poses": lambda: areas(body, camera, seen, poses, places),
+        "poses": lambda: areas(body, camera, observed, poses, places),
         "resident": resident,
     }
     seconds = fastest(jobs)
-    expected, found = problem.areas(poses, places)[0], areas(body, camera, seen, poses, places)
-    away = np.abs(found - expected).max(axis=1)
+    expected, counted = problem.areas(poses, places)[0], areas(body, camera, observed, poses, places)
+    away = np.abs(counted - expected).max(axis=1)
     off = np.abs(there.evaluate(proposals) - problem.evaluate(proposals))
     return {
-        "size": "x".join(map(str, seen.size)),
+        "size": "x".join(map(str, observed.size)),
         "poses": count,
         **{f"{name}_per_second": count / took for name, took in seconds.items()},
         "equal": not away.any(),

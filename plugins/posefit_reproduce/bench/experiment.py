@@ -36,8 +36,8 @@ def seen_at(problem: PoseProblem, size: tuple[int, int]) -> PoseProblem:
         *size, usual.focal * size[1] / usual.height, np.array(size) / 2.0, usual.rotation, usual.translation
     )
     poses, translations = problem.decode(np.zeros((1, problem.space.dimensions)))
-    seen = Silhouette.of(project(problem.body, camera, poses[0], translations[0]))
-    return replace(problem, cameras=[camera], silhouettes=[seen])
+    observed = Silhouette.of(project(problem.body, camera, poses[0], translations[0]))
+    return replace(problem, cameras=[camera], silhouettes=[observed])
 
 
 def many_figures() -> dict[str, float]:
@@ -51,7 +51,7 @@ def many_figures() -> dict[str, float]:
     proposals = draw_population(problem.space, rng, MANY)
     poses, places = problem.decode(proposals)
     few = proposals[:FEW].copy(), poses[:FEW].copy(), places[:FEW].copy()
-    seen = problem.silhouettes[0]
+    observed = problem.silhouettes[0]
     limbs = LimbPoses(poses[0], [poses[1 + k * CANDIDATES : 1 + (k + 1) * CANDIDATES] for k in range(len(LIMBS))])
     every = every_combination(limbs.counts)
     mixed = rng.permutation(every)[:1000]
@@ -59,13 +59,13 @@ def many_figures() -> dict[str, float]:
     jobs: dict[str, tuple[Callable[[], object], int]] = {
         f"evaluate_{FEW}": (lambda: problem.evaluate(few[0]), FEW),
         f"evaluate_{MANY}": (lambda: problem.evaluate(proposals), MANY),
-        f"areas_{FEW}": (lambda: areas(body, camera, seen, few[1], few[2]), FEW),
-        f"areas_{MANY}": (lambda: areas(body, camera, seen, poses, places), MANY),
+        f"areas_{FEW}": (lambda: areas(body, camera, observed, few[1], few[2]), FEW),
+        f"areas_{MANY}": (lambda: areas(body, camera, observed, poses, places), MANY),
         "limb_combination": (
-            lambda: LimbMasks.draw(body, camera, limbs, places[0]).areas(seen, every),
+            lambda: LimbMasks.draw(body, camera, limbs, places[0]).areas(observed, every),
             len(every),
         ),
-        "limb_combination_any_order": (lambda: masks.areas(seen, mixed), len(mixed)),
+        "limb_combination_any_order": (lambda: masks.areas(observed, mixed), len(mixed)),
     }
     for one in (problem, seen_at(problem, LARGE)):
         size = "x".join(str(side) for side in one.silhouettes[0].size)

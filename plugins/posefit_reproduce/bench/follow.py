@@ -1,4 +1,4 @@
-"""What it costs to follow somebody by the library: seconds before the first frame, milliseconds a frame, memory."""
+"""The cost of following a person with the library: seconds before the first frame, milliseconds a frame, memory."""
 
 import sys
 import time
@@ -37,15 +37,15 @@ def follow_figures(frames: int) -> dict[str, float]:
         tracker = registry().offer("tracker", "exemplars").factory(task)
     states = time.process_time() - began
 
-    def seen(count: int) -> Iterator[Observation]:
+    def observations(count: int) -> Iterator[Observation]:
         last = scene.count - 1
         for k in range(count):
             yield scene.observations[last - abs(k % (2 * last) - last)]
 
     spent, settled = [], 0.0
     with threadpool_limits(1):
-        list(tracker.track(seen(2), np.random.default_rng(0)))  # loads what is compiled
-        for frame in tracker.track(seen(frames), np.random.default_rng(0)):
+        list(tracker.track(observations(2), np.random.default_rng(0)))  # loads what is compiled
+        for frame in tracker.track(observations(frames), np.random.default_rng(0)):
             spent.append(frame.cpu_seconds)
             if len(spent) <= SETTLED:
                 settled = _peak_mb()

@@ -36,8 +36,8 @@ def optimiser_us(space: SearchSpace, names: Sequence[str] = ()) -> dict[str, flo
     Populations of 40 (for `scipy:dual_annealing` 1), as the cost a distance that takes no time to speak of; of a
     filter, with the step to the next frame. The best of several searches, on one thread.
     """
-    found = registry().offers["optimiser"]
-    names = names or [*(name for name, offer in found.items() if not offer.missing), "scipy:dual_annealing"]
+    offers = registry().offers["optimiser"]
+    names = names or [*(name for name, offer in offers.items() if not offer.missing), "scipy:dual_annealing"]
     with threadpool_limits(1):  # as a track has it: BLAS is slower with more threads where matrices are small
         return {name: 1e6 * _ask_and_tell(space, registry().offer("optimiser", name)) for name in names}
 

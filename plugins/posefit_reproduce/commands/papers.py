@@ -43,7 +43,7 @@ def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, w
     from posefit_reproduce.sapso.design import QUICK, Scale
     from posefit_reproduce.sapso.report import paper_report, paper_text
 
-    told = paper_report(clips, seeds, QUICK if quick else Scale(), out, workers, partial(progress, unit="run"))
-    click.echo(json_line(told) if as_json else paper_text(told))
+    report = paper_report(clips, seeds, QUICK if quick else Scale(), out, workers, partial(progress, unit="run"))
+    click.echo(json_line(report) if as_json else paper_text(report))
     if out and not as_json:
-        click.echo(f"written to {out}: look at {', '.join(told['figures'])}")
+        click.echo(f"written to {out}: look at {', '.join(report['figures'])}")

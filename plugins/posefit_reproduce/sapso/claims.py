@@ -86,7 +86,7 @@ def _counted(pairs: int, tests: int) -> str:
     return f"{pairs} pairs" + ("" if _enough(pairs, tests) else ", too few to confirm anything")
 
 
-def _told(good: bool) -> Verdict:
+def _verdict(good: bool) -> Verdict:
     return "confirmed" if good else "not confirmed"
 
 
@@ -115,9 +115,9 @@ def _label(name: str) -> str:
 
 def _compactness(results: PaperResults) -> list[PaperClaim]:
     shares = {motion: float(compact_space(results.motions[motion]).explained.sum()) for motion in TABLE_2}
-    told = ", ".join(f"{100 * share:.1f} % of the {LABELS[motion]}" for motion, share in shares.items())
+    text = ", ".join(f"{100 * share:.1f} % of the {LABELS[motion]}" for motion, share in shares.items())
     sentence = f"six components keep {100 * VARIANCE:.0f} % of the variance"
-    return [PaperClaim(sentence, "section 2.1", _told(min(shares.values()) >= VARIANCE), told)]
+    return [PaperClaim(sentence, "section 2.1", _verdict(min(shares.values()) >= VARIANCE), text)]
 
 
 def _convergence(results: PaperResults) -> list[PaperClaim]:
@@ -126,7 +126,7 @@ def _convergence(results: PaperResults) -> list[PaperClaim]:
     fall = histories[:, :, 0] - histories[:, :, -1]
     done = np.median((histories[:, :, 0] - histories[:, :, at]) / np.maximum(fall, np.finfo(float).tiny), axis=0)
     swarms = results.scale.swarms
-    told = ", ".join(f"{100 * share:.0f} % with N = {count}" for count, share in zip(swarms, done, strict=True))
+    text = ", ".join(f"{100 * share:.0f} % with N = {count}" for count, share in zip(swarms, done, strict=True))
     ends = histories[:, [0, -1], -1].T[:, None]  # the least and the most particles
     test = wilcoxon(ends)[0]
     middle = np.median(ends[:, 0], axis=1)
@@ -134,8 +134,8 @@ def _convergence(results: PaperResults) -> list[PaperClaim]:
         PaperClaim(
             f"the cost has converged after {at} iterations, {100 * FALLEN:.0f} % of its fall done",
             "figure 6",
-            _told(bool((done >= FALLEN).all())),
-            f"median share of the fall done: {told}",
+            _verdict(bool((done >= FALLEN).all())),
+            f"median share of the fall done: {text}",
         ),
         PaperClaim(
             "the number of particles matters little",
@@ -148,25 +148,25 @@ def _convergence(results: PaperResults) -> list[PaperClaim]:
 
 
 def _small(results: PaperResults) -> list[PaperClaim]:
-    found = []
+    claims = []
     for motion, one in results.motions.items():
         free = one.test.skeleton.free
         ours, mean = (results.angle_errors(motion, name)[free] < SMALL_DEGREES for name in ("sapso@pca", "mean_pose"))
-        found.append(
+        claims.append(
             PaperClaim(
                 f"most dimensions err by less than {SMALL_DEGREES:.0f} degrees on the {LABELS[motion]}",
                 "figure 7",
-                _told(ours.mean() > 0.5),
+                _verdict(ours.mean() > 0.5),
                 f"{ours.sum()} of the {free.sum()} free angles; of the mean training pose {mean.sum()}",
             )
         )
-    return found
+    return claims
 
 
 def _sides(results: PaperResults) -> list[PaperClaim]:
     shares = {motion: np.mean([run.swapped for run in results.of(motion, "sapso@pca")]) for motion in results.motions}
-    told = ", ".join(f"{100 * share:.0f} % of the frames of the {LABELS[motion]}" for motion, share in shares.items())
+    text = ", ".join(f"{100 * share:.0f} % of the frames of the {LABELS[motion]}" for motion, share in shares.items())
     good = bool(max(shares.values()) <= SWAPPED)
     return [
-        PaperClaim("left and right are never taken for each other", "section 5.3", _told(good), f"swapped in {told}")
+        PaperClaim("left and right are never taken for each other", "section 5.3", _verdict(good), f"swapped in {text}")
     ]

@@ -33,7 +33,7 @@ class TrackKey(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PaperTrack:
-    """What a track found."""
+    """A track and its figures."""
 
     poses: Array = field(repr=False)  # (T, 66)
     seconds: float  # a frame
@@ -44,7 +44,7 @@ class PaperTrack:
 
 @dataclass(frozen=True, eq=False)
 class PaperResults:
-    """Everything that was found, from which tables and figures are made."""
+    """All results, from which tables and figures are made."""
 
     motions: dict[str, PaperMotion]
     scale: Scale
@@ -63,13 +63,13 @@ class PaperResults:
 
     def poses(self, motion: str, name: str) -> Array:
         """Return what a method or a baseline makes of a motion, (views, seeds, T, 66)."""
-        found = [
+        results = [
             self.baselines[motion, view][name]
             if name in BASELINES
             else self.tracks[TrackKey(motion, name, view, seed)].poses
             for view, seed in self._pairs
         ]
-        return np.array(found).reshape(len(self.scale.views), self.seeds, *found[0].shape)
+        return np.array(results).reshape(len(self.scale.views), self.seeds, *results[0].shape)
 
     def errors(self, motion: str, name: str) -> Array:
         """Return the errors (8) in degrees of a method or a baseline, (views, seeds, T)."""
@@ -83,7 +83,7 @@ class PaperResults:
 
 
 class ViewKey(NamedTuple):
-    """Names what is seen of a motion."""
+    """Key of a motion seen from a side."""
 
     motion: str
     view: float
@@ -118,21 +118,21 @@ def repeat_paper(
         jobs[ViewKey(motion, view)] = partial(baseline_poses, motions[motion], view)
     for motion, view, seed in product(("walk", "run"), scale.views, range(seeds)):
         jobs[StartKey(motion, view, seed)] = partial(converge, motions[motion], scale, view, seed)
-    found = each(jobs, workers, progress)
+    results = each(jobs, workers, progress)
     return PaperResults(
         dict(motions),
         scale,
         seeds,
-        {key: one for key, one in found.items() if isinstance(key, TrackKey) and isinstance(one, PaperTrack)},
-        {key: one for key, one in found.items() if isinstance(key, ViewKey) and isinstance(one, dict)},
-        {key: one for key, one in found.items() if isinstance(key, StartKey) and isinstance(one, np.ndarray)},
+        {key: one for key, one in results.items() if isinstance(key, TrackKey) and isinstance(one, PaperTrack)},
+        {key: one for key, one in results.items() if isinstance(key, ViewKey) and isinstance(one, dict)},
+        {key: one for key, one in results.items() if isinstance(key, StartKey) and isinstance(one, np.ndarray)},
     )
 
 
 def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack:
     """Follow a motion with a method; the first pose is searched, the root's translation is known."""
     method = METHODS[key.method]
-    found = track(
+    results = track(
         paper_scene(motion, key.view),
         train=motion.training,
         method=f"{method.optimiser}@{method.prior}",
@@ -140,13 +140,13 @@ def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack
         iterations=scale.iterations,
         seed=key.seed,
     )
-    said = found.summary
+    summary = results.summary
     return PaperTrack(
-        found.motion.poses,
-        said["seconds_per_frame"],
-        said["evaluations"] / said["frames"],
-        said["swap_rate"],
-        said["lost_rate"],
+        results.motion.poses,
+        summary["seconds_per_frame"],
+        summary["evaluations"] / summary["frames"],
+        summary["swap_rate"],
+        summary["lost_rate"],
     )
 
 

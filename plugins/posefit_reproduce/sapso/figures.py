@@ -1,4 +1,4 @@
-"""The figures of the SAPSO paper, made anew: 3 and 4 the compact space, 5 and 6 one search, 7 and 9 errors."""
+"""The figures of the SAPSO paper, drawn again: 3 and 4 the compact space, 5 and 6 one search, 7 and 9 errors."""
 
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from posefit_reproduce.sapso.first_frame import WatchedSwarm, compact_space, wat
 from posefit_reproduce.sapso.motions import LABELS
 from posefit_reproduce.sapso.numbers import CONVERGED, SHOWN_ITERATIONS, SHOWN_PARTICLES, SMALL_DEGREES
 
-# Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers too
+# Okabe and Ito, Color universal design, 2008: distinguished by colour-blind readers too
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MOTIONS = ("walk", "run")
 _DIM = "0.55"
@@ -77,9 +77,9 @@ def _space(figure: Figure, k: int) -> Any:
     return axes
 
 
-def swarm_figure(seen: WatchedSwarm) -> Figure:
+def swarm_figure(swarm: WatchedSwarm) -> Figure:
     """Return the silhouette, and on it the bones of all particles after some iterations; the best in colour."""
-    scene, shown = seen.scene, [k for k in SHOWN_ITERATIONS if k < len(seen.poses)]
+    scene, shown = swarm.scene, [k for k in SHOWN_ITERATIONS if k < len(swarm.poses)]
     camera, mask = scene.cameras[0], scene.observations[0].silhouettes[0].mask
     figure = Figure(figsize=(12.5, 3.1), layout="constrained")
     panels: Any = figure.subplots(1, 1 + len(shown), squeeze=False)[0]
@@ -93,10 +93,10 @@ def swarm_figure(seen: WatchedSwarm) -> Figure:
         axes.set(xticks=[], yticks=[])
     panels[0].set_title("silhouette", fontsize=9)
     for axes, k in zip(panels[1:], shown, strict=True):
-        bones = _bones(camera.project(scene.body.skeleton.joints(seen.poses[k], seen.translations[k]))[0])
+        bones = _bones(camera.project(scene.body.skeleton.joints(swarm.poses[k], swarm.translations[k]))[0])
         axes.add_collection(LineCollection([*bones.reshape(-1, 2, 2)], colors="black", linewidths=0.5, alpha=0.12))
-        axes.add_collection(LineCollection([*bones[seen.best[k]]], colors=COLOURS[1], linewidths=1.4))
-        axes.set_title(f"iteration {k}, N = {len(bones)}\nlowest cost so far {seen.history[k]:.1f}", fontsize=9)
+        axes.add_collection(LineCollection([*bones[swarm.best[k]]], colors=COLOURS[1], linewidths=1.4))
+        axes.set_title(f"iteration {k}, N = {len(bones)}\nlowest cost so far {swarm.history[k]:.1f}", fontsize=9)
     return figure
 
 
@@ -110,11 +110,11 @@ def lowest_cost_figure(results: PaperResults) -> Figure:
     figure = Figure(figsize=(10.0, 3.8), layout="constrained")
     panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)
     for axes, motion in zip(panels, MOTIONS, strict=True):
-        found = np.array([history for key, history in results.histories.items() if key[0] == motion])
+        histories = np.array([history for key, history in results.histories.items() if key[0] == motion])
         for k, count in enumerate(results.scale.swarms):
-            _band(axes, found[:, k], COLOURS[k], f"N = {count}")
+            _band(axes, histories[:, k], COLOURS[k], f"N = {count}")
         axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
-        axes.set(xlabel="iteration", ylim=(0.0, None), title=f"{LABELS[motion]}, first frame, {len(found)} runs")
+        axes.set(xlabel="iteration", ylim=(0.0, None), title=f"{LABELS[motion]}, first frame, {len(histories)} runs")
         _plain(axes)
     panels[0].set_ylabel("lowest cost")
     panels[-1].legend(fontsize=8, frameon=False)

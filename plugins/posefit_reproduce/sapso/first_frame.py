@@ -33,7 +33,7 @@ class WatchedSwarm:
 
 @dataclass(eq=False)
 class _Search:
-    """What is seen of a search."""
+    """The proposals of a search."""
 
     space: SearchSpace
     asked: list[Array] = field(default_factory=list)
@@ -63,7 +63,7 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
             self._seen.best.append(int(np.argmin(costs)))
             self._optimiser.tell(proposals, costs)
 
-    found = track(
+    result = track(
         scene,
         optimiser=Watched,
         train=motion.training,
@@ -72,8 +72,8 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
         settings=DRIVEN,
         seed=seed,
     )
-    seen = searches[-1]  # the one before it only compiles
-    decoded = [seen.space.decode(proposals) for proposals in seen.asked]
+    search = searches[-1]  # the one before it only compiles
+    decoded = [search.space.decode(proposals) for proposals in search.asked]
     return WatchedSwarm(
-        scene, [one[0] for one in decoded], [one[1] for one in decoded], seen.best, found.found[0].history
+        scene, [one[0] for one in decoded], [one[1] for one in decoded], search.best, result.found[0].history
     )

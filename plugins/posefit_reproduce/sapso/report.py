@@ -25,16 +25,18 @@ from posefit_reproduce.sapso.motions import FPS, LABELS, SIZE, paper_motions
 from posefit_reproduce.sapso.numbers import FRAMES, TABLE_1, TABLE_1_JOINTS, TABLE_2, TRAINING_FRAMES
 
 
-def paper_text(told: dict[str, Any]) -> str:
+def paper_text(report: dict[str, Any]) -> str:
     """Return the report as it is printed."""
-    return "\n".join([*_lines_1(told), "", *_lines_2(told), "", *_lines_claims(told), "", *_lines_shortened(told)])
+    return "\n".join(
+        [*_lines_1(report), "", *_lines_2(report), "", *_lines_claims(report), "", *_lines_shortened(report)]
+    )
 
 
-def _lines_1(told: dict[str, Any]) -> Iterator[str]:
+def _lines_1(report: dict[str, Any]) -> Iterator[str]:
     yield "Table 1: angles in degrees. Ours are x, y, z of an Acclaim skeleton, whose knee has x alone; the paper's"
     yield "axes are not given. Error: mean of the twelve, in this frame and in all frames"
     yield f"{'':34} {''.join(f'{name:>24}' for name in TABLE_1_JOINTS)}  error  all frames"
-    for motion, rows in told["table_1"].items():
+    for motion, rows in report["table_1"].items():
         paper = rows["paper"]
         yield _angles(f"{LABELS[motion]}, the paper's truth", paper["truth"])
         yield _angles("  the paper's estimate", paper["estimate"], f"{paper['error']:7.2f}")
@@ -49,10 +51,10 @@ def _angles(label: str, joints: list[list[float]], errors: str = "") -> str:
     return f"{label:34} " + "".join(f"{x:8.1f}{y:8.1f}{z:8.1f}" for x, y, z in joints) + errors
 
 
-def _lines_2(told: dict[str, Any]) -> Iterator[str]:
+def _lines_2(report: dict[str, Any]) -> Iterator[str]:
     yield "Table 2: error in degrees (9), its spread (10) and seconds a frame, the paper's and ours"
     heads = ("paper", "spread", "s", "ours", "worst", "spread", "s", "skill", "swapped", "lost", "evaluations")
-    for motion, rows in told["table_2"].items():
+    for motion, rows in report["table_2"].items():
         yield f"{LABELS[motion]:34}" + "".join(f"{head:>{12 if head == 'evaluations' else 8}}" for head in heads)
         for name, one in rows.items():
             paper = list(one["paper"].values()) if "paper" in one else []
@@ -70,20 +72,20 @@ def _label(name: str) -> str:
     return f"{METHODS[name].label} ({name})" if name in METHODS else BASELINES[name]
 
 
-def _lines_claims(told: dict[str, Any]) -> Iterator[str]:
+def _lines_claims(report: dict[str, Any]) -> Iterator[str]:
     yield "What the paper says. Pairs are views and seeds of one clip: a p-value speaks of that clip alone."
-    for one in told["claims"]:
+    for one in report["claims"]:
         if one["source"]:
             yield f"  {one['verdict']}: {one['text']} ({one['source']}): {one['evidence']}"
     yield "What it does not ask"
-    for one in told["claims"]:
+    for one in report["claims"]:
         if not one["source"]:
             yield f"  {one['verdict']}: {one['text']}: {one['evidence']}"
 
 
-def _lines_shortened(told: dict[str, Any]) -> Iterator[str]:
-    yield f"Against the paper ({told['seeds']} seeds; baselines have the true root, which no method has)"
-    for one in told["shortened"]:
+def _lines_shortened(report: dict[str, Any]) -> Iterator[str]:
+    yield f"Against the paper ({report['seeds']} seeds; baselines have the true root, which no method has)"
+    for one in report["shortened"]:
         yield f"  {one}"
 
 
@@ -110,7 +112,7 @@ def paper_report(
     made = paper_motions(clips, scale.frames)
     with nullcontext() if out is None else new_folder(out) as folder:
         results = repeat_paper(made, seeds, scale, workers, progress)
-        told = {
+        report = {
             "version": __version__,
             "motions": {name: _described(results, name) for name in results.motions},
             "seeds": seeds,
@@ -123,10 +125,10 @@ def paper_report(
         if folder is not None:
             from posefit_reproduce.sapso.figures import paper_figures
 
-            told["figures"] = paper_figures(results, folder)
-            (folder / "report.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-            (folder / "report.txt").write_text(paper_text(told) + "\n", encoding="utf-8")
-    return told
+            report["figures"] = paper_figures(results, folder)
+            (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+            (folder / "report.txt").write_text(paper_text(report) + "\n", encoding="utf-8")
+    return report
 
 
 def _described(results: PaperResults, motion: str) -> dict[str, Any]:
@@ -144,9 +146,9 @@ def _table_1(results: PaperResults, motion: str) -> dict[str, Any]:
     truth, scale = results.motions[motion].test.poses, results.scale
     frame, view = len(truth) // 2, scale.views.index(scale.shown)
     poses = {name: results.poses(motion, name)[view, 0] for name in ("sapso@pca", *BASELINES)}
-    true, found = TABLE_1[motion]
+    true, estimate = TABLE_1[motion]
     rows = {name: _row(truth, one, frame) for name, one in poses.items()}
-    paper = {"truth": true.tolist(), "estimate": found.tolist(), "error": float(np.abs(found - true).mean())}
+    paper = {"truth": true.tolist(), "estimate": estimate.tolist(), "error": float(np.abs(estimate - true).mean())}
     return {"paper": paper, "frame": frame, "view_degrees": scale.shown, "truth": _shown(truth[frame]), **rows}
 
 

@@ -21,7 +21,7 @@ from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit_reproduce.jobs import Progress, check_seeds, each
 from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
-from posefit_reproduce.vsmm.switches import switching_figures, told_by
+from posefit_reproduce.vsmm.switches import model_states, switching_figures
 
 # What is compared, by the name under which the figures are given.
 METHODS: dict[str, TrackOptions] = {
@@ -48,39 +48,39 @@ class PatentTrack:
 
 def follow_film(options: TrackOptions, seed: int) -> PatentTrack:
     """Follow the film of a seed with a method and return what it is worth; the first pose is not known."""
-    seen = film_of(seed)
+    film = film_of(seed)
     task = Task(
-        seen.body,
-        [seen.camera],
+        film.body,
+        [film.camera],
         options.budget,
-        float(seen.truth.poses[0, 0]),
-        seen.truth.translations[0],
+        float(film.truth.poses[0, 0]),
+        film.truth.translations[0],
         "aligned",
-        seen.truth.fps,
+        film.truth.fps,
         [built_in.motion(one) for one in TRAINING],
     )
     with threadpool_limits(1):
-        frames = list(prepare(options, task).tracker(task).track(seen.observations, np.random.default_rng(seed)))
-    return PatentTrack(frames, {**patent_errors(seen, frames), **switching_figures(seen, told_by(frames))})
+        frames = list(prepare(options, task).tracker(task).track(film.observations, np.random.default_rng(seed)))
+    return PatentTrack(frames, {**patent_errors(film, frames), **switching_figures(film, model_states(frames))})
 
 
-def both_joints(seen: Film, frames: Sequence[Frame]) -> tuple[Array, Array]:
-    """Return the true and the found joints (T, 27, 3) in metres."""
-    skeleton = seen.body.skeleton
-    found = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
-    return skeleton.joints(seen.truth.poses, seen.truth.translations), skeleton.joints(*found)
+def both_joints(film: Film, frames: Sequence[Frame]) -> tuple[Array, Array]:
+    """Return the true and the estimated joints (T, 27, 3) in metres."""
+    skeleton = film.body.skeleton
+    estimate = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
+    return skeleton.joints(film.truth.poses, film.truth.translations), skeleton.joints(*estimate)
 
 
-def projected_cm(seen: Film, truth: Array, found: Array) -> Array:
-    """Return how far found joints are from the true ones in the image, in centimetres at the true one's depth."""
-    (pixels, depths), (others, _) = seen.camera.project(truth), seen.camera.project(found)
-    return np.asarray(100.0 * np.linalg.norm((pixels - others) / seen.camera.focal, axis=-1) * depths)
+def projected_cm(film: Film, truth: Array, estimate: Array) -> Array:
+    """Return how far estimated joints are from the true ones in the image, in centimetres at the true one's depth."""
+    (pixels, depths), (others, _) = film.camera.project(truth), film.camera.project(estimate)
+    return np.asarray(100.0 * np.linalg.norm((pixels - others) / film.camera.focal, axis=-1) * depths)
 
 
-def patent_errors(seen: Film, frames: Sequence[Frame]) -> dict[str, float]:
+def patent_errors(film: Film, frames: Sequence[Frame]) -> dict[str, float]:
     """Return the errors of right elbow and hand, in the image and in space, and of the whole pose."""
-    truth, found = both_joints(seen, frames)
-    flat, deep = projected_cm(seen, truth, found), 100.0 * np.linalg.norm(truth - found, axis=-1)
+    truth, estimate = both_joints(film, frames)
+    flat, deep = projected_cm(film, truth, estimate), 100.0 * np.linalg.norm(truth - estimate, axis=-1)
     poses = np.array([frame.pose for frame in frames])
     return {
         "elbow_cm": float(flat[:, ELBOW].mean()),
@@ -89,8 +89,8 @@ def patent_errors(seen: Film, frames: Sequence[Frame]) -> dict[str, float]:
         "hand_3d_cm": float(deep[:, HAND].mean()),
         "projected_cm": float(flat.mean()),
         "joints_3d_cm": float(deep.mean()),
-        "mpjpe_mm": float(metrics.mpjpe_mm(truth, found).mean()),
-        "error_degrees": float(metrics.pose_error_degrees(seen.truth.poses, poses).mean()),
+        "mpjpe_mm": float(metrics.mpjpe_mm(truth, estimate).mean()),
+        "error_degrees": float(metrics.pose_error_degrees(film.truth.poses, poses).mean()),
         "iou": float(np.mean([metrics.iou(frame.areas)[0] for frame in frames])),
         "frame_ms": 1e3 * float(np.median([frame.seconds for frame in frames])),
     }
@@ -98,9 +98,9 @@ def patent_errors(seen: Film, frames: Sequence[Frame]) -> dict[str, float]:
 
 def over_seeds(rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the mean of each figure over seeds, and `per_seed` the rows themselves."""
-    found = list(rows)
-    single = [name for name, value in found[0].items() if not isinstance(value, list)]
-    return {**{name: float(np.mean([row[name] for row in found])) for name in single}, "per_seed": found}
+    per_seed = list(rows)
+    single = [name for name, value in per_seed[0].items() if not isinstance(value, list)]
+    return {**{name: float(np.mean([row[name] for row in per_seed])) for name in single}, "per_seed": per_seed}
 
 
 def repeat_patent(
@@ -113,13 +113,13 @@ def repeat_patent(
     check_seeds(seeds)
     methods = METHODS | (SEARCHES if searches else {})
     jobs = {(seed, name): partial(_followed, methods[name], seed) for seed in range(seeds) for name in methods}
-    found = each(jobs, workers, progress)
-    figures = {name: over_seeds(found[seed, name].figures for seed in range(seeds)) for name in methods}
+    tracks = each(jobs, workers, progress)
+    figures = {name: over_seeds(tracks[seed, name].figures for seed in range(seeds)) for name in methods}
     outer = figures.pop("vsmm")
-    return {"seeds": seeds, **outer, **figures}, found[SHOWN, "vsmm"]
+    return {"seeds": seeds, **outer, **figures}, tracks[SHOWN, "vsmm"]
 
 
 def _followed(options: TrackOptions, seed: int) -> PatentTrack:
     """Return a track, without its frames where nobody will look at them."""
-    found = follow_film(options, seed)
-    return found if seed == SHOWN else replace(found, frames=())
+    track = follow_film(options, seed)
+    return track if seed == SHOWN else replace(track, frames=())

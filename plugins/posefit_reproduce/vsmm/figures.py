@@ -16,7 +16,7 @@ from posefit.silhouette.foreground import Image
 from posefit.tracking.drawing.body import draw_body, side_view
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film
 from posefit_reproduce.vsmm.experiment import ELBOW, HAND, both_joints, projected_cm
-from posefit_reproduce.vsmm.switches import ModelsTold, told_by
+from posefit_reproduce.vsmm.switches import ModelState, model_states
 
 STILLS = (10, 60, 110, 140, 180, 235, 258, 290, 340, 380, 405, 430)
 PATENT_CM = (2.7, 5.2)  # between these lie the patent's own mean errors
@@ -24,51 +24,51 @@ LARGER = 2  # pixels a pixel, in the stills
 _JOINT, _HIDDEN = (60, 220, 255), (120, 120, 120)
 
 
-def patent_figures(seen: Film, frames: Sequence[Frame], folder: Path) -> list[str]:
+def patent_figures(film: Film, frames: Sequence[Frame], folder: Path) -> list[str]:
     """Write the figures of a track to a folder that is there, and return the names of the files."""
-    told = told_by(frames)
+    states = model_states(frames)
     figures = {
-        "figure-10-probabilities.png": probability_figure(seen, told),
-        "figure-11-errors.png": error_figure(seen, frames),
+        "figure-10-probabilities.png": probability_figure(film, states),
+        "figure-11-errors.png": error_figure(film, frames),
     }
     for name, figure in figures.items():
         figure.savefig(folder / name, dpi=130)
     stills = "figure-9-joints.png"
-    if not cv2.imwrite(str(folder / stills), film_stills(seen, frames, told)):
+    if not cv2.imwrite(str(folder / stills), film_stills(film, frames, states)):
         raise InputError(f"{folder / stills}: expected to write a picture, got nothing written")
     return [stills, *figures]
 
 
-def probability_figure(seen: Film, told: Sequence[ModelsTold]) -> Figure:
+def probability_figure(film: Film, states: Sequence[ModelState]) -> Figure:
     """Return the probability of each model over time, with the groups that are in force."""
-    names = list(dict.fromkeys(model for group in told[0].groups.values() for model in group))
-    values = np.zeros((len(names), len(told)))
-    for k, one in enumerate(told):
+    names = list(dict.fromkeys(model for group in states[0].groups.values() for model in group))
+    values = np.zeros((len(names), len(states)))
+    for k, one in enumerate(states):
         for model, probability in zip(one.models, one.probabilities, strict=True):
             values[names.index(model), k] = probability
     figure = Figure(figsize=(10.0, 4.6), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4.0, 1.0))
-    seconds = np.arange(len(told)) / FPS
+    seconds = np.arange(len(states)) / FPS
     for name, series in zip(names, values, strict=True):
         upper.plot(seconds, series, linewidth=1.2, label=name)
     upper.set(ylabel="probability", ylim=(0.0, 1.14))
     upper.legend(fontsize=7, frameon=False, ncols=len(names), loc="upper center", bbox_to_anchor=(0.5, 1.14))
-    groups = list(told[0].groups)
+    groups = list(states[0].groups)
     for row, group in enumerate(groups):
-        force = [k for k, one in enumerate(told) if group in (one.group, one.newcomer) or one.group is None]
+        force = [k for k, one in enumerate(states) if group in (one.group, one.newcomer) or one.group is None]
         lower.scatter(seconds[force], np.full(len(force), row), s=4, marker="s")
     lower.set(yticks=range(len(groups)), yticklabels=groups, ylim=(-0.6, len(groups) - 0.4), xlabel="seconds")
     lower.set_ylabel("in force")
     for axes in (upper, lower):
-        _activities(axes, seen, label=axes is upper)
+        _activities(axes, film, label=axes is upper)
     return figure
 
 
-def error_figure(seen: Film, frames: Sequence[Frame]) -> Figure:
+def error_figure(film: Film, frames: Sequence[Frame]) -> Figure:
     """Return the errors of right elbow and right hand over time, in the image and in space."""
-    truth, found = both_joints(seen, frames)
-    flat = projected_cm(seen, truth, found)
-    deep = 100.0 * np.linalg.norm(truth - found, axis=-1)
+    truth, estimate = both_joints(film, frames)
+    flat = projected_cm(film, truth, estimate)
+    deep = 100.0 * np.linalg.norm(truth - estimate, axis=-1)
     figure = Figure(figsize=(10.0, 4.6), layout="constrained")
     seconds = np.arange(len(flat)) / FPS
     for axes, values, label in zip(
@@ -78,15 +78,15 @@ def error_figure(seen: Film, frames: Sequence[Frame]) -> Figure:
             axes.plot(seconds, values[:, joint], linewidth=1.0, label=f"{name}, mean {values[:, joint].mean():.1f}")
         axes.set(ylabel=label, ylim=(0.0, None))
         axes.legend(fontsize=7, frameon=False)
-        _activities(axes, seen, label=False)
+        _activities(axes, film, label=False)
         if values is flat:
             axes.axhspan(*PATENT_CM, color="0.5", alpha=0.2)
     axes.set_xlabel("seconds")
     return figure
 
 
-def _activities(axes: Any, seen: Film, label: bool) -> None:
-    switches = [0, *seen.switches]
+def _activities(axes: Any, film: Film, label: bool) -> None:
+    switches = [0, *film.switches]
     for k, one in zip(switches, ACTIVITIES, strict=True):
         axes.axvline(k / FPS, color="0.7", linewidth=0.8, linestyle=":")
         if label:
@@ -94,28 +94,28 @@ def _activities(axes: Any, seen: Film, label: bool) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def film_stills(seen: Film, frames: Sequence[Frame], told: Sequence[ModelsTold]) -> Image:
-    """Return stills: the detected joints on the mask, the body found on it, and the body from its side."""
-    columns = [_still(seen, frames[k], told[k], k) for k in STILLS]
+def film_stills(film: Film, frames: Sequence[Frame], states: Sequence[ModelState]) -> Image:
+    """Return stills: the detected joints on the mask, the fitted body on it, and the body from its side."""
+    columns = [_still(film, frames[k], states[k], k) for k in STILLS]
     rows = [np.hstack(columns[k : k + len(columns) // 2]) for k in (0, len(columns) // 2)]
     return np.asarray(np.vstack(rows))
 
 
-def _still(seen: Film, frame: Frame, told: ModelsTold, k: int) -> Image:
-    mask = seen.observations[k].silhouettes[0].mask
+def _still(film: Film, frame: Frame, states: ModelState, k: int) -> Image:
+    mask = film.observations[k].silhouettes[0].mask
     grey = np.where(mask, 150, 28).astype(np.uint8)
     blank = cv2.cvtColor(
         cv2.resize(grey, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR
     )
     marked = np.asarray(blank, dtype=np.uint8).copy()
-    for point, sure in zip(told.joints[0], told.confidence[0], strict=True):
+    for point, sure in zip(states.joints[0], states.confidence[0], strict=True):
         cv2.circle(marked, _pixel(point), 4, _JOINT if sure > 0.0 else _HIDDEN, -1 if sure > 0.0 else 1, cv2.LINE_AA)
     drawn = np.repeat(grey[..., None], 3, axis=2)
-    draw_body(drawn, seen.body, seen.camera, frame.pose, frame.translation)
+    draw_body(drawn, film.body, film.camera, frame.pose, frame.translation)
     drawn = np.asarray(cv2.resize(drawn, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
-    true = seen.body.skeleton.joints(seen.truth.poses[k], seen.truth.translations[k])
-    _bones(drawn, seen.camera.project(true)[0])
-    side = side_view(seen.body, seen.camera, frame.pose, frame.translation, drawn.shape[0])
+    true = film.body.skeleton.joints(film.truth.poses[k], film.truth.translations[k])
+    _bones(drawn, film.camera.project(true)[0])
+    side = side_view(film.body, film.camera, frame.pose, frame.translation, drawn.shape[0])
     middle = slice(drawn.shape[1] // 5, -drawn.shape[1] // 5)
     cv2.putText(marked, f"{k}", (marked.shape[1] // 5 + 8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (240, 240, 240), 1)
     parts = (marked[:, middle], drawn[:, middle], side)

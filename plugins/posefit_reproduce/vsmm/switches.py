@@ -1,7 +1,7 @@
 """How the models' probabilities and the groups in force fare: what the patent's figure 10 shows, as numbers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from typing import Any, Self
 
@@ -13,8 +13,8 @@ from posefit_reproduce.vsmm.activities import ACTIVITIES, Film
 
 
 @dataclass(frozen=True, eq=False)
-class ModelsTold:
-    """The models and the groups in force in a frame, and the joints that were seen."""
+class ModelState:
+    """The models and the groups in force in a frame, and the detected joints."""
 
     groups: Mapping[str, tuple[str, ...]]  # the models of every group there is
     group: str | None  # the one in force; None while one is chosen
@@ -35,61 +35,60 @@ class ModelsTold:
 
     @classmethod
     def of(cls, frame: Frame) -> Self | None:
-        """Return what a frame's `details` tell; None of a tracker that has no models, or while nothing is seen."""
+        """Return the state in a frame's `details`; None for a tracker without models."""
         if "probabilities" not in frame.details:
             return None
-        names = ("groups", "group", "newcomer", "models", "probabilities", "lost", "repairs")
-        seen = ("filter_seconds", "detection_seconds", "joints", "confidence")
-        return cls(**{name: frame.details[name] for name in (*names, *seen)})
+        return cls(**{one.name: frame.details[one.name] for one in fields(cls)})
 
 
-def told_by(frames: Sequence[Frame]) -> list[ModelsTold]:
-    """Return what every frame tells; nothing where one of them tells nothing."""
-    told = [ModelsTold.of(frame) for frame in frames]
-    return [] if None in told else [one for one in told if one is not None]
+def model_states(frames: Sequence[Frame]) -> list[ModelState]:
+    """Return the state in every frame; an empty list where one has none."""
+    states = [ModelState.of(frame) for frame in frames]
+    return [] if None in states else [one for one in states if one is not None]
 
 
-def switching_figures(seen: Film, told: Sequence[ModelsTold]) -> dict[str, Any]:
-    """Return how the models' probabilities and the groups in force fare; nothing where a tracker tells none."""
-    if not told:
+def switching_figures(film: Film, states: Sequence[ModelState]) -> dict[str, Any]:
+    """Return how the models' probabilities and the groups in force fare; nothing for a tracker without models."""
+    if not states:
         return {}
-    right = [ACTIVITIES[label].models for label in seen.labels]
-    likely = [one.models[int(np.argmax(one.probabilities))] for one in told]
-    delays = [_delay(told, first, seen.labels, right[first]) for first in seen.switches]
-    settled = [k for k, one in enumerate(told) if one.group is not None and one.newcomer is None]
-    smallest = min(len(told[k].models) for k in settled) if settled else 0
-    steady = [k for k in settled if len(told[k].models) == smallest]
+    right = [ACTIVITIES[label].models for label in film.labels]
+    likely = [one.models[int(np.argmax(one.probabilities))] for one in states]
+    delays = [_delay(states, first, film.labels, right[first]) for first in film.switches]
+    settled = [k for k, one in enumerate(states) if one.group is not None and one.newcomer is None]
+    smallest = min(len(states[k].models) for k in settled) if settled else 0
+    steady = [k for k in settled if len(states[k].models) == smallest]
     return {
-        "dominant_fraction": float(np.mean([one.probabilities.max() > 0.5 for one in told])),
+        "dominant_fraction": float(np.mean([one.probabilities.max() > 0.5 for one in states])),
         "right_model_fraction": float(np.mean([a in b for a, b in zip(likely, right, strict=True)])),
         "switch_delay_frames": max(delays),
         "switch_delays_frames": delays,
-        "filter_ms": 1e3 * float(np.median([told[k].filter_seconds for k in steady or range(len(told))])),
-        "detection_ms": 1e3 * float(np.median([one.detection_seconds for one in told])),
-        "activations": sum(_came(before, now) for before, now in pairwise(told)),
+        "filter_ms": 1e3 * float(np.median([states[k].filter_seconds for k in steady or range(len(states))])),
+        "detection_ms": 1e3 * float(np.median([one.detection_seconds for one in states])),
+        "activations": sum(_came(before, now) for before, now in pairwise(states)),
         "wrong_activations": sum(
-            _came(told[k - 1], told[k]) and not right[k] & set(told[k].contending) for k in range(1, len(told))
+            _came(states[k - 1], states[k]) and not right[k] & set(states[k].contending) for k in range(1, len(states))
         ),
         "wrong_terminations": sum(
-            bool(set(told[k - 1].models) & right[k]) and not set(told[k].models) & right[k] for k in range(1, len(told))
+            bool(set(states[k - 1].models) & right[k]) and not set(states[k].models) & right[k]
+            for k in range(1, len(states))
         ),
-        "repairs": int(told[-1].repairs),
-        "lost_frames": sum(bool(one.lost) for one in told),
+        "repairs": int(states[-1].repairs),
+        "lost_frames": sum(bool(one.lost) for one in states),
     }
 
 
-def _delay(told: Sequence[ModelsTold], first: int, labels: Sequence[int], right: frozenset[str]) -> int:
+def _delay(states: Sequence[ModelState], first: int, labels: Sequence[int], right: frozenset[str]) -> int:
     """Return how many frames after a switch a group with a right model is in force; all of the activity if never."""
-    for k in range(first, len(told)):
+    for k in range(first, len(states)):
         if labels[k] != labels[first]:
             return k - first
-        one = told[k]
+        one = states[k]
         names = [one.newcomer] if one.newcomer else []
         names += [one.group] if one.group else list(one.groups)  # all of them while a group is chosen
         if any(right & set(one.groups[name]) for name in names):
             return k - first
-    return len(told) - first
+    return len(states) - first
 
 
-def _came(before: ModelsTold, now: ModelsTold) -> bool:
+def _came(before: ModelState, now: ModelState) -> bool:
     return now.newcomer is not None and now.newcomer != before.newcomer
