@@ -79,7 +79,7 @@ EXTRACTION = (
 WITHOUT = click.option(
     "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
 )
-TRACK = (
+TRACK: tuple[Any, ...] = (
     click.argument("source", nargs=-1),
     *track_flags(),
     WITHOUT,

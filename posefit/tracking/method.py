@@ -273,6 +273,7 @@ def _rules(offer: Offer) -> AbstractContextManager[None]:
 
 
 def _offered(kind: Kind, chosen: "str | Callable[..., Any] | None") -> Offer:
+    assert chosen is not None
     if isinstance(chosen, str):
         return registry().offer(kind, chosen)
     frames: NextFrame = "carry" if hasattr(chosen, "advance") else "start"

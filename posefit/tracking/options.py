@@ -7,7 +7,7 @@ slow is imported here, as every start of the command line reads it.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, cast
 
 from posefit.errors import InputError
 from posefit.settings import POPULATION_SIZE
@@ -84,9 +84,9 @@ def _rate(name: str, value: Any) -> float:
     from posefit.motion.motion import RATES
     from posefit.reading import quoted
 
-    if not (isinstance(value, Real) and 0.0 < value < math.inf):
+    if not isinstance(value, Real) or not 0.0 < (rate := cast(Any, value)) < math.inf:
         raise InputError(f"{name} must be a positive number, got {quoted(value)}")
-    if not RATES[0] <= value <= RATES[1]:
+    if not RATES[0] <= rate <= RATES[1]:
         raise InputError(f"{name} must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(value)}")
     return float(value)
 
