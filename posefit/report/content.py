@@ -159,7 +159,7 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
     some = _drawn(contest)
     evaluations = curves.grid(some)
     under = "evaluations of a frame"
-    charts = [
+    charts: list[dict[str, Any]] = [
         {
             "id": "convergence",
             "title": "Convergence: best cost of a frame",

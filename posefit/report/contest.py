@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
 from posefit.arrays import Array
@@ -144,11 +145,11 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     return [{**row, "letters": letters.get(row["method"], "")} for row in board]
 
 
-def shared_rows(contest: Contest, method: int) -> Array:
+def shared_rows(contest: Contest, method: int) -> NDArray[np.int64]:
     """Return the rows (k,) of a method that count: those shared, or all its own if it does not take part."""
     if method in contest.methods:
         return np.asarray(contest.rows[contest.methods.index(method)].ravel())
-    return np.flatnonzero(contest.runs.method == method)
+    return np.flatnonzero(contest.runs.method == method).astype(np.int64)
 
 
 def _reached_interval(contest: Contest, place: int) -> dict[str, float]:
