@@ -30,9 +30,10 @@ from posefit.niching import (
 )
 from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.searches import boltzmann_weights
+from tests.cases import each
 
 
-@pytest.mark.parametrize("number", [0, 1, 2, 10_001])
+@each("number", [0, 1, 2, 10_001])
 def test_known_poses_cost_nearly_the_same_are_apart_and_have_hills_between_them(number: int) -> None:
     posed, space = niche_instance(number), niche_space()
     assert posed.kind == KINDS[number % 3]
@@ -155,7 +156,7 @@ def test_only_the_ten_heaviest_poses_count() -> None:
     assert set(score.peak_ratio.values()) == {0.0}
 
 
-@pytest.mark.parametrize(
+@each(
     ("proposals", "costs", "temperature", "said"),
     [
         (2, [1.0], 1.0, r"costs must be one a proposal \(2\), got shape \(1,\)"),

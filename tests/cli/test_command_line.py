@@ -19,6 +19,7 @@ from posefit.errors import InputError
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
+from tests.cases import each
 from tests.files import arrays
 from tests.plugins.test_registry import point
 
@@ -185,7 +186,7 @@ def test_an_amc_is_followed_with_the_asf_beside_it(clip: tuple[Path, Path]) -> N
     assert summary["train"] == ["walk-a", "walk-c"]
 
 
-@pytest.mark.parametrize("mode", ["known", "searched", "aligned"])
+@each("mode", ["known", "searched", "aligned"])
 def test_the_translation_may_be_known_searched_or_aligned(mode: str) -> None:
     result = run("track", "walk", "--frames", "0:3", "--translation", mode, "--json", *QUICK)
     assert result.exit_code == 0, result.stderr
@@ -387,7 +388,7 @@ def test_check_reports_every_rule_and_how_many_ran() -> None:
     assert "--set must be SETTING=VALUE" in fails("check", "prior", "pca", "--set", "colour")
 
 
-@pytest.mark.parametrize("kind", ["optimiser", "prior", "tracker", "segmenter"])
+@each("kind", ["optimiser", "prior", "tracker", "segmenter"])
 @pytest.mark.slow
 def test_a_new_plugin_installs_offline_and_passes_its_own_test(kind: str, tmp_path: Path) -> None:
     folder = tmp_path / "mine"
@@ -465,9 +466,7 @@ def test_a_new_plugin_has_a_module_of_its_own(tmp_path: Path) -> None:
         assert not (tmp_path / "x").exists()
 
 
-@pytest.mark.parametrize(
-    ("name", "class_name"), [("none", "NoneTracker"), ("true", "TrueTracker"), ("frame", "FrameTracker")]
-)
+@each(("name", "class_name"), [("none", "NoneTracker"), ("true", "TrueTracker"), ("frame", "FrameTracker")])
 def test_a_new_plugins_class_has_a_name_that_python_and_the_template_leave_free(
     name: str, class_name: str, tmp_path: Path
 ) -> None:

@@ -8,6 +8,7 @@ from posefit.motion import built_in
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
 from posefit_envs.instance import SPLITS, instance, select
+from tests.cases import each
 
 
 def azimuth(camera: Camera) -> float:
@@ -25,7 +26,7 @@ def both(motion: str, number: int, frames: int, **arguments):
     )
 
 
-@pytest.mark.parametrize("number", [0, 17, 10_017])
+@each("number", [0, 17, 10_017])
 def test_a_built_in_motion_is_the_same_and_is_seen_from_the_same_side(number):
     cell, made = both("walk", number, 6)
     assert cell.truth is not None

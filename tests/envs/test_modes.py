@@ -14,6 +14,7 @@ from gymnasium.vector import SyncVectorEnv
 import posefit_envs  # noqa: F401, registers it
 from posefit.niching import niche_instance
 from posefit_envs.instance import ArgumentError
+from tests.cases import each
 
 NAME = "posefit/Modes-v0"
 
@@ -101,7 +102,7 @@ def test_a_picture_is_drawn() -> None:
     assert (np.asarray(env.render()) != before).any()
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "said"),
     [
         ({"instance": 20_000}, "instance must lie in 0 to 19999, got 20000"),

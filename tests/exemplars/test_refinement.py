@@ -11,6 +11,7 @@ from posefit.geometry.skeleton import ANGLES
 from posefit.registry import registry
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.refinement import CARRIED, COMPONENTS, REACH, YAW, Surroundings, refined, surroundings
+from tests.cases import each
 
 
 def around(exemplars: Exemplars, off: Array | None = None) -> Surroundings:
@@ -63,8 +64,8 @@ def test_a_search_begins_nearly_as_far_off_as_the_frame_before(two: Exemplars) -
     assert np.abs(far.start.mean).max() == pytest.approx(2.0 / REACH)
 
 
-@pytest.mark.parametrize("name", ["cma", "sapso"])
-@pytest.mark.parametrize("pull", [0.0, 0.3, 30.0])
+@each("name", ["cma", "sapso"])
+@each("pull", [0.0, 0.3, 30.0])
 def test_what_is_found_is_never_worse_than_where_it_began(two: Exemplars, name: str, pull: float) -> None:
     off = np.zeros(ANGLES)
     off[[0, 12, 20]] = 0.05, 0.2, -0.1

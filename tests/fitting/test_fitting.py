@@ -16,6 +16,7 @@ from posefit.silhouette.cost import project
 from posefit_priors.pca import PCA
 from posefit_swarm.random import Random
 from posefit_swarm.sapso import SAPSO
+from tests.cases import each
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,7 @@ def problem() -> PoseProblem:
     return PoseProblem(body, [camera], [silhouette], space)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@each("threads", [1, 2])
 def test_a_cost_has_the_same_bits_whatever_stands_beside_it(problem: PoseProblem, threads: int) -> None:
     problem = replace(problem, threads=threads)
     proposals = draw_population(problem.space, np.random.default_rng(0), 300)
@@ -39,7 +40,7 @@ def test_a_cost_has_the_same_bits_whatever_stands_beside_it(problem: PoseProblem
     np.testing.assert_array_equal(problem.evaluate(proposals[::-1])[::-1], together)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@each("threads", [1, 2])
 def test_a_search_is_told_the_costs_of_the_areas_and_a_view_that_knows_nothing_has_no_say(
     problem: PoseProblem, threads: int
 ) -> None:

@@ -11,6 +11,7 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.drawn import PoseCount
 from posefit_priors.pca import PCA
+from tests.cases import each
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def problem() -> PoseProblem:
     return PoseProblem(body, cameras, seen, space)
 
 
-@pytest.mark.parametrize("translation", ["known", "searched", "aligned"])
+@each("translation", ["known", "searched", "aligned"])
 def test_a_thousand_proposals_cost_what_each_of_them_costs(problem: PoseProblem, translation: str) -> None:
     problem = replace(problem, space=replace(problem.space, translation=translation))
     proposals = draw_population(problem.space, np.random.default_rng(0), 1000)
@@ -38,7 +39,7 @@ def test_a_thousand_proposals_cost_what_each_of_them_costs(problem: PoseProblem,
     assert problem.evaluate(proposals[:0]).shape == (0,)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@each("threads", [1, 2])
 def test_a_mistake_among_a_thousand_is_named_as_among_few(problem: PoseProblem, threads: int) -> None:
     problem = replace(problem, threads=threads)
     with pytest.raises(ValueError, match=r"proposals must have shape \(n, 9\), got \(1000, 8\)"):
@@ -51,7 +52,7 @@ def test_a_mistake_among_a_thousand_is_named_as_among_few(problem: PoseProblem, 
         problem.evaluate(spoilt)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@each("threads", [1, 2])
 def test_a_thousand_proposals_are_counted_once_a_view(problem: PoseProblem, threads: int) -> None:
     count = PoseCount()
     with count.counting():
@@ -62,7 +63,7 @@ def test_a_thousand_proposals_are_counted_once_a_view(problem: PoseProblem, thre
     assert count.poses == 4000
 
 
-@pytest.mark.parametrize("translation", ["known", "searched", "aligned"])
+@each("translation", ["known", "searched", "aligned"])
 def test_a_proposal_means_the_same_pose_at_every_size(problem: PoseProblem, translation: str) -> None:
     problem = replace(problem, space=replace(problem.space, translation=translation))
     proposals = draw_population(problem.space, np.random.default_rng(1), 50)

@@ -17,6 +17,7 @@ from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
+from tests.cases import each
 
 LEFT_HIP = 3  # of a pose: its first joint angle
 DEGREE = np.radians(1.0)
@@ -79,7 +80,7 @@ def test_latents_that_training_never_had_tilt_no_farther_than_training() -> None
     assert most < 0.4
 
 
-@pytest.mark.parametrize("turns", [0, 1, -2])
+@each("turns", [0, 1, -2])
 def test_a_roll_past_half_a_turn_is_the_same_as_before_it(turns: int) -> None:
     rolls = np.radians([170.0, 175.0, -175.0, -170.0]) + 2.0 * np.pi * turns
     tilt = Tilt.of(Hip(), [bending(np.zeros(4), rolls)], 1.0, DEGREE)
@@ -141,7 +142,7 @@ def test_a_walker_tilts_a_few_degrees_more_than_others_did_at_most() -> None:
         assert (poses[:, 1:3] < tilts.max(axis=0) + np.radians(8.0)).all()
 
 
-@pytest.mark.parametrize("how", [Prediction(), Prediction(tilt="box")])
+@each("how", [Prediction(), Prediction(tilt="box")])
 def test_nothing_to_learn_from_or_a_box_is_a_box_around_upright(how: Prediction) -> None:
     training = [bending(np.full(9, 0.8), np.zeros(9))] if how.tilt == "box" else []
     follower = Follower(task_of(*training), Hip(), how)
@@ -199,7 +200,7 @@ def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
         space.decode(proposals)
 
 
-@pytest.mark.parametrize(
+@each(
     ("setting", "error"),
     [
         ({"tilt": "upright"}, "tilt must be one of learned, box, got 'upright'"),

@@ -16,6 +16,7 @@ from posefit.footage.extract import extract
 from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
+from tests.cases import each
 from tests.files import arrays
 from tests.footage.conftest import EMPTY, FRAMES, SIZE, truth
 
@@ -24,7 +25,7 @@ def iou(first: Any, second: Any) -> float:
     return float((first & second).sum() / max((first | second).sum(), 1))
 
 
-@pytest.mark.parametrize(("method", "background"), [("mixture", None), ("median", None), ("mean", f"0:{EMPTY}")])
+@each(("method", "background"), [("mixture", None), ("median", None), ("mean", f"0:{EMPTY}")])
 def test_each_method_finds_the_person(
     filmed: tuple[Path, list[Any]], tmp_path: Path, method: Any, background: Any
 ) -> None:

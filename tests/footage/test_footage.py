@@ -15,6 +15,7 @@ from click.testing import CliRunner, Result
 
 import posefit
 from posefit.cli import main
+from posefit.errors import InputError
 from posefit.fitting import metrics
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
@@ -30,6 +31,7 @@ from posefit.motion.amc import read_clip
 from posefit.motion.bvh import read_bvh
 from posefit.registry import registry
 from posefit.tracking.table import table
+from tests.cases import each
 from tests.files import arrays
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, truth, walk
 
@@ -222,7 +224,7 @@ def stopping(after: int, error: BaseException) -> Any:
     return progress
 
 
-@pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
+@each("optimiser", ["sapso", "annealed"])
 def test_a_track_goes_on_where_it_ended(tmp_path: Path, optimiser: str) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, masks=np.stack(truth()[10:30]).astype(np.uint8), usable=np.arange(20) != 11)
@@ -259,8 +261,8 @@ def test_what_cannot_be_resumed_is_said(tmp_path: Path) -> None:
         posefit.track(path, resume=True, **settings)
     with pytest.raises(ValueError, match="resume must be given with out"):
         posefit.track(path, resume=True)
-    with pytest.raises(ValueError, match="bad luck; 5 finished frames are kept"):
-        posefit.track(path, progress=stopping(5, ValueError("bad luck")), **settings)
+    with pytest.raises(InputError, match="bad luck; 5 finished frames are kept"):
+        posefit.track(path, progress=stopping(5, InputError("bad luck")), **settings)
     with pytest.raises(ValueError, match="seed must be 0, as before, to resume, got 1"):
         posefit.track(path, resume=True, seed=1, **settings)
     # a line that was half written does not count
@@ -324,7 +326,7 @@ def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:
     assert extract(tmp_path / "still.avi", tmp_path / "three")["warnings"] == []
 
 
-@pytest.mark.parametrize("kind", ["video", "masks"])
+@each("kind", ["video", "masks"])
 def test_a_calibration_fits_footage_that_a_codec_filled_up(
     filmed: tuple[Path, list[Any]], tmp_path: Path, kind: str
 ) -> None:

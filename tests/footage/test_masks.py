@@ -18,6 +18,7 @@ from posefit.footage.masks import PackedMasks
 from posefit.footage.readers import read_folder, read_masks
 from posefit.footage.source import scene_of
 from posefit.tracking.front import track
+from tests.cases import each
 from tests.footage.conftest import SIZE, camera, truth
 
 ALL = (None, None)
@@ -136,7 +137,7 @@ def labelled(walk: list[Any]) -> list[Any]:
     return images
 
 
-@pytest.mark.parametrize("kind", ["palette", "grey", "colours", "npz"])
+@each("kind", ["palette", "grey", "colours", "npz"])
 def test_labels_are_told_apart_and_one_is_chosen(walk: list[Any], tmp_path: Path, kind: str) -> None:
     images, path, label = labelled(walk), tmp_path / "masks", 2
     if kind == "palette":

@@ -13,6 +13,7 @@ import pytest
 import posefit
 from posefit.registry import Registry, registry, registry_of
 from posefit.testing.toy import Toy
+from tests.cases import each
 
 EXTRAS = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna", "ribs": "ribs"}
 
@@ -37,7 +38,7 @@ def test_listing_the_adapters_imports_none_of_their_libraries() -> None:
     assert ran.stdout.splitlines()[-1] == "[]"
 
 
-@pytest.mark.parametrize("name", ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna", "ribs"])
+@each("name", ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna", "ribs"])
 def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
     threads = threading.active_count()
     with warnings.catch_warnings():

@@ -16,6 +16,7 @@ from posefit.plugin import finite_costs
 from posefit.testing.toy import Toy, ball, sphere
 from posefit_nevergrad import GlobalRandom
 from posefit_scipy.bridge import Bridged
+from tests.cases import each
 
 
 def climbs(space: Toy, rng: np.random.Generator, objective: Any) -> None:
@@ -84,7 +85,7 @@ def test_what_the_library_raises_is_raised_where_it_is_asked() -> None:
         minimise(sphere, Bridged(Toy(3), np.random.default_rng(0), fails), 100)
 
 
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+@each("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
 def test_a_copy_goes_on_as_the_original(copied: Any) -> None:
     first = Bridged(Toy(3, ball), np.random.default_rng(0), climbs)
     for _ in range(4):

@@ -7,9 +7,10 @@ from posefit.arrays import Array
 from posefit.fitting.box import Start, displacement
 from posefit.testing.toy import Toy
 from posefit_evolution.cma import CMAES
+from tests.cases import each
 
 
-@pytest.mark.parametrize(("redraws", "share"), [(0, 0.4602), (4, 0.4602**5)])
+@each(("redraws", "share"), [(0, 0.4602), (4, 0.4602**5)])
 def test_what_leaves_the_box_is_drawn_again_before_it_is_moved_to_its_side(redraws: int, share: float) -> None:
     # a tenth of a standard deviation from the side, 46.02 % of all draws are beyond it
     space = Toy(2, start=Start(np.array([0.99, 0.0]), np.array([0.1, 0.01]), np.zeros(2)))
@@ -18,7 +19,7 @@ def test_what_leaves_the_box_is_drawn_again_before_it_is_moved_to_its_side(redra
     assert (asked[:, 0] == 1.0).mean() == pytest.approx(share, abs=0.02)
 
 
-@pytest.mark.parametrize("wrapping", [1, 2])
+@each("wrapping", [1, 2])
 def test_a_target_at_the_seam_of_a_circle_is_found(wrapping: int) -> None:
     space = Toy(5, wrapping=wrapping)
     target = np.where(space.periodic, 0.98, 0.3)

@@ -17,6 +17,7 @@ from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
 from posefit_priors.sklearn import Transformed
 from posefit_priors.union import Union
+from tests.cases import each
 from tests.files import arrays
 
 
@@ -122,7 +123,7 @@ def test_a_long_clip_does_not_push_a_short_one_out() -> None:
     assert floor(union, run) < 0.8 * floor(one, run)
 
 
-@pytest.mark.parametrize(("source", "wrong"), [("walk", "run"), ("run", "walk")])
+@each(("source", "wrong"), [("walk", "run"), ("run", "walk")])
 def test_one_union_tracks_walk_and_run_and_the_wrong_prior_does_not(source: str, wrong: str) -> None:
     # medians, since one first frame in five or so settles beside the best pose
     both, one = ("walk-a", "walk-b", "run-a", "run-b"), (f"{wrong}-a", f"{wrong}-b")
@@ -176,7 +177,7 @@ def test_mistakes_in_settings_are_named() -> None:
             Transformed(**settings)
 
 
-@pytest.mark.parametrize("kind", [Full, Union, Transformed])
+@each("kind", [Full, Union, Transformed])
 def test_a_file_that_is_no_prior_is_refused(kind: Any, tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", mean=np.zeros(3))
     (tmp_path / "b.npz").write_bytes(b"nothing of the kind")
@@ -248,7 +249,7 @@ def test_a_setting_that_makes_no_sense_is_one_line_of_check_and_not_one_a_rule()
     assert result.stderr.splitlines() == ["posefit: slack must be above 0, got -1"]
 
 
-@pytest.mark.parametrize(("kind", "name"), [(Loose, "loose"), (Full, "angles")])
+@each(("kind", "name"), [(Loose, "loose"), (Full, "angles")])
 def test_places_in_a_file_are_those_of_joint_angles(kind: Any, name: str, tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     kind().fit(angles("walk-a"), built_in.average_skeleton()).save(path)

@@ -16,6 +16,7 @@ from posefit.hooks import ClaimedOrder
 from posefit.registry import Offer, claimed_orders, claims_of, commands_of, registry, registry_of
 from posefit.version import source_digest
 from posefit_priors.pca import PCA
+from tests.cases import each
 
 
 def point(name: str, module: Any) -> Any:
@@ -90,7 +91,7 @@ BROKEN = {
 GOOD = {"methods": offering("good"), "commands": commands(click.Command("greet")), "claims": claims()}
 
 
-@pytest.mark.parametrize("what", BROKEN)
+@each("what", BROKEN)
 def test_a_broken_plugin_is_left_out_with_a_warning_and_the_others_work(what: str) -> None:
     load: Any = {
         "methods": lambda points, variables: registry_of(points, variables).plugins,

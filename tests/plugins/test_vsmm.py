@@ -26,7 +26,7 @@ from posefit_vsmm.joined import Search, joined
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.state import decode, encode
 from posefit_vsmm.tracker import MAX_BLIND_FRAMES, vsmm
-from tests.cases import cases
+from tests.cases import cases, each
 
 SIZE = (200, 240)
 NAMES = ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
@@ -187,7 +187,7 @@ def test_a_single_model_is_a_group(tmp_path: Path) -> None:
     assert iou(frames).mean() > 0.5
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "said"),
     [
         ('stay = 0.9\n[groups]\na = ["wlak"]\n[neighbours]\n', "a model must be one of stiff-walk, .*, got 'wlak'"),

@@ -18,6 +18,7 @@ from posefit_reproduce.bench import device, experiment, kernel, optimisers
 from posefit_reproduce.bench.kernel import bench_problem, opencv_costs
 from posefit_reproduce.bench.optimisers import Stopwatch, wide_space
 from posefit_reproduce.bench.processor import instructions, processor
+from tests.cases import each
 
 
 class Line:
@@ -55,7 +56,7 @@ def test_following_is_timed_and_weighed() -> None:
     assert 0.0 < told["mb"] <= told["mb_end"]
 
 
-@pytest.mark.parametrize("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])
+@each("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])
 def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tuple[float, float]) -> None:
     usual = bench_problem()
     camera = replace(usual.cameras[0], focal=usual.cameras[0].focal * stretch)

@@ -23,6 +23,7 @@ from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_silhouette
 from posefit.testing.problem import pose_problem, walking_angles
+from tests.cases import each
 
 pytestmark = [
     pytest.mark.device,
@@ -50,8 +51,8 @@ def assert_equals_the_cpu(body: Body, camera: Camera, poses: Array, places: Arra
 
 
 # widths about those of a word and of what a thread fills at a time; the body is as large as the image, or larger
-@pytest.mark.parametrize("size", [(40, 30), (1, 9), (63, 17), (65, 8), (97, 24), (129, 20), (161, 16)])
-@pytest.mark.parametrize("depth", [3.0, 0.6])
+@each("size", [(40, 30), (1, 9), (63, 17), (65, 8), (97, 24), (129, 20), (161, 16)])
+@each("depth", [3.0, 0.6])
 def test_200_poses_have_the_areas_that_a_cpu_counts(body: Body, size: tuple[int, int], depth: float) -> None:
     rng = np.random.default_rng(2)
     camera = Camera.around(np.zeros(3), 0.4, depth, size, field_of_view=0.9)

@@ -9,6 +9,7 @@ import pytest
 
 from posefit.silhouette.drawn import PoseCount, count_poses
 from posefit.silhouette.sharing import LEAST_SHARE, PART, SHARED_PART, parts_of, work_through
+from tests.cases import each
 
 
 def test_parts_hold_every_row_once_and_are_about_as_long() -> None:
@@ -24,7 +25,7 @@ def test_parts_hold_every_row_once_and_are_about_as_long() -> None:
             assert len(parts) % max(min(threads, n // LEAST_SHARE), 1) == 0
 
 
-@pytest.mark.parametrize("threads", [1, 2, 5])
+@each("threads", [1, 2, 5])
 def test_every_part_is_taken_and_worked_on_once_and_taken_by_one_thread_at_a_time(threads: int) -> None:
     done, taking, crowds, who = np.zeros(1000, dtype=int), threading.Lock(), [], set()
     company = threading.Event()
@@ -49,7 +50,7 @@ def test_every_part_is_taken_and_worked_on_once_and_taken_by_one_thread_at_a_tim
     assert min(threads, 2) <= len(who) <= threads
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@each("threads", [1, 2])
 def test_what_goes_wrong_in_a_part_is_raised(threads: int) -> None:
     def work(part: slice) -> None:
         if part.start <= 500 < part.stop:

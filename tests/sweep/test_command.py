@@ -102,7 +102,7 @@ def test_a_preview_names_the_kind_of_cell_that_fails_and_estimates_the_others(pl
     result = run("sweep", plan, "--dry-run", "--workers", 1)
     assert result.exit_code == 0, result.stderr
     *_, warning, last = result.stdout.splitlines()
-    assert warning.startswith("warning: random@pca on walk, instance 0, seed 0: ValueError: ")
+    assert warning.startswith("warning: random@pca on walk, instance 0, seed 0: InputError: ")
     assert last.startswith("9 cells, 9 of them to run: about ")
 
 

@@ -12,6 +12,7 @@ import posefit
 from posefit.fitting.validation import Audit, AuditedTracker, BrokenRuleError
 from posefit.silhouette.drawn import PoseCount
 from posefit.testing.tracker_rules import FRAMES, scene
+from tests.cases import each
 from tests.testing import planted
 
 QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 2440}
@@ -39,7 +40,7 @@ def test_an_honest_tracker_is_left_as_it_is() -> None:
         np.testing.assert_array_equal(one.areas, other.areas)
 
 
-@pytest.mark.parametrize(
+@each(
     ("kind", "said"),
     [
         (planted.SpendsAndSaysSo, "frame 0 must use at most 400 evaluations, got 20,000 (12 such frames)"),
@@ -74,7 +75,7 @@ def test_a_track_is_marked_by_a_warning_and_has_the_hosts_figures() -> None:
     assert len(free.summary["warnings"]) == 1
 
 
-@pytest.mark.parametrize("method", [{"method": "sapso"}, {"method": "vsmm"}, {"method": "sapso+vsmm"}])
+@each("method", [{"method": "sapso"}, {"method": "vsmm"}, {"method": "sapso+vsmm"}])
 def test_no_method_of_posefits_own_is_warned_of(method: dict[str, str]) -> None:
     seen = posefit.track("walk", view_degrees=(45.0, 135.0), **method, **{**QUICK, "evaluations": 400}).summary
     assert seen["warnings"] == []
@@ -127,7 +128,7 @@ def test_a_tracker_that_looks_ahead_is_honest() -> None:
     assert found(LooksAhead)[1] == []
 
 
-@pytest.mark.parametrize(
+@each(
     ("kind", "said"),
     [
         (planted.GivesFramesTwice, "track must yield a frame for each observation, got 2 for 1"),
@@ -150,7 +151,7 @@ def test_what_cannot_be_read_is_not_the_trackers_fault() -> None:
         next(frames)
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "said"),
     [
         ({"evaluations": 1.5}, "evaluations must be a whole number, 0 or more, got 1.5"),

@@ -23,6 +23,7 @@ from posefit.tracking.pipeline import track_scene
 from posefit.tracking.table import table, undetermined
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
+from tests.cases import each
 from tests.files import arrays
 from tests.tracking.test_evaluation import found
 
@@ -123,7 +124,7 @@ def test_the_width_is_the_mean_radius_of_the_frames_that_say_one() -> None:
     assert without.coverage is None
 
 
-@pytest.mark.parametrize(
+@each(
     ("sides", "lost", "said"),
     [
         (41, 3, "left and right: unknown in 41 of 60 frames; 3 frames lost"),

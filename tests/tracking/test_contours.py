@@ -28,6 +28,7 @@ from posefit.tracking.smoothing.contours import (
 from posefit.tracking.smoothing.path import Squares, Visibility
 from posefit.tracking.smoothing.smooth import smoothed_frames
 from posefit.uncertainty.modes import Posterior
+from tests.cases import each
 
 CAMERA = Camera.around(np.array([0.0, 0.9, 0.0]), 0.4, 4.0, (200, 200))
 
@@ -73,7 +74,7 @@ def frame(pose: np.ndarray, place: np.ndarray, posterior: Posterior | None = Non
     return Frame(pose, place, 0.0, np.zeros((1, 3), np.int64), 0, 0.0, np.empty(0), posterior=posterior)
 
 
-@pytest.mark.parametrize("radii", [(5.0, 2.0), (2.0, 5.0), (3.0, 3.0), (30.0, 2.0), (1.0, 40.0)])
+@each("radii", [(5.0, 2.0), (2.0, 5.0), (3.0, 3.0), (30.0, 2.0), (1.0, 40.0)])
 def test_the_distance_from_a_cone_is_that_from_the_nearest_of_all_its_discs(radii: tuple[float, float]) -> None:
     rng = np.random.default_rng(1)
     start, end = np.array([10.0, 20.0]), np.array([28.0, 12.0])
@@ -243,7 +244,7 @@ def test_steps_for_other_slopes_are_those_that_they_alone_would_ask_for() -> Non
         np.testing.assert_allclose(Squares(squares.curves, others[..., k]).least(), found[..., k], atol=1e-12)
 
 
-@pytest.mark.parametrize("views", [(60.0,), (0.0, 90.0)])
+@each("views", [(60.0,), (0.0, 90.0)])
 def test_poses_that_are_off_come_back_to_what_is_seen(views: tuple[float, ...]) -> None:
     scene, truth = footage(views=views)
     found = off(truth)
@@ -319,7 +320,7 @@ def test_frames_that_show_too_little_go_with_those_around_them() -> None:
     assert fit_contours(empty, found, seen_by(empty), None)[0] is found
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3])
+@each("frames", [1, 2, 3])
 def test_the_shortest_footage_is_told(frames: int) -> None:
     scene, truth = footage(frames)
     told, _ = fit_contours(scene, truth, seen_by(scene), average_shape(scene))

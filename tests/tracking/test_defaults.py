@@ -16,6 +16,7 @@ from posefit.registry import registry
 from posefit.tracking import method
 from posefit.tracking.method import resolved
 from posefit.tracking.options import TrackOptions
+from tests.cases import each
 
 WALKS = ("walk-a", "walk-b", "walk-c")
 
@@ -73,7 +74,7 @@ def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
     assert "looking for the first pose, 1 times" in said
 
 
-@pytest.mark.parametrize(
+@each(
     ("words", "method"),
     [
         ([], "exemplars"),

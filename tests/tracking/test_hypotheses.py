@@ -256,9 +256,10 @@ def stopping(after: int) -> Any:
 
 
 def test_tracks_that_were_interrupted_go_on_where_they_were(tmp_path: Path) -> None:
+    options: dict[str, Any] = {"hypotheses": 3, "seed": 1, "view_degrees": 90.0, **QUICK}
+    whole = posefit.track("walk", **options)
     for after in [1, 3, 4, 7]:
-        asked: dict[str, Any] = {"hypotheses": 3, "seed": 1, "view_degrees": 90.0, "out": tmp_path / "walk", **QUICK}
-        whole = posefit.track("walk", **{**asked, "out": tmp_path / "whole"})
+        asked: dict[str, Any] = {**options, "out": tmp_path / f"walk-{after}"}
         with pytest.raises(KeyboardInterrupt):
             posefit.track("walk", progress=stopping(after), **asked)
         with pytest.raises(ValueError, match="hypotheses must be 3, as before, to resume, got 2"):

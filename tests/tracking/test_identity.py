@@ -10,6 +10,7 @@ import pytest
 import posefit
 from posefit.motion import built_in
 from posefit.tracking.identity import ArgumentDigest, difference
+from tests.cases import each
 
 QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200}
 
@@ -66,7 +67,7 @@ def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
     assert ArgumentDigest.of(second, files=True).digest != empty.digest
 
 
-@pytest.mark.parametrize(
+@each(
     ("one", "other"),
     [
         (1, 1.5),

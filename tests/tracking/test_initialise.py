@@ -21,11 +21,12 @@ from posefit.silhouette.mask import Silhouette
 from posefit.tracking.initialise import first_seen_by_most, fitted_build, task_of
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import best_restart
+from tests.cases import each
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
 
-@pytest.mark.parametrize("method", [{}, {"method": "annealed"}, {"method": "vsmm"}])
+@each("method", [{}, {"method": "annealed"}, {"method": "vsmm"}])
 def test_a_search_is_made_once(method: dict[str, Any]) -> None:
     drawn = PoseCount()
     with drawn.counting():
@@ -59,7 +60,7 @@ def test_a_tracker_that_needs_its_whole_budget_works_all_the_same() -> None:
         posefit.track("walk", method=Demanding, frames=(0, 2), size=(120, 90), evaluations=400)
 
 
-@pytest.mark.parametrize(("size", "rows"), [((320, 240), 240), ((640, 479), 479), ((640, 480), 240), ((960, 721), 240)])
+@each(("size", "rows"), [((320, 240), 240), ((640, 479), 479), ((640, 480), 240), ((960, 721), 240)])
 def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole_one(
     size: tuple[int, int], rows: int
 ) -> None:
@@ -92,7 +93,7 @@ def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole
     assert begin.cameras is task.cameras
 
 
-@pytest.mark.parametrize(
+@each(
     ("count", "asked", "said"),
     [
         (12, 4, "no build is fitted to 4 frames: 4 are too few, at least 5 are needed; it is the average"),

@@ -5,6 +5,7 @@ import pytest
 
 import posefit
 from posefit.tracking.modes import EVEN_COST, LOST_STEEPNESS, lost_probability
+from tests.cases import each
 
 
 def test_a_frame_is_as_likely_lost_as_not_at_one_cost_and_likelier_the_more_it_costs() -> None:
@@ -17,7 +18,7 @@ def test_a_frame_is_as_likely_lost_as_not_at_one_cost_and_likelier_the_more_it_c
     assert np.log(odds) == pytest.approx(LOST_STEEPNESS * np.log(2.0))
 
 
-@pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
+@each("optimiser", ["sapso", "annealed"])
 def test_frames_say_it_where_modes_are_asked_for(optimiser: str) -> None:
     given = {"method": optimiser, "frames": (0, 2), "evaluations": 400, "population_size": 40, "size": (160, 120)}
     assert [frame.lost for frame in posefit.track("walk", **given).found] == [None, None]

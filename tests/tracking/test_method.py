@@ -15,12 +15,13 @@ from posefit.footage.scene import synthetic
 from posefit.registry import Offer, Plugin, Registry, registry
 from posefit.tracking import initialise, method
 from posefit.tracking.options import TrackOptions
+from tests.cases import each
 from tests.testing import planted
 
 QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 200}
 
 
-@pytest.mark.parametrize("name", ["sapso", "pso", "particle", "annealed", "cma", "random"])
+@each("name", ["sapso", "pso", "particle", "annealed", "cma", "random"])
 def test_every_method_gets_the_same_number_of_evaluations_and_says_how_many_it_used(name: str) -> None:
     for budget in (200, 437):
         summary = posefit.track("walk", method=name, **{**QUICK, "evaluations": budget}).summary
@@ -142,7 +143,7 @@ def test_a_broken_optimiser_ends_its_run_with_one_line_and_the_next_run_works(
     assert posefit.track("walk", **QUICK).summary["frames"] == 3
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "rule"),
     [
         ({"low": np.zeros((2, 3))}, r"low and high must be finite and of shape \(m,\), got \(2, 3\), \(6,\)"),
@@ -175,8 +176,8 @@ def test_a_broken_prior_is_named(change: dict[str, Any], rule: str, installed: A
         posefit.track("walk", method="@bad", **QUICK)
 
 
-@pytest.mark.parametrize("method", ["inverse_transform", "feasible"])
-@pytest.mark.parametrize(
+@each("method", ["inverse_transform", "feasible"])
+@each(
     ("error", "said"),
     [(SystemExit(0), "end the program, got SystemExit: 0"), (KeyError("lost"), "fail, got KeyError: 'lost'")],
 )
@@ -217,7 +218,7 @@ class FailingTracker(planted.Holds):
         raise OSError("no file")
 
 
-@pytest.mark.parametrize(
+@each(
     ("factory", "rule"),
     [
         (BadFrames, r"a pose must be 66 finite angles, got shape \(60,\)"),
@@ -240,7 +241,7 @@ def test_a_given_first_pose_starts_the_first_frame_around_it(seed: int) -> None:
     assert first["given"]["error_degrees"] < 6.0
 
 
-@pytest.mark.parametrize("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])
+@each("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])
 def test_every_prior_can_be_searched(prior: str) -> None:
     summary = posefit.track("walk", method=f"@{prior}", **QUICK).summary
     assert summary["method"] == f"sapso@{prior}"

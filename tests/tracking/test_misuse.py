@@ -13,6 +13,7 @@ from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
 from posefit.motion import built_in
 from posefit.registry import registry
+from tests.cases import each
 
 MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"evaluations": 1e3}, "evaluations must be a whole number of at least 1, got 1000.0"),
@@ -95,7 +96,7 @@ def test_costs_are_an_array_with_one_for_each_proposal(problem: PoseProblem) -> 
             minimise(costs, factory(problem.space, np.random.default_rng(0), population_size=40), 400)
 
 
-@pytest.mark.parametrize("name", ["sapso", "annealed", "particle"])
+@each("name", ["sapso", "annealed", "particle"])
 def test_a_search_that_ends_long_before_its_budget_says_so(problem: PoseProblem, name: str) -> None:
     factory = registry().optimiser(name)
     with pytest.warns(UserWarning, match="ended its search after 24.. of 100000 evaluations: .* build it with it"):

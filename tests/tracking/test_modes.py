@@ -18,6 +18,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import pose_problem, walking_angles
 from posefit.tracking.modes import modes
 from posefit.uncertainty.modes import Posterior, modes_of
+from tests.cases import each
 
 FEW = {"evaluations": 400, "population_size": 40, "size": (160, 120)}
 
@@ -34,7 +35,7 @@ def side_view(frame: int = 0) -> tuple[PoseProblem, Any, Any]:
     return PoseProblem(body, [camera], [Silhouette.of(mask)], space), motion.poses[frame], other[0]
 
 
-@pytest.mark.parametrize("name", ["sapso", "cma", "annealed", "scipy:differential_evolution"])
+@each("name", ["sapso", "cma", "annealed", "scipy:differential_evolution"])
 def test_a_planted_flip_is_found_by_any_optimiser(name: str) -> None:
     problem, truth, other = side_view()
     skeleton = problem.body.skeleton
@@ -54,7 +55,7 @@ def other_side(problem: PoseProblem, posterior: Posterior, truth: Any, other: An
     return float(posterior.weights @ (off[1] < off[0]))
 
 
-@pytest.mark.parametrize("given", [{}, {"searches": 1, "share": 0.2}], ids=["usual", "as a tracker has it"])
+@each("given", [{}, {"searches": 1, "share": 0.2}])
 def test_planted_flips_are_found_in_nine_of_ten_frames(given: dict[str, Any]) -> None:
     shares = []
     for frame in range(0, 40, 4):
@@ -64,7 +65,7 @@ def test_planted_flips_are_found_in_nine_of_ten_frames(given: dict[str, Any]) ->
     assert np.mean([0.1 <= share <= 0.9 for share in shares]) >= 0.9, shares
 
 
-@pytest.mark.parametrize(("temperature", "off"), [(2.0, 0.15), (1.0, 0.25)])
+@each(("temperature", "off"), [(2.0, 0.15), (1.0, 0.25)])
 def test_the_weight_of_a_flip_varies_little_between_seeds(temperature: float, off: float) -> None:
     varied = []
     for frame in (0, 12, 24, 36):
@@ -107,7 +108,7 @@ def test_a_wrong_setting_of_the_tracker_is_one_clear_error() -> None:
             )
 
 
-@pytest.mark.parametrize(("share", "searches"), [(0.2, 0), (0.5, 1), (2.0, 3)])
+@each(("share", "searches"), [(0.2, 0), (0.5, 1), (2.0, 3)])
 def test_all_that_modes_take_is_within_their_share(share: float, searches: int) -> None:
     begun = []
 
@@ -127,8 +128,8 @@ def test_all_that_modes_take_is_within_their_share(share: float, searches: int) 
         assert 1.05 * 2000 < frame.evaluations <= (1.0 + share) * 2000
 
 
-@pytest.mark.parametrize("optimiser", ["sapso", "annealed", "particle"])
-@pytest.mark.parametrize("searches", [1, 3])
+@each("optimiser", ["sapso", "annealed", "particle"])
+@each("searches", [1, 3])
 def test_a_track_is_the_same_with_modes_and_without(optimiser: str, searches: int) -> None:
     given = {"method": optimiser, "frames": (0, 3), **FEW}
     without = posefit.track("walk", **given)

@@ -17,6 +17,7 @@ from posefit.tracking.drawing.chart import HEAD, LEFT_MARGIN, RIGHT_MARGIN, doub
 from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, OTHER, RIGHT
 from posefit.tracking.picture import PANEL, Painter
 from posefit.uncertainty.modes import Mode
+from tests.cases import each
 from tests.tracking.test_evaluation import found
 
 FRAMES = 7
@@ -42,7 +43,7 @@ def pixels(image: Any, colour: tuple[int, int, int], close: int = 0) -> int:
     return int((np.abs(image.astype(int) - np.array(colour)).max(axis=2) <= close).sum())
 
 
-@pytest.mark.parametrize(
+@each(
     ("usable", "wanted"),
     [
         ([True] * 7, [0, 1, 2, 4, 5, 6]),
@@ -70,7 +71,7 @@ def test_a_bone_is_as_solid_as_the_less_sure_of_its_ends() -> None:
     assert opacities(np.full(len(JOINTS), np.nan)).tolist() == [1.0] * 26
 
 
-@pytest.mark.parametrize("solid", [0.0, 0.25, 1.0])
+@each("solid", [0.0, 0.25, 1.0])
 def test_what_lies_behind_shows_through_a_faint_body(scene: Scene, solid: float) -> None:
     frame, (camera,) = right(scene), scene.cameras
     behind = np.random.default_rng(0).integers(0, 255, (camera.height, camera.width, 3)).astype(np.uint8)
@@ -113,7 +114,7 @@ def test_an_unsure_limb_fades_on_the_masks_and_beside_them(scene: Scene) -> None
     np.testing.assert_array_equal(Painter(scene).add(right(scene), scene.observations[0], row(), radii=radii), plain)
 
 
-@pytest.mark.parametrize(("weight", "drawn"), [(0.19, False), (0.2, False), (0.21, True), (0.7, True)])
+@each(("weight", "drawn"), [(0.19, False), (0.2, False), (0.21, True), (0.7, True)])
 def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(scene: Scene, weight: float, drawn: bool) -> None:
     frame = right(scene)
     mirrored = mirrored_poses(scene.body.skeleton, frame.pose[None])[0]
@@ -137,7 +138,7 @@ def test_a_mode_is_drawn_on_what_was_filmed_too(scene: Scene) -> None:
     assert not film.any()
 
 
-@pytest.mark.parametrize(("lost", "marked"), [(np.nan, False), (0.49, False), (0.5, True), (1.0, True)])
+@each(("lost", "marked"), [(np.nan, False), (0.49, False), (0.5, True), (1.0, True)])
 def test_a_lost_frame_has_a_border(scene: Scene, lost: float, marked: bool) -> None:
     image = Painter(scene).add(right(scene), scene.observations[0], row(lost=lost))
     edges = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
@@ -201,7 +202,7 @@ def test_the_true_error_is_a_line_among_the_bands() -> None:
     assert line.mean() == pytest.approx((HEIGHT - 50 - HEAD) * (1 - 100 / 210), abs=2)
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@each("count", [1, 2])
 def test_a_single_frame_has_its_chart(count: int) -> None:
     rows = [row(unknown_sides=1.0, lost=1.0, mpjpe_mm=40.0)] * count
     image = doubts(rows, np.full((count, 3, 27), 0.1), "", WIDTH, HEIGHT)

@@ -18,6 +18,7 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.restarts import RelocalisingTracker
+from tests.cases import each
 
 WALKS, GAP = 30, 12  # frames
 AFTER = slice(WALKS + GAP, None)
@@ -51,7 +52,7 @@ def followed(folder: Path, comes: str, **given: Any) -> tuple[posefit.Track, Arr
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
+@each("optimiser", ["sapso", "annealed"])
 def test_who_comes_back_faces_where_he_goes_in_nine_of_ten_seeds(tmp_path: Path, optimiser: str) -> None:
     # which way he is followed is decided before the track is steadied
     tracks = [followed(tmp_path, "back", method=optimiser, seed=seed, smooth=False) for seed in range(10)]
@@ -59,7 +60,7 @@ def test_who_comes_back_faces_where_he_goes_in_nine_of_ten_seeds(tmp_path: Path,
     assert np.mean(np.array(right) > 0.95) >= 0.9, right
 
 
-@pytest.mark.parametrize("optimiser", ["sapso", "annealed"])
+@each("optimiser", ["sapso", "annealed"])
 def test_who_comes_back_is_told_with_what_it_took(tmp_path: Path, optimiser: str) -> None:
     track, right = followed(tmp_path, "back", method=optimiser)
     assert right[:WALKS].all()
@@ -136,7 +137,7 @@ def looked(told: Told, observations: Sequence[Observation], task: Task = TASK) -
     return [(k, frame.details["relocalised"]) for k, frame in enumerate(frames) if frame.details]
 
 
-@pytest.mark.parametrize(("gap", "found"), [(4, []), (5, [(8, True)]), (9, [(12, True)])])
+@each(("gap", "found"), [(4, []), (5, [(8, True)]), (9, [(12, True)])])
 def test_a_gap_of_five_frames_is_one(gap: int, found: list[tuple[int, bool]]) -> None:
     seen, gone = SEEN
     assert looked(Told([1.0] * 30, 5.0), [seen] * 3 + [gone] * gap + [seen] * 10) == found

@@ -11,6 +11,7 @@ from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.tracking.smoothing import path
 from posefit.tracking.smoothing.path import Squares, Visibility, smooth_path, standing_feet
+from tests.cases import each
 
 EYE = np.array([0.0, 1.0, 6.0])
 
@@ -141,7 +142,7 @@ def test_long_tracks_are_steadied_in_windows(monkeypatch: pytest.MonkeyPatch) ->
     assert np.abs(parts.translations - whole.translations).max() < 0.02
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3])
+@each("frames", [1, 2, 3])
 def test_the_shortest_tracks_are_told(frames: int) -> None:
     motion = walk().frames(0, frames)
     assert len(smooth_path(motion, all_seen(motion))) == frames

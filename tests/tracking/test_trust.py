@@ -31,6 +31,7 @@ from posefit.tracking.trust import (
     trust_line,
     trust_of,
 )
+from tests.cases import each
 from tests.tracking.viewing import right, viewed, walk
 
 ALL = np.ones(60, dtype=bool)
@@ -148,7 +149,7 @@ def test_a_track_without_a_sign_against_it_is_good_and_says_why() -> None:
     assert sentence(FINE, []).startswith("Trust: good. No sign speaks against it: 1.80 m tall, given 1.80 m, ")
 
 
-@pytest.mark.parametrize(
+@each(
     ("figures", "words"),
     [
         ({"unknown": 0.92}, "doubtful: left and right are unknown in 92% of the frames"),
@@ -247,7 +248,7 @@ def test_the_sentence_stands_on_top_of_everything_that_is_told(tmp_path: Path) -
     told = "Trust: doubtful: 3 frames that show the person are too few to judge by."
     assert summary["trust"]["sentence"] == told
     assert table(summary).splitlines()[0] == told
-    assert f'"told":"{told} The method does not say' in page.read_text("utf-8").replace('": "', '":"')
+    assert f'"verdict":"{told} The method does not report' in page.read_text("utf-8").replace('": "', '":"')
     image = cv2.imread(str(tmp_path / "seen" / "summary.png"))
     assert image is not None
     assert (image[8:32].max(axis=2) > 200).any()  # of the sentence's letters
