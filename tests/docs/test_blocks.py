@@ -14,7 +14,10 @@ from tests.docs import shell
 from tests.docs.pages import RUN, SHOWN, Block, blocks, pages
 
 BLOCKS = [block for page in pages() for block in blocks(page)]
-SLOW = ("docs/ways/sweep.md",)  # pages that take longer than a minute on a busy machine
+# pages that take seconds of a processor
+SLOW = tuple(
+    f"docs/{page}.md" for page in ("ways/sweep", "howto/ambiguity", "howto/suite", "howto/masks", "howto/settings")
+)
 
 
 def _run() -> list[object]:

@@ -123,6 +123,7 @@ def test_a_long_clip_does_not_push_a_short_one_out() -> None:
     assert floor(union, run) < 0.8 * floor(one, run)
 
 
+@pytest.mark.slow
 @each(("source", "wrong"), [("walk", "run"), ("run", "walk")])
 def test_one_union_tracks_walk_and_run_and_the_wrong_prior_does_not(source: str, wrong: str) -> None:
     # medians, since one first frame in five or so settles beside the best pose

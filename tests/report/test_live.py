@@ -239,6 +239,7 @@ def shown(path: Path) -> Iterator[str]:
         thread.join()
 
 
+@pytest.mark.slow
 def test_a_browser_shows_how_far_it_is_and_loads_the_page_anew(begun: Path) -> None:
     with browser() as chromium, shown(begun) as address, Driver(begun) as driver:
         driver.lease(PLAN[4])

@@ -39,7 +39,7 @@ def assert_equals_the_twin(body: Body, camera: Camera, pose: Array, translation:
 def test_the_twin_agrees_with_a_fine_sweep_of_discs() -> None:
     rng = np.random.default_rng(0)
     x, y = rng.uniform(-5.0, 15.0, (2, 400))
-    for _ in range(20):
+    for _ in range(8):
         first, second = rng.uniform(0.0, 10.0, (2, 2))
         r0, r1 = rng.uniform(0.2, 3.0, 2)
         t = np.linspace(0.0, 1.0, 20_001)[:, None]
@@ -49,13 +49,13 @@ def test_the_twin_agrees_with_a_fine_sweep_of_discs() -> None:
         np.testing.assert_allclose(hull_distance(x, y, first, second, r0, r1), swept.min(axis=0), atol=2e-3)
 
 
-def test_areas_equal_the_twin_on_1000_random_poses(body: Body, camera: Camera) -> None:
+def test_areas_equal_the_twin_on_300_random_poses(body: Body, camera: Camera) -> None:
     rng = np.random.default_rng(1)
     mask = project(body, camera, random_poses(rng, 1)[0], np.zeros(3))
     valid = rng.random(mask.shape) < 0.9
     silhouette = Silhouette.of(mask, valid)
     compared = 0
-    while compared < 1000:
+    while compared < 300:
         poses = random_poses(rng, 100)
         translations = rng.uniform(-0.4, 0.4, (100, 3))
         found = areas(body, camera, silhouette, poses, translations)

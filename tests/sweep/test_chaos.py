@@ -54,6 +54,7 @@ def leased(folder: Path) -> set[str]:
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds a driver's processes in /proc")
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_sabotaged_sweep_loses_and_doubles_no_row_and_quarantines_no_healthy_cell(
     engine: str, tmp_path: Path
