@@ -37,5 +37,6 @@ def _page(package: str, modules: list[str]) -> str:
     members = [] if modules else ["   :members:"]
     lines = [f"``{package}``", "=" * (len(package) + 4), "", f".. automodule:: {package}", *members, ""]
     for module in modules:
-        lines += [f"``{module}``", "-" * (len(module) + 4), "", f".. automodule:: {module}", "   :members:", ""]
+        lines += [f"``{module}``", "-" * (len(module) + 4), "", f".. automodule:: {module}", "   :members:"]
+        lines += ["   :ignore-module-all:", ""]  # what a module imports has its entry elsewhere
     return "\n".join(lines)
