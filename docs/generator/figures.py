@@ -19,7 +19,7 @@ ASKED = {
     "evaluations_per_frame": ("", "budget of a frame, in each track"),
     "hypotheses": (
         "",
-        "of each of several [tracks](../howto/tracks.md): its `beginning`, silhouette `cost` and pull of `motion`, and "
+        "of each of several [tracks](../howto/hypotheses.md): its `beginning`, silhouette `cost` and pull of `motion`, and "
         "whether it was `kept`; empty where there was one",
     ),
     "version": ("", "the version of posefit"),
@@ -28,8 +28,8 @@ ASKED = {
     "translation": ("", "how the root's place is found: known, searched or aligned"),
     "first_pose": ("", "how the first pose is found: searched, or given"),
     "kept_pass": ("", "which of these passes is told, the first being 1"),
-    "passes": ("", "how often all frames were followed: [so](../howto/steady.md)"),
-    "smooth": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/steady.md)"),
+    "passes": ("", "how often all frames were followed: [so](../howto/smoothing.md)"),
+    "smooth": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/smoothing.md)"),
     "views": ("", "number of cameras"),
     "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
     "size": ("pixels", "width and height of the first camera's masks"),

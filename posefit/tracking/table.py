@@ -98,7 +98,7 @@ def _chosen(tracks: Sequence[Mapping[str, Any]]) -> str:
     """Return which of several tracks was kept, and what each costs as a whole."""
     kept = next(k for k, one in enumerate(tracks) if one["kept"])
     costs = [f"{one['guess']} {one['cost'] + one['motion']:.2f}" for one in tracks]
-    return f"kept track {kept + 1} of {len(tracks)}; whole cost by beginning: {', '.join(costs)}"
+    return f"kept track {kept + 1} of {len(tracks)}; trajectory cost by initial guess: {', '.join(costs)}"
 
 
 def _training(names: Sequence[str]) -> str:
