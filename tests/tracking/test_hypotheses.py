@@ -299,7 +299,7 @@ def test_the_command_says_which_track_was_kept(tmp_path: Path) -> None:
     assert shown.exit_code == 0, shown.output
     assert "track 2 of 2: mirrored" in shown.stderr
     (line,) = [line for line in shown.stdout.splitlines() if line.startswith("kept track")]
-    assert "of 2; whole cost by beginning: searched " in line
+    assert "of 2; trajectory cost by initial guess: searched " in line
     assert "800 of 800 evaluations" in shown.stdout
     summary = json.loads((tmp_path / "walk" / "summary.json").read_text("utf-8"))
     assert [one["guess"] for one in summary["hypotheses"]] == ["searched", "mirrored"]
