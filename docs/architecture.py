@@ -34,14 +34,14 @@ def imports() -> Graph:
             for path in (HERE.parent / folder).glob("posefit_*/__init__.py")
         }
     )
-    found = grimp.build_graph(ROOT, *plugins, cache_dir=None, exclude_type_checking_imports=True)
+    imports = grimp.build_graph(ROOT, *plugins, cache_dir=None, exclude_type_checking_imports=True)
     graph: dict[str, set[str]] = {}
-    for module in found.modules:
+    for module in imports.modules:
         mine = box_of(module)
         if mine is None:
             continue
         graph.setdefault(mine, set())
-        theirs = {box_of(other) for other in found.find_modules_directly_imported_by(module)}
+        theirs = {box_of(other) for other in imports.find_modules_directly_imported_by(module)}
         graph[mine] |= {one for one in theirs if one not in (None, mine)}
     return {box: frozenset(lower) for box, lower in sorted(graph.items())}
 
@@ -63,12 +63,12 @@ def circle(graph: Mapping[str, Iterable[str]]) -> list[str]:
             return [*path[path.index(box) :], box]
         if box not in done:
             for lower in sorted(graph[box]):
-                if found := visit(lower, [*path, box]):
-                    return found
+                if cycle := visit(lower, [*path, box]):
+                    return cycle
             done.add(box)
         return []
 
-    return next((found for box in graph if (found := visit(box, []))), [])
+    return next((cycle for box in graph if (cycle := visit(box, []))), [])
 
 
 def reduced(graph: Graph) -> Graph:
@@ -205,8 +205,8 @@ def svg(graph: Graph) -> str:
 def drawing() -> str:
     """Return the drawing. Raises ValueError naming a circle where there is one."""
     graph = imports()
-    if found := circle(graph):
-        raise ValueError(f"boxes must not import each other in a circle, got {' -> '.join(found)}")
+    if boxes := circle(graph):
+        raise ValueError(f"boxes must not import each other in a circle, got {' -> '.join(boxes)}")
     return svg(graph)
 
 

@@ -49,11 +49,11 @@ class Tag(NamedTuple):
 
 def page() -> str:
     """Return a table of tags for each source, as Markdown."""
-    found = sorted(tags(), key=lambda tag: _key(tag.step))
+    ordered = sorted(tags(), key=lambda tag: _key(tag.step))
     parts = []
     for source, title in SOURCES.items():
         lines = [f"## {source}", f"{title}.", "| tag | the line that carries it | where | tests |\n|---|---|---|---|"]
-        for tag in (one for one in found if one.source == source):
+        for tag in (tag for tag in ordered if tag.source == source):
             code = f"`{tag.code}`".replace("|", "\\|")
             named = "<br>".join(f"`{name}`" for name in tests_of(tag))
             lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}:{tag.line}` | {named} |"
@@ -67,22 +67,22 @@ def tags() -> Iterator[Tag]:
         for path in sorted((ROOT / folder).rglob("*.py")):
             lines = path.read_text("utf-8").splitlines()
             for number, line in enumerate(lines, 1):
-                found = _TAG.search(line)
-                if found is None:
+                match = _TAG.search(line)
+                if match is None:
                     continue
-                code = line[: found.start()].strip() or lines[number].strip()  # a tag on its own is of the next line
-                yield Tag(found["source"], found["step"], str(path.relative_to(ROOT)), number, code)
+                code = line[: match.start()].strip() or lines[number].strip()  # a tag on its own is of the next line
+                yield Tag(match["source"], match["step"], str(path.relative_to(ROOT)), number, code)
 
 
 def tests_of(tag: Tag) -> list[str]:
     """Return the tests, as FILE::NAME, that carry a tag or are named after the paper's equation or step."""
-    found = []
+    names = []
     for path in sorted((ROOT / "tests" / "sources").glob("test_*.py")):
         for one in _TEST.finditer(path.read_text("utf-8")):
             carries = one["tag"] == f"{tag.source} {tag.step}"
             if carries or (path.name == f"test_{tag.source.lower()}.py" and _is_named_after(one["name"], tag.step)):
-                found.append(f"{path.name}::{one['name']}")
-    return found
+                names.append(f"{path.name}::{one['name']}")
+    return names
 
 
 def _is_named_after(test: str, step: str) -> bool:

@@ -9,7 +9,7 @@ from posefit.tracking.measures import BASELINES, FRAME, MEASURES, Measure
 RAW = {"%": "share, 0 to 1", "ms": "s", "ms a frame": "s"}
 
 # What summary.json says beside the figures: the question, not the answer.
-ASKED = {
+REQUEST = {
     "motion": ("", "name of the motion, the video or the masks"),
     "source": ("", "what was given as the source, a list with one entry for each camera"),
     "frames_chosen": ("frames", "start and stop of `--frames`; null is an end that was not given"),
@@ -24,10 +24,10 @@ ASKED = {
     ),
     "version": ("", "the version of posefit"),
     "train": ("", "names of the motions that the prior learned from"),
-    "view_degrees": ("degrees", "where the cameras were told to stand; null where nobody said"),
-    "translation": ("", "how the root's place is found: known, searched or aligned"),
-    "first_pose": ("", "how the first pose is found: searched, or given"),
-    "kept_pass": ("", "which of these passes is told, the first being 1"),
+    "view_degrees": ("degrees", "the given directions of the cameras; null where unknown"),
+    "translation": ("", "the root's position: known, searched or aligned"),
+    "first_pose": ("", "the first pose: searched, or given"),
+    "kept_pass": ("", "the reported pass, the first being 1"),
     "passes": ("", "how often all frames were followed: [so](../howto/smoothing.md)"),
     "smooth": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/smoothing.md)"),
     "views": ("", "number of cameras"),
@@ -56,7 +56,7 @@ ROW = {
     "warnings": ("", "what to look at before the result is trusted"),
 }
 SPENT = ("evaluations_used", "dimensions", "seconds", "warnings")
-SAID = {
+RESULT = {
     "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
     "none_of_modes": (
         "",
@@ -92,8 +92,8 @@ CELL = {
     "fps": ("1/s", "frames a second"),
     "size": ("pixels", "width and height of the masks"),
     "evaluations": ("", "budget of a frame, in each track"),
-    "translation": ("", "how the root's place is found: known, searched or aligned"),
-    "first_pose": ("", "how the first pose is found: searched, or given"),
+    "translation": ("", "the root's position: known, searched or aligned"),
+    "first_pose": ("", "the first pose: searched, or given"),
     "hypotheses": ("", "of how many tracks from different beginnings one was chosen"),
     "yaw_off_degrees": ("degrees", "by how much the first known yaw is off at most; 180 for an unknown one"),
     "body_off_percent": ("%", "by how much the known bones and radii are off at most"),
@@ -108,9 +108,9 @@ def page() -> str:
     """Return the three tables, as Markdown."""
     parts = [
         "## Keys of `summary.json`",
-        "`posefit track --json` prints the same object. First what was asked, then what was found.",
-        _table("key", _told(ASKED)),
-        _table("key", [*_measured(MEASURES.values()), *_told(SAID)]),
+        "`posefit track --json` prints the same object. First the request, then the results.",
+        _table("key", _described(REQUEST)),
+        _table("key", [*_measured(MEASURES.values()), *_described(RESULT)]),
         "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, `baselines_degrees` and "
         "`baselines_mm` hold one number for each baseline:",
         _table(
@@ -118,7 +118,7 @@ def page() -> str:
             [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],
         ),
         "`coverage` holds a share for each of `50`, `80` and `95`, and `interval_mm` a radius. A figure that needs the "
-        "truth is `null` where nobody knows it, and one that a method has to say where it does not.",
+        "truth is `null` where it is unknown, and a figure of a method is `null` where the method does not report it.",
         "## Columns of `frames.csv`",
         "One row a frame; those that need the truth are there only where it is known.",
         _table("column", [*_measured(FRAME.values()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())]),
@@ -127,11 +127,11 @@ def page() -> str:
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
         "`baselines_degrees.mean_pose`.",
         "What the cell is:",
-        _table("column", [*_told({name: ROW[name] for name in ("key", "version", "status", "reason")}), *_told(CELL)]),
+        _table("column", [*_described({name: ROW[name] for name in ("key", "version", "status", "reason")}), *_described(CELL)]),
         "What it measured:",
         _table(
             "column",
-            [*_measured(_of_rows()), *_told({name: ROW[name] for name in SPENT})],
+            [*_measured(_of_rows()), *_described({name: ROW[name] for name in SPENT})],
         ),
         _table(
             "column",
@@ -151,7 +151,7 @@ def _measured(measures: Iterable[Measure]) -> list[tuple[str, str, str]]:
     return [(one.name, one.unit if one.factor == 1.0 else RAW[one.unit], one.meaning) for one in measures]
 
 
-def _told(said: Said) -> list[tuple[str, str, str]]:
+def _described(said: Said) -> list[tuple[str, str, str]]:
     return [(name, unit, meaning) for name, (unit, meaning) in said.items()]
 
 

@@ -11,9 +11,9 @@ def pages() -> dict[str, str]:
     """Return a page for each package, by its name, and one that lists them."""
     packages = {name: _modules(name) for name in _packages()}
     alone = [f"posefit.{one.name}" for one in pkgutil.iter_modules([str(ROOT / "posefit")]) if _alone(one)]
-    found = {name: _page(name, modules) for name, modules in packages.items()}
-    found["posefit"] = _page("posefit", alone)
-    return found
+    pages = {name: _page(name, modules) for name, modules in packages.items()}
+    pages["posefit"] = _page("posefit", alone)
+    return pages
 
 
 def _alone(module: pkgutil.ModuleInfo) -> bool:
@@ -29,8 +29,8 @@ def _packages() -> list[str]:
 
 def _modules(package: str) -> list[str]:
     path = importlib.import_module(package).__path__
-    found = sorted(one.name for one in pkgutil.walk_packages(path, f"{package}."))
-    return [name for name in found if importlib.import_module(name).__doc__]
+    modules = sorted(module.name for module in pkgutil.walk_packages(path, f"{package}."))
+    return [name for name in modules if importlib.import_module(name).__doc__]
 
 
 def _page(package: str, modules: list[str]) -> str:
