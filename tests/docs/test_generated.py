@@ -52,9 +52,9 @@ def test_every_key_of_summary_json_is_told(followed: Path) -> None:
     import json
 
     found = json.loads((followed / "summary.json").read_text("utf-8"))
-    told = {*figures.ASKED, *figures.MEASURES, *figures.SAID}
-    assert set(found) <= told
-    assert told - set(found) <= {"history"}  # of a single frame
+    described = {*figures.REQUEST, *figures.MEASURES, *figures.RESULT}
+    assert set(found) <= described
+    assert described - set(found) <= {"history"}  # of a single frame
 
 
 def test_every_column_of_frames_csv_is_told(followed: Path) -> None:
@@ -66,16 +66,16 @@ def test_every_column_of_frames_csv_is_told(followed: Path) -> None:
 
 def test_every_column_of_a_sweeps_csv_is_told() -> None:
     row = run_cell(cell_of({"method": "sapso@pca", "motion": "walk", "frames": 2, "evaluations": 80})).row
-    told = rows(figures.page().partition("## Columns of a sweep")[2])
+    described = rows(figures.page().partition("## Columns of a sweep")[2])
     for column in flat(row):
-        assert column in told or column.partition(".")[0] in told or column.startswith("joint_errors_mm."), column
+        assert column in described or column.partition(".")[0] in described or column.startswith("joint_errors_mm."), column
 
 
 def test_every_setting_of_every_method_is_told() -> None:
-    told = rows(settings.page())
+    described = rows(settings.page())
     for kind in KINDS:
         for offer in registry().offers[kind].values():
-            assert {f"{offer.name}.{one.name}" for one in offer.settings} <= told or offer.distribution != "posefit"
+            assert {f"{offer.name}.{one.name}" for one in offer.settings} <= described or offer.distribution != "posefit"
 
 
 def test_every_equation_has_a_line_and_a_test() -> None:
@@ -93,8 +93,8 @@ def test_every_joint_is_told() -> None:
 def test_every_angle_is_told(followed: Path) -> None:
     head = (followed / "angles.csv").read_text("utf-8").splitlines()[0].split(",")
     assert head == ["frame", "seconds", *COLUMNS]
-    told = re.findall(r"^\| `(\w+)` \|", angles.page(), re.MULTILINE)
-    assert {name.partition("_")[2] for name in COLUMNS} == set(told)
+    described = re.findall(r"^\| `(\w+)` \|", angles.page(), re.MULTILINE)
+    assert {name.partition("_")[2] for name in COLUMNS} == set(described)
     page = (DOCS / "howto" / "measuring.md").read_text("utf-8")
     steps = (followed / "gait.csv").read_text("utf-8").splitlines()[0].split(",")
     assert re.findall(r"^\| `(\w+)` \|", page.partition("of `gait.csv`")[2], re.MULTILINE) == steps
