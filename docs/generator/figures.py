@@ -19,8 +19,8 @@ REQUEST = {
     "evaluations_per_frame": ("", "budget of a frame, in each track"),
     "hypotheses": (
         "",
-        "of each of several [tracks](../howto/hypotheses.md): its `beginning`, silhouette `cost` and pull of `motion`, and "
-        "whether it was `kept`; empty where there was one",
+        "of each of several [hypotheses](../howto/hypotheses.md): its `beginning`, silhouette `cost` and `motion` term, "
+        "and whether it was `kept`; empty where there was one",
     ),
     "version": ("", "the version of posefit"),
     "train": ("", "names of the motions that the prior learned from"),
@@ -127,7 +127,7 @@ def page() -> str:
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
         "`baselines_degrees.mean_pose`.",
         "What the cell is:",
-        _table("column", [*_described({name: ROW[name] for name in ("key", "version", "status", "reason")}), *_described(CELL)]),
+        _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason")} | CELL)),
         "What it measured:",
         _table(
             "column",

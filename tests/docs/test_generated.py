@@ -68,14 +68,18 @@ def test_every_column_of_a_sweeps_csv_is_told() -> None:
     row = run_cell(cell_of({"method": "sapso@pca", "motion": "walk", "frames": 2, "evaluations": 80})).row
     described = rows(figures.page().partition("## Columns of a sweep")[2])
     for column in flat(row):
-        assert column in described or column.partition(".")[0] in described or column.startswith("joint_errors_mm."), column
+        assert column in described or column.partition(".")[0] in described or column.startswith("joint_errors_mm."), (
+            column
+        )
 
 
 def test_every_setting_of_every_method_is_told() -> None:
     described = rows(settings.page())
     for kind in KINDS:
         for offer in registry().offers[kind].values():
-            assert {f"{offer.name}.{one.name}" for one in offer.settings} <= described or offer.distribution != "posefit"
+            assert {
+                f"{offer.name}.{one.name}" for one in offer.settings
+            } <= described or offer.distribution != "posefit"
 
 
 def test_every_equation_has_a_line_and_a_test() -> None:
