@@ -19,7 +19,7 @@ REQUEST = {
     "evaluations_per_frame": ("", "budget of a frame, in each track"),
     "hypotheses": (
         "",
-        "of each of several [hypotheses](../howto/hypotheses.md): its `beginning`, silhouette `cost` and `motion` term, "
+        "of each of several [hypotheses](../howto/hypotheses.md): its `beginning`, silhouette `cost`, `motion` term, "
         "and whether it was `kept`; empty where there was one",
     ),
     "version": ("", "the version of posefit"),
@@ -101,7 +101,7 @@ CELL = {
 }
 HEAD = "| {0} | unit | meaning |\n|---|---|---|"
 
-Said = Mapping[str, tuple[str, str]]
+Descriptions = Mapping[str, tuple[str, str]]
 
 
 def page() -> str:
@@ -151,8 +151,8 @@ def _measured(measures: Iterable[Measure]) -> list[tuple[str, str, str]]:
     return [(one.name, one.unit if one.factor == 1.0 else RAW[one.unit], one.meaning) for one in measures]
 
 
-def _described(said: Said) -> list[tuple[str, str, str]]:
-    return [(name, unit, meaning) for name, (unit, meaning) in said.items()]
+def _described(values: Descriptions) -> list[tuple[str, str, str]]:
+    return [(name, unit, meaning) for name, (unit, meaning) in values.items()]
 
 
 def _joints() -> str:
