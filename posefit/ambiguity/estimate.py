@@ -32,9 +32,9 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses, turned_poses
-from posefit.listening import QUIET, Listener
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
+from posefit.progress import QUIET, Progress
 from posefit.reading import parsed_json, read_text
 from posefit.silhouette.cost import pose_costs, project
 from posefit.silhouette.mask import Silhouette
@@ -408,15 +408,15 @@ def ambiguity_of(
         raise useless_for("motion", "build", str(build), "footage")
     viewing = TrackOptions(**options)
     clips = training_clips(train, viewing.asf, followed=sources[0])  # before the work, as a name may be wrong
-    listener = Listener(say or QUIET.say, QUIET.progress)
+    progress = Progress(say or QUIET.log, QUIET.steps)
     if not motion:
         viewing = viewing.changed(frames=(frame, frame + 1))
-    scene = scene_of(sources, listener, **viewing.view)
+    scene = scene_of(sources, progress, **viewing.view)
     if build is not None:
         scene = replace(scene, body=body_of(build, scene.body))
     moment = _moment(scene, frame if motion else 0, frame, translation, threads)
     for warning in scene.warnings:
-        listener.say(f"warning: {warning}")
+        progress.warn(warning)
     began = time.perf_counter()
     library = LibraryPoses.of(training_motions(clips, FPS), scene.body.skeleton)
     states = states_within(moment, library.poses, within)

@@ -22,7 +22,7 @@ from posefit.footage.video import Video
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
-from posefit.listening import Listener
+from posefit.progress import Progress
 from posefit.silhouette.foreground import Image
 
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
@@ -49,9 +49,9 @@ def masks_of(path: Path, frames: Range, label: int | None, holes: float | None) 
     return CameraView(masks, str(path), warnings=warnings)
 
 
-def video_of(video: Video, segmentation: Segmentation, listener: Listener) -> CameraView:
+def video_of(video: Video, segmentation: Segmentation, progress: Progress) -> CameraView:
     """Return what a video shows. Raises InputError where its masks cannot be those of a person."""
-    masks = segmented(segmentation, listener.progress)
+    masks = segmented(segmentation, progress.steps)
     if segmentation.verdict and segmentation.verdict.refused:
         raise InputError(segmentation.verdict.text)
     pictures = partial(video.frames, segmentation.start, segmentation.stop, segmentation.size)

@@ -17,9 +17,9 @@ from posefit.footage.video import Video
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
-from posefit.listening import QUIET, Listener
 from posefit.motion import built_in, recorded
 from posefit.motion.motion import Motion
+from posefit.progress import QUIET, Progress
 from posefit.reading import quoted
 
 MOTIONS = (".amc", ".bvh")
@@ -55,7 +55,7 @@ def useless_for(kind: Kind, name: str, value: object, where: str) -> InputError:
 
 def scene_of(
     sources: Sequence[Source],
-    listener: Listener = QUIET,
+    progress: Progress = QUIET,
     *,
     asf: str | Path | None = None,
     camera: Sequence[Camera | str | Path] = (),
@@ -89,7 +89,7 @@ def scene_of(
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
     paths = [Path(source) for source in sources if not isinstance(source, Motion)]
     if kind == "video":
-        views = _filmed(paths, camera, extraction or Extraction(), frames, listener)
+        views = _filmed(paths, camera, extraction or Extraction(), frames, progress)
     else:
         calibrated(camera, [None] * len(paths))
         views = [masks_of(path, frames, label, holes) for path in paths]
@@ -181,7 +181,7 @@ def _filmed(
     cameras: Sequence[Camera | str | Path],
     extraction: Extraction,
     frames: Range,
-    listener: Listener,
+    progress: Progress,
 ) -> list[CameraView]:
     """Return what videos show, after everything that a user may have got wrong was checked."""
     videos = [Video.of(path) for path in paths]
@@ -192,8 +192,8 @@ def _filmed(
     segmentations = [Segmentation(video, extraction, frames) for video in videos]
     views = []
     for video, segmentation in zip(videos, segmentations, strict=True):
-        listener.say(f"taking the person out of {video.path}")
-        views.append(video_of(video, segmentation, listener))
+        progress.log(f"taking the person out of {video.path}")
+        views.append(video_of(video, segmentation, progress))
     return views
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from posefit.fitting.tracker import Frame, Task, Tracker
 from posefit.footage.scene import Scene
-from posefit.listening import Listener
+from posefit.progress import Progress
 from posefit.tracking.initialise import Guess, following
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
@@ -36,7 +36,7 @@ class Tracked:
     fastest_turn: float = MAX_TURN_RATE
 
 
-def follow(guess: Guess, method: Method, options: TrackOptions, output: Output, listener: Listener) -> list[Hypothesis]:
+def follow(guess: Guess, method: Method, options: TrackOptions, output: Output, progress: Progress) -> list[Hypothesis]:
     """Return the frames of each hypothesis. Each is recorded as it comes; recorded ones are not tracked again."""
     earlier, state = output.earlier()
     scene, count, total = guess.scene, guess.scene.count, options.hypotheses
@@ -52,15 +52,15 @@ def follow(guess: Guess, method: Method, options: TrackOptions, output: Output, 
         if state is not None and 0 < len(frames) < count:
             rng.bit_generator.state = state
             frames = [_without_trajectory(frame) for frame in frames]
-            listener.say(f"going on from frame {len(frames)} of {count}{which}")
+            progress.log(f"going on from frame {len(frames)} of {count}{which}")
             last = frames[-1]
             task = replace(task, yaw=float(last.pose[0]), first_pose=last.pose[3:], before=tuple(frames))
         elif which and not frames:
-            listener.say(f"track {number + 1} of {total}: {name}")
+            progress.log(f"track {number + 1} of {total}: {name}")
         hypotheses.append(Hypothesis(name, frames))
         if len(frames) < count:
             rest = (scene.observations[k] for k in range(len(frames), count))
-            for frame in listener.progress(tracker_of(method, scene, task).track(rest, rng), count - len(frames)):
+            for frame in progress.steps(tracker_of(method, scene, task).track(rest, rng), count - len(frames)):
                 output.record(frame, dict(rng.bit_generator.state))
                 frames.append(frame)
     return hypotheses
@@ -75,7 +75,7 @@ def tracker_of(method: Method, scene: Scene, task: Task) -> Tracker:
 
 
 def retrack(
-    guess: Guess, method: Method, hypotheses: Sequence[Hypothesis], options: TrackOptions, listener: Listener
+    guess: Guess, method: Method, hypotheses: Sequence[Hypothesis], options: TrackOptions, progress: Progress
 ) -> Tracked:
     """Return the cheapest hypothesis, tracked again where footage spins under a method that looks ahead."""
     scene, task = guess.scene, guess.task
@@ -85,7 +85,7 @@ def retrack(
     again = retrack_spins(task, scene.observations, frames, following(method), options.seed)
     if again.start is not None:
         how = f"it was followed again, onward and backwards from frame {again.start}"
-        listener.say(f"the body turned faster than anybody does: {how}")
+        progress.log(f"the body turned faster than anybody does: {how}")
     return Tracked(again.frames, table, again.start)
 
 

@@ -15,9 +15,9 @@ from posefit.fitting.check import whole
 from posefit.footage.scene import Scene
 from posefit.footage.source import Source, check_used, kind_of, scene_of
 from posefit.footage.training import training_clips, training_motions
-from posefit.listening import QUIET, Listener
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.progress import QUIET, Progress
 from posefit.reading import quoted
 from posefit.tracking.identity import ArgumentDigest
 from posefit.tracking.method import resolved
@@ -81,19 +81,19 @@ def track(
         from posefit.tracking.recording import check_recording
 
         check_recording(rerun)
-    listener = Listener(say or QUIET.say, progress or QUIET.progress)
+    reporting = Progress(say or QUIET.log, progress or QUIET.steps)
     folder: AbstractContextManager[Nowhere | OutputFolder] = Nowhere()
     if out is not None:
-        folder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), listener.say)
+        folder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), reporting.log)
     with folder as output:
-        scene = scene or scene_of(sources, listener, **chosen.view)
+        scene = scene or scene_of(sources, reporting, **chosen.view)
         names = {
             "source": [one.name if isinstance(one, Motion) else str(one) for one in sources],
             "frames_chosen": list(chosen.frames),
             "view_degrees": options.get("view_degrees"),
         }
         training = training_motions(clips, scene.fps)
-        result = track_scene(scene, training, chosen, output=output, listener=listener, source=names)
+        result = track_scene(scene, training, chosen, output=output, progress=reporting, source=names)
         if rerun is not None:
             from posefit.tracking.recording import record
 

@@ -10,8 +10,8 @@ import numpy as np
 from posefit.fitting.shape import Shape, fit_shape
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
-from posefit.listening import Listener
 from posefit.motion.motion import Motion
+from posefit.progress import Progress
 from posefit.settings import POPULATION_SIZE
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
@@ -49,26 +49,26 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
     )
 
 
-def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, listener: Listener) -> Guess:
+def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, progress: Progress) -> Guess:
     """Return the first pose, where it is searched by restarts, and the person's build, where it is fitted."""
     began = time.perf_counter()
-    with _compiling_announced(listener.say):
+    with _compiling_announced(progress.log):
         looks_ahead = _warm_up(method, task, scene)
-    listener.say(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
+    progress.log(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
 
     follow, footage = following(method), scene.truth is None
     restarts = (RESTARTS if footage and not looks_ahead else 0) if options.restarts is None else options.restarts
     body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
     if restarts:
-        listener.say(f"looking for the first pose, {restarts} times")
+        progress.log(f"looking for the first pose, {restarts} times")
         task = best_restart(task, scene.observations, follow, restarts, options.seed)
     shape = None
     if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
         few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"
         needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"
-        listener.say(f"no build is fitted to {body_frames} frames: {few}, {needed}")
+        progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
     elif body_frames:
-        listener.say(f"fitting the person's build to {body_frames} frames")
+        progress.log(f"fitting the person's build to {body_frames} frames")
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = options.height or (task.body.stature if alone else None)
         shape = fitted_build(task, scene.observations, follow, body_frames, height, options.seed)
@@ -139,7 +139,7 @@ def _compiling_announced(say: Callable[[str], None]) -> Iterator[None]:
     """Announce once that something is compiled that is not in numba's cache."""
     from numba.core import event
 
-    class Once(event.Listener):  # type: ignore[misc]
+    class Once(event.Progress):  # type: ignore[misc]
         announced = False
 
         def on_start(self, _event: event.Event) -> None:

@@ -26,7 +26,11 @@ class Measure:
     unit: str  # in which it is shown; "" for none
     digits: int  # that are shown after the point
     meaning: str
-    factor: float = 1.0  # what a value is multiplied by to be in `unit`
+
+    @property
+    def factor(self) -> float:
+        """What a value is multiplied by to be in `unit`."""
+        return {"%": 100.0, "ms": 1e3, "ms a frame": 1e3}.get(self.unit, 1.0)
 
     def number(self, value: float | None) -> str:
         """Return a value with its digits and without its unit; a dash where there is none."""
@@ -37,8 +41,14 @@ class Measure:
         return " ".join(word for word in (self.label, self.number(value), self.unit) if word)
 
 
-def _about(label: str, unit: str, digits: int, meaning: str, factor: float = 1.0) -> dict[str, Any]:
-    return {"measure": (label, unit, digits, meaning, factor)}
+def _required(*figure: Any) -> Any:
+    """Return the field of a figure: all of `Measure` but the name."""
+    return field(metadata={"measure": figure})
+
+
+def _optional(*figure: Any) -> Any:
+    """Return the field of a figure that may be unknown: None."""
+    return field(default=None, metadata={"measure": figure})
 
 
 @dataclass(frozen=True)
@@ -54,172 +64,94 @@ class Spread:
 class Measures:
     """What one track is worth. Baselines and skill are by the names of `BASELINES`."""
 
-    error_degrees: Spread | None = field(
-        default=None,
-        metadata=_about(
-            "error",
-            "degrees",
-            2,
-            "absolute difference of the 66 angles from the true ones, the mean over angles: its mean over the frames, "
-            "standard deviation and maximum. SAPSO (8)-(10)",
-        ),
+    error_degrees: Spread | None = _optional(
+        "error",
+        "degrees",
+        2,
+        "absolute difference of the 66 angles from the true ones, the mean over angles: its mean over the frames, "
+        "standard deviation and maximum. SAPSO (8)-(10)",
     )
-    geodesic_degrees: float | None = field(
-        default=None,
-        metadata=_about(
-            "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
-        ),
+    geodesic_degrees: float | None = _optional(
+        "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
     )
-    free_error_degrees: float | None = field(
-        default=None,
-        metadata=_about(
-            "error of free angles", "degrees", 2, "the error over those angles alone that the skeleton lets move"
-        ),
+    free_error_degrees: float | None = _optional(
+        "error of free angles", "degrees", 2, "the error over those angles alone that the skeleton lets move"
     )
-    mpjpe_mm: float | None = field(
-        default=None,
-        metadata=_about("MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point"),
+    mpjpe_mm: float | None = _optional(
+        "MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point"
     )
-    pa_mpjpe_mm: float | None = field(
-        default=None,
-        metadata=_about("PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)"),
+    pa_mpjpe_mm: float | None = _optional(
+        "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)"
     )
-    iou: float = field(
-        metadata=_about(
-            "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
-        )
+    iou: float = _required(
+        "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
     )
-    cost: float = field(
-        metadata=_about("cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)")
+    cost: float = _required("cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)")
+    swap_rate: float | None = _optional(
+        "left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored"
     )
-    swap_rate: float | None = field(
-        default=None,
-        metadata=_about("left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored", 100.0),
+    lost_rate: float | None = _optional("lost", "%", 0, "share of frames with an MPJPE above 150 mm")
+    coverage: Mapping[str, float] | None = _optional(
+        "coverage", "%", 0, "share of joints but the root whose truth lies within their 50, 80 and 95 % intervals"
     )
-    lost_rate: float | None = field(
-        default=None, metadata=_about("lost", "%", 0, "share of frames with an MPJPE above 150 mm", 100.0)
+    interval_mm: Mapping[str, float] | None = _optional(
+        "interval",
+        "mm",
+        0,
+        "radius about a joint that holds it in 50, 80 and 95 % of cases, the mean over all but the root",
     )
-    coverage: Mapping[str, float] | None = field(
-        default=None,
-        metadata=_about(
-            "coverage",
-            "%",
-            0,
-            "share of joints, all but the root, whose truth lies within the ball about them that is to hold 50, 80 or "
-            "95 of 100, both roots at one point; where a method says how sure it is",
-            100.0,
-        ),
+    unknown_rate: float | None = _optional(
+        "said unknown", "%", 0, "share of frames whose left and right the method calls unknown, where it reports it"
     )
-    interval_mm: Mapping[str, float] | None = field(
-        default=None,
-        metadata=_about(
-            "interval",
-            "mm",
-            0,
-            "radius of the ball about a joint that is to hold it in 50, 80 or 95 of 100 cases, the mean over all "
-            "joints but the root and over the frames; where a method says how sure it is",
-        ),
+    swapped_known_rate: float | None = _optional(
+        "swapped where known", "%", 0, "share swapped of the frames whose left and right it calls known"
     )
-    unknown_rate: float | None = field(
-        default=None,
-        metadata=_about(
-            "said unknown",
-            "%",
-            0,
-            "share of frames whose left and right the method calls unknown, where it says",
-            100.0,
-        ),
+    lost_said_rate: float | None = _optional(
+        "said lost", "%", 0, "share of frames that the method calls lost, where it reports it"
     )
-    swapped_known_rate: float | None = field(
-        default=None,
-        metadata=_about(
-            "swapped where known", "%", 0, "share swapped of the frames whose left and right it calls known", 100.0
-        ),
+    acceleration: float | None = _optional(
+        "acceleration", "m/s2", 1, "of the joints, the mean over joints and frames: about 6 in a walk; more is jitter"
     )
-    lost_said_rate: float | None = field(
-        default=None,
-        metadata=_about("said lost", "%", 0, "share of frames that the method calls lost, where it says", 100.0),
+    acceleration_ratio: float | None = _optional("acceleration ratio", "", 1, "the same, over that of the true joints")
+    foot_slide_mm: float | None = _optional(
+        "foot slide",
+        "mm a step",
+        0,
+        "how far a foot gets along the ground from where it first stood, the mean over steps; a foot stands where "
+        "the true one does, or, where that is unknown, where it is low and slow; about 20 of motion capture; none "
+        "where no foot stands",
     )
-    acceleration: float | None = field(
-        default=None,
-        metadata=_about(
-            "acceleration",
-            "m/s2",
-            1,
-            "how fast the joints accelerate, the mean over joints and frames: a walk has about 6; more is jitter",
-        ),
+    held_frames: int = _required(
+        "held", "frames", 0, "frames that show too little: the pose is held or carried on, not searched"
     )
-    acceleration_ratio: float | None = field(
-        default=None, metadata=_about("acceleration ratio", "", 1, "the same, over that of the true joints")
+    skill: Mapping[str, float | None] | None = _optional(
+        "skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline"
     )
-    foot_slide_mm: float | None = field(
-        default=None,
-        metadata=_about(
-            "foot slide",
-            "mm a step",
-            0,
-            "how far a foot gets along the ground from where it first stood, the mean over steps; a foot stands where "
-            "the true one does, or, where that is unknown, where it is low and slow; about 20 of motion capture; none "
-            "where no foot stands",
-        ),
+    baselines_degrees: Mapping[str, float] | None = _optional(
+        "baselines", "degrees", 2, "errors of trivial methods, given the true root and translation"
     )
-    held_frames: int = field(
-        metadata=_about(
-            "held", "frames", 0, "frames that show too little: the pose is held or carried on, not searched"
-        )
+    baselines_mm: Mapping[str, float] | None = _optional(
+        "baselines' MPJPE", "mm", 0, "MPJPE of trivial methods, given the same"
     )
-    skill: Mapping[str, float | None] | None = field(
-        default=None,
-        metadata=_about(
-            "skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline"
-        ),
+    prior_floor_degrees: float | None = _optional(
+        "truth projected into the prior", "degrees", 2, "error of the true poses' projection; a floor of linear priors"
     )
-    baselines_degrees: Mapping[str, float] | None = field(
-        default=None,
-        metadata=_about(
-            "baselines", "degrees", 2, "errors of what anybody reaches, given the true root and translation"
-        ),
+    seconds_per_frame: float = _required("time", "ms a frame", 1, "wall time a frame")
+    cpu_seconds_per_frame: float | None = _required(
+        "CPU time", "ms a frame", 1, "of all threads, where a tracker reports it; a busy machine does not add to it"
     )
-    baselines_mm: Mapping[str, float] | None = field(
-        default=None, metadata=_about("baselines' MPJPE", "mm", 0, "MPJPE of what anybody reaches, in the same way")
-    )
-    prior_floor_degrees: float | None = field(
-        default=None,
-        metadata=_about(
-            "truth projected into the prior",
-            "degrees",
-            2,
-            "error of the true poses put into the prior and taken out again; no floor, as a prior that is "
-            "not linear may hold nearer ones",
-        ),
-    )
-    seconds_per_frame: float = field(metadata=_about("time", "ms a frame", 1, "wall time a frame", 1e3))
-    cpu_seconds_per_frame: float | None = field(
-        metadata=_about(
-            "CPU time",
-            "ms a frame",
-            1,
-            "processor time a frame, of all threads of the process together, where a tracker says; a busy machine "
-            "does not add to it",
-            1e3,
-        )
-    )
-    evaluations: int = field(
-        metadata=_about("evaluations", "", 0, "poses whose cost was computed, in all frames together")
-    )
-    evaluations_per_second: float = field(
-        metadata=_about("speed", "poses a second", 0, "evaluations over the time they took")
-    )
+    evaluations: int = _required("evaluations", "", 0, "poses whose cost was computed, in all frames together")
+    evaluations_per_second: float = _required("speed", "poses a second", 0, "evaluations over the time they took")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures by name, as JSON holds them."""
         return asdict(self)
 
 
-MEASURES = {one.name: Measure(one.name, *one.metadata["measure"]) for one in fields(Measures)}
+MEASURES = {figure.name: Measure(figure.name, *figure.metadata["measure"]) for figure in fields(Measures)}
 FRAME = {
-    one.name: one
-    for one in (
+    measure.name: measure
+    for measure in (
         Measure("frame", "frame", "", 0, "number of the frame, from 0"),
         Measure("cost", "cost", "", 2, "silhouette mismatch of the estimated pose, 0 to 100. SAPSO (4)"),
         Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
@@ -230,14 +162,10 @@ FRAME = {
         Measure("pa_mpjpe_mm", "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation"),
         Measure("swapped", "swapped", "", 0, "1 where the frame is nearer to the truth when mirrored"),
         Measure(
-            "unknown_sides",
-            "sides unknown",
-            "",
-            0,
-            "1 where left and right are unknown; blank where it is not estimated",
+            "unknown_sides", "sides unknown", "", 0, "1 where left and right are unknown; blank where not estimated"
         ),
-        Measure("lost", "lost", "", 2, "how likely the frame is lost, 0 to 1; blank where it is not estimated"),
+        Measure("lost", "lost", "", 2, "probability that the frame is lost; blank where not estimated"),
         Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
-        Measure("seconds", "time", "ms", 1, "wall time", 1e3),
+        Measure("seconds", "time", "ms", 1, "wall time"),
     )
 }

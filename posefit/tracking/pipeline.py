@@ -17,8 +17,8 @@ from threadpoolctl import threadpool_limits
 
 from posefit.errors import InputError
 from posefit.footage.scene import Scene, on_device
-from posefit.listening import QUIET, Listener
 from posefit.motion.motion import Motion
+from posefit.progress import QUIET, Progress
 from posefit.tracking.follow import follow, retrack
 from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import prepare
@@ -34,7 +34,7 @@ def track_scene(
     options: TrackOptions | None = None,
     *,
     output: Output | None = None,
-    listener: Listener = QUIET,
+    progress: Progress = QUIET,
     source: Mapping[str, Any] | None = None,
 ) -> Track:
     """Return a scene's motion tracked by a method that learns from `training`, with its errors or signs of trust.
@@ -53,15 +53,15 @@ def track_scene(
         raise InputError(f"passes must be 1 where a track is not smooth, got {options.passes}")
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         for warning in scene.warnings:
-            listener.say(f"warning: {warning}")
+            progress.warn(warning)
         method = prepare(options, task)
-        guess = initialise(scene, method, task, options, listener)
+        guess = initialise(scene, method, task, options, progress)
         method.audit.clear()  # what was tried before the first frame is in no row
-        hypotheses = follow(guess, method, options, output, listener)
-        tracked = retrack(guess, method, hypotheses, options, listener)
+        hypotheses = follow(guess, method, options, output, progress)
+        tracked = retrack(guess, method, hypotheses, options, progress)
         if tracked.start is not None:
             guess = replace(guess, task=replace(guess.task, fastest_turn=tracked.fastest_turn))
         smoothed = Pass(guess.scene, tracked.frames, guess.shape, 1)
         if options.smooth:
-            smoothed = smooth(guess, method, tracked.frames, options, listener)
-        return evaluate(smoothed, method, guess.task, tracked, options, output, listener, source or {})
+            smoothed = smooth(guess, method, tracked.frames, options, progress)
+        return evaluate(smoothed, method, guess.task, tracked, options, output, progress, source or {})

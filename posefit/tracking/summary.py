@@ -9,10 +9,10 @@ import numpy as np
 from posefit.fitting.shape import NAMES, Shape
 from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.skeleton import Skeleton
-from posefit.listening import Listener
 from posefit.measuring.gait import gait_of
 from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
+from posefit.progress import Progress
 from posefit.tracking.evaluation import LOST, Evaluation, unseen
 from posefit.tracking.follow import Tracked
 from posefit.tracking.measures import Measures
@@ -46,7 +46,7 @@ def evaluate(
     tracked: Tracked,
     options: TrackOptions,
     output: Output,
-    listener: Listener,
+    progress: Progress,
     source: Mapping[str, Any],
 ) -> Track:
     """Return a track with errors against the truth where it is known, else signs of trust, and write its files."""
@@ -58,7 +58,7 @@ def evaluate(
     ]
     modes = _trajectory_modes(skeleton, frames)
     for warning in method.audit.warnings:
-        listener.say(f"warning: {warning}")
+        progress.warn(warning)
     evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
     for frame, observation in zip(frames, scene.observations, strict=True):
         evaluation.add(frame, observation)
@@ -73,7 +73,7 @@ def evaluate(
     walks_back = backwards(estimate, unseen(rows))
     warnings = [*scene.warnings, *method.audit.warnings]
     if scene.truth is None and (warning := warned(walks_back)):
-        listener.say(f"warning: {warning}")
+        progress.warn(warning)
         warnings.append(warning)
     summary = {
         "motion": scene.name,

@@ -16,8 +16,8 @@ from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
-from posefit.listening import Listener
 from posefit.motion.motion import Motion
+from posefit.progress import Progress
 from posefit.silhouette.cost import only_camera, pose_costs
 from posefit.tracking.follow import tracker_of
 from posefit.tracking.initialise import Guess
@@ -52,7 +52,7 @@ class Pass:
         return mean_cost(self.frames, np.array([observation.usable for observation in self.scene.observations]))
 
 
-def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: TrackOptions, listener: Listener) -> Pass:
+def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: TrackOptions, progress: Progress) -> Pass:
     """Return a track smoothed; of several passes the last that costs not much more than the one kept before it.
 
     Each pass has the full budget, and follows the path of the one that was kept before it. The frames have the effort
@@ -64,9 +64,9 @@ def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: Track
         scene, path = before.scene, [frame.translation for frame in before.frames]
         task = replace(guess.task, body=scene.body, translation="known", anchor=path[0], before=())
         known = (replace(one, translation=place) for one, place in zip(scene.observations, path, strict=True))
-        listener.say(f"following once more where it went, pass {number + 1} of {options.passes}")
+        progress.log(f"following once more where it went, pass {number + 1} of {options.passes}")
         rng = stream(options.seed, "pass", number)
-        tracked = list(listener.progress(tracker_of(method, scene, task).track(known, rng), scene.count))
+        tracked = list(progress.steps(tracker_of(method, scene, task).track(known, rng), scene.count))
         passes.append(Pass.smoothed(scene, tracked, before.shape, method.beta, number + 1))
         if cheaper(passes[-1].cost, before.cost, PASS_TOLERANCE):
             kept = number
