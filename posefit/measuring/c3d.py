@@ -31,7 +31,7 @@ def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gai
 
     Strikes and toe-offs of `gait` are the file's events, the first 255 of them.
     """
-    joints = motion.skeleton.joints(motion.poses, motion.translations) * MILLIMETRES
+    joints = motion.joints * MILLIMETRES
     points = np.concatenate([joints, np.zeros((*joints.shape[:2], 1))], axis=2).astype("<f4")
     points[sorted(blank)] = (0.0, 0.0, 0.0, -1.0)
     parameters, start = b"", 0

@@ -45,5 +45,5 @@ CENTRES = tuple(
 
 def joint_centres(motion: Motion) -> dict[str, Array]:
     """Return where the centres of the twelve large joints are in each frame, (T, 3) metres in the world, by name."""
-    joints = motion.skeleton.joints(motion.poses, motion.translations)
+    joints = motion.joints
     return {name: joints[:, PLACES.index(name)] for name in CENTRES}

@@ -42,7 +42,7 @@ def gait_events(motion: Motion) -> GaitEvents:
     """
     if motion.fps < SLOWEST:
         raise InputError(f"fps must be at least {SLOWEST:g} to find the events of gait, got {motion.fps:g}")
-    joints = motion.skeleton.joints(motion.poses, motion.translations)[:, :, ::2]
+    joints = motion.joints[:, :, ::2]
     joints = low_pass(joints, CUTOFF, motion.fps)
     facing = rotation_from_root_angles(motion.poses[:, :3]) @ FORWARDS
     heading = low_pass(facing[:, ::2], SWAY, motion.fps)

@@ -12,7 +12,7 @@ def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> 
 
     Markers are named by `PLACES`. Programs that read such files take an empty field for an unobserved marker.
     """
-    path, joints = Path(path), motion.skeleton.joints(motion.poses, motion.translations)
+    path, joints = Path(path), motion.joints
     count, fps = len(motion), f"{motion.fps:g}"
     head = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame")
     lines = [

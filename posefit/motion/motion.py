@@ -44,6 +44,11 @@ class Motion:
     def __len__(self) -> int:
         return len(self.poses)
 
+    @property
+    def joints(self) -> Array:
+        """The joints (T, 27, 3) in the world, in metres."""
+        return self.skeleton.joints(self.poses, self.translations)
+
     def frames(self, start: int, stop: int) -> "Motion":
         """Return frames start to stop - 1 as a motion. Raises ValueError where that leaves the clip or is empty."""
         if not 0 <= start < stop <= len(self):

@@ -94,7 +94,7 @@ def write_formats(
     write_angles(folder / "angles.csv", estimate, blank)
     write_gait(folder / "gait.csv", gait)
     (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
-    joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
+    joints = estimate.joints
     names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
     with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

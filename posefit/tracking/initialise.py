@@ -139,7 +139,7 @@ def _compiling_announced(say: Callable[[str], None]) -> Iterator[None]:
     """Announce once that something is compiled that is not in numba's cache."""
     from numba.core import event
 
-    class Once(event.Progress):  # type: ignore[misc]
+    class Once(event.Listener):  # type: ignore[misc]
         announced = False
 
         def on_start(self, _event: event.Event) -> None:

@@ -26,11 +26,7 @@ class Measure:
     unit: str  # in which it is shown; "" for none
     digits: int  # that are shown after the point
     meaning: str
-
-    @property
-    def factor(self) -> float:
-        """What a value is multiplied by to be in `unit`."""
-        return {"%": 100.0, "ms": 1e3, "ms a frame": 1e3}.get(self.unit, 1.0)
+    factor: float = 1.0  # what a value is multiplied by to be in `unit`
 
     def number(self, value: float | None) -> str:
         """Return a value with its digits and without its unit; a dash where there is none."""
@@ -49,6 +45,11 @@ def _required(*figure: Any) -> Any:
 def _optional(*figure: Any) -> Any:
     """Return the field of a figure that may be unknown: None."""
     return field(default=None, metadata={"measure": figure})
+
+
+def _share(label: str, meaning: str) -> Any:
+    """Return the field of a share, shown in percent, that may be unknown."""
+    return _optional(label, "%", 0, meaning, 100.0)
 
 
 @dataclass(frozen=True)
@@ -87,12 +88,10 @@ class Measures:
         "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
     )
     cost: float = _required("cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)")
-    swap_rate: float | None = _optional(
-        "left/right swapped", "%", 0, "share of frames nearer to the truth when mirrored"
-    )
-    lost_rate: float | None = _optional("lost", "%", 0, "share of frames with an MPJPE above 150 mm")
-    coverage: Mapping[str, float] | None = _optional(
-        "coverage", "%", 0, "share of joints but the root whose truth lies within their 50, 80 and 95 % intervals"
+    swap_rate: float | None = _share("left/right swapped", "share of frames nearer to the truth when mirrored")
+    lost_rate: float | None = _share("lost", "share of frames with an MPJPE above 150 mm")
+    coverage: Mapping[str, float] | None = _share(
+        "coverage", "share of joints but the root whose truth lies within their 50, 80 and 95 % intervals"
     )
     interval_mm: Mapping[str, float] | None = _optional(
         "interval",
@@ -100,14 +99,14 @@ class Measures:
         0,
         "radius about a joint that holds it in 50, 80 and 95 % of cases, the mean over all but the root",
     )
-    unknown_rate: float | None = _optional(
-        "said unknown", "%", 0, "share of frames whose left and right the method calls unknown, where it reports it"
+    unknown_rate: float | None = _share(
+        "said unknown", "share of frames whose left and right the method calls unknown, where it reports it"
     )
-    swapped_known_rate: float | None = _optional(
-        "swapped where known", "%", 0, "share swapped of the frames whose left and right it calls known"
+    swapped_known_rate: float | None = _share(
+        "swapped where known", "share swapped of the frames whose left and right it calls known"
     )
-    lost_said_rate: float | None = _optional(
-        "said lost", "%", 0, "share of frames that the method calls lost, where it reports it"
+    lost_said_rate: float | None = _share(
+        "said lost", "share of frames that the method calls lost, where it reports it"
     )
     acceleration: float | None = _optional(
         "acceleration", "m/s2", 1, "of the joints, the mean over joints and frames: about 6 in a walk; more is jitter"
@@ -136,9 +135,13 @@ class Measures:
     prior_floor_degrees: float | None = _optional(
         "truth projected into the prior", "degrees", 2, "error of the true poses' projection; a floor of linear priors"
     )
-    seconds_per_frame: float = _required("time", "ms a frame", 1, "wall time a frame")
+    seconds_per_frame: float = _required("time", "ms a frame", 1, "wall time a frame", 1e3)
     cpu_seconds_per_frame: float | None = _required(
-        "CPU time", "ms a frame", 1, "of all threads, where a tracker reports it; a busy machine does not add to it"
+        "CPU time",
+        "ms a frame",
+        1,
+        "of all threads, where a tracker reports it; a busy machine does not add to it",
+        1e3,
     )
     evaluations: int = _required("evaluations", "", 0, "poses whose cost was computed, in all frames together")
     evaluations_per_second: float = _required("speed", "poses a second", 0, "evaluations over the time they took")
@@ -166,6 +169,6 @@ FRAME = {
         ),
         Measure("lost", "lost", "", 2, "probability that the frame is lost; blank where not estimated"),
         Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
-        Measure("seconds", "time", "ms", 1, "wall time"),
+        Measure("seconds", "time", "ms", 1, "wall time", 1e3),
     )
 }

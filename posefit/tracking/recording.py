@@ -58,7 +58,7 @@ def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Fr
             resolution=[camera.width, camera.height], focal_length=camera.focal, principal_point=camera.centre
         )
         recording.log(f"world/camera-{v}/mask", lens, static=True)
-    joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
+    joints = estimate.joints
     parents = np.array(PARENTS[1:])
     radii = scene.body.radii.mean(axis=1)
     for k, (points, observation, frame) in enumerate(zip(joints, scene.observations, frames, strict=True)):

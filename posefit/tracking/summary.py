@@ -13,7 +13,7 @@ from posefit.measuring.gait import gait_of
 from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
-from posefit.tracking.evaluation import LOST, Evaluation, unseen
+from posefit.tracking.evaluation import LOST, evaluated, unseen
 from posefit.tracking.follow import Tracked
 from posefit.tracking.measures import Measures
 from posefit.tracking.method import Method
@@ -21,6 +21,7 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
 from posefit.tracking.restarts import RELOCALISED
 from posefit.tracking.smoothing.smooth import Pass
+from posefit.tracking.trajectory import motion_of
 from posefit.tracking.trust import trust_of
 from posefit.uncertainty.modes import TrackMode, modes_of, track_modes
 from posefit.version import __version__
@@ -59,17 +60,8 @@ def evaluate(
     modes = _trajectory_modes(skeleton, frames)
     for warning in method.audit.warnings:
         progress.warn(warning)
-    evaluation = Evaluation(scene, method.prior, task.angles, method.beta)
-    for frame, observation in zip(frames, scene.observations, strict=True):
-        evaluation.add(frame, observation)
-    rows, measures = evaluation.close()
-    estimate = Motion(
-        scene.name,
-        skeleton,
-        np.array([frame.pose for frame in frames]),
-        np.array([frame.translation for frame in frames]),
-        scene.fps,
-    )
+    rows, measures = evaluated(scene, frames, method.prior, task.angles, method.beta)
+    estimate = motion_of(scene, frames)
     walks_back = backwards(estimate, unseen(rows))
     warnings = [*scene.warnings, *method.audit.warnings]
     if scene.truth is None and (warning := warned(walks_back)):

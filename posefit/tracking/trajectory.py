@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
-from posefit.geometry.skeleton import Skeleton
+from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import Skeleton, root_centred
 from posefit.motion.motion import Motion
 
-STEPS_PER_SECOND = 30.0  # how often velocities are compared, so that the jitter of a search counts the same at any rate
+VELOCITY_RATE = 30.0  # how often velocities are compared, so that the jitter of a search counts the same at any rate
 WALKING_SPEED = 1.0  # metres a second, of the joints about the root: the typical speed where nothing is learned from
 MIN_TYPICAL_SPEED = 0.25  # metres a second
-TURNING = 2.0  # typical speeds, which a joint's velocity changes by when it turns around on the spot
-JUMP = 5.0  # typical speeds: where the velocities of all joints change by more, the body is somewhere else
+TURN_AROUND_SPEED = 2.0  # typical speeds, which a joint's velocity changes by when it turns around on the spot
+JUMP_SPEED = 5.0  # typical speeds: where the velocities of all joints change by more, the body is somewhere else
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,12 @@ class TrajectoryCost:
     def total(self) -> float:
         """By which trajectories are compared: the less the better."""
         return self.cost + self.motion
+
+
+def motion_of(scene: Scene, frames: Sequence[Frame]) -> Motion:
+    """Return the estimated motion of a scene's person."""
+    poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
+    return Motion(scene.name, scene.body.skeleton, poses, places, scene.fps)
 
 
 def cheaper(cost: float, than: float, tolerance: float = 1.0) -> bool:
@@ -55,13 +62,13 @@ def with_total_effort(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Fram
 
 
 def _with_total(together: Sequence[Frame], frame: Frame) -> Frame:
-    total, cpu_seconds = sum(one.evaluations for one in together), [one.cpu_seconds for one in together]
-    known = [seconds for seconds in cpu_seconds if seconds is not None]
+    total = sum(other.evaluations for other in together)
+    cpu_seconds = [other.cpu_seconds for other in together if other.cpu_seconds is not None]
     return replace(
         frame,
         evaluations=total,
-        seconds=sum(one.seconds for one in together),
-        cpu_seconds=sum(known) if len(known) == len(cpu_seconds) else None,
+        seconds=sum(other.seconds for other in together),
+        cpu_seconds=sum(cpu_seconds) if len(cpu_seconds) == len(together) else None,
         spent=None if frame.spent is None else frame.spent * total // max(frame.evaluations, 1),
     )
 
@@ -88,18 +95,18 @@ def trajectory_cost(
     step = _step(fps)
     changes = _mean_squares(velocities[step:] - velocities[:-step])
     counted = shown[: -2 * step] & shown[step:-step] & shown[2 * step :]  # of each change, its three frames
-    terms = 0.5 * np.minimum(changes[counted], (JUMP * speed) ** 2) / (TURNING * speed) ** 2
+    terms = 0.5 * np.minimum(changes[counted], (JUMP_SPEED * speed) ** 2) / (TURN_AROUND_SPEED * speed) ** 2
     return TrajectoryCost(mean_cost(frames, shown), float(terms.mean()) if len(terms) else 0.0)
 
 
 def _step(fps: float) -> int:
     """Return how many frames a thirtieth of a second is, one at least."""
-    return max(round(fps / STEPS_PER_SECOND), 1)
+    return max(round(fps / VELOCITY_RATE), 1)
 
 
 def _velocities(joints: Array, fps: float) -> Array:
     """Return the velocities (T - step, 27, 3) of joints (T, 27, 3) about the root, in metres a second."""
-    step, rooted = _step(fps), joints - joints[:, :1]
+    step, rooted = _step(fps), root_centred(joints)
     return np.asarray((rooted[step:] - rooted[:-step]) * (fps / step))
 
 

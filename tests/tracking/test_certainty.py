@@ -17,7 +17,7 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.motion import built_in
-from posefit.tracking.evaluation import Evaluation
+from posefit.tracking.evaluation import evaluated as evaluate
 from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.table import table, undetermined
@@ -25,7 +25,7 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
 from tests.files import arrays
-from tests.tracking.test_evaluation import found
+from tests.tracking.test_evaluation import frame_of
 
 FRAMES = 6
 SPREAD = Recalibration(joint_spreads=np.full(len(JOINTS), 0.02))
@@ -45,17 +45,14 @@ def doubtful(scene: Scene, mirrored: Array, turned: float = 0.0, coherent: bool 
         poses = [pose, mirrored_poses(truth.skeleton, pose[None])[0], turned_poses(pose[None])[0]]
         weights = np.array([1.0 - mirrored[k] - turned, mirrored[k], turned])
         posterior = Posterior(np.array(poses), np.tile(place, (3, 1)), weights, coherent, SPREAD)
-        frames.append(replace(found(scene, pose, place, scene.observations[k]), posterior=posterior))
+        frames.append(replace(frame_of(scene, pose, place, scene.observations[k]), posterior=posterior))
     return frames
 
 
 def evaluated(scene: Scene, frames: Iterable[Frame]) -> tuple[list[dict[str, float]], Any]:
     truth = scene.truth
     assert truth is not None
-    collected = Evaluation(scene, None, truth.poses[:, 3:], 0.5)
-    for frame, seen in zip(frames, scene.observations, strict=True):
-        collected.add(frame, seen)
-    return collected.close()
+    return evaluate(scene, list(frames), None, truth.poses[:, 3:], 0.5)
 
 
 def test_where_nobody_says_anything_nothing_is_said() -> None:
@@ -116,10 +113,7 @@ def test_the_width_is_the_mean_radius_of_the_frames_that_say_one() -> None:
         name: pytest.approx(20.0 * r, abs=0.5) for name, r in {"50": 1.5382, "80": 2.1544, "95": 2.7955}.items()
     }
     unknown_truth = replace(scene, truth=None)
-    collected = Evaluation(unknown_truth, None, np.zeros((1, 63)), 0.5)
-    for frame, seen in zip(frames, scene.observations, strict=True):
-        collected.add(frame, seen)
-    without = collected.close()[1]
+    without = evaluate(unknown_truth, frames, None, np.zeros((1, 63)), 0.5)[1]
     assert without.interval_mm == measures.interval_mm
     assert without.coverage is None
 

@@ -18,7 +18,7 @@ from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, OTHER, RI
 from posefit.tracking.picture import PANEL, Painter
 from posefit.uncertainty.modes import Mode
 from tests.cases import each
-from tests.tracking.test_evaluation import found
+from tests.tracking.test_evaluation import frame_of
 
 FRAMES = 7
 WIDTH, HEIGHT = 700, 240
@@ -31,7 +31,7 @@ def scene() -> Scene:
 
 def right(scene: Scene, k: int = 0, **said: Any) -> Frame:
     assert scene.truth is not None
-    return replace(found(scene, scene.truth.poses[k], scene.truth.translations[k], scene.observations[k]), **said)
+    return replace(frame_of(scene, scene.truth.poses[k], scene.truth.translations[k], scene.observations[k]), **said)
 
 
 def row(**said: float) -> dict[str, float]:

@@ -17,7 +17,7 @@ from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.pipeline import track_scene
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
-from tests.tracking.test_evaluation import found
+from tests.tracking.test_evaluation import frame_of
 
 SPREAD = Recalibration(joint_spreads=np.full(len(JOINTS), 0.02))
 SIZE = (320, 240)
@@ -43,7 +43,7 @@ def right(scene: Scene) -> list[Frame]:
     truth = scene.truth
     assert truth is not None
     seen = scene.observations
-    return [found(scene, truth.poses[k], truth.translations[k], seen[k]) for k in range(scene.count)]
+    return [frame_of(scene, truth.poses[k], truth.translations[k], seen[k]) for k in range(scene.count)]
 
 
 def doubting(scene: Scene, mirrored: Sequence[float]) -> list[Frame]:

@@ -42,10 +42,10 @@ def track_data(
     track has every `step`-th frame; a frame is marked if one of those that it stands for is.
     """
     step, skeleton = stills.step, estimate.skeleton
-    joints = skeleton.joints(estimate.poses, estimate.translations)[::step]
+    joints = estimate.joints[::step]
     origin = np.round(joints[0, 0], 3)
     truth, free = scene.truth, skeleton.free
-    true = None if truth is None else truth.skeleton.joints(truth.poses, truth.translations)[::step]
+    true = None if truth is None else truth.joints[::step]
     angles = np.unwrap(estimate.poses[::step], axis=0)
     intervals = {name: values[::step] for name, values in sure.items() if name != "levels"}
     return {

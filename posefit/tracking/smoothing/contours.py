@@ -311,6 +311,6 @@ def _squares(part: _Part, pulled: _Pulled) -> Squares:
     squares.add(turned, np.eye(len(angles)) / GIVING**2, change / GIVING**2)
     squares.add_bends(turned, change, fps**2 / SHAKING)
     now = Motion(part.motion.name, part.body.skeleton, part.poses, part.places, fps)
-    stands = standing_feet(now.skeleton.joints(now.poses, now.translations), fps, part.eyes)
+    stands = standing_feet(now.joints, fps, part.eyes)
     add_standing(squares, now, stands, angles)
     return squares

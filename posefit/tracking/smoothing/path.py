@@ -199,7 +199,7 @@ def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
 def _window(motion: Motion, visibility: Visibility) -> Motion:
     """Return a smooth motion: first its root alone, which shows which foot stands, then the legs as well."""
     smooth = _solved(motion, visibility, np.zeros((len(motion), 2), dtype=bool))
-    stands = standing_feet(smooth.skeleton.joints(smooth.poses, smooth.translations), smooth.fps, visibility.eyes)
+    stands = standing_feet(smooth.joints, smooth.fps, visibility.eyes)
     return _solved(motion, visibility, stands)
 
 
