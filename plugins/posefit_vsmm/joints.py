@@ -33,7 +33,7 @@ class Detection:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """How far the rules are off, measured by `fit/joints.py` on silhouettes whose truth is known. Interpretation V7."""
+    """How far off the rules are, measured by docs/studies/make_joint_errors.py. Interpretation V7."""
 
     bias: Array = field(repr=False)  # (17, 2) legs, detected less true
     deviation: Array = field(repr=False)  # (17, 2) legs, around the bias

@@ -1,8 +1,8 @@
 """The motion models: how a body that walks, squats or jumps goes on to its next pose. VSMM step 3.
 
 A model is X_{k+1} = F X_k + W_k in a frame that turns with the body: its vertical axis is the world's, its heading the
-body's, its origin the root, so that places and directions do not matter. Lengths are counted in legs. The
-models were fitted by `fit/motion.py`, which reports their errors.
+body's, its origin the root, so that places and directions do not matter. Lengths are counted in legs. `ridge` fits
+them; the models that the package carries are fitted to CMU clips by docs/studies/make_models.py.
 """
 
 import json
@@ -22,6 +22,7 @@ from posefit_vsmm.imm import product
 from posefit_vsmm.state import ERROR, STATE, Reliance, free_errors
 
 FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
+LAMBDA = 0.15
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
 Shrink = Literal["identity", "zero"]  # what ridge regression draws F towards (Interpretation V5)
 
@@ -103,6 +104,23 @@ def library(shrink: Shrink = "identity") -> Library:
     }
     reliance = Reliance(*(np.array(stored["reliance"][key]) for key in ("matrix", "offset")))
     return Library(models, reliance, {name: one["report"] for name, one in stored["models"].items()})
+
+
+def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
+    """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Interpretation V5.
+
+    The penalty is 0.15 a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
+    """
+    inputs = before[:, 3:]
+    middle = inputs.mean(axis=0)
+    unit = np.sqrt(inputs.var(axis=0).sum() / (len(inputs[0]) / 4))
+    scaled = (inputs - middle) / unit
+    wanted = after - before - inputs @ target.T
+    wanted[:, [0, 2]] = 0.0  # the way over the ground is not predicted: stepping on the spot is walking, too
+    mean = wanted.mean(axis=0)
+    normal = scaled.T @ scaled + LAMBDA * len(scaled) * np.eye(scaled.shape[1])  # VSMM 3
+    matrix = np.linalg.solve(normal, scaled.T @ (wanted - mean)).T / unit
+    return matrix + target, mean - matrix @ middle
 
 
 def leg_of(skeleton: Skeleton) -> float:

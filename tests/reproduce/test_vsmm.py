@@ -33,7 +33,7 @@ def test_the_experiment_is_about_as_good_as_the_patents(experiment: PatentTrack)
 
 
 def test_no_motion_of_the_experiment_was_learned_from() -> None:
-    from posefit_vsmm.fit.motion import TEACHINGS
+    from make_models import TEACHINGS
 
     tested = {one.motion for one in activities.ACTIVITIES}
     stored = json.loads((Path(built_in.__file__).parent / "built_in.json").read_text(encoding="utf-8"))["motions"]

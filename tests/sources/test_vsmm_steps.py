@@ -10,13 +10,12 @@ from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit_vsmm.fit.motion import LAMBDA, ridge
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import Belief, Measurement, start
 from posefit_vsmm.joints import JointFilter, detected
 from posefit_vsmm.kernels import minus, plus
 from posefit_vsmm.measurement import Figure
-from posefit_vsmm.motion import library
+from posefit_vsmm.motion import LAMBDA, library, ridge
 from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.state import AT, ERROR, HELD_ANGLES, POINTS, decode, encode, points_of
 from posefit_vsmm.switching import (

@@ -1,4 +1,4 @@
-"""Fits the motion models to CMU clips: `python -m posefit_vsmm.fit.motion CMU_DIR`. Interpretations V4 to V6.
+"""Fits VSMM's motion models to CMU clips: `python docs/studies/make_models.py CMU_DIR`. Interpretations V4 to V7.
 
 Ridge regression of how the quaternions go on to the next frame; what is stored are its coefficients, the covariance of
 what it leaves, and means of similar poses, no recorded frame. Every clip is also used mirrored. Printed, and stored
@@ -6,11 +6,10 @@ beside each model, are its errors one and ten frames ahead on clips that were no
 """
 
 import json
-import os
-import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import click
 import numpy as np
 from scipy.spatial.transform import Rotation
 from sklearn.cluster import KMeans
@@ -26,14 +25,13 @@ from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit_vsmm import motion as models
 from posefit_vsmm.kernels import minus
-from posefit_vsmm.motion import FPS, MotionModel, leg_of, without_heading
+from posefit_vsmm.motion import FPS, MotionModel, leg_of, ridge, without_heading
 from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode
 
 ORIGIN = (
     "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
     "The database was created with funding from NSF EIA-0196217."
 )
-LAMBDA = 0.15
 FADING = 0.07  # share of its way from the mean pose that a joint loses in a frame where nothing else is learned
 DRAWN = 400  # frames of a built-in motion
 POSES = 24  # typical poses of a model
@@ -116,23 +114,6 @@ def pairs(clip: Recorded) -> tuple[Array, Array]:
     return np.array(before), np.array(after)
 
 
-def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
-    """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Interpretation V5.
-
-    The penalty is 0.15 a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
-    """
-    inputs = before[:, 3:]
-    middle = inputs.mean(axis=0)
-    unit = np.sqrt(inputs.var(axis=0).sum() / (len(inputs[0]) / 4))
-    scaled = (inputs - middle) / unit
-    wanted = after - before - inputs @ target.T
-    wanted[:, [0, 2]] = 0.0  # the way over the ground is not predicted: stepping on the spot is walking, too
-    mean = wanted.mean(axis=0)
-    normal = scaled.T @ scaled + LAMBDA * len(scaled) * np.eye(scaled.shape[1])  # VSMM 3
-    matrix = np.linalg.solve(normal, scaled.T @ (wanted - mean)).T / unit
-    return matrix + target, mean - matrix @ middle
-
-
 def noise(model: MotionModel, before: Array, after: Array) -> Array:
     """Return the covariance (33, 33) of what the model leaves, shrunk as Ledoit and Wolf propose. Interpretation V7."""
     left = np.array([minus(b, model.step(a)[0]) for a, b in zip(before, after, strict=True)])
@@ -201,6 +182,8 @@ def rounded(values: Array) -> Any:
     return [float(f"{v:.5g}") for v in values] if values.ndim == 1 else [rounded(row) for row in values]
 
 
+@click.command()
+@click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
 def main(root: Path) -> None:
     """Write models.json beside the models. Raises ValueError where a clip it needs is missing."""
     stored: dict[str, Any] = {}
@@ -236,10 +219,4 @@ def main(root: Path) -> None:
 
 
 if __name__ == "__main__":
-    folders = sys.argv[1:] or [folder for folder in [os.environ.get("POSEFIT_CMU")] if folder]
-    if len(folders) != 1:
-        sys.exit("usage: python -m posefit_vsmm.fit.motion CMU_DIR")
-    try:
-        main(Path(folders[0]))
-    except ValueError as error:
-        sys.exit(str(error))
+    main()

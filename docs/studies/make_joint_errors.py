@@ -1,4 +1,4 @@
-"""Measures the errors of joint detection: `python -m posefit_vsmm.fit.joints`. VSMM step 2, Interpretation V7.
+"""Measures the errors of VSMM's joint rules: `python docs/studies/make_joint_errors.py`. Step 2, Interpretation V7.
 
 The rules look at silhouettes of built-in motions from all sides, whose truth is known, and expect every point about
 where it is. Left and right share their errors, and no point is biased to one side. What is farther off than OUTLIER is
@@ -10,6 +10,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 
 from posefit.arrays import Array
@@ -51,12 +52,13 @@ def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
             detection = detected(
                 lines, expected, gates, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2))
             )
-            for k, one in enumerate(POINTS):
+            for k, point in enumerate(POINTS):
                 if detection.confidence[k] > 0.0:
-                    errors_of[one].append((detection.points[k] - true[k]) / (leg * scale))
+                    errors_of[point].append((detection.points[k] - true[k]) / (leg * scale))
     return errors_of
 
 
+@click.command()
 def main() -> None:
     """Write joints.json beside the rules."""
     errors_of = detection_errors(np.random.default_rng(0))
