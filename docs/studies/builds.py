@@ -17,7 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Task
-from posefit.footage.scene import Rendered, synthetic
+from posefit.footage.scene import rendered, synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
@@ -92,7 +92,7 @@ def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[floa
     options, average, true = TrackOptions(method="@loose"), Body.of(built_in.average_skeleton()), subject(seed)
     walk = replace(built_in.motion(motion), skeleton=true.skeleton)
     scene = synthetic(walk, setup.views_degrees, SIZE, [], (None, None))
-    scene = replace(scene, body=true, observations=Rendered(walk, true, scene.cameras))
+    scene = replace(scene, body=true, observations=rendered(walk, true, scene.cameras))
     height = true.stature if setup.stature else None
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
     training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]

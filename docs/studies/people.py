@@ -21,7 +21,7 @@ from posefit.arrays import Array
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Observation
-from posefit.footage.scene import Rendered, Scene, synthetic
+from posefit.footage.scene import Scene, rendered, synthetic
 from posefit.footage.training import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Silhouette
@@ -300,7 +300,7 @@ def returned(scene: Scene, views: Views) -> tuple[Scene, int, int]:
     motion = Motion(there.name, there.skeleton, poses, translations, there.fps)
     size = scene.cameras[0].width, scene.cameras[0].height
     seen = synthetic(motion, views, size, [], (None, None))
-    drawn = Rendered(motion, seen.body, seen.cameras)
+    drawn = rendered(motion, seen.body, seen.cameras)
     gone, back = len(there), len(there) + AWAY
     return replace(seen, yaw=scene.yaw, observations=Unseen(drawn, gone, back)), gone, back
 

@@ -34,7 +34,7 @@ def extract(
     masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,) and `fps`. The folder appears whole or not at
     all. Raises InputError for every mistake in arguments or files, where no frame shows a person, and on a full disk.
     """
-    how, target = how or Extraction(), Path(out)
+    target = Path(out)
     if os.path.lexists(target):
         raise InputError(f"{target}: expected a new folder, got one that exists")
     video, how = Video.of(source), how or Extraction()
@@ -69,8 +69,8 @@ def segmented(
         if on_frame is not None:
             on_frame(image, person, bool(segmentation.rows[-1]["usable"]))
     usable = np.array([row["usable"] for row in segmentation.rows], dtype=bool)
-    names = [f"{segmentation.name}, frame {segmentation.start + k}" for k in range(count)]
-    return PackedMasks(names, segmentation.size, masks[:count], valid[:count], usable, segmentation.fps)
+    names = [f"{segmentation.video.path}, frame {segmentation.start + k}" for k in range(count)]
+    return PackedMasks(names, segmentation.size, masks[:count], valid[:count], usable, segmentation.video.fps)
 
 
 def _write_npz(path: Path, masks: PackedMasks) -> None:

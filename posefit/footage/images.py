@@ -4,6 +4,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,11 +25,8 @@ def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
 
     Raises InputError where it has more than `PIXELS` or `LARGEST_FILE`.
     """
-    import cv2
-
     content = _content(Path(path))
-    image = None if content is None else _decoded(content, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
-    return None if image is None else np.asarray(image, dtype=np.uint8)
+    return None if content is None else _decoded(content, cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
 
 
 def read_values(path: Path, labelled: bool = False) -> tuple[NDArray[Any], bool] | None:
@@ -37,8 +35,6 @@ def read_values(path: Path, labelled: bool = False) -> tuple[NDArray[Any], bool]
     They are its alpha channel, where it has one that is not all opaque and no label is wanted; else the indices of a
     palette of colours, or colours as 0xRRGGBB, or grey levels, of 8 or 16 bits. Raises InputError as `read_image` does.
     """
-    import cv2
-
     content = _content(path)
     if content is None:
         return None
@@ -54,10 +50,9 @@ def read_values(path: Path, labelled: bool = False) -> tuple[NDArray[Any], bool]
         return image[..., 0], False
     if image.dtype != np.uint8:
         image = (image // 256).astype(np.uint8)
-    blue, green, red = (image[..., k].astype(np.int32) for k in range(3))
-    colours = (red << 16) | (green << 8) | blue
-    palette = _palette(content)
-    return colours if palette is None else _indices(colours, palette), False
+    colours = _numbers(image, (2, 1, 0))
+    indexed = content.startswith(b"\x89PNG") and content[25] == INDEXED
+    return _indices(colours, content) if indexed else colours, False
 
 
 def is_colourful(path: Path) -> bool:
@@ -77,36 +72,32 @@ def _content(path: Path) -> bytes | None:
     if size is None:
         return None
     if size[0] * size[1] > PIXELS:
-        raise InputError(
-            f"{path}: expected at most {PIXELS // 10**6} million pixels, got {cut(f'{size[0]}x{size[1]}')}"
-        )
+        came = cut(f"{size[0]}x{size[1]}")
+        raise InputError(f"{path}: expected at most {PIXELS // 10**6} million pixels, got {came}")
     return content
 
 
 def _decoded(content: bytes, how: int) -> NDArray[Any] | None:
-    import cv2
-
     try:
         return cv2.imdecode(np.frombuffer(content, np.uint8), how)
     except cv2.error:
         return None
 
 
-def _palette(content: bytes) -> NDArray[np.int32] | None:
-    """Return the colours of a PNG's palette as 0xRRGGBB; None where it has none."""
-    if content[:4] != b"\x89PNG" or content[25] != INDEXED:
-        return None
+def _indices(colours: NDArray[np.int32], content: bytes) -> NDArray[np.uint8]:
+    """Return which entry of a PNG's palette each colour is: the first, where it stands there twice."""
     place = content.find(b"PLTE")
     length = int.from_bytes(content[place - 4 : place], "big")
-    stored = np.frombuffer(content, np.uint8, 3 * (length // 3), place + 4).reshape(-1, 3).astype(np.int32)
-    return np.asarray((stored[:, 0] << 16) | (stored[:, 1] << 8) | stored[:, 2])
-
-
-def _indices(colours: NDArray[np.int32], palette: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """Return which entry of a palette each colour is: the first, where it stands there twice."""
-    known, first = np.unique(palette, return_index=True)
+    palette = np.frombuffer(content, np.uint8, 3 * (length // 3), place + 4).reshape(-1, 3)
+    known, first = np.unique(_numbers(palette, (0, 1, 2)), return_index=True)
     places = np.clip(np.searchsorted(known, colours), 0, len(known) - 1)
     return np.asarray(first[places], dtype=np.uint8)
+
+
+def _numbers(colours: NDArray[Any], channels: tuple[int, int, int]) -> NDArray[np.int32]:
+    """Return colours (..., 3) as 0xRRGGBB; `channels` are the places of red, green and blue."""
+    red, green, blue = (colours[..., k].astype(np.int32) for k in channels)
+    return np.asarray((red << 16) | (green << 8) | blue)
 
 
 def size_of(content: bytes) -> tuple[int, int] | None:
@@ -177,9 +168,8 @@ def _tiff(content: bytes) -> tuple[int, int] | None:
         entry = content[place + 2 + 12 * k : place + 14 + 12 * k]
         tag, kind = struct.unpack(f"{order}HH", entry[:4])
         if tag in (_WIDTH, _HEIGHT, _SAMPLES):
-            stated[tag] = struct.unpack(f"{order}H" if kind == 3 else f"{order}I", entry[8 : 10 if kind == 3 else 12])[
-                0
-            ]
+            short = kind == 3
+            (stated[tag],) = struct.unpack(f"{order}{'H' if short else 'I'}", entry[8 : 10 if short else 12])
     if not {_WIDTH, _HEIGHT} <= stated.keys():
         return None
     return stated[_WIDTH] * max(1, -(-stated.get(_SAMPLES, 1) // 4)), stated[_HEIGHT]

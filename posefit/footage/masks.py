@@ -1,6 +1,6 @@
 """Masks in memory, a bit a pixel, and what several cameras saw with them, frame by frame."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -85,9 +85,6 @@ class Views(Sequence[Observation]):
         silhouettes = [self._silhouette(masks, k) for masks in self.masks]
         usable = any(masks.usable[k] for masks in self.masks)
         return Observation(silhouettes, usable=usable, yaw=self.yaw(k))
-
-    def __iter__(self) -> Iterator[Observation]:
-        return (self[k] for k in range(len(self)))
 
     def yaw(self, k: int) -> float | None:
         """Return about which way the person faces in frame k, in radians; None where that is unknown."""

@@ -64,7 +64,8 @@ class FrameQuality:
 
         Its area must not be far from that of the frames before either, as far as they looked like a person.
         """
-        side = _longer_side(person.mask)
+        left, top, right, bottom = _box(person.mask) if person.area else (0, 0, 0, 0)
+        side = max(right - left, bottom - top)
         outside = self._outside(image, person, side)
         ghost = self._is_ghost(image, person.mask)
         whole = person.area > 0 and not person.touches_border
@@ -102,12 +103,8 @@ class FrameQuality:
         earlier, mask = self._before[0]
         covered = person.mask | mask
         reach = max(side, *self._sides) if self._sides else side
-        rows, columns = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
-        far = round(AROUND * reach)
-        window = np.s_[
-            max(0, rows[0] - far) : rows[-1] + 1 + far,
-            max(0, columns[0] - far) : columns[-1] + 1 + far,
-        ]
+        (left, top, right, bottom), far = _box(covered), round(AROUND * reach)
+        window = np.s_[max(0, top - far) : bottom + far, max(0, left - far) : right + far]
         changed = changed_pixels(image, earlier)[window] & person.valid[window]
         width = 2 * max(1, round(SLACK * reach)) + 1
         near = cv2.dilate(covered[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
@@ -140,12 +137,10 @@ def _edges(image: Image) -> NDArray[np.float32]:
     return np.asarray(cv2.dilate(cv2.magnitude(across, down), np.ones((3, 3), dtype=np.uint8)), dtype=np.float32)
 
 
-def _longer_side(mask: Mask) -> int:
-    """Return the longer side of a mask's bounding box, 0 where it is empty."""
-    if not mask.any():
-        return 0
+def _box(mask: Mask) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom of a mask with pixels; the last two are the first outside."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    return int(max(rows[-1] - rows[0], columns[-1] - columns[0])) + 1
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
 @dataclass(frozen=True)
@@ -159,9 +154,9 @@ class Verdict:
 def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) -> Verdict | None:
     """Return what is wrong with masks, by the rows of `FrameQuality`; None where nothing is.
 
-    `learned`: the segmenter was given no picture of the empty scene. What moves outside the masks while their
-    size jumps refuses them, and so does a size that jumps where few frames are usable or most masks are in pieces;
-    either alone may be another person or clothes like the background, and is a warning.
+    `learned`: the segmenter was given no picture of the empty scene. Masks are refused where much moves outside them
+    and their size jumps, or where it jumps and few frames are usable or most masks are in pieces. Either alone may be
+    another person, or clothes like the background, and is a warning.
     """
     whole = [row for row in rows if row["area"] and not row["touches_border"]]
     usable = sum(row["usable"] for row in whole)
@@ -174,26 +169,25 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
     taller, larger = (_change(pairs, name) for name in ("longer_side", "area"))
     unsteady = taller > TALLER or larger > LARGER
     ghosts = float(np.mean([row["ghost"] for row in whole]))
+    broken = float(np.mean([row["pieces"] > 1 for row in whole]))
+    moves, changes = f"{outside:.0%} of what moves", f"change by {larger:.0%} from frame to frame"
     if outside > UNEXPLAINED and unsteady:
-        moves = (
-            f"{outside:.0%} of what moves lies outside the masks, and they change by {larger:.0%} from frame to frame"
-        )
         where = "the person seems to stand in the background" if learned else "the masks do not show the whole person"
-        return Verdict(f"{where}: {moves}{instead}", True)
-    if ghosts > GHOSTS:
+        text, refused = f"{where}: {moves} lies outside the masks, and they {changes}", True
+    elif ghosts > GHOSTS:
         text = f"{ghosts:.0%} of the masks show a place that is empty now: the person was learned into the background"
-        return Verdict(f"{text}{instead}", ghosts > GHOSTS_REFUSED)
-    if not usable:
+        refused = ghosts > GHOSTS_REFUSED
+    elif not usable:
         return Verdict(none, True)
-    if unsteady:
-        broken = float(np.mean([row["pieces"] > 1 for row in whole]))
+    elif unsteady:
         pieces = f" and are in pieces in {broken:.0%} of the frames" if broken > BROKEN else ""
-        text = f"the masks change by {larger:.0%} from frame to frame{pieces}: parts of the person seem to be missing"
-        return Verdict(f"{text}{instead}", usable < MIN_USABLE * len(whole) or broken > BROKEN)
-    if outside > UNEXPLAINED:
-        text = f"{outside:.0%} of what moves near the person lies outside the masks, which may miss parts of the person"
-        return Verdict(f"{text}{instead}", False)
-    return None
+        text = f"the masks {changes}{pieces}: parts of the person seem to be missing"
+        refused = usable < MIN_USABLE * len(whole) or broken > BROKEN
+    elif outside > UNEXPLAINED:
+        text, refused = f"{moves} near the person lies outside the masks, which may miss parts of the person", False
+    else:
+        return None
+    return Verdict(f"{text}{instead}", refused)
 
 
 def advice(method: str, *, learned: bool) -> str:
@@ -213,9 +207,8 @@ def _change(pairs: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]], name: 
 
 def extent_of(silhouette: Silhouette) -> tuple[Array, float]:
     """Return the middle (2,) and the height in pixels of a silhouette's bounding box."""
-    rows, columns = np.flatnonzero(silhouette.mask.any(axis=1)), np.flatnonzero(silhouette.mask.any(axis=0))
-    middle = 0.5 * np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1])
-    return middle, float(rows[-1] + 1 - rows[0])
+    left, top, right, bottom = _box(silhouette.mask)
+    return 0.5 * np.array([left + right, top + bottom]), float(bottom - top)
 
 
 def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array, Array]:

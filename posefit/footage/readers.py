@@ -9,7 +9,7 @@ import re
 import tempfile
 import zlib
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -95,26 +95,39 @@ def read_npz(path: Path, frames: Range, label: int | None = None) -> PackedMasks
     """Return the masks of an .npz file. Raises InputError naming the file where it holds none."""
     existing(path)
     with archived(path, NAMES, "the key masks", UNPACKED, PACKED) as arrays:
-        if "masks" not in arrays:
-            raise InputError(f"{path}: expected an .npz file with the key masks, got none")
-        stack, known = arrays["masks"], arrays.get("valid")
-        _check_shapes(path, stack, known)
-        usable, fps = _usable(path, arrays.get("usable"), stack.shape[0]), _fps(path, arrays.get("fps"))
-        start, stop = span(frames, stack.shape[0])
+        stack = _checked_stack(path, arrays)
+        count, height, width = stack.shape
+        usable = arrays["usable"].read() if "usable" in arrays else np.ones(count, dtype=bool)
+        fps = float(arrays["fps"].read()) if "fps" in arrays else None
+        if fps is not None and not 0.0 < fps <= MAX_FPS:
+            raise InputError(f"{path}: fps must be a number up to {MAX_FPS:g}, got {fps:g}")
+        start, stop = span(frames, count)
         if not usable[start:stop].any():
             raise InputError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
         masks = _pack(stack, start, stop, _npz_classifier(path, stack, start, stop, label))
-        valid = None if known is None else _pack(known, start, stop, _above(0.0))
+        valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
     names = [f"{path}[{k}]" for k in range(start, stop)]
-    return PackedMasks(names, (stack.shape[2], stack.shape[1]), masks, valid, usable[start:stop], fps)
+    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps)
 
 
-def _check_shapes(path: Path, stack: Stored, known: Stored | None) -> None:
-    if len(stack.shape) != 3 or 0 in stack.shape or stack.dtype.kind not in "buif":
+def _checked_stack(path: Path, arrays: Mapping[str, Stored]) -> Stored:
+    """Return the masks of a file. Raises InputError where one of its arrays has another shape or type."""
+    if "masks" not in arrays:
+        raise InputError(f"{path}: expected an .npz file with the key masks, got none")
+    stack = arrays["masks"]
+    shape = tuple(stack.shape)
+    if len(shape) != 3 or 0 in shape or stack.dtype.kind not in "buif":
         raise InputError(f"{path}: masks must have shape (frames, height, width), got {_described(stack)}")
-    if known is not None and (known.shape != stack.shape or known.dtype.kind not in "bui"):
-        shape = quoted(tuple(stack.shape))
-        raise InputError(f"{path}: valid must have the masks' shape {shape}, got {_described(known)}")
+    others: dict[str, tuple[tuple[int, ...], str, str]] = {
+        "valid": (shape, "bui", f"have the masks' shape {quoted(shape)}"),
+        "usable": (shape[:1], "b", f"be {shape[0]} booleans"),
+        "fps": ((), "iuf", f"be a number up to {MAX_FPS:g}"),
+    }
+    for name, (wanted, kinds, expected) in others.items():
+        stored = arrays.get(name)
+        if stored is not None and (tuple(stored.shape) != wanted or stored.dtype.kind not in kinds):
+            raise InputError(f"{path}: {name} must {expected}, got {_described(stored)}")
+    return stack
 
 
 def _described(stored: Stored) -> str:
@@ -143,24 +156,6 @@ def _pack(stored: Stored, start: int, stop: int, is_person: Classifier) -> Plane
     return planes
 
 
-def _usable(path: Path, stored: Stored | None, count: int) -> NDArray[np.bool_]:
-    if stored is None:
-        return np.ones(count, dtype=bool)
-    if stored.shape != (count,) or stored.dtype != np.bool_:
-        raise InputError(f"{path}: usable must be {count} booleans, got {_described(stored)}")
-    return np.asarray(stored.read(), dtype=np.bool_)
-
-
-def _fps(path: Path, stored: Stored | None) -> float | None:
-    if stored is None:
-        return None
-    number: Any = stored.read() if stored.shape == () and stored.dtype.kind in "iuf" else None
-    if number is None or not 0.0 < number <= MAX_FPS:
-        came = number.tolist() if number is not None else _described(stored)
-        raise InputError(f"{path}: fps must be a number up to {MAX_FPS:g}, got {came}")
-    return float(number)
-
-
 @dataclass(eq=False)
 class ValueCounts:
     """Counts the values in the masks of a source, one mask after the other, and decides which are the person's."""
@@ -176,7 +171,12 @@ class ValueCounts:
         self.soft |= soft or values.dtype.kind == "f"
         if self.soft:
             return
-        unique, counts = np.unique(values, return_counts=True) if self.highest > 1 else _binary(values)
+        if self.highest > 1:
+            unique, counts = np.unique(values, return_counts=True)
+        else:  # faster than sorting zeros and ones
+            ones = int(np.count_nonzero(values))
+            unique, counts = np.flatnonzero([values.size - ones, ones]), np.array([values.size - ones, ones])
+            counts = counts[counts > 0]
         self.soft = len(unique) + len(self.pixels) > COUNTED_VALUES
         if self.soft:
             return
@@ -187,7 +187,12 @@ class ValueCounts:
     def classifier(self, label: int | None, name: object) -> Classifier:
         """Return how these values become masks. Raises InputError where it is open which label is the person."""
         if label is not None:
-            self._check_label(label, name)
+            if self.soft:
+                kinds = "masks whose values are labels, PNG or whole numbers"
+                raise InputError(f"{name}: label must be given for {kinds}, got soft ones")
+            if label not in self.pixels:
+                there = self._listed([value for value, _ in self.pixels.most_common()])
+                raise InputError(f"{name}: label must be one of those that are there, {there}, got {label}")
             return lambda values: np.asarray(values == label)
         values = sorted(self.pixels)
         if self.highest > SCALES[-1] and (self.soft or len(values) > FEW_VALUES):
@@ -209,15 +214,6 @@ class ValueCounts:
         full = next((scale for scale in SCALES if self.highest <= scale), self.highest)
         return 0.5 if full == 1.0 else float(full // 2)
 
-    def _check_label(self, label: int, name: object) -> None:
-        if self.soft:
-            raise InputError(
-                f"{name}: label must be given for masks whose values are labels, PNG or whole numbers, got soft ones"
-            )
-        if label not in self.pixels:
-            there = self._listed([value for value, _ in self.pixels.most_common()])
-            raise InputError(f"{name}: label must be one of those that are there, {there}, got {label}")
-
     def _listed(self, labels: list[int]) -> str:
         """Return some labels, the commonest first; colours as hexadecimal numbers."""
         written = [str(value) if self.highest <= SCALES[-1] else f"0x{value:06x}" for value in labels[:LISTED_LABELS]]
@@ -231,13 +227,6 @@ def _above(threshold: float) -> Classifier:
 
 def _many_colours(name: object) -> InputError:
     return InputError(f"{name}: expected masks, got pictures in many colours; a person cut out needs an alpha channel")
-
-
-def _binary(values: Values) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the unique values of zeros and ones, and how many pixels have each."""
-    ones = int(np.count_nonzero(values))
-    counts = np.array([values.size - ones, ones])
-    return np.flatnonzero(counts), counts[counts > 0]
 
 
 def _solid(values: Values, unique: NDArray[Any]) -> list[int]:

@@ -9,8 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Observation
-from posefit.footage.masks import Range, Views, span
-from posefit.footage.quality import disagreement, extent_of, meeting
+from posefit.footage.masks import Range, span
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
@@ -59,11 +58,10 @@ def synthetic(
     placing: Placing = "given" if cameras else "placed"
     motion = motion.frames(*span(frames, len(motion)))
     if not cameras:
-        joints = motion.skeleton.joints(motion.poses, motion.translations).reshape(-1, 3)
-        radii = np.tile(body.joint_radii(), len(motion))
+        joints, radii = motion.joints.reshape(-1, 3), np.tile(body.joint_radii(), len(motion))
         azimuths = motion.poses[0, 0] + np.radians(views_degrees or [VIEW_DEGREES])
         cameras = [Camera.framing(joints, radii, float(azimuth), size) for azimuth in azimuths]
-    observations = Rendered(motion, body, cameras)
+    observations = rendered(motion, body, cameras)
     for k in (0, len(motion) - 1):
         if not all(silhouette.mask.any() for silhouette in observations[k].silhouettes):
             raise InputError(f"camera must see the person, got an empty mask in frame {k}")
@@ -82,97 +80,54 @@ def synthetic(
 
 
 @dataclass(frozen=True, eq=False)
-class Rendered(Sequence[Observation]):
-    """The observations of a known motion, drawn when they are needed."""
+class LazyObservations(Sequence[Observation]):
+    """Observations of so many frames, each made by `at(k)` when it is needed."""
 
-    motion: Motion
-    body: Body
-    cameras: Sequence[Camera]
+    frames: int
+    at: Callable[[int], Observation] = field(repr=False)
 
     def __len__(self) -> int:
-        return len(self.motion)
+        return self.frames
 
     def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        if not 0 <= k < len(self):
+        if not 0 <= k < self.frames:
             raise IndexError(k)
-        pose, translation = self.motion.poses[k], self.motion.translations[k]
-        masks = [project(self.body, camera, pose, translation) for camera in self.cameras]
+        return self.at(k)
+
+
+def rendered(motion: Motion, body: Body, cameras: Sequence[Camera]) -> LazyObservations:
+    """Return the observations of a known motion."""
+
+    def at(k: int) -> Observation:
+        pose, translation = motion.poses[k], motion.translations[k]
+        masks = [project(body, camera, pose, translation) for camera in cameras]
         return Observation([Silhouette.of(mask) for mask in masks], translation)
 
-
-@dataclass(frozen=True, eq=False)
-class DeviceObservations(Sequence[Observation]):
-    """The same observations, their silhouettes on a device: poses are drawn and counted there."""
-
-    observations: Sequence[Observation]
-    device: str
-
-    def __len__(self) -> int:
-        return len(self.observations)
-
-    def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        observation = self.observations[k]
-        moved = [moved_to(silhouette, self.device) for silhouette in observation.silhouettes]
-        return replace(observation, silhouettes=moved)
+    return LazyObservations(len(motion), at)
 
 
 def on_device(scene: Scene, device: str) -> Scene:
     """Return a scene whose poses are drawn on a device, "cpu" or "cuda". Raises InputError where there is none."""
     check_device(device)
-    return scene if device == "cpu" else replace(scene, observations=DeviceObservations(scene.observations, device))
+    if device == "cpu":
+        return scene
+
+    def at(k: int) -> Observation:
+        observation = scene.observations[k]
+        return replace(observation, silhouettes=[moved_to(one, device) for one in observation.silhouettes])
+
+    return replace(scene, observations=LazyObservations(len(scene.observations), at))
 
 
-@dataclass(frozen=True, eq=False)
-class CorruptedObservations(Sequence[Observation]):
-    """Observations with corruptions of some strength, and a share of the frames dropped; the same each time."""
+def with_corruption(
+    observations: Sequence[Observation], noise: dict[str, float], dropped: float, seed: int
+) -> LazyObservations:
+    """Return observations with corruptions of some strength, and a share of the frames dropped; the same each time."""
 
-    observations: Sequence[Observation] = field(repr=False)
-    noise: dict[str, float]
-    dropped: float
-    seed: int
-
-    def __len__(self) -> int:
-        return len(self.observations)
-
-    def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        observation = self.observations[k]
-        rng = np.random.default_rng([RNG_STREAM_CORRUPTION, self.seed, k])
-        lost = k > 0 and rng.random() < self.dropped
-        masks = [corrupted(silhouette.mask, self.noise, rng) for silhouette in observation.silhouettes]
+    def at(k: int) -> Observation:
+        observation, rng = observations[k], np.random.default_rng([RNG_STREAM_CORRUPTION, seed, k])
+        lost = k > 0 and rng.random() < dropped
+        masks = [corrupted(silhouette.mask, noise, rng) for silhouette in observation.silhouettes]
         return replace(observation, silhouettes=[Silhouette.of(mask) for mask in masks], usable=not lost)
 
-    def __iter__(self) -> Iterator[Observation]:
-        return (self[k] for k in range(len(self)))
-
-
-def observed(
-    views: Views,
-    body: Body,
-    cameras: Sequence[Camera],
-    name: str,
-    fps: float,
-    view_degrees: float | None,
-    pictures: Callable[[], Iterator[Image]] | None = None,
-    placing: Placing = "given",
-    warnings: Sequence[str] = (),
-) -> Scene:
-    """Return the scene of masks, whose true poses are unknown.
-
-    The person is first searched where the rays through the middles of the masks meet; with a single camera, as far away
-    as their size in the image implies. Raises InputError where several cameras cannot see one person of this size.
-    """
-    boxes = [extent_of(silhouette) for silhouette in views[views.first].silhouettes]
-    if len(cameras) == 1:
-        camera, (middle, tall) = cameras[0], boxes[0]
-        depth = camera.focal[1] * body.stature / tall
-        place = np.array([*((middle - camera.centre) / camera.focal * depth), depth])
-        anchor = camera.rotation.T @ (place - camera.translation)
-    else:
-        if wrong := disagreement(views, cameras, body.stature):
-            raise InputError(f"{name}: {wrong}")
-        anchor = meeting(cameras, [middle for middle, _ in boxes])[0]
-    to_camera = -cameras[0].rotation[2]
-    yaw = views.yaw(views.first)
-    if view_degrees is not None:
-        yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
-    return Scene(name, body, cameras, fps, len(views), yaw, anchor, None, views, placing, warnings, pictures)
+    return LazyObservations(len(observations), at)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from inspect import Parameter
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -69,21 +69,18 @@ class Extraction:
             raise InputError(f"width must lie in 36 to 8192 pixels, got {self.width}")
         object.__setattr__(self, "method", segmenter_name(self.method, self.background))
         offer = registry().offer("segmenter", self.name)
-        needed = {setting.name: setting.default is Parameter.empty for setting in offer.settings}
         if self.background is not None:
-            if "background" not in needed:
-                offers = registry().offers["segmenter"].values()
-                takers = [
-                    other.name for other in offers if any(setting.name == "background" for setting in other.settings)
-                ]
+            offers = registry().offers["segmenter"].values()
+            takers = [other.name for other in offers if "background" in [setting.name for setting in other.settings]]
+            if self.name not in takers:
                 came = f"{self.background!r} with {self.name}"
                 raise InputError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
             object.__setattr__(self, "settings", {**self.settings, "background": self.background})
         check(self.name, offer.factory, self.settings)
-        for name, must in needed.items():
-            if must and name not in self.settings:
-                given = "frames A:B or an image" if name == "background" else "given"
-                raise InputError(f"{name} must be {given} for the method {self.name}, got none")
+        for setting in offer.settings:
+            if setting.default is Parameter.empty and setting.name not in self.settings:
+                given = "frames A:B or an image" if setting.name == "background" else "given"
+                raise InputError(f"{setting.name} must be {given} for the method {self.name}, got none")
 
     @property
     def name(self) -> str:
@@ -112,10 +109,6 @@ class VideoFootage:
     part: Box
 
     def __len__(self) -> int:
-        return self._count
-
-    @cached_property
-    def _count(self) -> int:
         return self.video.count()
 
     def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Image]:
@@ -127,11 +120,9 @@ class VideoFootage:
         image = read_image(path, grey=False)
         if image is None:
             raise InputError(f"background must be frames A:B or an image, got {path!r}")
-        came, wanted = (image.shape[1], image.shape[0]), self.video.size
-        if came != wanted:
-            raise InputError(
-                f"{path}: background must have the video's size {wanted[0]}x{wanted[1]}, got {came[0]}x{came[1]}"
-            )
+        (tall, wide), (width, height) = image.shape[:2], self.video.size
+        if (wide, tall) != (width, height):
+            raise InputError(f"{path}: background must have the video's size {width}x{height}, got {wide}x{tall}")
         return self.cut(np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8))
 
     def cut(self, image: NDArray[T]) -> NDArray[T]:
@@ -151,7 +142,7 @@ class Segmentation:
         scale = min(1.0, how.width / video.size[0])
         self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
         self.rows: list[dict[str, Any]] = []
-        self.name, self.method, self.fps, self._video = video.path, how.name, video.fps, video
+        self.video, self.method = video, how.name
         self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
         self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
         self._learn = partial(how.segmenter, self._film)
@@ -167,9 +158,9 @@ class Segmentation:
     def __iter__(self) -> Iterator[tuple[Image, Person]]:
         """Learn the background and yield each frame, scaled, with the person in it; `rows` holds its quality."""
         segmenter = self._segmenter or self._learn()
-        quality = FrameQuality(self.fps, getattr(segmenter, "background", None))
+        quality = FrameQuality(self.video.fps, getattr(segmenter, "background", None))
         motion = CameraMotion(self.size)
-        for k, image in enumerate(self._video.frames(self.start, self.stop, self.size)):
+        for k, image in enumerate(self.video.frames(self.start, self.stop, self.size)):
             if k % PERIOD == 0:
                 self._shifts.append(motion.shift(image))
             result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
@@ -179,13 +170,13 @@ class Segmentation:
             )
             part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
             self.rows.append(quality.row(self._film.cut(image), part, self.start + k))
-            if not self._video.is_filmed(self.start + k):
+            if not self.video.is_filmed(self.start + k):
                 self.rows[-1]["usable"] = 0
             yield image, result
         if not any(row["area"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
             none = "expected a person who moves before a still background, got none in any frame"
-            raise InputError(f"{self.name}: {none}{damage or advice(self.method, learned=not self._given)}")
+            raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
 
     def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
         """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""
@@ -205,13 +196,13 @@ class Segmentation:
     def facings(self) -> Array:
         """Which way the person faces in each frame, as `Segmenter.facing`; NaN where unknown or going along."""
         sides = [row["longer_side"] for row in self.rows]
-        return facings_on_the_spot(self._facings, self._middles, sides, self.fps)
+        return facings_on_the_spot(self._facings, self._middles, sides, self.video.fps)
 
     @property
     def verdict(self) -> Verdict | None:
         """What is wrong with the masks, if anything; known when the pass has ended."""
         result = verdict(self.rows, self.method, learned=not self._given)
-        return result and replace(result, text=f"{self.name}: {result.text}")
+        return result and replace(result, text=f"{self.video.path}: {result.text}")
 
     @property
     def _damage(self) -> str:
@@ -220,7 +211,7 @@ class Segmentation:
     @property
     def warnings(self) -> list[str]:
         """What a user should check before they trust the masks."""
-        texts, name = [*self._video.warnings], self.name
+        texts, name = [*self.video.warnings], self.video.path
         if self.verdict:
             texts.append(self.verdict.text)
         if self._missing > MISSING * len(self.rows):
@@ -244,7 +235,7 @@ class Segmentation:
             "frames": len(self.rows),
             "usable": sum(bool(row["usable"]) for row in self.rows),
             "size": list(self.size),
-            "fps": self.fps,
+            "fps": self.video.fps,
             "touching_border": sum(bool(row["touches_border"]) for row in self.rows),
             "in_pieces": sum(row["pieces"] > 1 for row in self.rows),
             "warnings": self.warnings,
@@ -256,8 +247,7 @@ class CameraMotion:
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._size = SMALL, max(16 * TILES, round(SMALL * size[1] / size[0]))
-        self._tile = self._size[0] // TILES, self._size[1] // TILES
-        self._first: Any = None
+        self._first: list[Any] | None = None  # the tiles of the first picture; None for one without texture
 
     def shift(self, image: Image) -> float:
         """Return by how many pixels of a picture `SMALL` wide an image is shifted against the first.
@@ -268,19 +258,17 @@ class CameraMotion:
         small = cv2.cvtColor(cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
         grey: Any = cv2.GaussianBlur(small.astype(np.float32), (0, 0), FINE)  # noise is no texture,
         grey -= cv2.GaussianBlur(grey, (0, 0), COARSE)  # and light that changes is none
-        if self._first is None:
-            self._first = [tile[REACH:-REACH, REACH:-REACH] if _textured(tile) else None for tile in self._tiles(grey)]
-        shifts = [
-            _shift_of_tile(before, now)
-            for before, now in zip(self._first, self._tiles(grey), strict=True)
-            if before is not None
-        ]
-        return float(np.quantile(shifts, FREE)) if len(shifts) > SPREAD * TILES**2 else 0.0
-
-    def _tiles(self, image: Any) -> list[Any]:
-        wide, tall = self._tile
+        wide, tall = (side // TILES for side in self._size)
         corners = [(y * tall, x * wide) for y in range(TILES) for x in range(TILES)]
-        return [np.ascontiguousarray(image[y : y + tall, x : x + wide]) for y, x in corners]
+        tiles = [np.ascontiguousarray(grey[y : y + tall, x : x + wide]) for y, x in corners]
+        if self._first is None:
+            self._first = [tile[REACH:-REACH, REACH:-REACH] if _textured(tile) else None for tile in tiles]
+        shifts = []
+        for before, now in zip(self._first, tiles, strict=True):
+            if before is not None:
+                best = cv2.minMaxLoc(cv2.matchTemplate(now, before, cv2.TM_CCOEFF_NORMED))[3]
+                shifts.append(float(np.hypot(*np.subtract(best, REACH))))
+        return float(np.quantile(shifts, FREE)) if len(shifts) > SPREAD * TILES**2 else 0.0
 
 
 def _textured(tile: Any) -> bool:
@@ -288,12 +276,6 @@ def _textured(tile: Any) -> bool:
     down, across = np.gradient(tile)
     tensor = [[np.mean(across * across), np.mean(across * down)], [np.mean(across * down), np.mean(down * down)]]
     return bool(np.linalg.eigvalsh(tensor)[0] > TEXTURE**2)
-
-
-def _shift_of_tile(before: Any, now: Any) -> float:
-    """Return by how many pixels the middle of a tile has moved, to where it correlates best whatever its brightness."""
-    correlation = cv2.matchTemplate(now, before, cv2.TM_CCOEFF_NORMED)
-    return float(np.hypot(*np.subtract(cv2.minMaxLoc(correlation)[3], REACH)))
 
 
 def _scaled_roi(roi: Box | None, video: Video, scale: float) -> Box | None:

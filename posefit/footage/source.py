@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 from posefit.errors import InputError
-from posefit.footage.cameras import CameraView, calibrated, combined, masks_of, video_of
+from posefit.footage.cameras import CameraView, calibrated, combined
+from posefit.footage.cleaning import cleaned
+from posefit.footage.extract import segmented
 from posefit.footage.masks import FPS, Range, existing
-from posefit.footage.readers import IMAGES
+from posefit.footage.readers import IMAGES, read_masks
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
@@ -18,6 +20,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in, recorded
+from posefit.motion.asf import read_asf
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
 from posefit.reading import quoted
@@ -29,23 +32,23 @@ Kind = Literal["motion", "masks", "video"]
 _KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video"}
 Source = str | Path | Motion
 HEIGHTS = (0.3, 2.8)  # metres that a person may stand
-_USED_FOR = {
-    "extraction": "video",
-    "fps": "motions and masks",
-    "label": "masks",
-    "holes": "masks",
-    "height": "footage",
-    "size": "motions",
-    "up": "calibrations",
+_USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
+    "extraction": ("video", ["video"]),
+    "fps": ("motions and masks", ["motion", "masks"]),
+    "label": ("masks", ["masks"]),
+    "holes": ("masks", ["masks"]),
+    "height": ("footage", ["masks", "video"]),
+    "size": ("motions", ["motion"]),
 }
 
 
 def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
     """Return nothing. Raises InputError where an option is given that sources of this kind have no use for."""
-    useless = {"motion": ("extraction", "label", "holes", "height"), "masks": ("extraction", "size")}
-    for name in (*useless.get(kind, ("fps", "label", "holes", "size")), *(() if view.get("camera") else ("up",))):
-        if view.get(name) is not None:
-            raise useless_for(kind, name, view[name], _USED_FOR[name])
+    for name, (where, kinds) in _USED_FOR.items():
+        if kind not in kinds and view.get(name) is not None:
+            raise useless_for(kind, name, view[name], where)
+    if view.get("up") is not None and not view.get("camera"):
+        raise useless_for(kind, "up", view["up"], "calibrations")
 
 
 def useless_for(kind: Kind, name: str, value: object, where: str) -> InputError:
@@ -89,12 +92,33 @@ def scene_of(
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
     paths = [Path(source) for source in sources if not isinstance(source, Motion)]
     if kind == "video":
-        views = _filmed(paths, camera, extraction or Extraction(), frames, progress)
+        videos = [Video.of(path) for path in paths]
+        rates = {round(video.fps, 3) for video in videos}
+        if len(rates) > 1:
+            raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
+        known = calibrated(camera, [video.size for video in videos])
+        segmentations = [Segmentation(video, extraction or Extraction(), frames) for video in videos]
+        views = [_filmed(segmentation, progress) for segmentation in segmentations]
     else:
-        calibrated(camera, [None] * len(paths))
-        views = [masks_of(path, frames, label, holes) for path in paths]
+        known = calibrated(camera, [None] * len(paths))
+        masks = [cleaned(read_masks(path, frames, label), path, holes) for path in paths]
+        views = [CameraView(*clean, name=str(path)) for clean, path in zip(masks, paths, strict=True)]
     facing = view_degrees[0] if view_degrees else None
-    return combined(views, paths[0].stem, _body(asf, height), camera, facing, up, fps)
+    body = Body.of(built_in.average_skeleton() if asf is None else read_asf(asf))
+    if height is not None:
+        body = body.scaled(height / body.stature, height / body.stature)
+    return combined(views, paths[0].stem, body, known, facing, up, fps)
+
+
+def _filmed(segmentation: Segmentation, progress: Progress) -> CameraView:
+    """Return what a video shows. Raises InputError where its masks cannot be those of a person."""
+    video = segmentation.video
+    progress.log(f"taking the person out of {video.path}")
+    masks = segmented(segmentation, progress.steps)
+    if segmentation.verdict and segmentation.verdict.refused:
+        raise InputError(segmentation.verdict.text)
+    pictures = partial(video.frames, segmentation.start, segmentation.stop, segmentation.size)
+    return CameraView(masks, segmentation.warnings, str(video.path), video.size, pictures, segmentation.facings)
 
 
 @dataclass(frozen=True)
@@ -133,7 +157,8 @@ def clip_of(source: Source, asf: str | Path | None = None) -> SourceClip:
     if isinstance(source, Motion):
         return SourceClip.of(source)
     if source in built_in.names():
-        return SourceClip(partial(_built_in, str(source)), len(built_in.motion(str(source))), None)
+        name = str(source)
+        return SourceClip(lambda fps: built_in.motion(name, fps=fps), len(built_in.motion(name)), None)
     if recorded.is_recorded(source):
         return SourceClip.of_recorded(recorded.clip(str(source)))
     path = Path(source)
@@ -145,7 +170,7 @@ def clip_of(source: Source, asf: str | Path | None = None) -> SourceClip:
         from posefit.motion.bvh import read_bvh
 
         return SourceClip.of(read_bvh(existing(path)))
-    if path.exists() or path.suffix or _has_folders(source):
+    if path.exists() or path.suffix or os.sep in str(source):
         existing(path)
         raise InputError(
             f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}"
@@ -166,35 +191,9 @@ def kind_of(source: Source) -> Kind:
     if isinstance(source, Motion) or source in built_in.names() or recorded.is_recorded(source):
         return "motion"
     path = Path(source)
-    if path.is_dir() or path.suffix.lower() == ".npz" or (not path.suffix and _has_folders(source)):
+    if path.is_dir() or path.suffix.lower() == ".npz" or (not path.suffix and os.sep in str(source)):
         return "masks"
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
-
-
-def _has_folders(source: str | Path) -> bool:
-    """Return whether a name is a path beyond doubt: with a separator, if only at its end."""
-    return os.sep in str(source)
-
-
-def _filmed(
-    paths: list[Path],
-    cameras: Sequence[Camera | str | Path],
-    extraction: Extraction,
-    frames: Range,
-    progress: Progress,
-) -> list[CameraView]:
-    """Return what videos show, after everything that a user may have got wrong was checked."""
-    videos = [Video.of(path) for path in paths]
-    rates = {round(video.fps, 3) for video in videos}
-    if len(rates) > 1:
-        raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
-    calibrated(cameras, [video.size for video in videos])
-    segmentations = [Segmentation(video, extraction, frames) for video in videos]
-    views = []
-    for video, segmentation in zip(videos, segmentations, strict=True):
-        progress.log(f"taking the person out of {video.path}")
-        views.append(video_of(video, segmentation, progress))
-    return views
 
 
 def _cameras(one: Camera | str | Path, up: Up | None) -> list[Camera]:
@@ -202,19 +201,6 @@ def _cameras(one: Camera | str | Path, up: Up | None) -> list[Camera]:
         return [one]
     known = read_calibrations(one)
     return [calibration.camera(calibration.size, upright(known, up)) for calibration in known]
-
-
-def _body(asf: str | Path | None, height: float | None) -> Body:
-    from posefit.motion.asf import read_asf
-
-    skeleton = built_in.average_skeleton() if asf is None else read_asf(asf)
-    body = Body.of(skeleton)
-    scale = 1.0 if height is None else height / body.stature
-    return body.scaled(scale, scale)
-
-
-def _built_in(name: str, fps: float) -> Motion:
-    return built_in.motion(name, fps=fps)
 
 
 def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:

@@ -3,7 +3,7 @@
 import errno
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -56,10 +56,9 @@ class Video:
             capture.release()
         rate = fps if np.isfinite(fps) and 0.0 < fps <= 1000.0 else 30.0
         order, filmed, rate = _even(_moments(path), rate)
-        said = int(claimed) if 0.0 < claimed < 1e9 else 0
-        if (np.diff(order) != 1).any():
-            said = 0  # of the frames as they were filmed, which are others
-        return cls(path, rate, (image.shape[1], image.shape[0]), said, _order=order, _filmed=filmed)
+        video = cls(path, rate, (image.shape[1], image.shape[0]), _order=order, _filmed=filmed)
+        # what a file says counts the frames as they were filmed
+        return replace(video, claimed=int(claimed)) if 0.0 < claimed < 1e9 and not video.uneven else video
 
     def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop, scaled to `size`.

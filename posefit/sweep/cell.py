@@ -291,7 +291,7 @@ def _installed() -> frozenset[str]:
 def cell_scene(cell: TrackCell) -> "Scene":
     """Return the observations of a cell; the same for all methods and seeds."""
     from posefit.footage.instance import motion_of_instance, variation
-    from posefit.footage.scene import CorruptedObservations, synthetic
+    from posefit.footage.scene import synthetic, with_corruption
 
     motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
     scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
@@ -299,8 +299,8 @@ def cell_scene(cell: TrackCell) -> "Scene":
     if not cell.corruption:
         return scene
     noise = {kind: strength for kind, strength in cell.corruption.items() if kind != DROPPED}
-    spoilt = CorruptedObservations(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
-    return replace(scene, observations=spoilt)
+    observations = with_corruption(scene.observations, noise, cell.corruption.get(DROPPED, 0.0), cell.instance)
+    return replace(scene, observations=observations)
 
 
 def _with_known_person(cell: TrackCell, scene: "Scene") -> "Scene":
