@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posefit.arrays.compiling import compiled_once
+from posefit.errors import InputError
 
 Array = NDArray[np.float64]
 Bits = NDArray[np.uint64]  # 64 pixels a number
@@ -52,3 +53,24 @@ def writeable(values: ArrayLike) -> Array:
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and values.flags.carray:
         return values
     return np.require(values, np.float64, ["C", "W"])
+
+
+def frozen(name: str, values: ArrayLike, shape: tuple[int | str, ...]) -> Array:
+    """Return a copy of finite numbers that cannot be written to; a word in a shape stands for any length.
+
+    Raises InputError, beginning with the name, where they are no such numbers.
+    """
+    sides = f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} must be numbers of shape {sides}, got {values!r}") from None
+    fits = array.ndim == len(shape) and all(
+        isinstance(side, str) or side == length for side, length in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise InputError(f"{name} must have shape {sides}, got {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} that are not")
+    array.setflags(write=False)
+    return array

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from posefit.arrays import Array
+from posefit.arrays import Array, frozen
 from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, MIRROR, PARENTS, Skeleton, kind
 
@@ -37,13 +37,9 @@ class Body:
     radii: Array = field(repr=False)  # (26, 2) where the bone starts, where it ends
 
     def __post_init__(self) -> None:
-        radii = np.array(self.radii, dtype=np.float64)
-        if radii.shape != (len(BONES), 2):
-            raise InputError(f"radii must have shape {(len(BONES), 2)}, got {radii.shape}")
-        if not (np.isfinite(radii).all() and (radii >= 0.0).all()):
-            raise InputError(f"radii must be finite and not negative, got {radii.min()} to {radii.max()}")
-        radii.setflags(write=False)
-        object.__setattr__(self, "radii", radii)
+        object.__setattr__(self, "radii", frozen("radii", self.radii, (len(BONES), 2)))
+        if (self.radii < 0.0).any():
+            raise InputError(f"radii must not be negative, got {self.radii.min()}")
 
     @classmethod
     def of(cls, skeleton: Skeleton, girth: float = 1.0) -> "Body":

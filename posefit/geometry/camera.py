@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from posefit.arrays import Array
+from posefit.arrays import Array, frozen
 from posefit.errors import InputError
+from posefit.reading import parsed_json, read_text
 
 LARGEST_SIDE = 16_384  # pixels
+LARGEST_FILE = 1_000_000  # bytes
 FIELD_OF_VIEW = math.radians(40.0)  # across the larger side; our guess for an unknown camera
 MARGIN = 0.06  # share of the image left free around what `framing` shows
 _KEYS = ("width", "height", "focal", "centre", "camera_from_world")
@@ -34,14 +36,7 @@ class Camera:
                 raise InputError(f"{name} must be a whole number from 1 to {LARGEST_SIDE}, got {side!r}")
             object.__setattr__(self, name, int(side))
         for name, shape in (("focal", (2,)), ("centre", (2,)), ("rotation", (3, 3)), ("translation", (3,))):
-            try:
-                value = np.array(getattr(self, name), dtype=np.float64)
-            except (TypeError, ValueError, OverflowError):
-                raise InputError(f"{name} must be numbers of shape {shape}, got {getattr(self, name)!r}") from None
-            if value.shape != shape or not np.isfinite(value).all():
-                raise InputError(f"{name} must be finite numbers of shape {shape}, got {value.tolist()}")
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
         if (self.focal <= 0.0).any():
             raise InputError(f"focal must be positive, got {self.focal.tolist()}")
         if not _turns(self.rotation):
@@ -106,24 +101,20 @@ class Camera:
     @classmethod
     def from_json(cls, path: str | Path) -> "Camera":
         """Return the camera of a file written by `to_json`. Raises ValueError naming the file and the key."""
-        path = Path(path)
-        if path.stat().st_size > 1_000_000:
-            raise InputError(f"{path}: expected a camera file of at most 1 MB, got {path.stat().st_size} bytes")
+        expected = f"{path}: expected a JSON object with {', '.join(_KEYS)}"
+        text = read_text(path, LARGEST_FILE)
         try:
-            values = json.loads(path.read_text(encoding="utf-8"))
-        except (ValueError, RecursionError) as error:  # bad UTF-8, bad JSON, endless digits, endless nesting
-            raise InputError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {error}") from None
+            values = parsed_json(text)
+        except ValueError as error:
+            raise InputError(f"{expected}, got {error}") from None
         if not isinstance(values, dict) or set(values) != set(_KEYS):
-            keys = sorted(values) if isinstance(values, dict) else type(values).__name__
-            raise InputError(f"{path}: expected a JSON object with {', '.join(_KEYS)}, got {keys}")
+            raise InputError(f"{expected}, got {sorted(values) if isinstance(values, dict) else type(values).__name__}")
         try:
-            matrix = np.array(values["camera_from_world"], dtype=np.float64)
-            if matrix.shape != (4, 4) or matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
-                raise InputError(f"camera_from_world must be 4 x 4 with last row 0 0 0 1, got {matrix.tolist()}")
-            return cls(
-                values["width"], values["height"], values["focal"], values["centre"], matrix[:3, :3], matrix[:3, 3]
-            )
-        except (TypeError, ValueError, OverflowError) as error:
+            matrix = frozen("camera_from_world", values.pop("camera_from_world"), (4, 4))
+            if matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+                raise InputError(f"camera_from_world must have the last row 0 0 0 1, got {matrix[3].tolist()}")
+            return cls(**values, rotation=matrix[:3, :3], translation=matrix[:3, 3])
+        except ValueError as error:
             raise InputError(f"{path}: {error}") from None
 
 

@@ -4,6 +4,7 @@ The function stands here as plain Python, and below it as numba compiles it.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from llvmlite import ir
@@ -87,26 +88,19 @@ def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> A
         )
         return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), _ROWS), [0] * _ROWS))
 
-    def product(a: Any, b: Any) -> Any:
-        return builder.fmul(a, b, flags=_FREEDOM)
-
-    def total(a: Any, b: Any) -> Any:
-        return builder.fadd(a, b, flags=_FREEDOM)
-
-    def difference(a: Any, b: Any) -> Any:
-        return builder.fsub(a, b, flags=_FREEDOM)
+    product = partial(builder.fmul, flags=_FREEDOM)
+    total = partial(builder.fadd, flags=_FREEDOM)
+    difference = partial(builder.fsub, flags=_FREEDOM)
 
     def changed_where(condition: Any, axes: Sequence[Any], change: Any) -> list[Any]:
         before = builder.block
         with builder.if_then(condition):
             others = change(*axes)
             within = builder.block
-        chosen = []
-        for old, new in zip(axes, others, strict=True):
-            either = builder.phi(column)
+        chosen = [builder.phi(column) for _ in axes]
+        for either, old, new in zip(chosen, axes, others, strict=True):
             either.add_incoming(old, before)
             either.add_incoming(new, within)
-            chosen.append(either)
         return chosen
 
     def at_rest(u: Any, v: Any, w: Any) -> list[Any]:
@@ -119,18 +113,16 @@ def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> A
             [in_all_rows(start(kind, of), builder.add(angle, index(k))) for k in range(3)]
             for kind, of in ((sines_type, sines), (cosines_type, cosines))
         )
-        u, v = (
-            total(product(u, cosine[2]), product(v, sine[2])),
-            difference(product(v, cosine[2]), product(u, sine[2])),
-        )
-        u, w = (
-            difference(product(u, cosine[1]), product(w, sine[1])),
-            total(product(w, cosine[1]), product(u, sine[1])),
-        )
-        v, w = (
-            total(product(v, cosine[0]), product(w, sine[0])),
-            difference(product(w, cosine[0]), product(v, sine[0])),
-        )
+
+        def turned_by(k: int, first: Any, second: Any) -> tuple[Any, Any]:
+            return (
+                total(product(first, cosine[k]), product(second, sine[k])),
+                difference(product(second, cosine[k]), product(first, sine[k])),
+            )
+
+        u, v = turned_by(2, u, v)
+        w, u = turned_by(1, w, u)
+        v, w = turned_by(0, v, w)
         return u, v, w
 
     axes = [builder.load(place_of(parent, k), align=8) for k in range(3)]

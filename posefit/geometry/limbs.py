@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.errors import InputError
-from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, angle_index
+from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, channel_angles
 
 # The chains of bones between the joints where several begin; what is left, from the root to the thorax, is the torso.
 LIMBS: Mapping[str, Sequence[str]] = {
@@ -46,5 +46,4 @@ def rows_of(bones: Sequence[str]) -> NDArray[np.intp]:
 
 def turns_of(bones: Sequence[str]) -> NDArray[np.intp]:
     """Return where in a pose (66,) the angles stand that turn bones."""
-    starts = [angle_index(JOINTS.index(bone)) for bone in bones]
-    return np.array([start + axis for start in starts if start >= 0 for axis in range(3)], dtype=np.intp)
+    return np.array([angle for bone in bones for angle in channel_angles(bone, ("rx", "ry", "rz"))], dtype=np.intp)

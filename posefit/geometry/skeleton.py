@@ -5,6 +5,7 @@ Following Acclaim, a joint is named after the bone that ends in it, and the angl
 bone about the joint it starts from. The five end bones have no freedom. SAPSO section 2.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -12,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, writeable
+from posefit.arrays import Array, frozen, writeable
 from posefit.errors import InputError
 from posefit.geometry import kernels
 
@@ -43,7 +44,7 @@ rwrist      rhand
 
 
 def _walk_tree() -> tuple[tuple[str, ...], tuple[int, ...]]:
-    children = {line.split()[0]: line.split()[1:] for line in _TREE.split("\n") if line}
+    children = {line.split()[0]: line.split()[1:] for line in _TREE.strip().split("\n")}
     names: list[str] = []
     parents: list[int] = []
 
@@ -101,6 +102,12 @@ def angle_index(joint: int) -> int:
     return 3 + 3 * INNER.index(joint) if joint in INNER else -1
 
 
+def channel_angles(bone: str, channels: Sequence[str]) -> list[int]:
+    """Return where in a pose (66,) the angles of a bone stand, such as `rx` and `rz`; none for one without angles."""
+    start = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
+    return [start + "xyz".index(channel[1]) for channel in channels] if start > 0 else []
+
+
 # (26,) of each bone: the joint it starts from, and where its angles are in a pose
 _STARTS, _TURNING = np.array(PARENTS[1:]), np.array([angle_index(j) for j in range(1, len(JOINTS))])
 
@@ -129,13 +136,7 @@ class Skeleton:
     def __post_init__(self) -> None:
         shapes = {"offsets": (26, 3), "axes": (26, 3, 3)} | ({} if self.limits is None else {"limits": (63, 2)})
         for name, shape in shapes.items():
-            value = np.array(getattr(self, name), dtype=np.float64)
-            if value.shape != shape:
-                raise InputError(f"{name} must have shape {shape}, got {value.shape}")
-            if not np.isfinite(value).all():
-                raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
         if self.limits is not None and (self.limits[:, 0] > self.limits[:, 1]).any():
             raise InputError("limits must not be reversed, got a lowest angle above the highest")
 
@@ -150,9 +151,7 @@ class Skeleton:
         free = np.zeros(ANGLES, dtype=bool)
         free[:3] = True
         for bone, angles in self.channels:
-            start = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
-            if start > 0:
-                free[[start + "xyz".index(angle[1]) for angle in angles]] = True
+            free[channel_angles(bone, angles)] = True
         return free
 
     @cached_property

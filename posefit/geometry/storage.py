@@ -88,12 +88,10 @@ def _count(value: Any) -> int:
 
 
 def _value(value: Any) -> Any:
-    if isinstance(value, dict) and "data" in value:
-        if {"rows", "cols"} <= value.keys():
-            return Matrix([value["rows"], value["cols"]], value.get("dt", "d"), value["data"])
-        if "sizes" in value:
-            return Matrix(value["sizes"], value.get("dt", "d"), value["data"])
-    return value
+    if not isinstance(value, dict) or "data" not in value:
+        return value
+    sides = [value["rows"], value["cols"]] if {"rows", "cols"} <= value.keys() else value.get("sizes")
+    return value if sides is None else Matrix(sides, value.get("dt", "d"), value["data"])
 
 
 def _yaml(text: str) -> Any:

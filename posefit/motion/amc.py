@@ -15,7 +15,7 @@ from posefit.geometry.rotation import (
     rotation_from_joint_angles,
     rotation_from_root_angles,
 )
-from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton, angle_index
+from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
 from posefit.motion.asf import LARGEST, METRES_PER_UNIT, mistake, parse_asf, unit_length
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import SHOWN, check_size, cut
@@ -65,10 +65,9 @@ def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.in
     start = 6
     for bone, angles in skeleton.channels:
         spans[bone.encode()] = start, start + len(angles)
-        first = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
-        if first > 0:
+        if indices := channel_angles(bone, angles):
             columns += range(start, start + len(angles))
-            targets += [first + "xyz".index(angle[1]) for angle in angles]
+            targets += indices
         start += len(angles)
     return spans, np.array(columns, dtype=np.int64), np.array(targets, dtype=np.int64)
 

@@ -9,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
-from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Channels, Skeleton, angle_index
+from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Skeleton, channel_angles
 from posefit.reading import SHOWN, check_size, cut
 
 INCH = 0.0254  # metres
@@ -103,9 +103,8 @@ def _limits(bones: dict[str, _Bone]) -> Array | None:
         bone = bones[JOINTS[joint]]
         if bone.free and bone.limits is None:
             return None
-        for k, angle in enumerate(bone.free):
-            assert bone.limits is not None
-            limits[angle_index(joint) - 3 + "xyz".index(angle[1])] = bone.limits[k]
+        if bone.limits is not None:
+            limits[[angle - 3 for angle in channel_angles(JOINTS[joint], bone.free)]] = bone.limits
     return limits
 
 
@@ -257,7 +256,9 @@ def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = 
         "  position 0 0 0\n  orientation 0 0 0\n:bonedata\n"
     )
     text = [header]
-    for number, (name, free) in enumerate(_in_file_order(skeleton.channels), 1):
+    turning = dict(skeleton.channels)
+    channels = [*((name, ()) for name in BONES if name not in turning), *skeleton.channels]
+    for number, (name, free) in enumerate(channels, 1):
         direction, length, axis = [1.0, 0.0, 0.0], 0.0, [0.0, 0.0, 0.0]
         if name in BONES:
             bone = BONES.index(name)
@@ -266,9 +267,8 @@ def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = 
             if length > 0.0:
                 direction = (skeleton.offsets[bone] / length).tolist()
         dof = f"    dof {' '.join(free)}\n" if free else ""
-        if free and skeleton.limits is not None and name in JOINTS:
-            start = angle_index(JOINTS.index(name)) - 3
-            rows = np.degrees(skeleton.limits[[start + "xyz".index(angle[1]) for angle in free]]).tolist()
+        if skeleton.limits is not None and (angles := channel_angles(name, free)):
+            rows = np.degrees(skeleton.limits[[angle - 3 for angle in angles]]).tolist()
             dof += "    limits " + "\n           ".join(f"({low!r} {high!r})" for low, high in rows) + "\n"
         text.append(
             f"  begin\n    id {number}\n    name {name}\n    direction {_spaced(direction)}\n"
@@ -283,11 +283,6 @@ def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = 
             text.append(f"    {parent} {' '.join(children)}\n")
     text.append("  end\n")
     Path(path).write_text("".join(text), encoding="utf-8", newline="\n")
-
-
-def _in_file_order(channels: Channels) -> Channels:
-    turning = {name for name, _ in channels}
-    return (*((name, ()) for name in BONES if name not in turning), *channels)
 
 
 def _spaced(values: list[float]) -> str:

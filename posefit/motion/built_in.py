@@ -11,6 +11,7 @@ with funding from NSF EIA-0196217.
 
 import json
 import re
+from collections.abc import Mapping
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
@@ -53,13 +54,17 @@ def other_styles(name: str) -> tuple[str, ...]:
 @lru_cache(maxsize=1)
 def average_skeleton() -> Skeleton:
     """Return the skeleton of the built-in motions: the mean of nine people, symmetric."""
-    stored = _stored()["skeleton"]
+    return stored_skeleton("average", _stored()["skeleton"])
+
+
+def stored_skeleton(name: str, stored: Mapping[str, Any]) -> Skeleton:
+    """Return a skeleton that the package holds as JSON, with its angles in degrees."""
     return Skeleton(
-        "average",
+        name,
         np.array(stored["offsets"]),
         rotation_from_joint_angles(np.radians(stored["axes_degrees"])),
         tuple((bone, tuple(free)) for bone, free in stored["channels"]),
-        np.radians(stored["limits_degrees"]),
+        None if stored["limits_degrees"] is None else np.radians(stored["limits_degrees"]),
     )
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from posefit.arrays import Array
+from posefit.arrays import Array, frozen
 from posefit.errors import InputError
 from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
@@ -28,13 +28,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         for name, columns in (("poses", ANGLES), ("translations", 3)):
-            value = np.array(getattr(self, name), dtype=np.float64)
-            if value.ndim != 2 or value.shape[1] != columns:
-                raise InputError(f"{name} must have shape (frames, {columns}), got {value.shape}")
-            if not np.isfinite(value).all():
-                raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(value))} that are not")
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, frozen(name, getattr(self, name), ("frames", columns)))
         if len(self.poses) < 1:
             raise InputError("poses must hold at least 1 frame, got 0")
         if len(self.translations) != len(self.poses):
@@ -79,22 +73,17 @@ class Motion:
         poses, translations = (
             (1.0 - share) * series[before] + share * series[before + 1] for series in (self.poses, self.translations)
         )
-        poses[:, :3] = self._root_angles(times)
-        return Motion(self.name, self.skeleton, poses, translations, fps)
-
-    def _root_angles(self, times: Array) -> Array:
         from scipy.spatial.transform import Rotation, Slerp  # a quarter of a second to import
 
         rotations = Rotation.from_matrix(rotation_from_root_angles(self.poses[:, :3]))
         between = Slerp(np.arange(len(self)), rotations)(times).as_matrix()
         angles = np.unwrap(root_angles_from_rotation(between), axis=0)
         turns = np.round((self.poses[0, :3] - angles[0]) / (2.0 * np.pi))
-        return np.asarray(angles + 2.0 * np.pi * turns)
+        poses[:, :3] = angles + 2.0 * np.pi * turns
+        return Motion(self.name, self.skeleton, poses, translations, fps)
 
 
 def _rate(fps: float) -> float:
-    if not 0.0 < fps < np.inf:
-        raise InputError(f"fps must be a positive number, got {quoted(fps)}")
     if not RATES[0] <= fps <= RATES[1]:
         raise InputError(f"fps must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(fps)}")
     return float(fps)

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
+from posefit.motion.built_in import stored_skeleton
 from posefit.motion.motion import Motion
 from posefit.reading import quoted
 
@@ -82,16 +82,7 @@ def _stored() -> dict[str, RecordedClip]:
         names, owners = stored["names"].tolist(), stored["owners"].tolist()
         ends = np.cumsum(stored["counts"], dtype=np.int64)
         changes, gaps = stored["changes"].T.astype(np.int64), stored["gaps"].astype(np.int64)
-    skeletons = [
-        Skeleton(
-            one["name"],
-            np.array(one["offsets"]),
-            rotation_from_joint_angles(np.radians(one["axes_degrees"])),
-            tuple((bone, tuple(free)) for bone, free in one["channels"]),
-            None if one["limits_degrees"] is None else np.radians(one["limits_degrees"]),
-        )
-        for one in skeletons_json
-    ]
+    skeletons = [stored_skeleton(skeleton["name"], skeleton) for skeleton in skeletons_json]
     clips = {}
     for name, owner, start, stop in zip(names, owners, [0, *ends[:-1].tolist()], ends.tolist(), strict=True):
         values = STEP * np.cumsum(changes[start:stop], axis=0)

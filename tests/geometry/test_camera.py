@@ -180,9 +180,9 @@ def test_a_camera_is_copied_and_cannot_be_written_to() -> None:
         ({"width": 0}, "width must be a whole number from 1 to 16384, got 0"),
         ({"height": 16385}, "height must be a whole number from 1 to 16384, got 16385"),
         ({"width": True}, "width must be a whole number from 1 to 16384, got True"),
-        ({"focal": [50.0]}, r"focal must be finite numbers of shape \(2,\), got \[50.0\]"),
+        ({"focal": [50.0]}, r"focal must have shape \(2,\), got \(1,\)"),
         ({"focal": [50.0, -1.0]}, r"focal must be positive, got \[50.0, -1.0\]"),
-        ({"translation": [0.0, np.nan, 0.0]}, r"translation must be finite numbers of shape \(3,\), got"),
+        ({"translation": [0.0, np.nan, 0.0]}, "translation must be finite, got 1 that are not"),
         ({"rotation": 2.0 * np.eye(3)}, "rotation must be orthonormal and right-handed, got"),
         ({"rotation": np.diag([1.0, 1.0, -1.0])}, "rotation must be orthonormal and right-handed, got"),
     ],
@@ -195,17 +195,17 @@ def test_a_camera_that_cannot_be_is_refused(change: dict[str, Any], message: str
 
 def test_a_camera_file_of_more_than_a_megabyte_is_not_read(tmp_path: Path) -> None:
     (tmp_path / "camera.json").write_text(" " * 1_000_001)
-    with pytest.raises(ValueError, match="expected a camera file of at most 1 MB, got 1000001 bytes"):
+    with pytest.raises(ValueError, match="expected at most 1 MB, got 1.0 MB"):
         Camera.from_json(tmp_path / "camera.json")
 
 
-@pytest.mark.parametrize(
+@each(
     ("key", "text"),
     [
-        pytest.param("focal", "[" * 100_000, id="nested"),
-        pytest.param("focal", f"[{10**400}, 1]", id="huge"),
-        pytest.param("width", "9" * 5000, id="digits"),
-        pytest.param("camera_from_world", "[[1], [1, 2]]", id="ragged"),
+        ("focal", "[" * 100_000),
+        ("focal", f"[{10**400}, 1]"),
+        ("width", "9" * 5000),
+        ("camera_from_world", "[[1], [1, 2]]"),
     ],
 )
 def test_a_hostile_camera_file_is_refused_in_one_line(tmp_path: Path, key: str, text: str) -> None:
