@@ -10,6 +10,8 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.reading import quoted
 
+MAX_BITS = 1_024  # of a whole number, so that it can be written down
+
 
 def at_least(name: str, value: float, least: float) -> None:
     """Return nothing. Raises ValueError where a number is below the least it may be, or is not finite."""
@@ -33,7 +35,7 @@ def positive(name: str, value: float) -> None:
 
 def whole(name: str, value: object, least: int) -> int:
     """Return a whole number as an int. Raises ValueError where it is none, or below the least it may be."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or int(value).bit_length() > MAX_BITS:
         raise InputError(f"{name} must be a whole number of at least {least}, got {quoted(value)}")
     if value < least:
         raise InputError(f"{name} must be {f'at least {least}' if least else '0 or more'}, got {quoted(int(value))}")

@@ -329,15 +329,6 @@ def digest_of(path: str | Path) -> str:
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
-def parts(method: str) -> tuple[str, str, str | None]:
-    """Return the optimiser, the prior and the tracker that a method names; without a tracker the last is None.
-
-    A tracker has no optimiser and no prior: these are "".
-    """
-    optimiser, at, prior = method.partition("@")
-    return (optimiser, prior, None) if at else ("", "", method)
-
-
 def settings_text(settings: Mapping[str, Any]) -> list[str]:
     """Return settings as `--set` takes them."""
     return [f"{name}={setting_text(value)}" for name, value in settings.items()]

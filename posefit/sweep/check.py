@@ -1,33 +1,29 @@
-"""Checks a cell's spec, so that no mistake in it is reported only after hours."""
+"""Checks a cell's spec before anything runs: options of a track by their one declaration, all other fields here."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from difflib import get_close_matches
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from posefit.errors import InputError
-from posefit.fitting.space import TRANSLATIONS
+from posefit.fitting.check import between, finite_number, whole
 from posefit.fitting.tracker import Prediction
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
 from posefit.footage.training import training_clips
 from posefit.motion import built_in, recorded
-from posefit.motion.motion import RATES
-from posefit.reading import SHOWN, cut, quoted
-from posefit.registry import Kind, Offer, registry
+from posefit.reading import SHOWN, quoted
+from posefit.registry import Offer, registry
 from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.sweep.cell import ALL_AROUND, DROPPED, TrackCell, digest_of, parts, settings_text, version_of
-from posefit.tracking.method import parsed_settings
+from posefit.sweep.cell import ALL_AROUND, DROPPED, TrackCell, digest_of, settings_text, version_of
+from posefit.tracking.method import method_names, parsed_settings
+from posefit.tracking.options import TrackOptions, declared
 
 FIELDS = tuple(one.name for one in fields(TrackCell) if one.name not in ("files", "version"))
-MAX_SIDE = 16_384  # pixels
 MAX_BODY_OFF = 50.0  # percent that a body may be off
-MAX_BITS = 1_024  # of a whole number, so that it can be written down
 
 
 def cell_of(spec: Mapping[str, Any]) -> TrackCell:
@@ -43,9 +39,8 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
         if name not in spec:
             raise InputError(f"a cell must say its {name}, got none")
     values = checked(spec)
-    offers = _offers(values["method"])
     texts = tuple(settings_text(values.get("settings", {})))
-    settings = _settings(values["method"], texts)
+    offers, settings = _of_method(values["method"], texts)
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
         raise InputError(f"train must not contain the motion itself, got {values['motion']}")
@@ -64,47 +59,34 @@ def checked(spec: Mapping[str, Any]) -> dict[str, Any]:
     return {name: _CHECKS[name](name, value) for name, value in spec.items()}
 
 
-@lru_cache(maxsize=256)
-def names_of(method: str) -> tuple[str, ...]:
-    """Return the names that settings of a method begin with."""
-    optimiser, prior, tracker = parts(method)
-    chosen = (optimiser, prior, "tracker") if tracker is None else (tracker,)
-    return tuple(name.partition(":")[0] for name in chosen)
+def families(method: str) -> tuple[str, ...]:
+    """Return the names that settings of a method begin with. Raises ValueError where it is unknown."""
+    return tuple(_places(method))
 
 
 @lru_cache(maxsize=256)
 def _offers(method: str) -> tuple[Offer, ...]:
-    optimiser, prior, tracker = parts(method)
-    if tracker is None:
-        wanted: list[tuple[Kind, str]] = [("optimiser", optimiser), ("prior", prior)]
-        return tuple(registry().offer(kind, name) for kind, name in wanted)
-    known = registry().offers
-    if tracker not in known["tracker"] and tracker.partition(":")[0] in known["optimiser"]:
-        hint = f"; did you mean {quoted(f'{tracker}@pca')}?"
-        raise InputError(f"method must be a tracker or OPTIMISER@PRIOR, got {quoted(tracker)}{hint}")
-    if tracker.partition(":")[0] not in known["tracker"]:
-        trackers = ", ".join(sorted(known["tracker"])) or "of which there are none"
-        near = _nearest(tracker, [*known["tracker"], *(f"{name}@pca" for name in known["optimiser"])])
-        raise InputError(f"method must be a tracker ({trackers}) or OPTIMISER@PRIOR, got {quoted(tracker)}{near}")
-    return (registry().offer("tracker", tracker),)
+    names = method_names(method)
+    if names.tracker is not None:
+        return (registry().offer("tracker", names.tracker),)
+    return registry().offer("optimiser", names.optimiser), registry().offer("prior", names.prior)
+
+
+def _places(method: str) -> dict[str, tuple[str, Callable[..., Any]]]:
+    """Return the kind and the factory of each name that settings of a method begin with."""
+    places: dict[str, tuple[str, Callable[..., Any]]] = {
+        offer.name.partition(":")[0]: (offer.kind, offer.factory) for offer in _offers(method)
+    }
+    return places if len(places) == 1 else places | {"tracker": ("tracker", Prediction)}
 
 
 @lru_cache(maxsize=1024)
-def _settings(method: str, texts: tuple[str, ...]) -> dict[str, Any]:
-    """Return the settings that texts such as `sapso.cooling=0.9` give, sorted, each of the type that it has to be."""
-    tracker = parts(method)[2]
-    for text in texts:
-        if text.partition(".")[0] not in names_of(method):
-            known = ", ".join(names_of(method))
-            raise InputError(f"settings must be of {known}, which {cut(method)} uses, got {quoted(text)}")
-    places: dict[str, tuple[str, Any]] = {} if tracker else {"tracker": ("tracker", Prediction)}
-    for offer in _offers(method):
-        family = offer.name.partition(":")[0]
-        places[family] = family, offer.factory
-    typed: dict[str, Any] = {}
-    for family, mine in parsed_settings(places, texts).items():
-        typed |= {f"{family}.{setting}": value for setting, value in mine.items()}
-    return dict(sorted(typed.items()))
+def _of_method(method: str, texts: tuple[str, ...]) -> tuple[tuple[Offer, ...], dict[str, Any]]:
+    """Return a method's plugins, and the settings of texts such as `sapso.cooling=0.9`: sorted, as their types ask."""
+    places = _places(method)
+    parsed = parsed_settings(places, texts)
+    typed = {f"{name}.{one}": value for name, (kind, _) in places.items() for one, value in parsed[kind].items()}
+    return _offers(method), dict(sorted(typed.items()))
 
 
 @lru_cache(maxsize=1024)
@@ -113,11 +95,7 @@ def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
     offer = _offers(method)[0]
     if offer.kind != "optimiser":
         return 1
-    family = f"{offer.name.partition(':')[0]}."
-    mine = {
-        name.removeprefix(family): value for name, value in _settings(method, texts).items() if name.startswith(family)
-    }
-    return population(offer.factory, mine, evaluations)
+    return population(offer.factory, parsed_settings(_places(method), texts)["optimiser"], evaluations)
 
 
 @lru_cache(maxsize=1024)
@@ -155,6 +133,11 @@ def _name(field: str, value: Any) -> str:
     return value
 
 
+def _method(field: str, value: Any) -> str:
+    """Return a method by its whole name: `sapso` is `sapso@pca`."""
+    return str(method_names(_name(field, value)))
+
+
 def _motion(field: str, value: Any) -> str:
     name = _name(field, value)
     if name not in built_in.names() and not recorded.is_recorded(name) and Path(name).suffix.lower() not in MOTIONS:
@@ -165,7 +148,7 @@ def _motion(field: str, value: Any) -> str:
     return name
 
 
-def _motions(field: str, value: Any) -> tuple[str, ...]:
+def _train(field: str, value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise InputError(f"{field} must be a list of motions, got {quoted(value)}")
     return tuple(_learned_from(field, one) for one in value)
@@ -180,50 +163,10 @@ def _learned_from(field: str, value: Any) -> str:
 
 
 def _views(field: str, value: Any) -> tuple[float, ...]:
-    views = value if isinstance(value, list | tuple) else [value]
-    if not views:
+    degrees: tuple[float, ...] = _OPTIONS[field](field, value)
+    if not degrees:
         raise InputError(f"{field} must be at least one angle, got none")
-    return tuple(_number(field, view) for view in views)
-
-
-def _number(field: str, value: Any, low: float = -np.inf, high: float = np.inf) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{field} must be a finite number, got {quoted(value)}")
-    try:
-        number = float(value)
-    except OverflowError:  # a whole number of any size
-        number = np.inf
-    if not np.isfinite(number):
-        raise InputError(f"{field} must be a finite number, got {quoted(value)}")
-    if not low <= number <= high:
-        raise InputError(f"{field} must lie in {low:g} to {high:g}, got {value}")
-    return number
-
-
-def _rate(field: str, value: Any) -> float:
-    if (rate := _number(field, value)) <= 0.0:
-        raise InputError(f"{field} must be a positive number, got {value}")
-    return _number(field, rate, *RATES)
-
-
-def _between(low: float, high: float) -> Callable[[str, Any], float]:
-    return partial(_number, low=low, high=high)
-
-
-def _whole(least: int) -> Callable[[str, Any], int]:
-    def check(field: str, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > MAX_BITS:
-            raise InputError(f"{field} must be a whole number of at least {least}, got {quoted(value)}")
-        return value
-
-    return check
-
-
-def _size(field: str, value: Any) -> tuple[int, int]:
-    sides = list(value) if isinstance(value, list | tuple) else []
-    if len(sides) != 2 or not all(type(side) is int and 1 <= side <= MAX_SIDE for side in sides):
-        raise InputError(f"{field} must be [width, height] in pixels, up to {MAX_SIDE}, got {quoted(value)}")
-    return sides[0], sides[1]
+    return degrees
 
 
 def _corruption(field: str, value: Any) -> dict[str, float]:
@@ -233,7 +176,7 @@ def _corruption(field: str, value: Any) -> dict[str, float]:
     for kind in value:
         if kind not in kinds:
             raise InputError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{_nearest(kind, kinds)}")
-    strengths = {kind: _number(f"{field} {kind}", value[kind], 0.0, 1.0) for kind in sorted(value)}
+    strengths = {kind: _within(1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)}
     return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
 
 
@@ -247,31 +190,26 @@ def flattened(field: str, value: Any) -> dict[str, Any]:
     return flat
 
 
-def _one_of(*choices: str) -> Callable[[str, Any], str]:
-    def check(field: str, value: Any) -> str:
-        if value not in choices:
-            raise InputError(f"{field} must be one of {', '.join(choices)}, got {quoted(value)}")
-        return str(value)
+def _within(high: float) -> Callable[[str, Any], float]:
+    def check(field: str, value: Any) -> float:
+        number = finite_number(field, value)
+        between(field, number, 0.0, high)
+        return number
 
     return check
 
 
+_OPTIONS = {one.name: check for one in fields(TrackOptions) if (check := declared(one).check) is not None}
 _CHECKS: dict[str, Callable[[str, Any], Any]] = {
-    "method": _name,
+    **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
+    "method": _method,
     "motion": _motion,
-    "train": _motions,
+    "train": _train,
     "settings": flattened,
     "view_degrees": _views,
     "corruption": _corruption,
-    "instance": _whole(0),
-    "frames": _whole(1),
-    "fps": _rate,
-    "size": _size,
-    "evaluations": _whole(1),
-    "translation": _one_of(*TRANSLATIONS),
-    "first_pose": _one_of("searched", "given"),
-    "hypotheses": _whole(1),
-    "yaw_off_degrees": _between(0.0, ALL_AROUND),
-    "body_off_percent": _between(0.0, MAX_BODY_OFF),
-    "seed": _whole(0),
+    "instance": lambda field, value: whole(field, value, 0),
+    "frames": lambda field, value: whole(field, value, 1),
+    "yaw_off_degrees": _within(ALL_AROUND),
+    "body_off_percent": _within(MAX_BODY_OFF),
 }

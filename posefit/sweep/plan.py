@@ -48,7 +48,7 @@ from posefit.registry import registry
 from posefit.suites.functions import DIMENSIONS, FUNCTIONS, HELD_OUT, SUITES, checked_address, suite_function
 from posefit.suites.problem import EVALUATIONS, INFEASIBLE
 from posefit.sweep.cell import Cell, SearchCell, TrackCell, version_of
-from posefit.sweep.check import FIELDS, cell_of, flattened, names_of
+from posefit.sweep.check import FIELDS, cell_of, families, flattened
 from posefit.sweep.product import Entries, Product
 
 LISTS = {
@@ -161,7 +161,7 @@ class _Shared:
     def settings(self, spec: Mapping[str, Any]) -> dict[str, Any]:
         """Return the settings of a cell: its own, and of the shared ones those of what its method uses."""
         method = spec.get("method", self._method)
-        names = names_of(method) if isinstance(method, str) else ()
+        names = families(method) if isinstance(method, str) else ()
         fitting = {name: value for name, value in self._flat.items() if name.partition(".")[0] in names}
         for name in fitting:
             self._unused.pop(name, None)

@@ -84,7 +84,7 @@ def _rate(name: str, value: Any) -> float:
     from posefit.motion.motion import RATES
     from posefit.reading import quoted
 
-    if not isinstance(value, Real) or not 0.0 < (rate := cast(Any, value)) < math.inf:
+    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < (rate := cast(Any, value)) < math.inf:
         raise InputError(f"{name} must be a positive number, got {quoted(value)}")
     if not RATES[0] <= rate <= RATES[1]:
         raise InputError(f"{name} must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(value)}")
