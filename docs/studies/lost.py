@@ -354,7 +354,7 @@ def _tracked(cell: TrackCell, track: Turn) -> dict[str, Any]:
         "swapped": [int(one["swapped"]) for one in told.frames],
         "cost": [round(one["cost"], DIGITS) for one in told.frames],
     }
-    evidence = [frame.details.get("evidence", {}) for frame in told.found]
+    evidence = [frame.details.get("evidence", {}) for frame in told.estimates]
     if all(evidence):
         row["evidence"] = [{name: round(value, DIGITS) for name, value in one.items()} for one in evidence]
     return row

@@ -176,14 +176,14 @@ def followed(seen: OneTrack) -> Followed:
     )
     track = track_scene(scene, training, options)
     assert track.truth is not None
-    posteriors = [one.posterior for one in track.found]
+    posteriors = [one.posterior for one in track.estimates]
     most = max(len(one) for one in posteriors if one is not None)
     drawn = np.zeros((len(posteriors), most, track.truth.poses.shape[1]))
     weights = np.zeros((len(posteriors), most))
     for k, one in enumerate(posteriors):
         assert one is not None
         drawn[k, : len(one)], weights[k, : len(one)] = one.poses, one.weights
-    costs = np.array([one.cost for one in track.found])
+    costs = np.array([one.cost for one in track.estimates])
     return Followed(seen, track.truth.poses, track.motion.poses, drawn, weights, costs)
 
 

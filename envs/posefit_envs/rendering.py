@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.silhouette.cost import project
-from posefit.tracking.drawing.body import side_view
-from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, SPILLED, TEXT
+from posefit.tracking.drawing import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, side_view
 from posefit_envs.instance import Scenery
 
 MODES = ("rgb_array", "human")

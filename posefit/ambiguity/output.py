@@ -17,8 +17,7 @@ from posefit.geometry.skeleton import JOINTS, kind
 from posefit.geometry.symmetry import facing
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.drawing.body import draw_body, side_view
-from posefit.tracking.drawing.colours import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, write
+from posefit.tracking.drawing import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, draw_body, side_view, write
 from posefit.tracking.picture import SOLID
 from posefit.version import __version__
 

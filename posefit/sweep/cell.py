@@ -178,8 +178,8 @@ class TrackCell(Cell):
             "evaluations_used": result.measures.evaluations,
             "dimensions": result.summary["dimensions"],
             "joint_errors_mm": [round(float(error), 3) for error in errors],
-            "mode_reliability": _mode_reliability(result.found, truth, result.motion.skeleton),
-            "trace": anytime_trace(result.found),
+            "mode_reliability": _mode_reliability(result.estimates, truth, result.motion.skeleton),
+            "trace": anytime_trace(result.estimates),
         }
         return CellResult(row, packed_joints(estimate=estimate, truth=truth))
 

@@ -97,7 +97,7 @@ def track(
         if rerun is not None:
             from posefit.tracking.recording import record
 
-            record(rerun, scene, result.motion, result.found)
+            record(rerun, scene, result.motion, result.estimates)
     return result
 
 

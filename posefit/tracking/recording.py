@@ -16,10 +16,9 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import BONES, PARENTS, SIDES, Skeleton
 from posefit.motion.motion import Motion
-from posefit.tracking.drawing.body import SIDE_COLOURS, opacities
-from posefit.tracking.drawing.colours import OTHER
+from posefit.tracking.drawing import OTHER, SIDE_COLOURS, opacities
 from posefit.tracking.evaluation import LOST
-from posefit.tracking.picture import DRAWN, LIKELY
+from posefit.tracking.picture import DRAWN_LEVEL, MIN_OTHER_WEIGHT
 from posefit.uncertainty.intervals import joint_intervals
 from posefit.uncertainty.modes import other_mode
 
@@ -79,14 +78,14 @@ def _colours(skeleton: Skeleton, frame: Frame) -> Array:
     """Return the colour of each bone (26, 3): of its side, the darker the less sure it is."""
     colours = np.array([SIDE_COLOURS[side][::-1] for side in SIDES[1:]], dtype=np.float64)
     if frame.posterior is not None:
-        radii = joint_intervals(skeleton, frame.posterior, frame.pose).radii[DRAWN]
+        radii = joint_intervals(skeleton, frame.posterior, frame.pose).radii[DRAWN_LEVEL]
         colours *= opacities(radii)[:, None]
     return np.asarray(colours.round(), np.uint8)
 
 
 def _other(rerun: Any, skeleton: Skeleton, frame: Frame) -> Any:
     """Return what the frame may show as well, in thin lines; what clears it where that is nothing."""
-    other = other_mode(skeleton, frame.modes, frame.pose, LIKELY)
+    other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
     if other is None:
         return rerun.Clear(recursive=False)
     points = skeleton.joints(other.pose, other.translation)

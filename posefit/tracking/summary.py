@@ -36,7 +36,7 @@ class Track:
     measures: Measures
     frames: list[dict[str, float]] = field(repr=False)  # one row a frame: see posefit.tracking.measures.FRAME
     summary: dict[str, Any] = field(repr=False)  # what `posefit track --json` prints
-    found: list[Frame] = field(repr=False)  # the tracker's frames, as they are in the end
+    estimates: list[Frame] = field(repr=False)  # the tracker's frames, smoothed
     modes: list[TrackMode] = field(default_factory=list, repr=False)  # of the whole track, the likeliest first
 
 

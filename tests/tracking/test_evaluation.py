@@ -7,34 +7,20 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
-from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.scene import Scene, synthetic
+from posefit.footage.scene import Scene
 from posefit.footage.training import training_clips
 from posefit.geometry.body import varied
-from posefit.motion import built_in
-from posefit.silhouette.cost import areas
 from posefit.tracking import evaluation
 from posefit.tracking.evaluation import evaluated, nearest
 from posefit.tracking.measures import Measures
+from tests.tracking.scenes import frame_of, truth_of, walk
 
-FRAMES = 4
-
-
-def walk(size: tuple[int, int] = (320, 240)) -> Scene:
-    return synthetic(built_in.motion("walk", frames=FRAMES), [45.0, 135.0], size, [], (None, None))
-
-
-def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observation) -> Frame:
-    """Return the frame of a tracker that estimates a pose."""
-    views = zip(scene.cameras, observation.silhouettes, strict=True)
-    counts = [areas(scene.body, camera, mask, pose[None], translation[None])[0] for camera, mask in views]
-    return Frame(pose, translation, 0.0, np.array(counts), 1, 1.0, np.zeros(1))
+FRAMES, VIEWS = 4, (45.0, 135.0)
 
 
 def measures_of(scene: Scene, training: Array | None = None, shaken_mm: float = 0.0) -> Measures:
     """Return what the true track of a scene is worth, whose root goes up and down by so much from frame to frame."""
-    truth = scene.truth
-    assert truth is not None
+    truth = truth_of(scene)
     places = truth.translations + np.outer((-1.0) ** np.arange(len(truth)), [0.0, 0.5e-3 * shaken_mm, 0.0])
     frames = [frame_of(scene, *values) for values in zip(truth.poses, places, scene.observations, strict=True)]
     return evaluated(scene, frames, None, truth.poses[:, 3:] if training is None else training, 0.5)[1]
@@ -43,7 +29,7 @@ def measures_of(scene: Scene, training: Array | None = None, shaken_mm: float = 
 @pytest.mark.parametrize("size", [(320, 240), (64, 48)])
 def test_small_pictures_lead_to_the_nearest_pose(size: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
     training = np.concatenate([clip(30.0).poses[:, 3:] for clip in training_clips(["library:02,16"])])
-    scene = walk(size)
+    scene = walk(FRAMES, VIEWS, size)
     poses = []
     for limit in (len(training) - 1, len(training)):
         monkeypatch.setattr(evaluation, "MAX_FULL_SIZE_POSES", limit)
@@ -52,9 +38,8 @@ def test_small_pictures_lead_to_the_nearest_pose(size: tuple[int, int], monkeypa
 
 
 def test_baselines_are_reported_in_millimetres_too() -> None:
-    scene = walk()
-    truth = scene.truth
-    assert truth is not None
+    scene = walk(FRAMES, VIEWS)
+    truth = truth_of(scene)
     measures = measures_of(scene, np.tile(truth.poses[:1, 3:], (2, 1)))
     baselines = measures.baselines_mm
     assert baselines is not None
@@ -65,11 +50,10 @@ def test_baselines_are_reported_in_millimetres_too() -> None:
 
 
 def test_the_truth_has_its_own_bones_whatever_the_body_is() -> None:
-    exact = walk()
+    exact = walk(FRAMES, VIEWS)
     scene = replace(exact, body=varied(exact.body, 10.0, np.random.default_rng(1)))
     measures = measures_of(scene)
-    assert exact.truth is not None
-    joints = [body.skeleton.joints(exact.truth.poses) for body in (exact.body, scene.body)]
+    joints = [body.skeleton.joints(truth_of(exact).poses) for body in (exact.body, scene.body)]
     assert measures.mpjpe_mm == pytest.approx(metrics.mpjpe_mm(*joints).mean(), abs=1e-6)
     assert measures.mpjpe_mm > 1.0
     assert measures.error_degrees is not None
@@ -77,7 +61,7 @@ def test_the_truth_has_its_own_bones_whatever_the_body_is() -> None:
 
 
 def test_acceleration_and_foot_slide_stand_beside_those_of_the_truth() -> None:
-    scene = synthetic(built_in.motion("walk", frames=40), [45.0], (64, 48), [], (None, None))
+    scene = walk(40, size=(64, 48))
     exact, shaken = measures_of(scene), measures_of(scene, shaken_mm=10.0)
     assert exact.acceleration_ratio == 1.0
     assert exact.acceleration is not None
@@ -87,5 +71,5 @@ def test_acceleration_and_foot_slide_stand_beside_those_of_the_truth() -> None:
     assert shaken.acceleration_ratio == pytest.approx(shaken.acceleration / exact.acceleration)
     assert exact.foot_slide_mm is not None
     assert shaken.foot_slide_mm == pytest.approx(exact.foot_slide_mm)  # up and down is along no ground
-    single = measures_of(synthetic(built_in.motion("walk", frames=1), [45.0], (64, 48), [], (None, None)))
+    single = measures_of(walk(1, size=(64, 48)))
     assert (single.acceleration, single.acceleration_ratio, single.foot_slide_mm) == (None, None, None)

@@ -102,9 +102,9 @@ def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) ->
         posefit.track("walk", progress=stopping, **asked)
     resumed = posefit.track("walk", resume=True, **asked)
     whole = posefit.track("walk", **{**asked, "out": None})
-    for before, after in zip(whole.found, resumed.found, strict=True):
+    for before, after in zip(whole.estimates, resumed.estimates, strict=True):
         assert after.cpu_seconds is not None
         assert after.details.keys() == before.details.keys()
-    first, again = whole.found[0].details, resumed.found[0].details
+    first, again = whole.estimates[0].details, resumed.estimates[0].details
     np.testing.assert_array_equal(first["probabilities"], again["probabilities"])
     assert resumed.summary["cpu_seconds_per_frame"] is not None

@@ -21,9 +21,9 @@ def test_a_frame_is_as_likely_lost_as_not_at_one_cost_and_likelier_the_more_it_c
 @each("optimiser", ["sapso", "annealed"])
 def test_frames_say_it_where_modes_are_asked_for(optimiser: str) -> None:
     given = {"method": optimiser, "frames": (0, 2), "evaluations": 400, "population_size": 40, "size": (160, 120)}
-    assert [frame.lost for frame in posefit.track("walk", **given).found] == [None, None]
+    assert [frame.lost for frame in posefit.track("walk", **given).estimates] == [None, None]
     track = posefit.track("walk", settings={"tracker.modes": 1}, **given)
-    assert [frame.lost for frame in track.found] == [
-        pytest.approx(float(lost_probability(np.array(f.cost)))) for f in track.found
+    assert [frame.lost for frame in track.estimates] == [
+        pytest.approx(float(lost_probability(np.array(f.cost)))) for f in track.estimates
     ]
-    assert [row["lost"] for row in track.frames] == pytest.approx([frame.lost for frame in track.found])
+    assert [row["lost"] for row in track.frames] == pytest.approx([frame.lost for frame in track.estimates])

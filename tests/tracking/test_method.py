@@ -257,7 +257,7 @@ def test_a_scene_is_followed_as_it_is() -> None:
     result = posefit.track(seen, train=built_in.other_styles("walk"), evaluations=200)
     by_name = posefit.track(motion, train=built_in.other_styles("walk"), evaluations=200, size=(120, 90))
     np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
-    assert [frame.cost for frame in result.found] == [row["cost"] for row in result.frames]
+    assert [frame.cost for frame in result.estimates] == [row["cost"] for row in result.frames]
     with pytest.raises(ValueError, match="a scene must be tracked as it is, got fps"):
         posefit.track(seen, fps=20.0)
     with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth is unknown"):

@@ -124,7 +124,7 @@ def test_all_that_modes_take_is_within_their_share(share: float, searches: int) 
     posefit.track("walk", optimiser=counted, frames=(0, 2), **given)
     # of the two frames; those that would have less than 200 evaluations are not begun
     assert count - (len(begun) - count) == 2 * searches
-    for frame in track.found:
+    for frame in track.estimates:
         assert 1.05 * 2000 < frame.evaluations <= (1.0 + share) * 2000
 
 
@@ -135,7 +135,7 @@ def test_a_track_is_the_same_with_modes_and_without(optimiser: str, searches: in
     without = posefit.track("walk", **given)
     found = posefit.track("walk", settings={"tracker.modes": searches}, **given)
     np.testing.assert_array_equal(found.motion.poses, without.motion.poses)
-    for frame, plain in zip(found.found, without.found, strict=True):
+    for frame, plain in zip(found.estimates, without.estimates, strict=True):
         assert plain.posterior is None
         assert frame.posterior is not None
         assert frame.cost == plain.cost

@@ -75,7 +75,7 @@ def test_the_second_time_the_way_is_known() -> None:
     np.testing.assert_allclose(told, WALK.translations, atol=0.03)  # it is the steady way,
     assert not np.array_equal(told, WALK.translations)  # and not what was found
     assert (found.summary["passes"], found.summary["kept_pass"]) == (2, 2)
-    assert [frame.evaluations for frame in found.found] == [14] * len(WALK)  # of both
+    assert [frame.evaluations for frame in found.estimates] == [14] * len(WALK)  # of both
     assert found.measures.seconds_per_frame == pytest.approx(1.0)
 
 
@@ -84,7 +84,7 @@ def test_a_pass_that_costs_much_more_is_not_kept_but_counted() -> None:
     found = followed(known=1.0)
     assert found.summary["kept_pass"] == 1
     assert found.measures.cost == pytest.approx(alone.measures.cost)
-    assert [frame.evaluations for frame in found.found] == [14] * len(WALK)
+    assert [frame.evaluations for frame in found.estimates] == [14] * len(WALK)
 
 
 def test_of_passes_the_better_one_is_kept() -> None:
@@ -102,7 +102,7 @@ def test_a_track_is_followed_once_where_nobody_asks_for_more() -> None:
 def test_more_passes_are_followed_where_they_are_asked_for() -> None:
     found = followed(passes=3)
     assert [task.translation for task, seen in Walker.told if len(seen) == len(WALK)] == ["aligned", "known", "known"]
-    assert [frame.evaluations for frame in found.found] == [21] * len(WALK)
+    assert [frame.evaluations for frame in found.estimates] == [21] * len(WALK)
 
 
 def test_passes_that_make_no_sense_are_refused() -> None:

@@ -67,7 +67,7 @@ def test_who_comes_back_is_told_with_what_it_took(tmp_path: Path, optimiser: str
     assert right[AFTER].mean() > 0.95
     assert track.summary["relocalised"] == [WALKS + GAP]
     assert track.summary["backwards_share"] == 0.0
-    spent = [frame.evaluations for frame in track.found]
+    spent = [frame.evaluations for frame in track.estimates]
     # eight starts and the track as it was, ten frames each, and the frame itself
     assert 80 * 840 < spent[WALKS + GAP] <= 91 * 840
     assert max(spent[: WALKS + GAP] + spent[WALKS + GAP + 1 :]) <= 840
@@ -85,9 +85,9 @@ def test_with_0_he_is_followed_backwards_which_is_told(tmp_path: Path) -> None:
 def test_who_goes_on_after_a_gap_is_followed_on(tmp_path: Path) -> None:
     track, right = followed(tmp_path, "on", smooth=False)
     assert right[AFTER].all()
-    assert all(frame.evaluations == 0 for frame in track.found[WALKS : WALKS + GAP])
+    assert all(frame.evaluations == 0 for frame in track.estimates[WALKS : WALKS + GAP])
     np.testing.assert_array_equal(
-        [frame.pose for frame in track.found[WALKS : WALKS + GAP]], [track.found[WALKS - 1].pose] * GAP
+        [frame.pose for frame in track.estimates[WALKS : WALKS + GAP]], [track.estimates[WALKS - 1].pose] * GAP
     )
 
 

@@ -155,7 +155,7 @@ def test_a_track_is_steady_where_it_is_asked_for_and_tells_the_cost_of_what_it_t
     assert (found.summary["smooth"], told.summary["smooth"]) == (False, True)
     assert told.summary["acceleration"] < found.summary["acceleration"]
     assert told.summary["cost"] != found.summary["cost"]
-    assert [frame.evaluations for frame in told.found] == [frame.evaluations for frame in found.found]
+    assert [frame.evaluations for frame in told.estimates] == [frame.evaluations for frame in found.estimates]
     with pytest.raises(
         ValueError, match="smooth must be given where the translation is searched or aligned, got known"
     ):

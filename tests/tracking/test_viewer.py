@@ -12,7 +12,7 @@ import pytest
 
 from posefit.silhouette.cost import project
 from tests.report.browser import EVIL, Watched, opened
-from tests.tracking.viewing import SIZE, doubting, right, viewed, walk
+from tests.tracking.scenes import SIZE, exact_frames, uncertain_frames, viewed, walk
 
 FRAMES = 12
 MIRRORED = [0.0, 0.0, 0.3, 0.4, 0.15, *[0.0] * 7]
@@ -25,7 +25,7 @@ def doubtful(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = walk(FRAMES, [45.0, 135.0])
     seen = list(scene.observations)
     seen[HELD] = replace(seen[HELD], usable=False)
-    frames = [replace(one, lost=0.9 if k == LOST else 0.1) for k, one in enumerate(doubting(scene, MIRRORED))]
+    frames = [replace(one, lost=0.9 if k == LOST else 0.1) for k, one in enumerate(uncertain_frames(scene, MIRRORED))]
     return viewed(tmp_path_factory.mktemp("doubtful") / "out", replace(scene, observations=seen), frames)
 
 
@@ -35,7 +35,7 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = walk(FRAMES)
     pictures = [np.full((SIZE[1], SIZE[0], 3), (20 * k, 200, 40), np.uint8) for k in range(FRAMES)]
     unknown = replace(scene, truth=None, name=EVIL, warnings=[EVIL], pictures=lambda: iter(pictures))
-    return viewed(tmp_path_factory.mktemp("filmed") / "out", unknown, right(scene))
+    return viewed(tmp_path_factory.mktemp("filmed") / "out", unknown, exact_frames(scene))
 
 
 def picture(page: Any, canvas: str) -> Any:
@@ -275,7 +275,7 @@ def test_a_joint_has_intervals_and_a_clinical_angle_has_none(chromium: Any, doub
 
 def test_a_single_frame_has_no_player_and_no_curves(chromium: Any, tmp_path: Path) -> None:
     scene = walk(1)
-    with opened(chromium, viewed(tmp_path / "out", scene, right(scene)), 390) as seen:
+    with opened(chromium, viewed(tmp_path / "out", scene, exact_frames(scene)), 390) as seen:
         assert seen.page.locator("#lead").inner_text() == "A single frame."
         assert not seen.page.locator("#frame").is_visible()
         assert seen.page.locator("#curves").count() == 0

@@ -173,4 +173,4 @@ def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array
         )
         for count in scale.swarms
     ]
-    return np.array([one.found[0].history for one in tracks])
+    return np.array([one.estimates[0].history for one in tracks])

@@ -75,5 +75,5 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
     search = searches[-1]  # the one before it only compiles
     decoded = [search.space.decode(proposals) for proposals in search.asked]
     return WatchedSwarm(
-        scene, [one[0] for one in decoded], [one[1] for one in decoded], search.best, result.found[0].history
+        scene, [one[0] for one in decoded], [one[1] for one in decoded], search.best, result.estimates[0].history
     )

@@ -13,7 +13,7 @@ from posefit.errors import InputError
 from posefit.fitting.tracker import Frame
 from posefit.geometry.skeleton import PARENTS
 from posefit.silhouette.foreground import Image
-from posefit.tracking.drawing.body import draw_body, side_view
+from posefit.tracking.drawing import draw_body, side_view
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film
 from posefit_reproduce.vsmm.experiment import ELBOW, HAND, both_joints, projected_cm
 from posefit_reproduce.vsmm.switches import ModelState, model_states

@@ -21,8 +21,8 @@ background. Marks distinguish methods too.
 from typing import Any
 
 from posefit.page.document import assembled, colour_style, one_script, part
-from posefit.tracking.drawing.colours import OTHER, hexadecimal
-from posefit.tracking.page.colours import BODY_DARK, BODY_LIGHT
+from posefit.tracking.drawing import OTHER, hexadecimal
+from posefit.tracking.page import BODY_DARK, BODY_LIGHT
 
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
 SCRIPTS = ("methods", "curves", "first", "tables", "compare", "gallery", "main")  # in this order

@@ -2,10 +2,9 @@
 
 | looking for | file |
 |---|---|
-| the document | this file |
+| the document and its colours | this file |
 | the data of the page | content.py |
 | small pictures of footage and masks, as many as there is room for | stills.py |
-| colours, those of bodies on any page too | colours.py |
 | the places of everything, empty; how it looks | track.html, track.css |
 | a camera's picture with the body on it; the body in 3D | panels.js |
 | curves with intervals, and rows of marks | curves.js |
@@ -17,7 +16,32 @@ The constant `D` is the data that content.py returns; `posefit.page` has what al
 from typing import Any
 
 from posefit.page.document import assembled, colour_style, one_script, part
-from posefit.tracking.page.colours import DARK, LIGHT
+from posefit.tracking.drawing import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
+
+# The limbs of a body, and the truth, on any page; on dark screens as in pictures.
+BODY_LIGHT = {"left": "#b84500", "right": "#0063a6", "truth": "#5d6975"}
+BODY_DARK = {"left": hexadecimal(LEFT), "right": hexadecimal(RIGHT), "truth": "#98a5b3"}
+
+LIGHT = {
+    **BODY_LIGHT,
+    "middle": "#8d97a3",
+    "both": "#8fc3a3",
+    "missed": "#c8372d",
+    "spilled": "#3b8fd1",
+    "other": "#9a3f86",
+    "unsure": "#0072b2",
+    "held": "#7a8794",
+}
+DARK = {
+    **BODY_DARK,
+    "middle": hexadecimal(MIDDLE),
+    "both": hexadecimal(BOTH),
+    "missed": hexadecimal(MISSED),
+    "spilled": hexadecimal(SPILLED),
+    "other": hexadecimal(OTHER),
+    "unsure": hexadecimal(RIGHT),
+    "held": "#98a5b3",
+}
 
 SCRIPTS = ("panels", "curves", "main")  # in this order
 _MARK = "<!doctype html>\n<!-- a track of posefit -->\n"

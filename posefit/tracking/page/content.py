@@ -17,7 +17,7 @@ from posefit.tracking.evaluation import LOST
 from posefit.tracking.formats import Rows, State
 from posefit.tracking.measures import FRAME
 from posefit.tracking.page.stills import Stills
-from posefit.tracking.picture import LIKELY
+from posefit.tracking.picture import MIN_OTHER_WEIGHT
 from posefit.tracking.table import undetermined
 from posefit.uncertainty.modes import other_mode
 from posefit.version import __version__
@@ -142,7 +142,7 @@ def _column(name: str) -> dict[str, Any]:
 def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
     """Return the other likely poses of frames: their numbers among those shown, weights and joints."""
     skeleton = scene.body.skeleton
-    modes = [other_mode(skeleton, frame.modes, frame.pose, LIKELY) for frame in frames]
+    modes = [other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT) for frame in frames]
     likely = {k: mode for k, mode in enumerate(modes) if mode is not None}
     joints = [skeleton.joints(mode.pose, mode.translation) - origin for mode in likely.values()]
     return {

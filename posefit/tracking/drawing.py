@@ -1,6 +1,10 @@
-"""A body in a picture, and the thin bones of what else it may be: what is unsure is faint."""
+"""What pictures of a track are made of: colours, words, a body, and the thin bones of another mode.
+
+Colours are blue, green, red, as OpenCV has them. What is unsure is faint.
+"""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import cv2
@@ -12,14 +16,37 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.rasteriser import NEAR
-from posefit.tracking.drawing.colours import BACKGROUND, LEFT, MIDDLE, OTHER, RIGHT
 
-DISTANCE = 6.0  # metres from the view from the side
-SURE, UNSURE = 0.05, 0.3  # metres: a joint's 80 % interval, up to which it is drawn solid, and from which on faintest
+BACKGROUND = (28, 24, 22)
+BOTH, MISSED, SPILLED = (186, 214, 168), (90, 90, 235), (235, 160, 70)  # Y, R, B
+LEFT, RIGHT, MIDDLE = (80, 150, 245), (225, 165, 85), (205, 205, 205)
+OTHER = (198, 156, 227)  # what else a frame may show
+TEXT = (240, 240, 240)
+LINES = (70, 66, 64)  # of a chart
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+SIDE_VIEW_DISTANCE = 6.0  # metres
+SURE_RADIUS, UNSURE_RADIUS = 0.05, 0.3  # metres of a joint's 80 % interval: where bones are solid, and where faintest
 FAINTEST = 0.2  # how much of a faintest limb's colour is left
-_PARENTS = np.array(PARENTS[1:])
+_STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
 SIDE_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}
 _ENDS = [JOINTS.index(side + name) for side in "lr" for name in ("wrist", "foot")]
+
+
+def write(image: Image, text: str, at: tuple[int, int], colour: Any = TEXT, scale: float = 0.5) -> None:
+    """Write a text into an image."""
+    cv2.putText(image, text, at, _FONT, scale, colour, 1, cv2.LINE_AA)
+
+
+def width_of(text: str, scale: float = 0.5) -> int:
+    """Return how many pixels wide a text is."""
+    return int(cv2.getTextSize(text, _FONT, scale, 1)[0][0])
+
+
+def hexadecimal(colour: tuple[int, int, int]) -> str:
+    """Return a colour as a page has it."""
+    blue, green, red = colour
+    return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def opacities(radii: Array) -> Array:
@@ -27,8 +54,8 @@ def opacities(radii: Array) -> Array:
 
     A bone is as sure as the less sure of its two ends. Where that is unknown, NaN, it is solid.
     """
-    solid = np.clip((UNSURE - np.nan_to_num(radii)) / (UNSURE - SURE), FAINTEST, 1.0)
-    return np.asarray(np.minimum(solid[_PARENTS], solid[1:]))
+    solid = np.clip((UNSURE_RADIUS - np.nan_to_num(radii)) / (UNSURE_RADIUS - SURE_RADIUS), FAINTEST, 1.0)
+    return np.asarray(np.minimum(solid[_STARTS], solid[1:]))
 
 
 def side_camera(body: Body, camera: Camera, pose: Array, translation: Array, side: int) -> Camera:
@@ -38,7 +65,9 @@ def side_camera(body: Body, camera: Camera, pose: Array, translation: Array, sid
     back = -camera.rotation[2]
     azimuth = math.atan2(back[0], back[2]) + 0.5 * math.pi
     tall = 1.25 * (float(np.ptp(joints[:, 1])) + 2.0 * float(body.radii.max()))
-    return Camera.around(middle, azimuth, DISTANCE, (side, side), 2.0 * math.atan(0.5 * tall / DISTANCE))
+    return Camera.around(
+        middle, azimuth, SIDE_VIEW_DISTANCE, (side, side), 2.0 * math.atan(0.5 * tall / SIDE_VIEW_DISTANCE)
+    )
 
 
 def side_view(
@@ -75,26 +104,22 @@ def draw_stick(image: Image, body: Body, camera: Camera, pose: Array, translatio
     pixels, depths = camera.project(body.skeleton.joints(pose, translation))
     thick = max(1, round(camera.height / 240))
     # pixel centres are at +0.5 here, and at whole numbers in OpenCV
-    points = np.rint((np.nan_to_num(pixels) - 0.5) * 16).astype(np.int64)
+    points = np.rint((np.nan_to_num(pixels) - 0.5) * 16).astype(np.int64).tolist()
     for joint, parent in enumerate(PARENTS[1:], 1):
         if min(depths[joint], depths[parent]) > NEAR:
-            cv2.line(image, _point(points[parent]), _point(points[joint]), OTHER, thick, cv2.LINE_AA, 4)
+            cv2.line(image, points[parent], points[joint], OTHER, thick, cv2.LINE_AA, 4)
     for joint in _ENDS:
         if depths[joint] > NEAR:
             colour = SIDE_COLOURS[SIDES[joint]]
-            cv2.circle(image, _point(points[joint]), 16 * (thick + 1), colour, -1, cv2.LINE_AA, 4)
+            cv2.circle(image, points[joint], 16 * (thick + 1), colour, -1, cv2.LINE_AA, 4)
 
 
-def _point(point: Array) -> tuple[int, int]:
-    return int(point[0]), int(point[1])
-
-
-def _cones(body: Body, camera: Camera, pose: Array, translation: Array) -> Any:
+def _cones(body: Body, camera: Camera, pose: Array, translation: Array) -> Iterator[tuple[int, Array, Array, float]]:
     """Yield bones before a camera, far ones first: number, pixels of both ends, radii there, and shade."""
     pixels, depths = camera.project(body.skeleton.joints(pose, translation))
     scale = np.sqrt(camera.focal.prod()) / depths  # as in the cost, where the two focal lengths differ
-    for bone in np.argsort(-(depths[_PARENTS] + depths[1:])):
-        ends = [int(_PARENTS[bone]), int(bone) + 1]
+    for bone in np.argsort(-(depths[_STARTS] + depths[1:])):
+        ends = [int(_STARTS[bone]), int(bone) + 1]
         if depths[ends].min() <= NEAR:
             continue
         shade = 1.0 - 0.25 * float(np.clip(depths[ends].mean() - depths[0], -0.4, 0.4)) / 0.4
@@ -102,11 +127,11 @@ def _cones(body: Body, camera: Camera, pose: Array, translation: Array) -> Any:
 
 
 def _hull(centres: Array, radii: Array) -> Any:
-    outline: list[Array] = []
-    for centre, radius in zip(centres, radii, strict=True):
-        angles = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
-        outline.append(centre + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
-    return cv2.convexHull(np.rint(np.vstack(outline) * 16).astype(np.int32))
+    """Return the convex hull of discs, in sixteenths of a pixel."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    outline = centres[:, None] + radii[:, None, None] * circle
+    return cv2.convexHull(np.rint(outline.reshape(-1, 2) * 16).astype(np.int32))
 
 
 def _cone(image: Image, centres: Array, radii: Array, colour: Any, solid: float) -> None:

@@ -1,0 +1,96 @@
+"""A walk, a tracker whose frames are given, and the track and the page that it leads to."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.footage.scene import Scene, synthetic
+from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.symmetry import mirrored_poses, turned_poses
+from posefit.motion import built_in
+from posefit.motion.motion import Motion
+from posefit.silhouette.cost import areas
+from posefit.tracking import method
+from posefit.tracking.outputs import OutputFolder
+from posefit.tracking.pipeline import track_scene
+from posefit.tracking.summary import Track
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
+
+SPREAD = Recalibration(joint_spreads=np.full(len(JOINTS), 0.02))
+MAXWELL = {"50": 1.5382, "80": 2.1544, "95": 2.7955}  # quantiles of the distance of points that a unit normal scatters
+SIZE = (320, 240)
+
+
+def walk(frames: int, views: Sequence[float] = (45.0,), size: tuple[int, int] = SIZE) -> Scene:
+    return synthetic(built_in.motion("walk", frames=frames), views, size, [], (None, None))
+
+
+def truth_of(scene: Scene) -> Motion:
+    assert scene.truth is not None
+    return scene.truth
+
+
+def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observation) -> Frame:
+    """Return the frame of a tracker that estimates a pose."""
+    views = zip(scene.cameras, observation.silhouettes, strict=True)
+    counts = [areas(scene.body, camera, mask, pose[None], translation[None])[0] for camera, mask in views]
+    return Frame(pose, translation, 0.0, np.array(counts), 1, 1.0, np.zeros(1))
+
+
+def exact_frames(scene: Scene, **values: Any) -> list[Frame]:
+    """Return frames of the true poses, without posteriors."""
+    truth = truth_of(scene)
+    each = zip(truth.poses, truth.translations, scene.observations, strict=False)
+    return [replace(frame_of(scene, *estimate), **values) for estimate in each]
+
+
+def uncertain_frames(
+    scene: Scene, mirrored: Sequence[float], turned: float = 0.0, coherent: bool = False
+) -> list[Frame]:
+    """Return frames of the true poses, that may be mirrored or turned with such weights."""
+    frames = []
+    for frame, weight in zip(exact_frames(scene), mirrored, strict=True):
+        pose = frame.pose[None]
+        poses = np.concatenate([pose, mirrored_poses(scene.body.skeleton, pose), turned_poses(pose)])
+        weights = np.array([1.0 - weight - turned, weight, turned])
+        posterior = Posterior(poses, np.tile(frame.translation, (3, 1)), weights, coherent, SPREAD)
+        frames.append(replace(frame, posterior=posterior))
+    return frames
+
+
+@dataclass(frozen=True)
+class FixedTracker:
+    """A tracker that yields the frames it was made with."""
+
+    frames: Sequence[Frame]
+    first: int = 0
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        for k, _ in enumerate(observations, self.first):
+            yield self.frames[k]
+
+
+def tracked(scene: Scene, frames: Sequence[Frame], **how: Any) -> Track:
+    """Return the track of a scene whose tracker yields just these frames."""
+
+    def tracker(_: object, task: Task, *_patience: object) -> FixedTracker:
+        resumed = len(task.before) if len(task.before) > 1 else 0  # a single one is what a track is begun with
+        return FixedTracker(frames, resumed)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(method.Method, "tracker", tracker)
+        return track_scene(scene, [built_in.motion("walk-b", frames=20)], **how)
+
+
+def viewed(folder: Path, scene: Scene, frames: Sequence[Frame]) -> Path:
+    """Return the page of a track that consists of just these frames."""
+    with OutputFolder(folder, False, False, {}, print) as output:
+        tracked(scene, frames, output=output)
+    return folder / "track.html"
