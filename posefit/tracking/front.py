@@ -2,7 +2,6 @@
 
 import inspect
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from posefit.reading import quoted
 from posefit.tracking.identity import ArgumentDigest
 from posefit.tracking.method import resolved
 from posefit.tracking.options import VIEW, TrackOptions, declared
-from posefit.tracking.outputs import Nowhere, OutputFolder
+from posefit.tracking.outputs import Output, OutputFolder
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.summary import Track
 from posefit.version import __version__
@@ -82,7 +81,7 @@ def track(
 
         check_recording(rerun)
     reporting = Progress(say or QUIET.log, progress or QUIET.steps)
-    folder: AbstractContextManager[Nowhere | OutputFolder] = Nowhere()
+    folder = Output()
     if out is not None:
         folder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), reporting.log)
     with folder as output:

@@ -5,9 +5,11 @@ have them under these names. `FRAME` are the columns of frames.csv, one value a 
 figure that needs it is None.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
+
+Rows = Sequence[Mapping[str, float]]  # one a frame, by the names of `FRAME`
 
 # Trivial methods that a track is held against, and how a table calls them. All have the true root and translation.
 BASELINES = {

@@ -4,73 +4,67 @@ Until it is whole it stands beside its place, hidden, with every frame that was 
 early, because a disk is full or it is stopped, those frames are kept, and the same track can go on from them.
 """
 
+import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import Unfinished, other_entries
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
-from posefit.motion.motion import Motion
+from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.reading import cut
-from posefit.tracking.formats import FILES, Rows, State, intervals_of, write_formats
+from posefit.tracking.evaluation import unseen
 from posefit.tracking.identity import ArgumentDigest, difference
+from posefit.tracking.measures import Rows
 from posefit.tracking.page import track_document
 from posefit.tracking.page.content import track_data
 from posefit.tracking.page.stills import Stills
 from posefit.tracking.picture import Painter
 from posefit.tracking.table import undetermined
+from posefit.tracking.trajectory import motion_of
+from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import Posterior
 
+FILES = (
+    *("poses.npz", "track.amc", "skeleton.asf", "track.bvh", "track.trc", "camera.json", "track.c3d", "frames.csv"),
+    *("angles.csv", "gait.csv", "summary.json", "overlay.mp4", "summary.png", "track.html"),
+)
 _RECORD = "frames.jsonl"
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
 _ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
 _PLAIN = ("cost", "evaluations", "seconds", "cpu_seconds", "lost", "details")
 
 
-class Output(Protocol):
-    """Where a track goes."""
-
-    def earlier(self) -> tuple[list[Frame], State | None]:
-        """Return the frames that were recorded before, and the state of the random generator after them."""
-        ...
-
-    def record(self, frame: Frame, state: State) -> None:
-        """Record a frame, and the state of the random generator after it."""
-        ...
-
-    def finish(self, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State) -> None:
-        """Write everything."""
-        ...
-
-
-class Nowhere:
-    """The output of a track that is not written."""
+class Output:
+    """Where a track goes; here nowhere."""
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
         """Nothing has to be closed."""
 
-    def earlier(self) -> tuple[list[Frame], State | None]:
-        """Return that there is nothing."""
+    def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
+        """Return the frames that were recorded before, and the state of the random generator after them."""
         return [], None
 
-    def record(self, frame: Frame, state: State) -> None:
-        """Keep nothing."""
+    def record(self, frame: Frame, state: dict[str, Any]) -> None:
+        """Record a frame, and the state of the random generator after it."""
 
-    def finish(self, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State) -> None:
-        """Write nothing."""
+    def finish(self, scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> None:
+        """Write everything."""
 
 
-class OutputFolder:
+class OutputFolder(Output):
     """Writes beside the target and renames at the end. Raises ValueError where the target may not be written.
 
     `spec` is what a track has to have in common with the one that it resumes.
@@ -100,17 +94,17 @@ class OutputFolder:
         left = Unfinished.interrupted(self.path)
         if not left:
             raise InputError(f"{self.path}: expected a track that was interrupted to resume, got none")
-        others = [difference(one.info, self._spec) for one in left]
+        others = [difference(folder.info, self._spec) for folder in left]
         place = left[others.index(None)] if None in others else None
-        for one in left:
-            if one is not place:
-                one.close()
+        for folder in left:
+            if folder is not place:
+                folder.close()
         if place is None:
             raise InputError(f"{self.path}: {others[0]}")
         return place
 
     def __enter__(self) -> Self:
-        arguments = {name: one.as_json() for name, one in self._spec.items()}
+        arguments = {name: digest.as_json() for name, digest in self._spec.items()}
         try:
             if self._place is None:
                 for earlier in Unfinished.interrupted(self.path):
@@ -147,11 +141,11 @@ class OutputFolder:
         if kept:
             self._say(kept[2:])
 
-    def earlier(self) -> tuple[list[Frame], State | None]:
+    def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames that were recorded before, and the state of the random generator after them."""
         frames: list[Frame] = []
         whole: list[str] = []
-        state: State | None = None
+        state: dict[str, Any] | None = None
         path = self._building / _RECORD
         for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
             try:
@@ -170,9 +164,9 @@ class OutputFolder:
         self._recorded = len(frames)
         return frames, state
 
-    def record(self, frame: Frame, state: State) -> None:
+    def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
-        row: State = {name: getattr(frame, name) for name in _PLAIN} | {"state": state}
+        row: dict[str, Any] = {name: getattr(frame, name) for name in _PLAIN} | {"state": state}
         for name in _ARRAYS:
             value = getattr(frame, name)
             row[name] = None if value is None else np.asarray(value).tolist()
@@ -181,23 +175,21 @@ class OutputFolder:
             file.write(json.dumps(row, default=_encoded) + "\n")
         self._recorded += 1
 
-    def finish(self, scene: Scene, estimate: Motion, frames: Sequence[Frame], rows: Rows, summary: State) -> None:
+    def finish(self, scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> None:
         """Write everything."""
         import cv2
 
         folder, stills = self._building, Stills(scene)
         painter = Painter(scene, [row["usable"] == 1.0 for row in rows])
-        sure = intervals_of(scene.body.skeleton, frames)
-        radii = sure.get("joint_radii")
-        write_formats(folder, scene, estimate, frames, rows, summary, sure)
-        filmed = scene.pictures() if scene.pictures is not None else repeat(None)
+        intervals = intervals_of(scene.body.skeleton, frames)
+        radii = intervals.get("joint_radii")
+        _write_formats(folder, scene, frames, rows, summary, intervals)
+        pictures = repeat(None) if scene.pictures is None else scene.pictures()
+        each = zip(frames, scene.observations, rows, pictures, repeat(None) if radii is None else radii, strict=False)
         writer: VideoWriter | None = None
-        each_radii = repeat(None) if radii is None else radii
-        for frame, observation, row, picture, one in zip(
-            frames, scene.observations, rows, filmed, each_radii, strict=False
-        ):
+        for frame, observation, row, picture, frame_radii in each:
             stills.add(frame, observation, picture)
-            image = painter.add(frame, observation, row, picture, one)
+            image = painter.add(frame, observation, row, picture, frame_radii)
             if writer is None:
                 writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))
             writer.write(image)
@@ -206,7 +198,7 @@ class OutputFolder:
         trust = "" if summary["trust"] is None else summary["trust"]["sentence"]
         if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, radii, undetermined(summary), trust)):
             raise OSError("no room for summary.png")
-        page = track_document(track_data(scene, estimate, frames, rows, summary, sure, stills))
+        page = track_document(track_data(scene, frames, rows, summary, intervals, stills))
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
 
 
@@ -222,3 +214,69 @@ def _decoded(mapping: dict[str, Any]) -> Any:
     if mapping.keys() == {"dtype", "values"}:
         return np.array(mapping["values"], dtype=mapping["dtype"])
     return mapping
+
+
+def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:
+    """Return how far joints and angles may be off, as poses.npz has it; empty where no frame has a posterior.
+
+    `levels` (3,), `joint_radii` (T, 3, 27) metres, `angle_halves` (T, 3, 66) radians; NaN in frames without any.
+    """
+    if all(frame.posterior is None for frame in frames):
+        return {}
+    radii = np.full((len(frames), len(LEVELS), len(JOINTS)), np.nan)
+    halves = np.full((len(frames), len(LEVELS), ANGLES), np.nan)
+    for k, frame in enumerate(frames):
+        if frame.posterior is not None:
+            radii[k] = joint_intervals(skeleton, frame.posterior, frame.pose).radii
+            halves[k] = angle_intervals(frame.posterior, frame.pose).halves
+    return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
+
+
+def _write_formats(
+    folder: Path,
+    scene: Scene,
+    frames: Sequence[Frame],
+    rows: Rows,
+    summary: dict[str, Any],
+    intervals: Mapping[str, Array],
+) -> None:
+    """Write every file of a track to a folder but for its pictures and its page; see `FILES`."""
+    from posefit.measuring.c3d import write_c3d
+    from posefit.measuring.centres import PLACES
+    from posefit.measuring.gait import gait_of
+    from posefit.measuring.tables import write_angles, write_gait
+    from posefit.measuring.trc import write_trc
+    from posefit.motion.amc import write_amc
+    from posefit.motion.asf import write_asf
+    from posefit.motion.bvh import write_bvh
+
+    estimate = motion_of(scene, frames)
+    np.savez_compressed(
+        folder / "poses.npz",
+        poses=estimate.poses,
+        translations=estimate.translations,
+        fps=np.array(estimate.fps),
+        joints=np.array(JOINTS),
+        places=np.array(PLACES),
+        costs=np.array([frame.cost for frame in frames]),
+        radii=scene.body.radii,
+        **dict[str, Any](intervals),
+    )
+    write_asf(folder / "skeleton.asf", estimate.skeleton)
+    write_amc(folder / "track.amc", estimate)
+    write_bvh(folder / "track.bvh", estimate)
+    blank = unseen(rows)
+    gait = gait_of(estimate, blank)
+    write_trc(folder / "track.trc", estimate, blank)
+    write_c3d(folder / "track.c3d", estimate, blank, gait)
+    write_angles(folder / "angles.csv", estimate, blank)
+    write_gait(folder / "gait.csv", gait)
+    (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
+    names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
+    with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*rows[0], *names])
+        for k, (row, points) in enumerate(zip(rows, estimate.joints, strict=True)):
+            values = ["" if np.isnan(value) else value for value in row.values()]
+            writer.writerow([*values, *("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))])
+    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -23,7 +23,7 @@ from posefit.tracking.follow import follow, retrack
 from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.outputs import Nowhere, Output
+from posefit.tracking.outputs import Output
 from posefit.tracking.smoothing.smooth import Pass, smooth
 from posefit.tracking.summary import Track, evaluate
 
@@ -43,7 +43,7 @@ def track_scene(
     scene is from. Raises InputError where something does not fit.
     """
     options = options or TrackOptions()
-    output = output or Nowhere()
+    output = output or Output()
     options = options.changed(smooth=scene.truth is None if options.smooth is None else options.smooth)
     scene = on_device(scene, options.device)
     task = task_of(scene, options, training)

@@ -102,7 +102,7 @@ def evaluate(
         "gait": gait_of(estimate, unseen(rows)).as_dict(),
         "warnings": warnings,
     }
-    output.finish(scene, estimate, frames, rows, summary)
+    output.finish(scene, frames, rows, summary)
     return Track(estimate, scene.truth, measures, rows, summary, frames, modes)
 
 

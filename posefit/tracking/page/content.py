@@ -14,11 +14,11 @@ from posefit.measuring.centres import PLACES
 from posefit.motion.motion import Motion
 from posefit.page.bodies import camera_from_origin, in_16_bits
 from posefit.tracking.evaluation import LOST
-from posefit.tracking.formats import Rows, State
-from posefit.tracking.measures import FRAME
+from posefit.tracking.measures import FRAME, Rows
 from posefit.tracking.page.stills import Stills
 from posefit.tracking.picture import MIN_OTHER_WEIGHT
 from posefit.tracking.table import undetermined
+from posefit.tracking.trajectory import motion_of
 from posefit.uncertainty.modes import other_mode
 from posefit.version import __version__
 
@@ -29,25 +29,23 @@ CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_d
 
 def track_data(
     scene: Scene,
-    estimate: Motion,
     frames: Sequence[Frame],
     rows: Rows,
-    summary: State,
-    sure: Mapping[str, Array],
+    summary: dict[str, Any],
+    intervals: Mapping[str, Array],
     stills: Stills,
 ) -> dict[str, Any]:
-    """Return the data of the page; `sure` comes from `posefit.tracking.formats.intervals_of`.
+    """Return the data of the page; `intervals` come from `posefit.tracking.outputs.intervals_of`.
 
     Joints are millimetres from the first position of the root and angles tenths of a degree, in 16 bits each. A long
     track has every `step`-th frame; a frame is marked if one of those that it stands for is.
     """
-    step, skeleton = stills.step, estimate.skeleton
+    step, estimate = stills.step, motion_of(scene, frames)
     joints = estimate.joints[::step]
     origin = np.round(joints[0, 0], 3)
-    truth, free = scene.truth, skeleton.free
+    truth, free = scene.truth, estimate.skeleton.free
     true = None if truth is None else truth.joints[::step]
     angles = np.unwrap(estimate.poses[::step], axis=0)
-    intervals = {name: values[::step] for name, values in sure.items() if name != "levels"}
     return {
         "version": __version__,
         "title": str(summary["motion"]),
@@ -84,23 +82,23 @@ def track_data(
             "values": in_16_bits(_clinical(estimate, step), TENTH),
             "truth": None if truth is None else in_16_bits(_clinical(truth, step), TENTH),
         },
-        "intervals": None
-        if not intervals
-        else {
-            "levels": [round(100 * level) for level in sure["levels"].tolist()],
-            "joints": in_16_bits(intervals["joint_radii"]),
-            "angles": in_16_bits(intervals["angle_halves"][..., free], UNIT),
-        },
+        "intervals": {
+            "levels": [round(100 * level) for level in intervals["levels"].tolist()],
+            "joints": in_16_bits(intervals["joint_radii"][::step]),
+            "angles": in_16_bits(intervals["angle_halves"][::step, :, free], UNIT),
+        }
+        if intervals
+        else None,
     }
 
 
-def _verdict(summary: State) -> str:
+def _verdict(summary: dict[str, Any]) -> str:
     """Return whether the track can be trusted, if the truth is unknown, and what was not determined."""
     trust = summary["trust"]
     return _determined(summary) if trust is None else f"{trust['sentence']} {_determined(summary)}"
 
 
-def _determined(summary: State) -> str:
+def _determined(summary: dict[str, Any]) -> str:
     if not_determined := undetermined(summary):
         return f"Not determined: {not_determined}."
     unreported = [
@@ -113,13 +111,13 @@ def _determined(summary: State) -> str:
     return "The method reports no frame as lost, and left and right as known in every frame."
 
 
-def _held(summary: State) -> list[str]:
+def _held(summary: dict[str, Any]) -> list[str]:
     held = summary["held_frames"]
     show = "shows" if held == 1 else "show"
     return [f"{held} of {summary['frames']} frames {show} too little of the person: the pose is held."] if held else []
 
 
-def _facts(summary: State) -> list[list[str]]:
+def _facts(summary: dict[str, Any]) -> list[list[str]]:
     """Return names and values of the track's method and scene."""
     known = [
         ("method", str(summary["method"])),
