@@ -2,10 +2,8 @@
 
 import math
 from collections.abc import Iterable
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
-
-import numpy as np
 
 from posefit.errors import InputError
 from posefit.reading import quoted
@@ -35,7 +33,7 @@ def positive(name: str, value: float) -> None:
 
 def whole(name: str, value: object, least: int) -> int:
     """Return a whole number as an int. Raises ValueError where it is none, or below the least it may be."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or int(value).bit_length() > MAX_BITS:
+    if isinstance(value, bool) or not isinstance(value, Integral) or int(value).bit_length() > MAX_BITS:
         raise InputError(f"{name} must be a whole number of at least {least}, got {quoted(value)}")
     if value < least:
         raise InputError(f"{name} must be {f'at least {least}' if least else '0 or more'}, got {quoted(int(value))}")

@@ -4,12 +4,16 @@ An option is one line of `TrackOptions`: its type and default, and with `option(
 slow is imported here, as every start of the command line reads it.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, cast
 
 from posefit.errors import InputError
+from posefit.fitting.check import finite_number, one_of, pair, positive, whole
+from posefit.reading import quoted
 from posefit.settings import POPULATION_SIZE
 
 if TYPE_CHECKING:
@@ -46,43 +50,39 @@ def option(default: Any, text: str, *more: Any, **others: Any) -> Any:
     return field(default=default, metadata={"option": Option(text, *more, **others)})
 
 
-def declared(one: "Field[Any]") -> Option:
+def declared(field: "Field[Any]") -> Option:
     """Return what is declared of a field of `TrackOptions`."""
-    return one.metadata["option"]  # type: ignore[no-any-return]
+    return field.metadata["option"]  # type: ignore[no-any-return]
 
 
 def _whole(least: int) -> Check:
-    def check(name: str, value: Any) -> int:
-        from posefit.fitting.check import whole
-
-        return whole(name, value, least)
-
-    return check
+    return lambda name, value: whole(name, value, least)
 
 
 def _one_of(*choices: str) -> Check:
     def check(name: str, value: Any) -> Any:
-        if value not in choices:
-            raise InputError(f"{name} must be one of {', '.join(choices)}, got {value!r}")
+        one_of(name, value, choices)
         return value
 
     return check
 
 
-def _positive(name: str, value: Any) -> float:
-    from posefit.fitting.check import finite_number
+def _between(low: float, high: float, unit: str = "") -> Check:
+    def check(name: str, value: Any) -> float:
+        if not low <= finite_number(name, value) <= high:
+            raise InputError(f"{name} must lie in {low:g} to {high:g}{unit}, got {quoted(value)}")
+        return float(value)
 
-    if not finite_number(name, value) > 0.0:
-        raise InputError(f"{name} must be above 0, got {value}")
+    return check
+
+
+def _positive(name: str, value: Any) -> float:
+    positive(name, finite_number(name, value))
     return float(value)
 
 
 def _rate(name: str, value: Any) -> float:
-    import math
-    from numbers import Real
-
     from posefit.motion.motion import RATES
-    from posefit.reading import quoted
 
     if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < (rate := cast(Any, value)) < math.inf:
         raise InputError(f"{name} must be a positive number, got {quoted(value)}")
@@ -91,9 +91,13 @@ def _rate(name: str, value: Any) -> float:
     return float(value)
 
 
-def _size(name: str, value: Any) -> tuple[int, int]:
-    from posefit.fitting.check import pair
+def _height(name: str, value: Any) -> float:
+    from posefit.footage.source import HEIGHTS
 
+    return float(_between(*HEIGHTS, " metres")(name, value))
+
+
+def _size(name: str, value: Any) -> tuple[int, int]:
     sides = pair(name, value, "(width, height)")
     if not all(_is_whole(side) and 1 <= side <= LARGEST_SIDE for side in sides):
         largest = f"{LARGEST_SIDE}x{LARGEST_SIDE}"
@@ -102,9 +106,6 @@ def _size(name: str, value: Any) -> tuple[int, int]:
 
 
 def _range(name: str, value: Any) -> tuple[int | None, int | None]:
-    from posefit.fitting.check import pair
-    from posefit.reading import quoted
-
     start, stop = pair(name, value, "(start, stop), either of which may be None")
     if not all(end is None or _is_whole(end) for end in (start, stop)):
         raise InputError(f"{name} must be two whole numbers or None, got {quoted(value)}")
@@ -112,28 +113,13 @@ def _range(name: str, value: Any) -> tuple[int | None, int | None]:
 
 
 def _label(name: str, value: Any) -> int:
-    from posefit.reading import quoted
-
     if not _is_whole(value):
         raise InputError(f"{name} must be a whole number, got {quoted(value)}")
     return int(value)
 
 
-def _between(low: float, high: float, unit: str) -> Check:
-    def check(name: str, value: Any) -> float:
-        from posefit.fitting.check import finite_number
-
-        if not low <= finite_number(name, value) <= high:
-            raise InputError(f"{name} must lie in {low:g} to {high:g}{unit}, got {value}")
-        return float(value)
-
-    return check
-
-
-def _height(name: str, value: Any) -> float:
-    from posefit.footage.source import HEIGHTS
-
-    return float(_between(*HEIGHTS, " metres")(name, value))
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def _device(_name: str, value: Any) -> str:
@@ -144,8 +130,6 @@ def _device(_name: str, value: Any) -> str:
 
 
 def _degrees(name: str, value: Any) -> tuple[float, ...]:
-    from posefit.fitting.check import finite_number
-
     several = hasattr(value, "__len__") and not isinstance(value, str)
     return tuple(finite_number(name, degrees) for degrees in (value if several else [value]))
 
@@ -155,17 +139,9 @@ def _cameras(_name: str, value: Any) -> tuple[Any, ...]:
 
 
 def _sources(name: str, value: Any) -> Sequence[Any]:
-    from posefit.reading import quoted
-
     if isinstance(value, str | Path) or not isinstance(value, Sequence):
         raise InputError(f"{name} must be a list of motions, got {quoted(value)}")
     return value
-
-
-def _is_whole(value: Any) -> bool:
-    from numpy import integer
-
-    return isinstance(value, int | integer) and not isinstance(value, bool)
 
 
 def text_size(text: str) -> tuple[int, int]:
@@ -209,7 +185,7 @@ class TrackOptions:
     prior: "Prior | None" = option(None, "A prior that has learned instead of a name.", flag="")
     settings: Mapping[str, Any] | Sequence[str] = option(
         (),
-        "A plugin's setting, such as sapso.cooling=0.9; repeatable.",
+        "Of a plugin, such as sapso.cooling=0.9; repeatable.",
         None,
         "NAME.SETTING=VALUE",
         "set",
@@ -267,7 +243,7 @@ class TrackOptions:
     )
     translation: "Translation | None" = option(
         None,
-        "Root translation: known where the truth is, searched, or aligned.",
+        "Of the root: known (the truth), searched, or aligned.",
         _one_of("known", "searched", "aligned"),
         "HOW",
     )
@@ -278,20 +254,13 @@ class TrackOptions:
         None, "Searches of an unknown first pose: 8, or 0 for a tracker that looks ahead.", _whole(0), "N", parse=int
     )
     body_frames: int | None = option(
-        None,
-        "Frames a build is fitted to, every third; by default 12 for footage, 0 for none.",
-        _whole(0),
-        "N",
-        parse=int,
+        None, "Frames a build is fitted to; by default 12 for footage, 0 for none.", _whole(0), "N", parse=int
     )
     hypotheses: int = option(
         1, "Tracks from different initial guesses, each at the full budget; one is kept.", _whole(1), "N", parse=int
     )
     smooth: bool | None = option(
-        None,
-        "The root moves smoothly, and standing feet do not slide; the default for footage.",
-        parse=bool,
-        identifies=False,
+        None, "The root moves smoothly, and feet do not slide; the default for footage.", parse=bool, identifies=False
     )
     passes: int = option(1, "How often a smooth track is followed.", _whole(1), "N", parse=int, identifies=False)
     seed: int = option(0, "Of all random numbers.", _whole(0), "N", parse=int)
@@ -301,12 +270,12 @@ class TrackOptions:
     )
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value, check = getattr(self, one.name), declared(one).check
-            if value is None and isinstance(one.default, tuple):
-                object.__setattr__(self, one.name, one.default)
-            elif value is not one.default and check is not None:
-                object.__setattr__(self, one.name, check(one.name, value))
+        for each in fields(self):
+            value, check = getattr(self, each.name), declared(each).check
+            if value is None and isinstance(each.default, tuple):
+                object.__setattr__(self, each.name, each.default)
+            elif value is not each.default and check is not None:
+                object.__setattr__(self, each.name, check(each.name, value))
         if self.evaluations is not None and self.iterations is not None:
             raise InputError("evaluations and iterations must not both be given: a budget has so many iterations")
 

@@ -34,10 +34,9 @@ from posefit.uncertainty.calibration import LEVELS
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import Posterior
 
-FILES = (
-    *("poses.npz", "track.amc", "skeleton.asf", "track.bvh", "track.trc", "camera.json", "track.c3d", "frames.csv"),
-    *("angles.csv", "gait.csv", "summary.json", "overlay.mp4", "summary.png", "track.html"),
-)
+_MOTION_FILES = ("poses.npz", "track.amc", "skeleton.asf", "track.bvh", "track.trc", "camera.json", "track.c3d")
+_TABLES = ("frames.csv", "angles.csv", "gait.csv", "summary.json")
+FILES = (*_MOTION_FILES, *_TABLES, "overlay.mp4", "summary.png", "track.html")
 _RECORD = "frames.jsonl"
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
 _ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
