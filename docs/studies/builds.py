@@ -21,7 +21,7 @@ from posefit.footage.scene import rendered, synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
-from posefit.tracking.initialise import BODY_FRAMES, fitted_build, following
+from posefit.tracking.initialise import BODY_FRAMES, fitted_build
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit_reproduce.jobs import Progress, each
@@ -97,7 +97,7 @@ def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[floa
     start = average if height is None else average.scaled(*[height / average.stature] * 2)
     training = [built_in.motion(style) for style in built_in.other_styles(scene.name)]
     task = Task(start, scene.cameras, options.budget, scene.yaw, scene.anchor, setup.translation, training=training)
-    shape = fitted_build(task, scene.observations, following(prepare(options, task)), BODY_FRAMES, height, seed)
+    shape = fitted_build(task, scene.observations, prepare(options, task).follow, BODY_FRAMES, height, seed)
     return _off(shape.body, true), _off(start, true)
 
 

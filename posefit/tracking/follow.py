@@ -9,13 +9,12 @@ import numpy as np
 from posefit.fitting.tracker import Frame, Task, Tracker
 from posefit.footage.scene import Scene
 from posefit.progress import Progress
-from posefit.tracking.initialise import Guess, following
+from posefit.tracking.initialise import Guess
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
 from posefit.tracking.restarts import GAP, SEARCHED, RelocalisingTracker, initial_guess, retrack_spins, stream
-from posefit.tracking.spins import MAX_TURN_RATE
-from posefit.tracking.trajectory import cheaper, trajectory_cost, typical_speed, with_total_effort
+from posefit.tracking.trajectory import trajectory_cost, typical_speed, with_total_effort
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,6 @@ class Tracked:
     frames: list[Frame] = field(repr=False)
     hypotheses: list[dict[str, Any]]  # of each of several: its initial guess, cost and motion term, and whether kept
     start: int | None  # the frame from which it was tracked again because it spun
-    fastest_turn: float = MAX_TURN_RATE
 
 
 def follow(guess: Guess, method: Method, options: TrackOptions, output: Output, progress: Progress) -> list[Hypothesis]:
@@ -71,7 +69,7 @@ def tracker_of(method: Method, scene: Scene, task: Task) -> Tracker:
     tracker, gap = method.tracker(task), method.relocalise_gap
     if gap is None:
         gap = GAP if scene.truth is None and getattr(tracker, "lag", None) is None else 0
-    return RelocalisingTracker(task, following(method), gap) if gap else tracker
+    return RelocalisingTracker(task, method.follow, gap) if gap else tracker
 
 
 def retrack(
@@ -82,11 +80,10 @@ def retrack(
     frames, table = _cheapest(scene, hypotheses, task)
     if scene.truth is not None or getattr(method.tracker(task), "lag", None) is None:
         return Tracked(frames, table, None)
-    again = retrack_spins(task, scene.observations, frames, following(method), options.seed)
-    if again.start is not None:
-        how = f"it was followed again, onward and backwards from frame {again.start}"
-        progress.log(f"the body turned faster than anybody does: {how}")
-    return Tracked(again.frames, table, again.start)
+    frames, start = retrack_spins(task, scene.observations, frames, method.follow, options.seed)
+    if start is not None:
+        progress.log(f"the body turned faster than a person can: tracked again, both ways from frame {start}")
+    return Tracked(frames, table, start)
 
 
 def _cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], task: Task) -> tuple[list[Frame], list[dict[str, Any]]]:
@@ -94,16 +91,14 @@ def _cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], task: Task) -> tup
     if len(hypotheses) == 1:
         return hypotheses[0].frames, []
     usable, speed = [observation.usable for observation in scene.observations], typical_speed(task.training)
-    costs = [trajectory_cost(one.frames, usable, scene.body.skeleton, scene.fps, speed) for one in hypotheses]
-    kept = 0
-    for k, cost in enumerate(costs):
-        if cheaper(cost.total, costs[kept].total):
-            kept = k
+    tracks = [hypothesis.frames for hypothesis in hypotheses]
+    costs = [trajectory_cost(frames, usable, scene.body.skeleton, scene.fps, speed) for frames in tracks]
+    kept = min(range(len(costs)), key=lambda k: costs[k].total)
     table = [
-        {"guess": one.guess, "cost": whole.cost, "motion": whole.motion, "kept": k == kept}
-        for k, (one, whole) in enumerate(zip(hypotheses, costs, strict=True))
+        {"guess": hypothesis.guess, "cost": cost.cost, "motion": cost.motion, "kept": k == kept}
+        for k, (hypothesis, cost) in enumerate(zip(hypotheses, costs, strict=True))
     ]
-    return with_total_effort([one.frames for one in hypotheses], kept), table
+    return with_total_effort(tracks, kept), table
 
 
 def _first_usable(scene: Scene, frames: Sequence[Frame]) -> Frame:

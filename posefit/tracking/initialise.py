@@ -1,7 +1,7 @@
 """What is estimated before the first frame: its pose, by several restarts, and the person's build."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
@@ -10,6 +10,7 @@ import numpy as np
 from posefit.fitting.shape import Shape, fit_shape
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
+from posefit.geometry.body import Body
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.settings import POPULATION_SIZE
@@ -56,12 +57,12 @@ def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, 
         looks_ahead = _warm_up(method, task, scene)
     progress.log(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
 
-    follow, footage = following(method), scene.truth is None
+    footage = scene.truth is None
     restarts = (RESTARTS if footage and not looks_ahead else 0) if options.restarts is None else options.restarts
     body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
     if restarts:
         progress.log(f"looking for the first pose, {restarts} times")
-        task = best_restart(task, scene.observations, follow, restarts, options.seed)
+        task = best_restart(task, scene.observations, method.follow, restarts, options.seed)
     shape = None
     if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
         few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"
@@ -71,18 +72,9 @@ def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, 
         progress.log(f"fitting the person's build to {body_frames} frames")
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = options.height or (task.body.stature if alone else None)
-        shape = fitted_build(task, scene.observations, follow, body_frames, height, options.seed)
+        shape = fitted_build(task, scene.observations, method.follow, body_frames, height, options.seed)
         task = replace(task, body=shape.body)
     return Guess(replace(scene, body=task.body), task, shape)
-
-
-def following(method: Method) -> Follow:
-    """Return a function that follows observations with a method, as a task asks."""
-
-    def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        return method.tracker(task).track(observations, rng)
-
-    return follow
 
 
 def fitted_build(
@@ -97,27 +89,22 @@ def fitted_build(
     if len(chosen) < frames:
         chosen, stride = usable_observations(observations, frames), 1
     task = replace(task, fps=task.fps / stride)
-    return fit_shape(
-        task.body,
-        task.cameras,
-        chosen,
-        lambda body: list(follow(replace(task, body=body), chosen, np.random.default_rng(seed))),
-        np.random.default_rng(seed),
-        height=height,
-        aligned=task.translation == "aligned",
-    )
+
+    def frames_of(body: Body) -> list[Frame]:
+        return list(follow(replace(task, body=body), chosen, np.random.default_rng(seed)))
+
+    aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
+    return fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned)
 
 
 def first_seen_by_most(observations: Sequence[Observation]) -> int:
     """Return the first frame in which no fewer cameras see the person than in any other; 0 for one camera."""
     best, most = 0, 0
-    for k in range(len(observations)):
-        silhouettes = observations[k].silhouettes
-        if len(silhouettes) == 1:
-            return 0
-        if (seeing := sum(silhouette.known for silhouette in silhouettes)) > most:
+    for k, observation in enumerate(observations):
+        cameras = len(observation.silhouettes)
+        if (seeing := sum(silhouette.known for silhouette in observation.silhouettes)) > most:
             best, most = k, seeing
-        if most == len(silhouettes):
+        if most == cameras or cameras == 1:
             break
     return best
 

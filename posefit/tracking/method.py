@@ -3,7 +3,7 @@
 `resolved` fills in the method of a source, and what it learns from, where the options leave them open.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -18,7 +18,7 @@ from posefit.errors import InputError
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
-from posefit.fitting.tracker import Prediction, SynthesisTracker, Task, Tracker
+from posefit.fitting.tracker import Frame, Observation, Prediction, SynthesisTracker, Task, Tracker
 from posefit.fitting.validation import (
     Audit,
     AuditedTracker,
@@ -108,6 +108,10 @@ class Method:
     def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
         """Return a tracker for a task, whose plugin may take so many seconds longer to propose a population."""
         return self._make(task, patience)
+
+    def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a frame for each observation, as a task asks."""
+        return self.tracker(task).track(observations, rng)
 
     def dimensions(self, task: Task) -> int | None:
         """Return how many coordinates a proposal has; None of a tracker of its own, which need not have any."""

@@ -25,6 +25,7 @@ from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
 from posefit.tracking.smoothing.smooth import Pass, smooth
+from posefit.tracking.spins import MAX_TURN_RATE
 from posefit.tracking.summary import Track, evaluate
 
 
@@ -60,7 +61,7 @@ def track_scene(
         hypotheses = follow(guess, method, options, output, progress)
         tracked = retrack(guess, method, hypotheses, options, progress)
         if tracked.start is not None:
-            guess = replace(guess, task=replace(guess.task, fastest_turn=tracked.fastest_turn))
+            guess = replace(guess, task=replace(guess.task, fastest_turn=MAX_TURN_RATE))
         smoothed = Pass(guess.scene, tracked.frames, guess.shape, 1)
         if options.smooth:
             smoothed = smooth(guess, method, tracked.frames, options, progress)

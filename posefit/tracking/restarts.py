@@ -11,7 +11,8 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Literal
 
 import numpy as np
@@ -27,7 +28,7 @@ from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, r
 from posefit.motion.motion import Motion
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask
-from posefit.tracking.trajectory import cheaper, mean_cost, with_total_effort
+from posefit.tracking.trajectory import cheaper, effort_of, mean_cost, with_total_effort
 
 RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "pass": 2026}  # part of the seed of what is tracked again
 RESTARTS = 8  # searches of the first frame
@@ -66,13 +67,8 @@ def usable_observations(
     observations: Sequence[Observation], count: int, stride: int = 1, start: int = 0
 ) -> list[Observation]:
     """Return the first `count` observations from `start` on, of every `stride`th, that show enough of the person."""
-    usable: list[Observation] = []
-    for k in range(start, len(observations), stride):
-        if len(usable) == count:
-            break
-        if (observation := observations[k]).usable:
-            usable.append(observation)
-    return usable
+    each = (observations[k] for k in range(start, len(observations), stride))
+    return list(islice((observation for observation in each if observation.usable), count))
 
 
 def best_restart(
@@ -129,8 +125,8 @@ def _after(task: Task, frame: Frame) -> Task:
 def _coarser(task: Task, observations: Sequence[Observation], factor: int) -> tuple[Task, list[Observation]]:
     """Return a task and its observations through every `factor`th pixel of every `factor`th row."""
     small = [
-        replace(one, silhouettes=[coarser_silhouette(silhouette, factor) for silhouette in one.silhouettes])
-        for one in observations
+        replace(seen, silhouettes=[coarser_silhouette(silhouette, factor) for silhouette in seen.silhouettes])
+        for seen in observations
     ]
     return replace(task, cameras=[coarser_camera(camera, factor) for camera in task.cameras]), small
 
@@ -160,11 +156,11 @@ class RelocalisingTracker:
         history, coming = _History(self.task, self.gap), _LookAhead(observations)
         going = self.follow(self.task, coming.rest(), rng)
         while shown := coming.peek(1):
-            effort: list[Frame] = []
+            tried: list[Frame] = []
             relocalised: bool | None = None
             if shown[0].usable and history.is_lost:
                 window = coming.peek((TRIAL_FRAMES - 1) * TRIAL_STRIDE + 1)
-                task = self._relocalise(history, window, effort, independent(rng))
+                task = self._relocalise(history, window, tried, independent(rng))
                 if relocalised := task is not None:
                     going = self.follow(task, coming.rest(), rng)
                 history.forget()
@@ -172,13 +168,13 @@ class RelocalisingTracker:
                 return
             coming.drop()
             history.add(frame, shown[0].usable)
-            yield frame if relocalised is None else _with_effort(frame, effort, relocalised)
+            yield frame if relocalised is None else _with_effort(frame, tried, relocalised)
         yield from going  # none: the tracker gets to its end
 
     def _relocalise(
-        self, history: "_History", coming: list[Observation], effort: list[Frame], rng: np.random.Generator
+        self, history: "_History", coming: list[Observation], tried: list[Frame], rng: np.random.Generator
     ) -> Task | None:
-        """Return the task to go on with; None where the track is best as it is. `effort` gets every frame tried."""
+        """Return the task to go on with; None where the track is best as it is. `tried` gets every frame tried."""
         latest = history.latest
         assert latest is not None
         around = replace(self.task, yaw=None, anchor=latest.translation, first_pose=None, before=())
@@ -186,27 +182,18 @@ class RelocalisingTracker:
 
         def counted(task: Task, shown: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
             for frame in self.follow(task, shown, rng):
-                effort.append(frame)
+                tried.append(frame)
                 yield frame
 
         task = best_restart(around, coming, counted, RESTARTS, rng.integers(0, 2**32, 2).tolist(), on)
         return None if task is on else task
 
 
-def _with_effort(frame: Frame, effort: Sequence[Frame], relocalised: bool) -> Frame:
+def _with_effort(frame: Frame, tried: Sequence[Frame], relocalised: bool) -> Frame:
     """Return a frame with the evaluations and times of those that were tried before it."""
-    evaluations = sum(one.evaluations for one in effort)
-    cpu_seconds = (
-        None if frame.cpu_seconds is None else frame.cpu_seconds + sum(one.cpu_seconds or 0.0 for one in effort)
-    )
-    return replace(
-        frame,
-        evaluations=frame.evaluations + evaluations,
-        seconds=frame.seconds + sum(one.seconds for one in effort),
-        cpu_seconds=cpu_seconds,
-        spent=None if frame.spent is None else frame.spent + evaluations,
-        details={**frame.details, RELOCALISED: relocalised},
-    )
+    effort = effort_of([frame, *tried])
+    spent = None if frame.spent is None else frame.spent + effort["evaluations"] - frame.evaluations
+    return replace(frame, **effort, spent=spent, details={**frame.details, RELOCALISED: relocalised})
 
 
 class _History:
@@ -214,9 +201,8 @@ class _History:
 
     def __init__(self, task: Task, gap: int) -> None:
         self._gap = gap
-        self._typical, self._high = (
-            max(round(seconds * task.fps), 1) for seconds in (TYPICAL_COST_SECONDS, HIGH_COST_SECONDS)
-        )
+        self._typical = max(round(TYPICAL_COST_SECONDS * task.fps), 1)
+        self._high = max(round(HIGH_COST_SECONDS * task.fps), 1)
         self.latest: Frame | None = None
         self.forget()
         if len(task.before) > 1:  # a single one is what the track was begun with
@@ -286,15 +272,7 @@ SYMMETRIC_POSES: Mapping[str, Operator] = {
     "arms exchanged": lambda skeleton, poses, _: exchanged_limbs(skeleton, poses, "arms"),
 }
 # The initial guesses of the hypotheses after the first, in turn: those first that are mistaken most often.
-GUESSES = (
-    "mirrored",
-    "reflected",
-    SEARCHED_AGAIN,
-    "legs exchanged",
-    "turned",
-    SEARCHED_AGAIN,
-    "arms exchanged",
-)
+GUESSES = ("mirrored", "reflected", SEARCHED_AGAIN, "legs exchanged", "turned", SEARCHED_AGAIN, "arms exchanged")
 
 
 def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, first: Frame) -> tuple[str, Task]:
@@ -321,38 +299,28 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
 # After the last frame.
 
 
-@dataclass(frozen=True, eq=False)
-class Retracked:
-    """A track after its spins were looked at."""
-
-    frames: list[Frame] = field(repr=False)  # with the effort of both tracks
-    start: int | None  # the frame from which it was tracked again; None where it is as it was
-
-
 def retrack_spins(
     task: Task, observations: Sequence[Observation], frames: Sequence[Frame], follow: Follow, seed: int
-) -> Retracked:
-    """Return a track without spins: where there are some, all frames are tracked again from the surest one.
+) -> tuple[list[Frame], int | None]:
+    """Return a track without spins, and the frame from which it was tracked again; None where it is as it was.
 
-    Which way the person faces is what most frames agree on, see `spins.facing_consensus`. From that frame they are
+    That frame is the surest of those that face as most do, see `spins.facing_consensus`. From there the person is
     followed onward, and backwards by training motions in reverse. The old track is kept where the new one spins as
-    often, or costs half as much again.
+    often, or costs half as much again. The frames have the effort of both tracks.
     """
     usable = np.array([observation.usable for observation in observations])
     before = _spin_count(task, frames, usable)
     start = anchor_frame(frames, facing_consensus(frames, task.cameras, usable, task.fps)) if before else None
     if start is None:
-        return Retracked(list(frames), None)
+        return list(frames), None
     sure = replace(_after(task, frames[start]), before=(), fastest_turn=MAX_TURN_RATE)
     back = replace(sure, training=[in_reverse(motion) for motion in task.training], backwards=True)
-    onward = (observations[k] for k in range(start, len(frames)))
-    ahead = list(follow(sure, onward, stream(seed, "spin", 0)))
-    until = (observations[k] for k in range(start, -1, -1))
-    behind = list(follow(back, until, stream(seed, "spin", 1)))
+    ahead = list(follow(sure, (observations[k] for k in range(start, len(frames))), stream(seed, "spin", 0)))
+    behind = list(follow(back, (observations[k] for k in range(start, -1, -1)), stream(seed, "spin", 1)))
     again = [*_joined(task.body.skeleton, behind, ahead[0])[:0:-1], *ahead]
     better = _spin_count(task, again, usable) < before
     better = better and cheaper(mean_cost(again, usable), mean_cost(frames, usable), SPIN_TOLERANCE)
-    return Retracked(with_total_effort([frames, again], int(better)), start if better else None)
+    return with_total_effort([frames, again], int(better)), start if better else None
 
 
 def in_reverse(motion: Motion) -> Motion:
@@ -372,16 +340,12 @@ def _joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[F
     mine, others = ahead.posterior, behind[0].posterior
     if mine is None or others is None:
         return list(behind)
-    joints, near = skeleton.joints(mine.poses), skeleton.joints(others.poses)
-    rows = np.array([int(((near - one) ** 2).sum(axis=(1, 2)).argmin()) for one in joints])
-
-    def picked(frame: Frame) -> Frame:
-        if (posterior := frame.posterior) is None:
-            return frame
-        poses, translations = posterior.poses[rows], posterior.translations[rows]
-        return replace(
-            frame,
-            posterior=replace(posterior, poses=poses, translations=translations, weights=np.ones(len(rows))),
-        )
-
-    return [picked(frame) for frame in behind]
+    near = skeleton.joints(others.poses)
+    rows = np.array([((near - joints) ** 2).sum(axis=(1, 2)).argmin() for joints in skeleton.joints(mine.poses)])
+    frames = []
+    for frame in behind:
+        if (posterior := frame.posterior) is not None:
+            poses, places = posterior.poses[rows], posterior.translations[rows]
+            posterior = replace(posterior, poses=poses, translations=places, weights=np.ones(len(rows)))
+        frames.append(replace(frame, posterior=posterior))
+    return frames

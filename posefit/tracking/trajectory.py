@@ -6,6 +6,7 @@ in most frames, or has to jump. So a trajectory that is judged as a whole is rig
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,24 +54,27 @@ def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
     return float(costs[usable].mean() if usable.any() else costs.mean())
 
 
+def effort_of(frames: Sequence[Frame]) -> dict[str, Any]:
+    """Return the evaluations and the time of several frames together; CPU time where all have it."""
+    cpu_seconds = [frame.cpu_seconds for frame in frames if frame.cpu_seconds is not None]
+    return {
+        "evaluations": sum(frame.evaluations for frame in frames),
+        "seconds": sum(frame.seconds for frame in frames),
+        "cpu_seconds": sum(cpu_seconds) if len(cpu_seconds) == len(frames) else None,
+    }
+
+
 def with_total_effort(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Frame]:
     """Return the frames of the track that is kept, with the evaluations and the time of all tracks.
 
     The course of a search is given as if all tracks went on abreast: its evaluations are stretched to those of all.
     """
-    return [_with_total(together, together[kept]) for together in zip(*tracks, strict=True)]
-
-
-def _with_total(together: Sequence[Frame], frame: Frame) -> Frame:
-    total = sum(other.evaluations for other in together)
-    cpu_seconds = [other.cpu_seconds for other in together if other.cpu_seconds is not None]
-    return replace(
-        frame,
-        evaluations=total,
-        seconds=sum(other.seconds for other in together),
-        cpu_seconds=sum(cpu_seconds) if len(cpu_seconds) == len(together) else None,
-        spent=None if frame.spent is None else frame.spent * total // max(frame.evaluations, 1),
-    )
+    frames = []
+    for together in zip(*tracks, strict=True):
+        frame, effort = together[kept], effort_of(together)
+        spent = None if frame.spent is None else frame.spent * effort["evaluations"] // max(frame.evaluations, 1)
+        frames.append(replace(frame, **effort, spent=spent))
+    return frames
 
 
 def typical_speed(training: Sequence[Motion]) -> float:

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from posefit.arrays import Array
+from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, runs
+from posefit.silhouette.cost import only_camera
 
 REACH = 2  # frames to either side that a frame meets
 BEND = np.array([1.0, -2.0, 1.0])
@@ -157,6 +159,16 @@ class Visibility:
 
     usable: NDArray[np.bool_]  # (T,)
     eyes: Array = field(repr=False)  # (T, 3) metres: where the only camera stands that sees it; NaN where several do
+
+    @classmethod
+    def of(cls, scene: Scene) -> Self:
+        """Return the visibility of the frames of a scene."""
+        usable, eyes = [], []
+        for observation in scene.observations:
+            only = only_camera(scene.cameras, observation.silhouettes)
+            usable.append(observation.usable)
+            eyes.append(np.full(3, np.nan) if only is None else only.position)
+        return cls(np.array(usable), np.array(eyes))
 
 
 def smooth_path(motion: Motion, visibility: Visibility) -> Motion:

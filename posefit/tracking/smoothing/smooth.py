@@ -11,14 +11,13 @@ from typing import Self
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.fitting.shape import Shape
-from posefit.fitting.tracker import Frame, Observation
+from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
-from posefit.silhouette.cost import only_camera, pose_costs
+from posefit.silhouette.cost import pose_costs
 from posefit.tracking.follow import tracker_of
 from posefit.tracking.initialise import Guess
 from posefit.tracking.method import Method
@@ -26,7 +25,7 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import stream
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
-from posefit.tracking.trajectory import cheaper, mean_cost, with_total_effort
+from posefit.tracking.trajectory import cheaper, mean_cost, motion_of, with_total_effort
 
 PASS_TOLERANCE = 1.125  # times what the pass before costs: a pass that costs more is not kept
 
@@ -63,14 +62,14 @@ def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: Track
         before = passes[kept]
         scene, path = before.scene, [frame.translation for frame in before.frames]
         task = replace(guess.task, body=scene.body, translation="known", anchor=path[0], before=())
-        known = (replace(one, translation=place) for one, place in zip(scene.observations, path, strict=True))
-        progress.log(f"following once more where it went, pass {number + 1} of {options.passes}")
+        known = (replace(seen, translation=place) for seen, place in zip(scene.observations, path, strict=True))
+        progress.log(f"tracking again along its path, pass {number + 1} of {options.passes}")
         rng = stream(options.seed, "pass", number)
         tracked = list(progress.steps(tracker_of(method, scene, task).track(known, rng), scene.count))
         passes.append(Pass.smoothed(scene, tracked, before.shape, method.beta, number + 1))
         if cheaper(passes[-1].cost, before.cost, PASS_TOLERANCE):
             kept = number
-    return replace(passes[kept], frames=with_total_effort([one.frames for one in passes], kept))
+    return replace(passes[kept], frames=with_total_effort([done.frames for done in passes], kept))
 
 
 def smoothed_frames(
@@ -81,23 +80,15 @@ def smoothed_frames(
     The build stays the scene's where it was not fitted before (`shape` is None). Costs and areas are those of the
     smoothed frames, and their posteriors move as far as the pose and the root did.
     """
-    poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
-    motion = Motion(scene.name, scene.body.skeleton, poses, places, scene.fps)
-    usable = np.array([observation.usable for observation in scene.observations])
-    visibility = Visibility(usable, np.array([_eye(scene, observation) for observation in scene.observations]))
-    motion, shape = fit_contours(scene, smooth_path(motion, visibility), visibility, shape, beta)
+    visibility = Visibility.of(scene)
+    motion = smooth_path(motion_of(scene, frames), visibility)
+    motion, shape = fit_contours(scene, motion, visibility, shape, beta)
     motion = smooth_path(motion, visibility)  # contours pull at standing feet
     scene = scene if shape is None else replace(scene, body=shape.body)
     smooth = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
     if shape is not None:
-        shape = replace(shape, cost=mean_cost(smooth, usable))
+        shape = replace(shape, cost=mean_cost(smooth, visibility.usable))
     return smooth, shape
-
-
-def _eye(scene: Scene, observation: Observation) -> Array:
-    """Return where the only camera stands (3,) that sees anything; NaN where several do, or none."""
-    only = only_camera(scene.cameras, observation.silhouettes)
-    return np.full(3, np.nan) if only is None else only.position
 
 
 def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:
