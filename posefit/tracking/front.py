@@ -87,7 +87,7 @@ def track(
     with folder as output:
         scene = scene or scene_of(sources, reporting, **chosen.view)
         names = {
-            "source": [one.name if isinstance(one, Motion) else str(one) for one in sources],
+            "source": [each.name if isinstance(each, Motion) else str(each) for each in sources],
             "frames_chosen": list(chosen.frames),
             "view_degrees": options.get("view_degrees"),
         }
@@ -118,21 +118,22 @@ def _sources(source: Source | Scene | Sequence[Source]) -> Sequence[Source]:
 
 def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Source]) -> None:
     """Return nothing. Raises InputError for options that do not fit a source whose truth is known, or unknown."""
-    if not known and options.translation == "known":
-        raise InputError("translation must be searched or aligned where only masks are given, got known")
-    if not known and options.first_pose == "given":
-        raise InputError("first_pose must be searched where only masks are given, got given")
-    captured = any(str(one).lower().endswith(".amc") for one in motions if isinstance(one, str | Path))
-    if known and options.asf is not None and not captured:
+    if not known:
+        if options.translation == "known":
+            raise InputError("translation must be searched or aligned where only masks are given, got known")
+        if options.first_pose == "given":
+            raise InputError("first_pose must be searched where only masks are given, got given")
+        return
+    captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
+    if options.asf is not None and not captured:
         raise InputError(f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}")
-    if known and options.restarts == 0:
+    if options.restarts == 0:
         raise InputError("restarts must be at least 1 for a motion, which is searched once where it is left out, got 0")
 
 
 def _identity(sources: Sequence[Source], options: TrackOptions, train: Sequence[Source]) -> dict[str, ArgumentDigest]:
     """Return what a track must have in common with one that it goes on with."""
-    same = [one.name for one in fields(options) if declared(one).identifies]
-    values: dict[str, Any] = {name: getattr(options, name) for name in same}
+    values = {option.name: getattr(options, option.name) for option in fields(options) if declared(option).identifies}
     values |= {"source": sources, "train": train, "version": __version__}
     named = kind_of(sources[0]) == "motion" and sources[0] in built_in.names()  # a folder of that name is not read
     return {
@@ -143,12 +144,11 @@ def _identity(sources: Sequence[Source], options: TrackOptions, train: Sequence[
 
 def _documented(function: Callable[..., Any]) -> None:
     """Show the options of a track in a function's signature and docstring, as if it declared them itself."""
-    own = [one for one in inspect.signature(function).parameters.values() if one.kind is not one.VAR_KEYWORD]
-    taken = {one.name for one in own} | ({"frames"} if function is fit else set())
-    listed = [one for one in fields(TrackOptions) if one.name not in taken]
-    more = [inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=one.default) for one in listed]
+    own = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
+    listed = [option for option in fields(TrackOptions) if function is track or option.name != "frames"]
+    more = [inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=option.default) for option in listed]
     function.__signature__ = inspect.Signature([*own, *more])  # type: ignore[attr-defined]
-    lines = "\n".join(f"    {one.name}: {declared(one).help}" for one in listed)
+    lines = "\n".join(f"    {option.name}: {declared(option).help}" for option in listed)
     function.__doc__ = f"{(function.__doc__ or '').rstrip()}\n\n    Options:\n{lines}\n"
 
 

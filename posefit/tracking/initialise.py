@@ -35,7 +35,7 @@ class Guess:
 
 def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> Task:
     """Return the task of tracking a scene, as far as it is known before anything is searched."""
-    known = None if scene.truth is None or options.first_pose == "searched" else scene.truth.poses[0, 3:]
+    first_pose = None if scene.truth is None or options.first_pose == "searched" else scene.truth.poses[0, 3:]
     return Task(
         scene.body,
         scene.cameras,
@@ -45,7 +45,7 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
         translation=options.translation or ("aligned" if scene.truth is None else "known"),
         fps=scene.fps,
         training=training,
-        first_pose=known,
+        first_pose=first_pose,
         threads=options.threads,
     )
 

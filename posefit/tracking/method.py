@@ -76,7 +76,8 @@ def resolved(source: Source, options: TrackOptions) -> TrackOptions:
     built-in walks, too.
     """
     footage, method = kind_of(source) != "motion", options.method
-    searched = options.optimiser is not None or options.prior is not None or _sets_search(options.settings)
+    sets_search = any(name.partition(".")[0] != DEFAULT_TRACKER for name in options.settings)
+    searched = options.optimiser is not None or options.prior is not None or sets_search
     if method is None and footage and not searched and DEFAULT_TRACKER in registry().offers["tracker"]:
         method = DEFAULT_TRACKER
     elif not callable(method):
@@ -86,11 +87,6 @@ def resolved(source: Source, options: TrackOptions) -> TrackOptions:
         train = [recorded.LIBRARY]
     train = train or built_in.other_styles(str(source) if source in built_in.names() else "walk")
     return options.changed(method=method, train=train)
-
-
-def _sets_search(given: Mapping[str, Any] | Sequence[str]) -> bool:
-    """Return whether some settings are those of a search, and not of the default tracker."""
-    return any(name.partition(".")[0] != DEFAULT_TRACKER for name in given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,10 +125,8 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     chosen = options.method
     if callable(chosen) or (names := method_names(chosen)).tracker is not None:
         for name in ("optimiser", "prior"):
-            if getattr(options, name) is not None:
-                raise InputError(
-                    f"{name} must not be given beside a tracker, got {getattr(options, name)} and {chosen}"
-                )
+            if (plugin := getattr(options, name)) is not None:
+                raise InputError(f"{name} must not be given beside a tracker, got {plugin} and {chosen}")
         return _tracker_method(_offered("tracker", chosen), options.settings)
     optimiser = _offered("optimiser", options.optimiser or names.optimiser)
     prior = None if options.prior is not None else registry().offer("prior", names.prior)
@@ -141,9 +135,8 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         places[_family(prior.name)] = "prior", prior.factory
     mine = parsed_settings({**places, "tracker": ("tracker", Prediction)}, options.settings)
     mine.setdefault("prior", {})
-    mine["optimiser"] = settings.planned(
-        optimiser.factory, mine["optimiser"], task.evaluations, options.population_size
-    )
+    given = mine["optimiser"]
+    mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations, options.population_size)
     settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
     if prior is not None:
         learned, name = _learned(prior, mine["prior"], task), prior.name
@@ -226,16 +219,17 @@ def _learned(offer: Offer, given: Mapping[str, Any], task: Task) -> Prior:
 
 
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
+    """Return nothing. Raises BrokenRuleError where a prior's range, shapes or numbers are wrong."""
+
+    def broken(rule: str) -> BrokenRuleError:
+        return BrokenRuleError(f"{offer.label}: {rule}")
+
     low, high = np.asarray(prior.low), np.asarray(prior.high)
     if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low).all() and np.isfinite(high).all()):
-        raise BrokenRuleError(
-            f"{offer.label}: low and high must be finite and of shape (m,), got {low.shape}, {high.shape}"
-        )
+        raise broken(f"low and high must be finite and of shape (m,), got {low.shape}, {high.shape}")
     if (low > high).any():
         k = int((low > high).argmax())
-        raise BrokenRuleError(
-            f"{offer.label}: low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}"
-        )
+        raise broken(f"low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}")
     angles = training[:3]
     latents = np.asarray(prior.transform(angles))
     back, feasible = prior.inverse_transform(latents), prior.feasible(latents)
@@ -245,22 +239,16 @@ def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
         ("feasible", feasible, (len(angles),)),
     ):
         if np.shape(value) != shape:
-            raise BrokenRuleError(f"{offer.label}: {name} must return shape {shape}, got {np.shape(value)}")
+            raise broken(f"{name} must return shape {shape}, got {np.shape(value)}")
         if not np.isfinite(value).all():
-            raise BrokenRuleError(f"{offer.label}: {name} must return finite numbers, got some that are not")
-    if not np.any(feasible):
-        _check_feasible(prior, training, offer)
-
-
-def _check_feasible(prior: Prior, training: Array, offer: Offer) -> None:
-    """Return nothing. Raises BrokenRuleError where a larger sample holds no feasible pose either."""
-    some = training[np.unique(np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64))]
-    drawn = np.random.default_rng(0).uniform(prior.low, prior.high, (FEASIBILITY_SAMPLES, len(prior.low)))
-    for latents in (np.asarray(prior.transform(some)), drawn):
-        if np.any(prior.feasible(latents)):
-            return
-    came = f"none of {len(some)} training poses and {FEASIBILITY_SAMPLES} of the range"
-    raise BrokenRuleError(f"{offer.label}: feasible must allow some poses, got {came}")
+            raise broken(f"{name} must return finite numbers, got some that are not")
+    if np.any(feasible):
+        return
+    sample = training[np.unique(np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64))]
+    drawn = np.random.default_rng(0).uniform(low, high, (FEASIBILITY_SAMPLES, len(low)))
+    if not (np.any(prior.feasible(np.asarray(prior.transform(sample)))) or np.any(prior.feasible(drawn))):
+        came = f"none of {len(sample)} training poses and {FEASIBILITY_SAMPLES} of the range"
+        raise broken(f"feasible must allow some poses, got {came}")
 
 
 def _guarded(

@@ -1,11 +1,4 @@
-"""The modes of one problem, by several searches of any optimiser, and a tracker that has them for every frame.
-
-    from posefit.tracking.modes import modes
-
-    posterior = modes(problem, factory, searches=8, evaluations=2440, rng=np.random.default_rng(0))
-
-`factory(space, rng)` builds any optimiser. The result is a `posefit.uncertainty.modes.Posterior`.
-"""
+"""The modes of one problem, by several searches of any optimiser, and a tracker that has them for every frame."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -77,10 +70,7 @@ def further(
     searches: int,
     temperature: float,
 ) -> tuple[Posterior, int]:
-    """Return the posterior of a problem after a first search, by so many more, and how many evaluations it took.
-
-    That is about as many as are given.
-    """
+    """Return the posterior of a problem after a first search, by so many more, and the evaluations that it took."""
     spared = int(OTHER_SEARCHES * evaluations)
     others = elsewhere(problem, make, spared, rng, min(searches, spared // MIN_EVALUATIONS))
     used = sum(len(costs) for _, costs in others)
@@ -89,7 +79,7 @@ def further(
     searched = [first, *others, *([(symmetric, landscape.costs(symmetric))] if len(symmetric) else [])]
     left = evaluations - used - landscape.evaluations
     sample = weighed(landscape, searched, temperature, rng, evaluations=left)
-    return posterior_of(problem, *sample.even(POSTERIOR_POSES, rng)), used + landscape.evaluations
+    return _posterior_of(problem, *sample.even(POSTERIOR_POSES, rng)), used + landscape.evaluations
 
 
 def elsewhere(
@@ -109,16 +99,18 @@ def elsewhere(
 
 def search(problem: PoseProblem, optimiser: Optimiser, evaluations: int) -> Searched:
     """Return all proposals (n, d) that an optimiser had evaluated within a budget, and their costs (n,)."""
-    return gathered([(np.array(one), costs) for one, costs in populations(optimiser, problem.evaluate, evaluations)])
+    return gathered(
+        [(np.array(proposals), costs) for proposals, costs in populations(optimiser, problem.evaluate, evaluations)]
+    )
 
 
 def gathered(populations: list[Searched]) -> Searched:
     """Return the populations of a search as one."""
-    return np.concatenate([one for one, _ in populations]), np.concatenate([costs for _, costs in populations])
+    proposals, costs = zip(*populations, strict=True)
+    return np.concatenate(proposals), np.concatenate(costs)
 
 
-def posterior_of(problem: PoseProblem, proposals: Array, weights: Array) -> Posterior:
-    """Return weighted proposals (n, d) as poses."""
+def _posterior_of(problem: PoseProblem, proposals: Array, weights: Array) -> Posterior:
     return Posterior(*problem.decode(proposals), weights)
 
 
@@ -157,12 +149,11 @@ def lost_probability(costs: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class WeighingTracker:
-    """Follows as the tracker does that it is given, and adds a posterior to every frame that shows the person.
+    """Adds a posterior and the probability to be lost to every frame of a tracker that shows the person.
 
     The track is the same as without. Beside the tracker's own search come others, `prediction.modes` in all, anywhere
-    in the same space; they and the weighing have `prediction.modes_share` of its evaluations. Where `modes` is 1 and
-    the optimiser a filter, its last particles are weighed as they are. A frame's evaluations are all of them, beyond
-    the budget too. Each frame has the probability that it is lost.
+    in the same space; they and the weighing have `prediction.modes_share` of its evaluations, beyond the budget. Where
+    `modes` is 1 and the optimiser a filter, its last particles are weighed as they are.
     """
 
     tracker: SynthesisTracker
@@ -176,17 +167,14 @@ class WeighingTracker:
             yield self._with_posterior(frame, record, rng) if record.observation.usable else frame
 
     def _with_posterior(self, frame: Frame, record: "_Record", rng: np.random.Generator) -> Frame:
-        began, begun = time.perf_counter(), time.process_time()
+        start, cpu_start = time.perf_counter(), time.process_time()
         posterior, more = self._posterior(record, rng)
-        seconds = frame.seconds + time.perf_counter() - began
-        cpu_seconds = None if frame.cpu_seconds is None else frame.cpu_seconds + time.process_time() - begun
+        frame = replace(frame, posterior=posterior, lost=float(lost_probability(np.array(frame.cost))))
         return replace(
             frame,
-            posterior=posterior,
-            lost=float(lost_probability(np.array(frame.cost))),
             evaluations=frame.evaluations + more,
-            seconds=seconds,
-            cpu_seconds=cpu_seconds,
+            seconds=frame.seconds + time.perf_counter() - start,
+            cpu_seconds=None if frame.cpu_seconds is None else frame.cpu_seconds + time.process_time() - cpu_start,
         )
 
     def _posterior(self, record: "_Record", rng: np.random.Generator) -> tuple[Posterior, int]:
@@ -197,17 +185,13 @@ class WeighingTracker:
         if how.modes == 1 and self.tracker.next_frame == "carry":
             particles, costs = record.evaluated[-1]
             weights = boltzmann_weights(costs, how.posterior_temperature)
-            return posterior_of(problem, *_few(particles, weights)), 0
+            if len(particles) > POSTERIOR_POSES:  # some of equal weight
+                particles = particles[systematic_rows(weights, 0.5, POSTERIOR_POSES)]
+                weights = np.full(POSTERIOR_POSES, 1.0 / POSTERIOR_POSES)
+            return _posterior_of(problem, particles, weights), 0
         own = independent(rng)  # the track is the same as without
         first, more = gathered(record.evaluated), round(how.modes_share * evaluations)
         return further(problem, self.tracker.make, first, more, own, how.modes - 1, how.posterior_temperature)
-
-
-def _few(particles: Array, weights: Array) -> tuple[Array, Array]:
-    """Return weighted particles as they are, or where they are many, some of equal weight."""
-    if len(particles) <= POSTERIOR_POSES:
-        return particles, weights
-    return particles[systematic_rows(weights, 0.5, POSTERIOR_POSES)], np.full(POSTERIOR_POSES, 1.0 / POSTERIOR_POSES)
 
 
 class _Record:

@@ -58,14 +58,12 @@ def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Fr
         )
         recording.log(f"world/camera-{v}/mask", lens, static=True)
     joints = estimate.joints
-    parents = np.array(PARENTS[1:])
     radii = scene.body.radii.mean(axis=1)
     for k, (points, observation, frame) in enumerate(zip(joints, scene.observations, frames, strict=True)):
         recording.set_time("frame", sequence=k)
         recording.set_time("time", duration=k / estimate.fps)
-        bones = np.stack([points[parents], points[1:]], axis=1)
-        look = {"radii": radii, "colors": _colours(estimate.skeleton, frame)}
-        recording.log("world/body", rerun.LineStrips3D(bones, **look, labels=list(BONES), show_labels=False))
+        look = {"radii": radii, "colors": _colours(estimate.skeleton, frame), "labels": list(BONES)}
+        recording.log("world/body", rerun.LineStrips3D(_bones(points), **look, show_labels=False))
         recording.log("world/other", _other(rerun, estimate.skeleton, frame))
         if frame.lost is not None and frame.lost >= LOST:
             recording.log("lost", rerun.TextLog(f"frame {k} is lost", level=rerun.TextLogLevel.WARN))
@@ -88,6 +86,10 @@ def _other(rerun: Any, skeleton: Skeleton, frame: Frame) -> Any:
     other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
     if other is None:
         return rerun.Clear(recursive=False)
-    points = skeleton.joints(other.pose, other.translation)
-    bones = np.stack([points[np.array(PARENTS[1:])], points[1:]], axis=1)
+    bones = _bones(skeleton.joints(other.pose, other.translation))
     return rerun.LineStrips3D(bones, radii=THIN, colors=[OTHER[::-1]] * len(bones))
+
+
+def _bones(joints: Array) -> Array:
+    """Return both ends (26, 2, 3) of each bone of joints (27, 3)."""
+    return np.stack([joints[np.array(PARENTS[1:])], joints[1:]], axis=1)

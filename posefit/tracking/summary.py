@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from posefit.fitting.shape import NAMES, Shape
+from posefit.fitting.shape import NAMES
 from posefit.fitting.tracker import Frame, Task
-from posefit.geometry.skeleton import Skeleton
 from posefit.measuring.gait import gait_of
 from posefit.measuring.heading import backwards, warned
 from posefit.motion.motion import Motion
@@ -57,7 +56,11 @@ def evaluate(
         frame if frame.posterior is None else replace(frame, modes=modes_of(skeleton, frame.posterior))
         for frame in smoothed.frames
     ]
-    modes = _trajectory_modes(skeleton, frames)
+    posteriors = [frame.posterior for frame in frames if frame.posterior is not None]
+    whole = len(posteriors) == len(frames) and len({len(posterior) for posterior in posteriors}) == 1
+    trajectories = whole and all(posterior.coherent for posterior in posteriors)
+    modes = track_modes(skeleton, posteriors) if trajectories else []
+    none = [p.recalibration.none for p in posteriors if p.recalibration is not None]
     for warning in method.audit.warnings:
         progress.warn(warning)
     rows, measures = evaluated(scene, frames, method.prior, task.angles, method.beta)
@@ -90,9 +93,16 @@ def evaluate(
         "size": [scene.cameras[0].width, scene.cameras[0].height],
         "fps": scene.fps,
         "settings": method.settings,
-        "body": None if shape is None else _build(shape),
+        "body": None
+        if shape is None
+        else {
+            "stature": shape.body.stature,
+            "cost": shape.cost,
+            "factors": dict(zip(NAMES, shape.factors.tolist(), strict=True)),
+            "spread": dict(zip(NAMES, shape.spread.tolist(), strict=True)),
+        },
         "modes": [round(mode.weight, 6) for mode in modes] or None,
-        "none_of_modes": _no_mode_probability(frames),
+        "none_of_modes": round(float(np.mean(none)), 6) if none else None,
         "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
         "lost_frames": _numbers(rows, "lost", LOST),
         "relocalised": [k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
@@ -106,32 +116,8 @@ def evaluate(
     return Track(estimate, scene.truth, measures, rows, summary, frames, modes)
 
 
-def _trajectory_modes(skeleton: Skeleton, frames: Sequence[Frame]) -> list[TrackMode]:
-    """Return the modes of a whole track; none where its frames' posteriors are no trajectories."""
-    each = [frame.posterior for frame in frames if frame.posterior is not None and frame.posterior.coherent]
-    whole = len(each) == len(frames) and len({len(one) for one in each}) == 1
-    return track_modes(skeleton, each) if whole else []
-
-
-def _no_mode_probability(frames: Sequence[Frame]) -> float | None:
-    """Return how likely no mode of a frame is right, the mean over frames; None where it is unknown."""
-    learned = [frame.posterior.recalibration for frame in frames if frame.posterior is not None]
-    known = [one.none for one in learned if one is not None]
-    return round(float(np.mean(known)), 6) if known else None
-
-
 def _numbers(rows: Sequence[Mapping[str, float]], name: str, least: float) -> list[int] | None:
     """Return the frames that have so much in a column; None where it is blank in all."""
     if np.isnan([row[name] for row in rows]).all():
         return None
     return [int(row["frame"]) for row in rows if row[name] >= least]
-
-
-def _build(shape: Shape) -> dict[str, Any]:
-    """Return a build as the summary holds it."""
-    return {
-        "stature": shape.body.stature,
-        "cost": shape.cost,
-        "factors": dict(zip(NAMES, shape.factors.tolist(), strict=True)),
-        "spread": dict(zip(NAMES, shape.spread.tolist(), strict=True)),
-    }

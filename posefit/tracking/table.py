@@ -6,22 +6,22 @@ from typing import Any
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit.tracking.trust import trust_line
 
-NOTABLE = 0.05  # a part of the build that is off the average by less is not worth a word
-
+MIN_BUILD_CHANGE = 0.05  # a part of the build that is off the average by less is not worth a word
 WIDTH = 30  # of the names
-NAMED = 8  # motions that were learned from, and are named
+MAX_NAMED = 8  # motions that were learned from, and are named
 
 
 def table(summary: Mapping[str, Any]) -> str:
     """Return the lines that `posefit track` prints."""
     trust = summary["trust"]
     lines = [] if trust is None else [trust["sentence"], trust_line(trust)]
-    lines += [
+    names = summary["train"]
+    training = ", ".join(names) if len(names) <= MAX_NAMED else f"{len(names)} clips, {names[0]} to {names[-1]}"
+    lines.append(
         f"{summary['motion']}: {summary['frames']} frames, {summary['method']}, seed {summary['seed']}, "
-        f"translation {summary['translation']}, trained on {_training(summary['train'])}"
-    ]
-    error = summary["error_degrees"]
-    if error is not None:
+        f"translation {summary['translation']}, trained on {training}"
+    )
+    if (error := summary["error_degrees"]) is not None:
         lines.append(f"{'':{WIDTH}} {'error deg':>9} {'skill':>7}")
         lines.append(f"{summary['method']:{WIDTH}} {error['mean']:9.2f}")
         for name, baseline in summary["baselines_degrees"].items():
@@ -32,21 +32,19 @@ def table(summary: Mapping[str, Any]) -> str:
             lines.append(f"{projected.label:{WIDTH}} {projected.number(summary[projected.name]):>9}")
         shown = (_shown(summary, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
         lines.append(f"{', '.join(shown)} of frames")
-    if summary["held_frames"]:
-        held = summary["held_frames"]
+    if held := summary["held_frames"]:
         show = "frame shows" if held == 1 else "frames show"
         lines.append(
             f"{held} {show} too little of the person: the pose is held or carried on, not searched, and may be off "
             "the person; IoU is that of the others"
         )
-    lines += [said] if (said := undetermined(summary)) else []
+    lines += [sentence] if (sentence := undetermined(summary)) else []
     lines += [gait_line(summary["gait"])] if summary["frames"] > 1 else []
-    if summary["body"] is not None:
-        body = summary["body"]
+    if (body := summary["body"]) is not None:
         parts = [
             f"{name} {factor:.2f} +- {body['spread'][name]:.2f}"
             for name, factor in body["factors"].items()
-            if abs(factor - 1.0) >= NOTABLE
+            if abs(factor - 1.0) >= MIN_BUILD_CHANGE
         ]
         lines.append(
             f"build: {body['stature']:.2f} m tall; against the average {', '.join(parts) or 'nothing notable'}"
@@ -96,10 +94,6 @@ def _shown(summary: Mapping[str, Any], name: str) -> str:
 
 def _chosen(tracks: Sequence[Mapping[str, Any]]) -> str:
     """Return which of several tracks was kept, and what each costs as a whole."""
-    kept = next(k for k, one in enumerate(tracks) if one["kept"])
-    costs = [f"{one['guess']} {one['cost'] + one['motion']:.2f}" for one in tracks]
+    kept = next(k for k, track in enumerate(tracks) if track["kept"])
+    costs = [f"{track['guess']} {track['cost'] + track['motion']:.2f}" for track in tracks]
     return f"kept track {kept + 1} of {len(tracks)}; trajectory cost by initial guess: {', '.join(costs)}"
-
-
-def _training(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= NAMED else f"{len(names)} clips, {names[0]} to {names[-1]}"

@@ -17,7 +17,7 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.smoothing import contours, kernels
 from posefit.tracking.smoothing.contours import (
-    STARTS,
+    BONE_STARTS,
     MaskContours,
     build_jacobian,
     distances_outside,
@@ -150,7 +150,7 @@ def test_the_gradient_of_the_borders_squares_is_that_of_their_sum() -> None:
     def pulled(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         out = np.zeros((1, 106, 106)), np.zeros((1, 106))
         drawn = numbers[:, :54].reshape(1, 27, 2), numbers[:, 54:].reshape(1, 26, 2)
-        kernels.pull_to_borders(STARTS, *drawn, *nothing, points, np.array([0, 30]), 1.0, np.array([1e9]), out)
+        kernels.pull_to_borders(BONE_STARTS, *drawn, *nothing, points, np.array([0, 30]), 1.0, np.array([1e9]), out)
         return out
 
     def half_sum(numbers: np.ndarray) -> float:
@@ -158,7 +158,7 @@ def test_the_gradient_of_the_borders_squares_is_that_of_their_sum() -> None:
         for x, y in points:
             total += 0.5 * min(
                 kernels.cone_distance(x, y, *joints[p], r[0], *joints[b + 1], r[1])[0]
-                for b, (p, r) in enumerate(zip(STARTS, radii, strict=True))
+                for b, (p, r) in enumerate(zip(BONE_STARTS, radii, strict=True))
             ) ** 2  # fmt: skip
         return total
 

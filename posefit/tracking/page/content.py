@@ -94,21 +94,14 @@ def track_data(
 
 def _verdict(summary: dict[str, Any]) -> str:
     """Return whether the track can be trusted, if the truth is unknown, and what was not determined."""
-    trust = summary["trust"]
-    return _determined(summary) if trust is None else f"{trust['sentence']} {_determined(summary)}"
-
-
-def _determined(summary: dict[str, Any]) -> str:
+    trust = "" if summary["trust"] is None else f"{summary['trust']['sentence']} "
     if not_determined := undetermined(summary):
-        return f"Not determined: {not_determined}."
-    unreported = [
-        words
-        for name, words in (("unknown_sides", "which side is left"), ("lost_frames", "which frames are lost"))
-        if summary[name] is None
-    ]
+        return f"{trust}Not determined: {not_determined}."
+    certainties = (("unknown_sides", "which side is left"), ("lost_frames", "which frames are lost"))
+    unreported = " or ".join(words for name, words in certainties if summary[name] is None)
     if unreported:
-        return f"The method does not report {' or '.join(unreported)}: frames without a mark may be wrong too."
-    return "The method reports no frame as lost, and left and right as known in every frame."
+        return f"{trust}The method does not report {unreported}: frames without a mark may be wrong too."
+    return f"{trust}The method reports no frame as lost, and left and right as known in every frame."
 
 
 def _held(summary: dict[str, Any]) -> list[str]:
@@ -119,17 +112,16 @@ def _held(summary: dict[str, Any]) -> list[str]:
 
 def _facts(summary: dict[str, Any]) -> list[list[str]]:
     """Return names and values of the track's method and scene."""
-    known = [
-        ("method", str(summary["method"])),
-        ("seed", str(summary["seed"])),
-        ("cameras", f"{summary['views']}, {summary['camera']}"),
-        ("translation", str(summary["translation"])),
-        ("IoU", f"{summary['iou']:.3f}"),
-        ("posefit", str(summary["version"])),
+    mpjpe = [] if summary["mpjpe_mm"] is None else [["MPJPE", f"{summary['mpjpe_mm']:.0f} mm"]]
+    return [
+        *mpjpe,
+        ["method", str(summary["method"])],
+        ["seed", str(summary["seed"])],
+        ["cameras", f"{summary['views']}, {summary['camera']}"],
+        ["translation", str(summary["translation"])],
+        ["IoU", f"{summary['iou']:.3f}"],
+        ["posefit", str(summary["version"])],
     ]
-    if summary["mpjpe_mm"] is not None:
-        known.insert(0, ("MPJPE", f"{summary['mpjpe_mm']:.0f} mm"))
-    return [list(pair) for pair in known]
 
 
 def _column(name: str) -> dict[str, Any]:

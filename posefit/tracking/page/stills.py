@@ -23,12 +23,7 @@ MAX_FILM, MAX_MASKS = 4_500_000, 1_200_000  # characters of all frames of footag
 SPARE = 0.2  # of the room for footage, as later frames may need more than the first
 MAX_HEIGHT = 360  # pixels of a picture
 # pixels of height and quality of JPEG, 0 to 100, of the part around the person and of the whole frame, finest first
-FINENESS = (
-    ((MAX_HEIGHT, 75), (200, 50)),
-    ((MAX_HEIGHT, 50), (200, 50)),
-    ((288, 40), (180, 35)),
-    ((216, 35), (120, 30)),
-)
+FINENESS = ((MAX_HEIGHT, 75), (200, 50)), ((MAX_HEIGHT, 50), (200, 50)), ((288, 40), (180, 35)), ((216, 35), (120, 30))
 MARGIN = 0.25  # of the larger side of a person's box, to each side
 
 Fineness = tuple[tuple[int, int], tuple[int, int]]
@@ -47,7 +42,7 @@ class Strip:
         """Take the next frame, whose `pictures` are made if they are needed; the first is of the box."""
         if self._count % self.every == 0:
             self.pictures.append((box, pictures()))
-            while len(self.pictures) > 1 and sum(len(one) for _, each in self.pictures for one in each) > self._room:
+            while len(self.pictures) > 1 and sum(len(text) for _, each in self.pictures for text in each) > self._room:
                 self.pictures = self.pictures[::2]
                 self.every *= 2
         self._count += 1
@@ -76,11 +71,11 @@ class Stills:
     def add(self, frame: Frame, observation: Observation, filmed: Image | None) -> None:
         """Take the next frame."""
         masks = [silhouette.mask for silhouette in observation.silhouettes]
-        boxes = [_box(one, self._body, camera, frame) for one, camera in zip(masks, self._cameras, strict=True)]
+        boxes = [_box(mask, self._body, camera, frame) for mask, camera in zip(masks, self._cameras, strict=True)]
         if self._film is not None and filmed is not None:
             if self._fineness is None:
                 each = int((1.0 - SPARE) * MAX_FILM / self._wanted)
-                small = (one for one in FINENESS if sum(map(len, _photographs(filmed, boxes[0], one))) <= each)
+                small = (step for step in FINENESS if sum(map(len, _photographs(filmed, boxes[0], step))) <= each)
                 self._fineness = next(small, FINENESS[-1])
             fineness = self._fineness
             self._film.add(boxes[0], lambda: _photographs(filmed, boxes[0], fineness))
@@ -98,10 +93,10 @@ class Stills:
 def _box(mask: Mask, body: Body, camera: Camera, frame: Frame) -> Box:
     """Return the part of a picture that holds the mask and the body, with a margin."""
     pixels, depths = camera.project(body.skeleton.joints(frame.pose, frame.translation))
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
     points = [pixels[depths > NEAR]]
-    if len(rows):
-        points.append(np.array([[columns[0], rows[0]], [columns[-1] + 1, rows[-1] + 1]]))
+    if width:
+        points.append(np.array([[left, top], [left + width, top + height]]))
     size = np.array([camera.width, camera.height])
     inside = np.clip(np.concatenate(points), 0, size)
     if not len(inside):
@@ -119,11 +114,10 @@ def _cut(image: Image, box: Box) -> Image:
 
 
 def _photographs(image: Image, box: Box, fineness: Fineness) -> list[str]:
-    return [_jpeg(_cut(image, box), *fineness[0]), _jpeg(image, *fineness[1])]
-
-
-def _jpeg(image: Image, height: int, quality: int) -> str:
-    return _encoded(".jpg", _small(image, height), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return [
+        _encoded(".jpg", _small(picture, height), [cv2.IMWRITE_JPEG_QUALITY, quality])
+        for picture, (height, quality) in zip((_cut(image, box), image), fineness, strict=True)
+    ]
 
 
 def _png(mask: Mask, box: Box) -> str:
@@ -145,5 +139,4 @@ def _small(image: Image, highest: int) -> Image:
 def _encoded(suffix: str, image: Any, parameters: list[int]) -> str:
     done, content = cv2.imencode(suffix, image, parameters)
     assert done
-    kind = {".jpg": "jpeg", ".png": "png"}[suffix]
-    return f"data:image/{kind};base64,{base64.b64encode(content.tobytes()).decode()}"
+    return f"data:image/{suffix[1:].replace('jpg', 'jpeg')};base64,{base64.b64encode(content.tobytes()).decode()}"

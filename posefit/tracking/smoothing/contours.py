@@ -28,9 +28,9 @@ from posefit.silhouette.rasteriser import NEAR
 from posefit.tracking.smoothing import kernels
 from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
 
-FINE = 80.0  # pixels of a metre; of finer masks every second pixel, third, ... is looked at
-MARGIN = 48  # pixels around a mask that know how far they are from it
-SPAN = 12.0  # millimetres, about, of the border between two points of it
+FINE_PIXELS = 80.0  # pixels of a metre; of finer masks every second pixel, third, ... is looked at
+FIELD_MARGIN = 48  # pixels around a mask that know how far they are from it
+POINT_SPACING = 12.0  # millimetres, about, of the border between two points of it
 
 Distances = NDArray[np.float32]
 Integers = NDArray[np.int64]
@@ -54,19 +54,18 @@ class MaskContours:
         """Return the borders that a camera, number `view`, saw of a person whose root is about at `places` (T, 3)."""
         far = np.maximum(camera.project(places)[1], 0.1)
         metres = np.sqrt(camera.focal.prod()) / far
-        factor = max(int(np.median(metres) / FINE), 1)
+        factor = max(int(np.median(metres) / FINE_PIXELS), 1)
         factor = min(factor, camera.width, camera.height)
         camera, metres = coarser_camera(camera, factor), metres / factor
-        step = max(int(np.median(metres) * SPAN / 1e3), 1)
+        step = max(int(np.median(metres) * POINT_SPACING / 1e3), 1)
         traced = [_border(observation, view, factor, step) for observation in observations]
-        sizes = np.array([one.shape for _, _, one in traced])
+        points, corners, distances = zip(*traced, strict=True)
+        sizes = np.array([part.shape for part in distances])
         fields = np.zeros((len(traced), *sizes.max(axis=0)), dtype=np.float32)
-        for whole, (_, _, one) in zip(fields, traced, strict=True):
-            whole[: one.shape[0], : one.shape[1]] = one
-        points = [points for points, _, _ in traced]
-        starts = np.cumsum([0, *(len(one) for one in points)])
-        corners = np.array([corner for _, corner, _ in traced])
-        return cls(camera, metres, float(step), fields, corners, sizes, np.concatenate(points), starts)
+        for whole, part in zip(fields, distances, strict=True):
+            whole[: part.shape[0], : part.shape[1]] = part
+        starts = np.cumsum([0, *map(len, points)])
+        return cls(camera, metres, float(step), fields, np.array(corners), sizes, np.concatenate(points), starts)
 
 
 def _border(observation: Observation, view: int, factor: int, step: int) -> tuple[Array, tuple[int, int], Distances]:
@@ -75,15 +74,13 @@ def _border(observation: Observation, view: int, factor: int, step: int) -> tupl
     if not observation.usable:
         return nothing
     silhouette = coarser_silhouette(observation.silhouettes[view], factor)
-    mask = _large(silhouette.mask)
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
-        return nothing
-    top, left = max(int(rows[0]) - MARGIN, 0), max(int(columns[0]) - MARGIN, 0)
-    part = np.s_[top : rows[-1] + 1 + MARGIN, left : columns[-1] + 1 + MARGIN]
-    mask = mask[part]
-    around = silhouette.valid[part] & ~mask  # the background there is known
-    if not around.any():
+    mask = _without_small_pieces(silhouette.mask)
+    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+    right, bottom = left + width + FIELD_MARGIN, top + height + FIELD_MARGIN
+    left, top = max(left - FIELD_MARGIN, 0), max(top - FIELD_MARGIN, 0)
+    mask, valid = mask[top:bottom, left:right], silhouette.valid[top:bottom, left:right]
+    around = valid & ~mask  # the background there is known
+    if not width or not around.any():
         return nothing
     pixels = np.concatenate([_between(mask, around), _between(mask.T, around.T)[:, ::-1]])
     return pixels[::step] + np.array([left, top]), (left, top), distances_outside(mask, around)
@@ -91,7 +88,7 @@ def _border(observation: Observation, view: int, factor: int, step: int) -> tupl
 
 def distances_outside(mask: Mask, around: Mask) -> Distances:
     """Return how far pixels (h, w) are outside a mask's border, below 0 within, and 0 where neither is true."""
-    out, within = (cv2.distanceTransform((~one).astype(np.uint8), cv2.DIST_L2, 5) - 0.5 for one in (mask, around))
+    out, within = (cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5) - 0.5 for part in (mask, around))
     return np.asarray(np.where(mask, -within, np.where(around, out, 0.0)), dtype=np.float32)
 
 
@@ -102,7 +99,7 @@ def _between(mask: Mask, around: Mask) -> Array:
     return np.column_stack([columns + 1.0, rows + 0.5])
 
 
-def _large(mask: Mask) -> Mask:
+def _without_small_pieces(mask: Mask) -> Mask:
     """Return a mask without its small pieces, which are not the person."""
     count, numbers, pieces, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     if count <= 2:
@@ -111,8 +108,8 @@ def _large(mask: Mask) -> Mask:
     return np.asarray(np.append(False, sizes >= PIECE * sizes.max())[numbers])
 
 
-STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
-NUMBERS = 2 * len(JOINTS) + 2 * len(BONES)  # of a drawn body: pixels of joints, then radii of bones
+BONE_STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
+BODY_NUMBERS = 2 * len(JOINTS) + 2 * len(BONES)  # of a drawn body: pixels of joints, then radii of bones
 DIFFERENCE = 1e-4  # radians, metres, or of the logarithm of a factor: of a difference quotient
 
 
@@ -125,7 +122,7 @@ def projected_body(body: Body, camera: Camera, poses: Array, places: Array) -> A
     far = np.maximum(points[..., 2:], NEAR)
     pixels = points[..., :2] / far * camera.focal + camera.centre
     metres = np.sqrt(camera.focal.prod()) / far[..., 0]
-    radii = np.stack([metres[:, STARTS] * body.radii[:, 0], metres[:, 1:] * body.radii[:, 1]], axis=-1)
+    radii = np.stack([metres[:, BONE_STARTS] * body.radii[:, 0], metres[:, 1:] * body.radii[:, 1]], axis=-1)
     return np.concatenate([pixels.reshape(len(poses), -1), radii.reshape(len(poses), -1)], axis=1)
 
 
@@ -138,7 +135,7 @@ def pose_jacobian(body: Body, camera: Camera, poses: Array, places: Array, angle
     for k, angle in enumerate(angles, 3):
         turned[k, :, angle] += DIFFERENCE
     there = projected_body(body, camera, turned.reshape(-1, ANGLES), moved.reshape(-1, 3))
-    changes = there.reshape(count, len(poses), NUMBERS) - projected_body(body, camera, poses, places)
+    changes = there.reshape(count, len(poses), BODY_NUMBERS) - projected_body(body, camera, poses, places)
     return np.ascontiguousarray(np.moveaxis(changes, 0, 2)) / DIFFERENCE
 
 
@@ -150,46 +147,33 @@ def build_jacobian(body: Body, camera: Camera, poses: Array, places: Array, heig
     return (np.stack(there, axis=2) - here[:, :, None]) / DIFFERENCE
 
 
-OFF = 0.01  # metres that a point of the border may be off: standard deviation, as all that follow
-ROUGH = 0.5  # pixels, besides
-TOGETHER = 0.09  # metres of the border that are off together, so that they are one measurement
-SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)  # metres, step by step: what is
-LEAST_SCALE = 3.0  # pixels           farther off counts less, and at last is another person's, or a bag's
-GIVING = np.radians(8.0)  # that an angle may be off the estimate
-SHAKING = np.radians(450.0)  # a second squared, of that difference
-AWAY = 0.03  # metres that the root may be off the estimate, across the line of sight
-FARTHEST, WIDEST = np.radians(20.0), 0.2  # that a step may turn an angle, and change the logarithm of a factor
-BUILD_FRAMES = (
-    3.0  # frames for each of which the build is held once more: the errors of contours are correlated, and add up
-)
-WINDOW, OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
+BORDER_DEVIATION = 0.01  # metres that a point of the border may be off: standard deviation, as all that follow
+PIXEL_DEVIATION = 0.5  # pixels, besides
+CORRELATION_LENGTH = 0.09  # metres of the border that are off together, so that they are one measurement
+ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)  # metres, step by step: what is
+MIN_ROBUST_SCALE = 3.0  # pixels           farther off counts less, and at last is another person's, or a bag's
+ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate
+ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
+ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
+MAX_ANGLE_STEP, MAX_FACTOR_STEP = np.radians(20.0), 0.2  # of a step: of an angle, and of the logarithm of a factor
+BUILD_FRAMES = 3.0  # for each of which the build is held once more: errors of contours are correlated, and add up
+WINDOW_FRAMES, OVERLAP_FRAMES = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
     """A window of a track, as far as it is fitted."""
 
-    motion: Motion  # as it was estimated
+    estimate: Motion  # before it is fitted
+    fitted: Motion
     body: Body
     factors: Array  # (17,) logarithms of what the body was fitted by before
     height: float | None
-    usable: NDArray[np.bool_]
-    eyes: Array  # (T, 3): see `Visibility`
-    poses: Array
-    places: Array
+    visibility: Visibility
 
     @property
     def angles(self) -> list[int]:
-        return np.flatnonzero(self.motion.skeleton.free).tolist()
-
-
-@dataclass(frozen=True, eq=False)
-class _Pulled:
-    """What the masks' borders ask for: of poses and way (T, n), and of the build (17)."""
-
-    poses: tuple[Array, Array]
-    mixed: Array  # (T, n, 17)
-    build: tuple[Array, Array]
+        return np.flatnonzero(self.fitted.skeleton.free).tolist()
 
 
 def fit_contours(
@@ -203,7 +187,7 @@ def fit_contours(
     """
     if len(motion) < 3 or not visibility.usable.any():
         return motion, shape
-    parts = windows_over(len(motion), WINDOW, OVERLAP)
+    parts = windows_over(len(motion), WINDOW_FRAMES, OVERLAP_FRAMES)
     fitted: dict[int, _Part] = {}
     if shape is not None:
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
@@ -215,7 +199,7 @@ def fit_contours(
     poses, places = motion.poses.copy(), motion.translations.copy()
     for k, (rows, kept) in enumerate(parts):
         part = fitted.get(k) or _fitted(scene, motion, visibility, rows, body, None, beta)
-        poses[rows[kept]], places[rows[kept]] = part.poses[kept], part.places[kept]
+        poses[rows[kept]], places[rows[kept]] = part.fitted.poses[kept], part.fitted.translations[kept]
     return replace(motion, skeleton=body.skeleton, poses=poses, translations=places), shape
 
 
@@ -229,15 +213,15 @@ def _fitted(
     beta: float,
 ) -> _Part:
     """Return some frames of a motion as the best step fits them; the build too where there is a shape to begin with."""
-    poses, places = motion.poses[rows], motion.translations[rows]
-    observations: Sequence[Observation] = [scene.observations[k] for k in rows.tolist()]
+    estimate = replace(motion, skeleton=body.skeleton, poses=motion.poses[rows], translations=motion.translations[rows])
+    observations = [scene.observations[k] for k in rows.tolist()]
+    places = estimate.translations
     borders = [MaskContours.of(camera, view, observations, places) for view, camera in enumerate(scene.cameras)]
     factors, height = (np.zeros(len(SPREAD)), None) if shape is None else (np.log(shape.factors), shape.height)
-    estimate = Motion(motion.name, body.skeleton, poses, places, motion.fps)
-    part = _Part(estimate, body, factors, height, visibility.usable[rows], visibility.eyes[rows], poses, places)
+    part = _Part(estimate, estimate, body, factors, height, visibility.at(rows))
     best, least = part, _mean_cost(scene, part, observations, beta)
-    for scale in SCALES:
-        part = _stepped(part, _pulled(part, borders, scale, build=shape is not None), build=shape is not None)
+    for scale in ROBUST_SCALES:
+        part = _stepped(part, borders, scale, build=shape is not None)
         if (cost := _mean_cost(scene, part, observations, beta)) < least:
             best, least = part, cost
     return best
@@ -246,71 +230,67 @@ def _fitted(
 def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], beta: float) -> float:
     """Return the mean cost of the frames that show enough of the person; infinite where there is none."""
     costs = []
-    for row in np.flatnonzero(part.usable).tolist():
-        silhouettes, pose, place = observations[row].silhouettes, part.poses[row : row + 1], part.places[row : row + 1]
-        costs.append(float(pose_costs(part.body, scene.cameras, silhouettes, pose, place, beta)[0][0]))
+    for k in np.flatnonzero(part.visibility.usable).tolist():
+        pose, place = part.fitted.poses[k : k + 1], part.fitted.translations[k : k + 1]
+        costs.append(pose_costs(part.body, scene.cameras, observations[k].silhouettes, pose, place, beta)[0][0])
     return float(np.mean(costs)) if costs else np.inf
 
 
-def _pulled(part: _Part, borders: Sequence[MaskContours], scale: float, *, build: bool) -> _Pulled:
-    """Return what the borders of all views ask for."""
-    count, angles, factors = len(part.poses), part.angles, len(part.factors) if build else 0
-    numbers = 3 + len(angles)
+def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float, *, build: bool) -> _Part:
+    """Return a window one step of Gauss and Newton farther, towards the borders of all views."""
+    count, angles, factors = len(part.fitted), part.angles, len(part.factors) if build else 0
+    numbers, joints = 3 + len(angles), 1 + len(BONE_STARTS)
     curves, slopes = np.zeros((count, numbers, numbers)), np.zeros((count, numbers))
     mixed, curve, slope = np.zeros((count, numbers, factors)), np.zeros((factors, factors)), np.zeros(factors)
-    joints = len(STARTS) + 1
+    poses, places = part.fitted.poses, part.fitted.translations
     for view in borders:
-        drawn = projected_body(part.body, view.camera, part.poses, part.places)
+        drawn = projected_body(part.body, view.camera, poses, places)
         centres, radii = drawn[:, : 2 * joints].reshape(count, -1, 2), drawn[:, 2 * joints :].reshape(count, -1, 2)
-        out = np.zeros((count, NUMBERS, NUMBERS)), np.zeros((count, NUMBERS))
-        scales = np.maximum(scale * view.metres, LEAST_SCALE)
-        shown = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
-        kernels.pull_to_borders(STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), *shown, scales, out)
-        worth = 1.0 / (view.metres**3 * TOGETHER * (OFF**2 + (ROUGH / view.metres) ** 2))
+        out = np.zeros((count, BODY_NUMBERS, BODY_NUMBERS)), np.zeros((count, BODY_NUMBERS))
+        scales = np.maximum(scale * view.metres, MIN_ROBUST_SCALE)
+        contours = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
+        body = BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii)
+        kernels.pull_to_borders(*body, *contours, scales, out)
+        deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / view.metres) ** 2
+        worth = 1.0 / (view.metres**3 * CORRELATION_LENGTH * deviation)
         curvature, gradient = out[0] * worth[:, None, None], out[1] * worth[:, None]
-        ways = pose_jacobian(part.body, view.camera, part.poses, part.places, angles)
+        ways = pose_jacobian(part.body, view.camera, poses, places, angles)
         across = ways.transpose(0, 2, 1)
         curves += across @ (curvature @ ways)
         slopes += (across @ gradient[..., None])[..., 0]
         if build:
-            grown = build_jacobian(part.body, view.camera, part.poses, part.places, part.height)
+            grown = build_jacobian(part.body, view.camera, poses, places, part.height)
             mixed += across @ (curvature @ grown)
             curve += np.einsum("tqi,tqj->ij", grown, curvature @ grown)
             slope += np.einsum("tqi,tq->i", grown, gradient)
-    return _Pulled((curves, slopes), mixed, (curve, slope))
-
-
-def _stepped(part: _Part, pulled: _Pulled, *, build: bool) -> _Part:
-    """Return a window one step of Gauss and Newton farther."""
-    steps, turns = _squares(part, pulled), np.zeros(len(part.factors))
+    squares, turns = _squares(part, curves, slopes), np.zeros(len(part.factors))
     if not build:
-        way = steps.least()
+        way = squares.least()
     else:
-        solved = steps.steps_for(np.concatenate([steps.slopes[..., None], pulled.mixed], axis=2))
+        solved = squares.steps_for(np.concatenate([squares.slopes[..., None], mixed], axis=2))
         way, answers = solved[..., 0], solved[..., 1:]
-        known = max(np.count_nonzero(part.usable) / BUILD_FRAMES, 1.0) / SPREAD**2
-        curve = pulled.build[0] + np.diag(known) - np.einsum("tni,tnj->ij", pulled.mixed, answers)
-        slope = pulled.build[1] + known * part.factors - np.einsum("tni,tn->i", pulled.mixed, way)
-        turns = np.clip(np.linalg.solve(curve, slope), -WIDEST, WIDEST)
+        known = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0) / SPREAD**2
+        curve = curve + np.diag(known) - np.einsum("tni,tnj->ij", mixed, answers)
+        slope = slope + known * part.factors - np.einsum("tni,tn->i", mixed, way)
+        turns = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
         turns = part.factors - np.clip(part.factors - turns, -REACH * SPREAD, REACH * SPREAD)
         way = way - answers @ turns
-    poses = part.poses.copy()
-    poses[:, part.angles] -= np.clip(way[:, 3:], -FARTHEST, FARTHEST)
+    poses = poses.copy()
+    poses[:, angles] -= np.clip(way[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
     body = shaped(part.body, np.exp(-turns), part.height) if build else part.body
-    return replace(part, poses=poses, places=part.places - way[:, :3], body=body, factors=part.factors - turns)
+    fitted = replace(part.fitted, skeleton=body.skeleton, poses=poses, translations=places - way[:, :3])
+    return replace(part, fitted=fitted, body=body, factors=part.factors - turns)
 
 
-def _squares(part: _Part, pulled: _Pulled) -> Squares:
-    """Return what borders, smoothness and standing feet ask of poses and way together."""
-    fps, angles = part.motion.fps, part.angles
+def _squares(part: _Part, curves: Array, slopes: Array) -> Squares:
+    """Return what borders, by their curves and slopes, smoothness and standing feet ask of poses and way together."""
+    fitted, estimate, angles = part.fitted, part.estimate, part.angles
     turned = slice(3, 3 + len(angles))
-    squares = Squares.of(len(part.poses), 3 + len(angles))
-    squares.add(slice(None), *pulled.poses)
-    add_root(squares, part.motion, Visibility(part.usable, part.eyes), AWAY, part.places - part.motion.translations)
-    change = wrapped(part.poses - part.motion.poses)[:, angles]
-    squares.add(turned, np.eye(len(angles)) / GIVING**2, change / GIVING**2)
-    squares.add_bends(turned, change, fps**2 / SHAKING)
-    now = Motion(part.motion.name, part.body.skeleton, part.poses, part.places, fps)
-    stands = standing_feet(now.joints, fps, part.eyes)
-    add_standing(squares, now, stands, angles)
+    squares = Squares.of(len(fitted), 3 + len(angles))
+    squares.add(slice(None), curves, slopes)
+    add_root(squares, estimate, part.visibility, ROOT_DEVIATION, fitted.translations - estimate.translations)
+    change = wrapped(fitted.poses - estimate.poses)[:, angles]
+    squares.add(turned, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
+    squares.add_bends(turned, change, fitted.fps**2 / ANGLE_ACCELERATION)
+    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.eyes), angles)
     return squares

@@ -19,7 +19,7 @@ from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, runs
 from posefit.silhouette.cost import only_camera
 
-REACH = 2  # frames to either side that a frame meets
+BAND_REACH = 2  # frames to either side that a frame meets
 BEND = np.array([1.0, -2.0, 1.0])
 
 
@@ -27,13 +27,13 @@ BEND = np.array([1.0, -2.0, 1.0])
 class Squares:
     """Half the second derivative and half the gradient of a sum of squares, in T frames of n numbers each."""
 
-    curves: Array  # (REACH + 1, T, n, n): a frame with itself, with the next one, and with the one after that
+    curves: Array  # (BAND_REACH + 1, T, n, n): a frame with itself, with the next one, and with the one after that
     slopes: Array  # (T, n)
 
     @classmethod
     def of(cls, frames: int, numbers: int) -> Self:
         """Return the sum of nothing."""
-        return cls(np.zeros((REACH + 1, frames, numbers, numbers)), np.zeros((frames, numbers)))
+        return cls(np.zeros((BAND_REACH + 1, frames, numbers, numbers)), np.zeros((frames, numbers)))
 
     def add(self, which: slice, precise: Array, slopes: Array) -> None:
         """Add squares of some numbers of each frame: their precision (m, m) or (T, m, m), and its product (T, m)."""
@@ -72,9 +72,9 @@ class Squares:
     def steps_for(self, slopes: Array) -> Array:
         """Return the steps (T, n, m) that would be the least ones, were the slopes each of m others (T, n, m)."""
         _, count, numbers, _ = self.curves.shape
-        band = (REACH + 1) * numbers
+        band = (BAND_REACH + 1) * numbers
         lines = np.zeros((band, count * numbers))  # scipy's upper form: lines[band - 1 + row - column, column]
-        for apart in range(REACH + 1):
+        for apart in range(BAND_REACH + 1):
             for row in range(numbers):
                 for column in range(numbers):
                     off = apart * numbers + column - row
@@ -85,12 +85,12 @@ class Squares:
         return np.asarray(steps).reshape(slopes.shape)
 
 
-SLOW = 0.25  # metres a second that a standing foot may seem to move
-SHARE = 0.45  # of the root's speed, which it may seem to move where that is more
-LOW = 0.07  # metres above the lowest place of either foot, within `AROUND`, up to which a foot may stand
-AROUND = 1.2  # seconds: a stride
-SHORTEST = 0.12  # seconds that a foot stands at least
-GAP = 0.07  # seconds that it may seem not to, in between
+STANDING_SPEED = 0.25  # metres a second that a standing foot may seem to move
+STANDING_SPEED_SHARE = 0.45  # of the root's speed, which it may seem to move where that is more
+STANDING_HEIGHT = 0.07  # metres above the lowest place of either foot within a stride, up to which a foot may stand
+STRIDE_SECONDS = 1.2
+MIN_STANCE_SECONDS = 0.12  # seconds that a foot stands at least
+MAX_STANCE_GAP_SECONDS = 0.07  # seconds that it may seem not to, in between
 
 
 def standing_feet(joints: Array, fps: float, eyes: Array) -> NDArray[np.bool_]:
@@ -104,12 +104,14 @@ def standing_feet(joints: Array, fps: float, eyes: Array) -> NDArray[np.bool_]:
         return np.zeros((count, 2), dtype=bool)
     feet, sights = joints[:, BALLS], (joints[:, 0] - eyes)[:, [0, 2]]
     speed, root = (_speeds(places, sights, fps) for places in (feet, joints[:, :1]))
-    reach = max(round(0.5 * AROUND * fps), 1)
+    reach = max(round(0.5 * STRIDE_SECONDS * fps), 1)
     heights = feet[..., 1].min(axis=1)
     lowest = np.array([heights[max(k - reach, 0) : k + reach + 1].min() for k in range(count)])
-    stands = (speed < np.maximum(SLOW, SHARE * root)) & (feet[..., 1] < lowest[:, None] + LOW)
+    slow = speed < np.maximum(STANDING_SPEED, STANDING_SPEED_SHARE * root)
+    stands = slow & (feet[..., 1] < lowest[:, None] + STANDING_HEIGHT)
     for side in range(2):
-        stands[:, side] = _without_short(~_without_short(~stands[:, side], GAP * fps), SHORTEST * fps)
+        bridged = ~_without_short(~stands[:, side], MAX_STANCE_GAP_SECONDS * fps)
+        stands[:, side] = _without_short(bridged, MIN_STANCE_SECONDS * fps)
     return np.asarray(stands)
 
 
@@ -133,24 +135,20 @@ def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     return kept
 
 
-ACROSS = 0.006  # metres that a root may be off from its estimate: standard deviation, as all that follow
-DEPTH = 0.004  # of the distance, towards or away from a single camera
-UNSEEN = 1.0  # metres, in frames that show too little
-ACCELERATION = 3.0  # metres a second squared, of the root on each axis
-TURNING = np.radians(3.0)  # that an angle of a leg may be off the estimate
-SHAKING = np.radians(400.0)  # a second squared, of that difference
-STANDING = 0.004  # metres that a foot which stands may move in a thirtieth of a second
-STRANGE = 4.0  # standard deviations from the estimate beyond which a place is weighted down
-ROUNDS = 4  # of Gauss and Newton
-STEP = 1e-4  # radians: of a difference quotient
-WINDOW, OVERLAP = 900, 60  # frames that are solved for at once, and those that two windows share
+ROOT_DEVIATION = 0.006  # metres that a root may be off from its estimate: standard deviation, as all that follow
+DEPTH_DEVIATION = 0.004  # of the distance, towards or away from a single camera
+UNSEEN_DEVIATION = 1.0  # metres, in frames that show too little
+ROOT_ACCELERATION = 3.0  # metres a second squared, of the root on each axis
+LEG_DEVIATION = np.radians(3.0)  # that an angle of a leg may be off the estimate
+LEG_ACCELERATION = np.radians(400.0)  # a second squared, of that difference
+STANDING_SLIDE = 0.004  # metres that a foot which stands may move in a thirtieth of a second
+OUTLIER_DEVIATIONS = 4.0  # standard deviations from the estimate beyond which a place is weighted down
+GAUSS_NEWTON_STEPS = 4  # of Gauss and Newton
+DIFFERENCE = 1e-4  # radians: of a difference quotient
+WINDOW_FRAMES, OVERLAP_FRAMES = 900, 60  # frames that are solved for at once, and those that two windows share
 
-LEGS = tuple(
-    angle_index(JOINTS.index(side + bone)) + axis
-    for side in "lr"
-    for bone in ("femur", "tibia", "foot")
-    for axis in range(3)
-)
+_LEG_JOINTS = [JOINTS.index(side + bone) for side in "lr" for bone in ("femur", "tibia", "foot")]
+LEGS = tuple(angle_index(joint) + axis for joint in _LEG_JOINTS for axis in range(3))  # the angles of both
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +168,10 @@ class Visibility:
             eyes.append(np.full(3, np.nan) if only is None else only.position)
         return cls(np.array(usable), np.array(eyes))
 
+    def at(self, rows: NDArray[np.int64]) -> Self:
+        """Return the visibility of some frames."""
+        return replace(self, usable=self.usable[rows], eyes=self.eyes[rows])
+
 
 def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
     """Return a motion whose root goes smoothly and whose feet do not slide where they stand.
@@ -180,9 +182,9 @@ def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
         return motion
     motion = replace(motion, translations=_bridged(motion.translations, visibility.usable))
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for rows, kept in windows_over(len(motion), WINDOW, OVERLAP):
+    for rows, kept in windows_over(len(motion), WINDOW_FRAMES, OVERLAP_FRAMES):
         part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
-        smooth = _window(part, Visibility(visibility.usable[rows], visibility.eyes[rows]))
+        smooth = _window(part, visibility.at(rows))
         poses[rows[kept]], places[rows[kept]] = smooth.poses[kept], smooth.translations[kept]
     return replace(motion, poses=poses, translations=places)
 
@@ -211,27 +213,25 @@ def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
 def _window(motion: Motion, visibility: Visibility) -> Motion:
     """Return a smooth motion: first its root alone, which shows which foot stands, then the legs as well."""
     smooth = _solved(motion, visibility, np.zeros((len(motion), 2), dtype=bool))
-    stands = standing_feet(smooth.joints, smooth.fps, visibility.eyes)
-    return _solved(motion, visibility, stands)
+    return _solved(motion, visibility, standing_feet(smooth.joints, smooth.fps, visibility.eyes))
 
 
 def _solved(motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]) -> Motion:
     """Return the motion of the least sum of squares, given which feet stand."""
-    skeleton, fps, count = motion.skeleton, motion.fps, len(motion)
-    angles = [angle for angle in LEGS if skeleton.free[angle]]
+    angles = [angle for angle in LEGS if motion.skeleton.free[angle]]
     root, legs = slice(0, 3), slice(3, 3 + len(angles))
-    change = np.zeros((count, 3 + len(angles)))  # of the root, and of the angles
+    change = np.zeros((len(motion), 3 + len(angles)))  # of the root, and of the angles
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for _ in range(ROUNDS):
+    for _ in range(GAUSS_NEWTON_STEPS):
         squares = Squares.of(*change.shape)
-        add_root(squares, motion, visibility, ACROSS, change[:, root])
-        squares.add(legs, np.eye(len(angles)) / TURNING**2, change[:, legs] / TURNING**2)
-        squares.add_bends(legs, change[:, legs], fps**2 / SHAKING)
-        add_standing(squares, Motion(motion.name, skeleton, poses, places, fps), stands, angles)
+        add_root(squares, motion, visibility, ROOT_DEVIATION, change[:, root])
+        squares.add(legs, np.eye(len(angles)) / LEG_DEVIATION**2, change[:, legs] / LEG_DEVIATION**2)
+        squares.add_bends(legs, change[:, legs], motion.fps**2 / LEG_ACCELERATION)
+        add_standing(squares, replace(motion, poses=poses, translations=places), stands, angles)
         change = change - squares.least()
         poses[:, angles] = motion.poses[:, angles] + change[:, 3:]
         places = motion.translations + change[:, root]
-    return Motion(motion.name, skeleton, poses, places, fps)
+    return replace(motion, poses=poses, translations=places)
 
 
 def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation: float, moved: Array) -> None:
@@ -242,9 +242,9 @@ def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation
     """
     root, precision = slice(0, 3), _root_precisions(motion, visibility, deviation)
     off = np.einsum("ti,tij,tj->t", moved, precision, moved)
-    precision /= (1.0 + off / STRANGE**2)[:, None, None]
+    precision /= (1.0 + off / OUTLIER_DEVIATIONS**2)[:, None, None]
     squares.add(root, precision, np.einsum("tij,tj->ti", precision, moved))
-    squares.add_bends(root, motion.translations + moved, motion.fps**2 / ACCELERATION)
+    squares.add_bends(root, motion.translations + moved, motion.fps**2 / ROOT_ACCELERATION)
 
 
 def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], angles: Sequence[int]) -> None:
@@ -259,18 +259,18 @@ def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], an
         feet, slopes = _moving_feet(motion.skeleton, motion.poses, motion.translations, ball, legs)
         ways = np.zeros((*feet.shape, 3 + len(angles)))
         ways[..., columns] = slopes
-        squares.add_steps(both, feet, ways, motion.fps / (30.0 * STANDING))
+        squares.add_steps(both, feet, ways, motion.fps / (30.0 * STANDING_SLIDE))
 
 
 def _root_precisions(motion: Motion, visibility: Visibility, deviation: float) -> Array:
     """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance."""
-    across = np.where(visibility.usable, deviation, UNSEEN)
+    across = np.where(visibility.usable, deviation, UNSEEN_DEVIATION)
     precise = np.eye(3) / across[:, None, None] ** 2
     alone = np.isfinite(visibility.eyes).all(axis=1)
     sights = motion.translations[alone] - visibility.eyes[alone]
     far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
     sights = sights / far[:, None]
-    along = np.maximum(DEPTH * far, across[alone])
+    along = np.maximum(DEPTH_DEVIATION * far, across[alone])
     less = 1.0 / along**2 - 1.0 / across[alone] ** 2
     precise[alone] += less[:, None, None] * sights[:, :, None] * sights[:, None, :]
     return np.asarray(precise)
@@ -283,7 +283,7 @@ def _moving_feet(
     feet = skeleton.joints(poses, places)[:, ball]
     turned = np.repeat(poses[None], len(angles), axis=0)
     for row, angle in enumerate(angles):
-        turned[row, :, angle] += STEP
-    slopes = (skeleton.joints(turned, np.repeat(places[None], len(angles), axis=0))[:, :, ball] - feet) / STEP
+        turned[row, :, angle] += DIFFERENCE
+    slopes = (skeleton.joints(turned, np.repeat(places[None], len(angles), axis=0))[:, :, ball] - feet) / DIFFERENCE
     root = np.repeat(np.eye(3)[None], len(poses), axis=0)
     return feet, np.concatenate([root, np.moveaxis(slopes, 0, 2)], axis=2)
