@@ -1,4 +1,4 @@
-"""Bodies that are fitted to the borders of masks: what the border says, and that a body which is off comes back."""
+"""Bodies fitted to the borders of masks: distances and gradients by slow twins, and bodies that come back."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ CAMERA = Camera.around(np.array([0.0, 0.9, 0.0]), 0.4, 4.0, (200, 200))
 
 
 def footage(frames: int = 14, views: tuple[float, ...] = (60.0,), girth: float = 1.0) -> tuple[Scene, Motion]:
-    """Return footage of a walk by somebody whose limbs are thicker than those of the body that is fitted to it."""
+    """Return footage of a walk by a person whose limbs are thicker than those of the body that is fitted to it."""
     motion = built_in.motion("walk", frames=60).frames(5, 5 + frames)
     scene = synthetic(motion, views, (160, 160), (), (None, None))
     factors = np.ones(len(NAMES))
@@ -43,35 +43,29 @@ def footage(frames: int = 14, views: tuple[float, ...] = (60.0,), girth: float =
     if girth != 1.0:
         thick = replace(scene.observations, body=shaped(body, factors))  # type: ignore[type-var]
         observations = [thick[k] for k in range(len(motion))]
-    observations = [replace(one, translation=None) for one in observations]
+    observations = [replace(observation, translation=None) for observation in observations]
     return replace(scene, truth=None, observations=observations), motion
 
 
-def off(motion: Motion, degrees: float = 5.0, seed: int = 0) -> Motion:
-    """Return a motion whose angles are off, smoothly, as a tracker finds it."""
+def estimate_of(motion: Motion, degrees: float = 5.0, seed: int = 0) -> Motion:
+    """Return a motion whose angles are off, smoothly, as those of a tracker."""
     rng = np.random.default_rng(seed)
     times = np.arange(len(motion))[:, None] / motion.fps
     waves = np.sin(2.0 * np.pi * times + rng.uniform(0.0, 6.0, 66)) * rng.uniform(0.5, 1.0, 66)
     return replace(motion, poses=motion.poses + np.radians(degrees) * waves * motion.skeleton.free)
 
 
-def seen_by(scene: Scene) -> Visibility:
-    eye = scene.cameras[0].position if len(scene.cameras) == 1 else np.full(3, np.nan)
-    return Visibility(np.array([one.usable for one in scene.observations]), np.tile(eye, (scene.count, 1)))
+def fitted(scene: Scene, motion: Motion, shape: Shape | None = None) -> tuple[Motion, Shape | None]:
+    return fit_contours(scene, motion, Visibility.of(scene), shape)
 
 
-def away(motion: Motion, truth: Motion) -> float:
-    """Return how far joints are off, metres, the mean."""
-    first, second = (one.skeleton.joints(one.poses, one.translations) for one in (motion, truth))
-    return float(np.linalg.norm(first - second, axis=2).mean())
+def distance(motion: Motion, truth: Motion) -> float:
+    """Return the mean distance of the joints in metres."""
+    return float(np.linalg.norm(motion.joints - truth.joints, axis=2).mean())
 
 
 def average_shape(scene: Scene) -> Shape:
     return Shape(scene.body, np.ones(len(NAMES)), np.zeros(len(NAMES)), 0.0)
-
-
-def frame(pose: np.ndarray, place: np.ndarray, posterior: Posterior | None = None) -> Frame:
-    return Frame(pose, place, 0.0, np.zeros((1, 3), np.int64), 0, 0.0, np.empty(0), posterior=posterior)
 
 
 @each("radii", [(5.0, 2.0), (2.0, 5.0), (3.0, 3.0), (30.0, 2.0), (1.0, 40.0)])
@@ -82,13 +76,13 @@ def test_the_distance_from_a_cone_is_that_from_the_nearest_of_all_its_discs(radi
     for x, y in rng.uniform(-10.0, 50.0, (40, 2)):
         far = np.linalg.norm((x, y) - (start + shares * (end - start)), axis=1)
         expected = (far - (radii[0] + shares[:, 0] * (radii[1] - radii[0]))).min()
-        found, share, across, down = kernels.cone_distance(x, y, *start, radii[0], *end, radii[1])
-        assert found == pytest.approx(expected, abs=1e-4)
+        distance, share, across, down = kernels.cone_distance(x, y, *start, radii[0], *end, radii[1])
+        assert distance == pytest.approx(expected, abs=1e-4)
         assert 0.0 <= share <= 1.0
         assert np.hypot(across, down) == pytest.approx(1.0)
 
 
-def test_pixels_know_how_far_they_are_outside_and_nothing_where_nobody_knows() -> None:
+def test_pixels_have_their_distance_from_the_border_and_none_where_it_is_unknown() -> None:
     mask, around = np.zeros((1, 7), dtype=bool), np.ones((1, 7), dtype=bool)
     mask[0, 2:5] = True
     around[0, 2:5] = around[0, 6] = False
@@ -96,33 +90,33 @@ def test_pixels_know_how_far_they_are_outside_and_nothing_where_nobody_knows() -
     np.testing.assert_allclose(distances_outside(mask, around), [[1.5, 0.5, -0.5, -1.5, -0.5, 0.5, 0.0]], atol=1e-6)
 
 
-def test_the_border_of_a_mask_is_where_it_meets_what_is_known_to_be_empty() -> None:
+def test_the_border_of_a_mask_is_where_it_meets_known_background() -> None:
     mask, valid = np.zeros((60, 60), dtype=bool), np.ones((60, 60), dtype=bool)
     mask[20:40, 20:40] = True
-    valid[:, 40:] = False  # its right border is not seen
+    valid[:, 40:] = False  # its right border is unknown
     mask[5, 5] = True  # and a speck is not the person
-    some = [Observation([Silhouette.of(mask, valid)]), Observation([Silhouette.of(mask, valid)], usable=False)]
+    observations = [Observation([Silhouette.of(mask, valid)], usable=usable) for usable in (True, False)]
     camera = Camera.around(np.zeros(3), 0.0, 4.0, (60, 60))
-    found = MaskContours.of(camera, 0, some, np.zeros((2, 3)))
-    assert found.starts.tolist() == [0, 60, 60]  # of four sides of 20 pixels three; a frame that shows too little none
-    assert (found.points[:, 0].min(), found.points[:, 0].max()) == (20.0, 39.5)
-    assert (found.points[:, 1].min(), found.points[:, 1].max()) == (20.0, 40.0)
-    assert found.metres == pytest.approx([camera.focal[0] / 4.0] * 2)
+    borders = MaskContours.of(camera, 0, observations, np.zeros((2, 3)))
+    assert borders.starts.tolist() == [0, 60, 60]  # three sides of 20 pixels; none of a frame that is not usable
+    assert borders.points.min(axis=0).tolist() == [20.0, 20.0]
+    assert borders.points.max(axis=0).tolist() == [39.5, 40.0]
+    assert borders.metres == pytest.approx([camera.focal[0] / 4.0] * 2)
 
 
-def test_of_a_large_mask_every_so_many_pixels_are_looked_at_and_mean_the_same_place() -> None:
+def test_large_masks_are_reduced_with_their_camera() -> None:
     mask = np.zeros((800, 800), dtype=bool)
     mask[200:600, 300:500] = True
     camera = Camera.around(np.zeros(3), 0.0, 4.0, (800, 800))
-    found = MaskContours.of(camera, 0, [Observation([Silhouette.of(mask)])], np.zeros((1, 3)))
-    factor = round(800 / found.camera.width)
+    borders = MaskContours.of(camera, 0, [Observation([Silhouette.of(mask)])], np.zeros((1, 3)))
+    factor = round(800 / borders.camera.width)
     assert factor == int(camera.focal[0] / 4.0 / 80.0) == 3
-    point, small = (one.project(np.array([0.3, 0.2, 0.1]))[0] for one in (camera, found.camera))
-    middle = 0.5 * (found.points.min(axis=0) + found.points.max(axis=0))
+    point, small = (each.project(np.array([0.3, 0.2, 0.1]))[0] for each in (camera, borders.camera))
+    middle = 0.5 * (borders.points.min(axis=0) + borders.points.max(axis=0))
     np.testing.assert_allclose(factor * (small - middle), point - [400.0, 400.0], atol=factor)
 
 
-def test_what_is_drawn_changes_with_poses_places_and_builds_as_its_slopes_say() -> None:
+def test_jacobians_are_the_change_with_poses_places_and_builds() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(2)
     poses, places = rng.normal(0.0, 0.3, (3, 66)), rng.normal(0.0, 0.2, (3, 3)) + [0.0, 0.9, 0.0]
     angles = [0, 1, 9, 30]
@@ -141,7 +135,7 @@ def test_what_is_drawn_changes_with_poses_places_and_builds_as_its_slopes_say() 
     np.testing.assert_allclose(there - here, slopes @ growth, atol=2e-3)
 
 
-def test_the_gradient_of_the_borders_squares_is_that_of_their_sum() -> None:
+def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(3)
     numbers = projected_body(body, CAMERA, np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]]))
     points = rng.uniform(40.0, 160.0, (30, 2))
@@ -177,7 +171,7 @@ def point_of(joints, radii, parents, bone, share, normal):  # type: ignore[no-un
 
 
 def field_at(field: np.ndarray, x: float, y: float, corner: np.ndarray) -> float:
-    """Return what a field says between the middles of four pixels."""
+    """Return a field between the middles of four pixels."""
     where = [[y - corner[1] - 0.5], [x - corner[0] - 0.5]]
     return float(map_coordinates(field.astype(np.float64), where, order=1)[0])
 
@@ -199,12 +193,12 @@ def border_of(joint: np.ndarray, radii: np.ndarray, spacing: float) -> tuple[np.
     return np.tile(shares, 2), np.concatenate(both), np.tile(weights, 2)
 
 
-def test_the_gradient_of_the_bones_squares_is_that_of_their_points_in_the_field() -> None:
+def test_the_gradient_of_the_bones_is_that_of_their_points_in_the_field() -> None:
     parents, rng = np.array([0, 1]), np.random.default_rng(5)
     joints, radii = np.array([[12.3, 14.1], [30.2, 20.4], [44.6, 41.7]]), np.array([[4.2, 3.1], [2.9, 5.3]])
     field = cv2.GaussianBlur(rng.normal(0.0, 30.0, (64, 70)), (0, 0), 6.0).astype(np.float32)
     corner, scale = np.array([-3, -4]), 1.5
-    seen = []  # (bone, share, normal, weight) of the points that no other bone covers
+    visible = []  # (bone, share, normal, weight) of the points that no other bone covers
     for b, parent in enumerate(parents):
         other = 1 - b
         for share, normal, weight in zip(*border_of(joints[[parent, b + 1]], radii[b], 2.0), strict=True):
@@ -213,16 +207,15 @@ def test_the_gradient_of_the_bones_squares_is_that_of_their_points_in_the_field(
                 x, y, *joints[parents[other]], radii[other, 0], *joints[other + 1], radii[other, 1]
             )
             if off[0] >= -kernels.COVERED:
-                seen.append((b, share, normal, weight / (1.0 + (field_at(field, x, y, corner) / scale) ** 2)))
-    assert 20 < len(seen) < 100
+                visible.append((b, share, normal, weight / (1.0 + (field_at(field, x, y, corner) / scale) ** 2)))
+    assert 20 < len(visible) < 100
 
     def offs(numbers: np.ndarray) -> np.ndarray:
         """Return how far the points are outside, each times the root of its weight: normals stay as they were."""
         moved, grown = numbers[:6].reshape(3, 2), numbers[6:].reshape(2, 2)
-        places = [point_of(moved, grown, parents, b, share, normal) for b, share, normal, _ in seen]
-        return np.array(
-            [np.sqrt(one[-1]) * field_at(field, x, y, corner) for one, (x, y) in zip(seen, places, strict=True)]
-        )
+        places = [point_of(moved, grown, parents, b, share, normal) for b, share, normal, _ in visible]
+        weights = np.array([weight for *_, weight in visible])
+        return np.sqrt(weights) * [field_at(field, x, y, corner) for x, y in places]
 
     out = np.zeros((1, 10, 10)), np.zeros((1, 10))
     kernels._pull_bones(field, corner, np.array(field.shape), parents, joints, radii, 2.0, scale, out[0][0], out[1][0])
@@ -233,126 +226,117 @@ def test_the_gradient_of_the_bones_squares_is_that_of_their_points_in_the_field(
     np.testing.assert_allclose(out[0][0], slopes @ slopes.T, rtol=1e-4, atol=1e-4)
 
 
-def test_steps_for_other_slopes_are_those_that_they_alone_would_ask_for() -> None:
+def test_several_slopes_are_solved_for_at_once() -> None:
     rng = np.random.default_rng(4)
     squares = Squares.of(5, 2)
     squares.add(slice(0, 2), np.eye(2) * 3.0, rng.normal(size=(5, 2)))
     squares.add_bends(slice(0, 1), rng.normal(size=(5, 1)), 2.0)
     others = rng.normal(size=(5, 2, 3))
-    found = squares.steps_for(others)
+    steps = squares.steps_for(others)
     for k in range(3):
-        np.testing.assert_allclose(Squares(squares.curves, others[..., k]).least(), found[..., k], atol=1e-12)
+        np.testing.assert_allclose(Squares(squares.curves, others[..., k]).least(), steps[..., k], atol=1e-12)
 
 
 @each("views", [(60.0,), (0.0, 90.0)])
-def test_poses_that_are_off_come_back_to_what_is_seen(views: tuple[float, ...]) -> None:
+def test_poses_that_are_off_come_back_to_the_masks(views: tuple[float, ...]) -> None:
     scene, truth = footage(views=views)
-    found = off(truth)
-    told, shape = fit_contours(scene, found, seen_by(scene), None)
+    estimate = estimate_of(truth)
+    motion, shape = fitted(scene, estimate)
     assert shape is None
-    assert away(told, truth) < 0.65 * away(found, truth)
-    assert told.skeleton is scene.body.skeleton
+    assert distance(motion, truth) < 0.65 * distance(estimate, truth)
+    assert motion.skeleton is scene.body.skeleton
 
 
-def test_limbs_that_are_thicker_than_the_bodys_become_as_thick() -> None:
+def test_limbs_become_as_thick_as_the_persons_and_the_height_stays() -> None:
     scene, truth = footage(girth=1.25)
-    _, shape = fit_contours(scene, off(truth, 2.0), seen_by(scene), average_shape(scene))
+    average = average_shape(scene)
+    _, shape = fitted(scene, estimate_of(truth, 2.0), average)
     assert shape is not None
-    found = dict(zip(NAMES, shape.factors, strict=True))
-    assert found["thighs girth"] == pytest.approx(1.25, abs=0.1)
-    assert found["torso girth"] == pytest.approx(1.25, abs=0.1)
-    assert found["shanks girth"] == pytest.approx(1.0, abs=0.1)
+    factors = dict(zip(NAMES, shape.factors, strict=True))
+    expected = {"thighs girth": 1.25, "torso girth": 1.25, "shanks girth": 1.0}
+    assert {name: factors[name] for name in expected} == pytest.approx(expected, abs=0.1)
     np.testing.assert_allclose(shape.body.radii, shaped(scene.body, shape.factors).radii)
+    _, shape = fitted(scene, truth, replace(average, height=scene.body.stature))
+    assert shape is not None
+    assert shape.body.stature == pytest.approx(scene.body.stature)
 
 
-def test_a_fit_that_costs_more_than_what_it_began_with_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    def astray(part: contours._Part, pulled: object, *, build: bool) -> contours._Part:
-        return replace(part, places=part.places + 1.0, body=shaped(part.body, np.full(len(NAMES), 0.9)))
+def test_a_fit_that_costs_more_than_its_start_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    def astray(part: contours._Part, borders: object, scale: float, *, build: bool) -> contours._Part:
+        moved = replace(part.fitted, translations=part.fitted.translations + 1.0)
+        return replace(part, fitted=moved, body=shaped(part.body, np.full(len(NAMES), 0.9)))
 
     scene, motion = footage(6)
-    shape = average_shape(scene)
+    average = average_shape(scene)
     monkeypatch.setattr(contours, "_stepped", astray)
-    told, found = fit_contours(scene, motion, seen_by(scene), shape)
-    assert found is shape
-    np.testing.assert_array_equal(told.poses, motion.poses)
-    np.testing.assert_array_equal(told.translations, motion.translations)
+    kept, shape = fitted(scene, motion, average)
+    assert shape is average
+    np.testing.assert_array_equal(kept.poses, motion.poses)
+    np.testing.assert_array_equal(kept.translations, motion.translations)
 
 
-def test_a_build_stays_within_what_the_opening_searches() -> None:
+def test_a_build_stays_within_its_range() -> None:
     scene, motion = footage(6, girth=4.0)  # three spreads of 0.3 make a girth at most 2.46 times as thick
-    _, shape = fit_contours(scene, motion, seen_by(scene), average_shape(scene))
+    _, shape = fitted(scene, motion, average_shape(scene))
     assert shape is not None
     assert 1.5 < shape.factors.max() <= np.exp(0.9) + 1e-9
 
 
-def test_a_build_as_tall_as_was_said_stays_so_tall() -> None:
-    scene, truth = footage(girth=1.25)
-    shape = replace(average_shape(scene), height=scene.body.stature)
-    _, fitted = fit_contours(scene, truth, seen_by(scene), shape)
-    assert fitted is not None
-    assert fitted.body.stature == pytest.approx(scene.body.stature)
-
-
 def test_a_long_track_is_fitted_in_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, truth = footage(20)
-    found = off(truth)
-    whole, _ = fit_contours(scene, found, seen_by(scene), None)
-    monkeypatch.setattr(contours, "WINDOW", 10)
-    monkeypatch.setattr(contours, "OVERLAP", 6)
-    parts, _ = fit_contours(scene, found, seen_by(scene), None)
-    assert away(parts, whole) < 0.1 * away(found, whole)
-    tall = replace(average_shape(scene), height=scene.body.stature)
-    again, shape = fit_contours(scene, found, seen_by(scene), tall)
+    estimate = estimate_of(truth)
+    whole, _ = fitted(scene, estimate)
+    monkeypatch.setattr(contours, "WINDOW_FRAMES", 10)
+    monkeypatch.setattr(contours, "OVERLAP_FRAMES", 6)
+    assert distance(fitted(scene, estimate)[0], whole) < 0.1 * distance(estimate, whole)
+    motion, shape = fitted(scene, estimate, replace(average_shape(scene), height=scene.body.stature))
     assert shape is not None
-    assert away(again, whole) < 0.5 * away(found, whole)
-    assert again.skeleton is shape.body.skeleton
+    assert distance(motion, whole) < 0.5 * distance(estimate, whole)
+    assert motion.skeleton is shape.body.skeleton
 
 
-def test_frames_that_show_too_little_go_with_those_around_them() -> None:
+def test_frames_that_are_not_usable_go_with_those_around_them() -> None:
     scene, truth = footage()
     observations = list(scene.observations)
     observations[6] = replace(observations[6], usable=False)
-    empty = replace(scene, observations=[replace(one, usable=False) for one in observations])
-    scene = replace(scene, observations=observations)
-    found = off(truth)
-    told, _ = fit_contours(scene, found, seen_by(scene), None)
-    assert away(told.frames(6, 7), truth.frames(6, 7)) < 0.8 * away(found.frames(6, 7), truth.frames(6, 7))
-    assert fit_contours(empty, found, seen_by(empty), None)[0] is found
+    estimate = estimate_of(truth)
+    motion, _ = fitted(replace(scene, observations=observations), estimate)
+    before, after = (distance(each.frames(6, 7), truth.frames(6, 7)) for each in (estimate, motion))
+    assert after < 0.8 * before
+    empty = replace(scene, observations=[replace(observation, usable=False) for observation in observations])
+    assert fitted(empty, estimate)[0] is estimate
 
 
-@each("frames", [1, 2, 3])
-def test_the_shortest_footage_is_told(frames: int) -> None:
+@each("frames", [1, 2, 3, 6])
+def test_footage_of_any_length_is_fitted_and_the_same_each_time(frames: int) -> None:
     scene, truth = footage(frames)
-    told, _ = fit_contours(scene, truth, seen_by(scene), average_shape(scene))
-    assert len(told) == frames
-    assert np.isfinite(told.poses).all()
+    (motion, shape), (again, same) = (fitted(scene, estimate_of(truth), average_shape(scene)) for _ in range(2))
+    assert len(motion) == frames
+    assert np.isfinite(motion.poses).all()
+    np.testing.assert_array_equal(motion.poses, again.poses)
+    assert shape is not None
+    assert same is not None
+    np.testing.assert_array_equal(shape.factors, same.factors)
 
 
-def test_a_second_time_the_same_comes_out_bit_by_bit() -> None:
-    scene, truth = footage(6)
-    one, other = (fit_contours(scene, off(truth), seen_by(scene), average_shape(scene)) for _ in range(2))
-    np.testing.assert_array_equal(one[0].poses, other[0].poses)
-    assert one[1] is not None
-    assert other[1] is not None
-    np.testing.assert_array_equal(one[1].factors, other[1].factors)
-
-
-def test_frames_tell_the_cost_of_the_build_that_is_told_and_what_else_they_may_be_goes_along() -> None:
+def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_move_along() -> None:
     scene, truth = footage(girth=1.25)
-    found = off(truth, 3.0)
-    posterior = Posterior(found.poses[:2], found.translations[:2], np.ones(2))
-    frames = [frame(pose, place, posterior) for pose, place in zip(found.poses, found.translations, strict=True)]
+    estimate = estimate_of(truth, 3.0)
+    posterior = Posterior(estimate.poses[:2], estimate.translations[:2], np.ones(2))
+    nothing = np.zeros((1, 3), np.int64)
+    frames = [
+        Frame(pose, place, 0.0, nothing, 0, 0.0, np.empty(0), posterior=posterior)
+        for pose, place in zip(estimate.poses, estimate.translations, strict=True)
+    ]
     alone, none = smoothed_frames(scene, frames, 0.5)
-    told, shape = smoothed_frames(scene, frames, 0.5, average_shape(scene))
+    smooth, shape = smoothed_frames(scene, frames, 0.5, average_shape(scene))
     assert none is None
     assert shape is not None
-    assert np.mean([one.cost for one in told]) < 0.7 * np.mean([one.cost for one in alone])
-    assert shape.cost == pytest.approx(np.mean([one.cost for one in told]))
-    moved = told[0].posterior
+    costs = [np.mean([frame.cost for frame in each]) for each in (smooth, alone)]
+    assert costs[0] < 0.7 * costs[1]
+    assert shape.cost == pytest.approx(costs[0])
+    moved, pose = smooth[0].posterior, smooth[0].pose
     assert moved is not None
-    np.testing.assert_allclose(
-        moved.poses - posterior.poses, np.tile(told[0].pose - frames[0].pose, (2, 1)), atol=1e-12
-    )
-    np.testing.assert_allclose(
-        moved.translations[1] - told[0].translation, found.translations[1] - found.translations[0]
-    )
+    np.testing.assert_allclose(moved.poses - posterior.poses, np.tile(pose - frames[0].pose, (2, 1)), atol=1e-12)
+    apart = estimate.translations[1] - estimate.translations[0]
+    np.testing.assert_allclose(moved.translations[1] - smooth[0].translation, apart)

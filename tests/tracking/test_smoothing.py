@@ -1,4 +1,4 @@
-"""Tracks that shake, of motions whose steady form is known."""
+"""Tracks that shake, of motions whose smooth form is known."""
 
 from dataclasses import replace
 
@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit.arrays import Array
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.tracking.smoothing import path
 from posefit.tracking.smoothing.path import Squares, Visibility, smooth_path, standing_feet
-from tests.cases import each
 
 EYE = np.array([0.0, 1.0, 6.0])
 
@@ -30,7 +30,7 @@ def walk() -> Motion:
 
 
 def shaken(motion: Motion, seed: int = 0) -> Motion:
-    """Return a motion as a search of each frame finds it: depth worst; its angles are smooth, and off."""
+    """Return a motion as a search of each frame estimates it: depth worst; its angles are smooth, and off."""
     rng = np.random.default_rng(seed)
     poses, places = motion.poses.copy(), motion.translations.copy()
     legs, times = list(path.LEGS), np.arange(len(motion)) / motion.fps
@@ -40,22 +40,17 @@ def shaken(motion: Motion, seed: int = 0) -> Motion:
     return replace(motion, poses=poses, translations=places)
 
 
-def joints_of(motion: Motion) -> np.ndarray:
-    return motion.skeleton.joints(motion.poses, motion.translations)
-
-
-def all_seen(motion: Motion) -> Visibility:
-    return Visibility(np.ones(len(motion), dtype=bool), np.tile(EYE, (len(motion), 1)))
+def smoothed(motion: Motion, eyes: Array = EYE, usable: Array | None = None) -> Motion:
+    """Return a motion smoothed that is seen from `eyes`, in all frames or those that are usable."""
+    count = len(motion)
+    visible = np.ones(count, dtype=bool) if usable is None else usable
+    return smooth_path(motion, Visibility(visible, np.broadcast_to(eyes, (count, 3))))
 
 
 def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
     rng = np.random.default_rng(3)
     count, numbers = 7, 3
-    now, feet, ways = (
-        rng.normal(size=(count, numbers)),
-        rng.normal(size=(count, 2)),
-        rng.normal(size=(count, 2, numbers)),
-    )
+    now, feet, ways = (rng.normal(size=size) for size in ((count, numbers), (count, 2), (count, 2, numbers)))
     squares = Squares.of(count, numbers)
     squares.add(slice(0, 3), np.eye(3) * 4.0, 4.0 * now)
     squares.add_bends(slice(1, 3), now[:, 1:], 5.0)
@@ -80,83 +75,71 @@ def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
 
 def test_stances_of_a_walk_are_those_of_feet_that_are_low_and_slow() -> None:
     motion = walk()
-    found = standing_feet(joints_of(motion), motion.fps, np.tile(EYE, (len(motion), 1)))
-    stands = standing(joints_of(motion), motion.fps)
-    assert found[stands].mean() > 0.95
-    assert found.any(axis=1).mean() > 0.9  # who walks has a foot on the ground,
-    assert found.mean() < 0.75  # and the other one in the air for two fifths of the time
-    assert standing_feet(joints_of(motion)[:2], motion.fps, np.tile(EYE, (2, 1))).shape == (2, 2)
+    stands = standing_feet(motion.joints, motion.fps, np.tile(EYE, (len(motion), 1)))
+    assert stands[standing(motion.joints, motion.fps)].mean() > 0.95
+    assert stands.any(axis=1).mean() > 0.9  # a person who walks has a foot on the ground,
+    assert stands.mean() < 0.75  # and the other one in the air for two fifths of the time
+    assert standing_feet(motion.joints[:2], motion.fps, np.tile(EYE, (2, 1))).shape == (2, 2)
 
 
-def test_a_track_that_shakes_becomes_steady_and_its_feet_stand() -> None:
+def test_a_track_that_shakes_becomes_smooth_and_its_feet_stand() -> None:
     motion = walk()
-    found, stands = shaken(motion), standing(joints_of(motion), motion.fps)
-    told = smooth_path(found, all_seen(found))
-    before, after, true = (np.nanmean(acceleration(joints_of(one), 30.0)) for one in (found, told, motion))
+    estimate, stands = shaken(motion), standing(motion.joints, motion.fps)
+    smooth = smoothed(estimate)
+    before, after, true = (np.nanmean(acceleration(each.joints, 30.0)) for each in (estimate, smooth, motion))
     assert before > 5.0 * true
     assert after < 1.3 * true
-    assert slides(joints_of(found), stands).mean() > 0.05
-    assert slides(joints_of(told), stands).mean() < 0.02
-    off, was = (np.linalg.norm(joints_of(one) - joints_of(motion), axis=2).mean() for one in (told, found))
+    assert slides(estimate.joints, stands).mean() > 0.05
+    assert slides(smooth.joints, stands).mean() < 0.02
+    off, was = (np.linalg.norm(each.joints - motion.joints, axis=2).mean() for each in (smooth, estimate))
     assert off < 0.6 * was
     others = np.setdiff1d(np.arange(66), path.LEGS)
-    np.testing.assert_array_equal(told.poses[:, others], found.poses[:, others])
+    np.testing.assert_array_equal(smooth.poses[:, others], estimate.poses[:, others])
 
 
-def test_depth_is_believed_where_several_cameras_see_and_hardly_where_one_does() -> None:
-    # one camera, then several: whoever comes in is 10 cm too far at first, and then where he is
+def test_depth_counts_much_where_several_cameras_see_and_little_where_one_does() -> None:
+    # one camera, then several: a person who comes in is 10 cm too far at first, and then in place
     motion, alone = walk(), 15
-    places = motion.translations.copy()
+    places, eyes = motion.translations.copy(), np.full((len(motion), 3), np.nan)
     places[:alone, 2] -= 0.1
-    eyes = np.full((len(motion), 3), np.nan)
-    several = smooth_path(
-        replace(motion, translations=places), Visibility(np.ones(len(motion), dtype=bool), eyes.copy())
-    )
+    several = smoothed(replace(motion, translations=places), eyes.copy())
     eyes[:alone] = EYE
-    told = smooth_path(replace(motion, translations=places), Visibility(np.ones(len(motion), dtype=bool), eyes))
-    off, was = (np.abs(one.translations - motion.translations)[:, 2] for one in (told, several))
+    single = smoothed(replace(motion, translations=places), eyes)
+    off, was = (np.abs(each.translations - motion.translations)[:, 2] for each in (single, several))
     assert off[alone - 5 : alone].mean() < 0.7 * was[alone - 5 : alone].mean()
     assert off[alone + 5 :].max() < 0.02
 
 
-def test_frames_that_show_too_little_are_bridged_and_strange_places_are_not_believed() -> None:
+def test_frames_that_are_not_usable_are_bridged_and_outliers_count_little() -> None:
     motion = walk()
     usable = np.ones(len(motion), dtype=bool)
     usable[:4] = usable[20:25] = False
     places = motion.translations.copy()
     places[~usable] += [200.0, 30.0, -500.0]
     places[40, 2] -= 20.0
-    told = smooth_path(replace(motion, translations=places), Visibility(usable, np.tile(EYE, (len(motion), 1))))
-    off = np.linalg.norm(told.translations - motion.translations, axis=1)
+    smooth = smoothed(replace(motion, translations=places), usable=usable)
+    off = np.linalg.norm(smooth.translations - motion.translations, axis=1)
     assert off[20:25].max() < 0.05
     assert off[40] < 0.1
-    assert np.linalg.norm(told.translations[0] - motion.translations[4]) < 0.3
+    assert np.linalg.norm(smooth.translations[0] - motion.translations[4]) < 0.3
 
 
-def test_long_tracks_are_steadied_in_windows(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = shaken(walk())
-    whole = smooth_path(found, all_seen(found))
-    monkeypatch.setattr(path, "WINDOW", 30)
-    monkeypatch.setattr(path, "OVERLAP", 25)
-    parts = smooth_path(found, all_seen(found))
-    assert np.abs(parts.translations - whole.translations).max() < 0.02
+def test_tracks_of_any_length_are_smoothed_long_ones_in_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    for frames in (1, 2, 3):
+        assert len(smoothed(walk().frames(0, frames))) == frames
+    estimate = shaken(walk())
+    whole = smoothed(estimate)
+    monkeypatch.setattr(path, "WINDOW_FRAMES", 30)
+    monkeypatch.setattr(path, "OVERLAP_FRAMES", 25)
+    assert np.abs(smoothed(estimate).translations - whole.translations).max() < 0.02
 
 
-@each("frames", [1, 2, 3])
-def test_the_shortest_tracks_are_told(frames: int) -> None:
-    motion = walk().frames(0, frames)
-    assert len(smooth_path(motion, all_seen(motion))) == frames
-
-
-def test_a_track_is_steady_where_it_is_asked_for_and_tells_the_cost_of_what_it_tells() -> None:
-    settings = {"frames": (0, 8), "translation": "aligned", "evaluations": 400}
-    found = posefit.track("walk", **settings)
-    told = posefit.track("walk", **settings, smooth=True)
-    assert (found.summary["smooth"], told.summary["smooth"]) == (False, True)
-    assert told.summary["acceleration"] < found.summary["acceleration"]
-    assert told.summary["cost"] != found.summary["cost"]
-    assert [frame.evaluations for frame in told.estimates] == [frame.evaluations for frame in found.estimates]
-    with pytest.raises(
-        ValueError, match="smooth must be given where the translation is searched or aligned, got known"
-    ):
+def test_a_track_is_smoothed_on_demand_and_has_the_cost_of_its_smooth_poses() -> None:
+    options = {"frames": (0, 8), "translation": "aligned", "evaluations": 400}
+    rough, smooth = (posefit.track("walk", **options, smooth=smooth) for smooth in (None, True))
+    assert (rough.summary["smooth"], smooth.summary["smooth"]) == (False, True)
+    assert smooth.summary["acceleration"] < rough.summary["acceleration"]
+    assert smooth.summary["cost"] != rough.summary["cost"]
+    assert [frame.evaluations for frame in smooth.estimates] == [frame.evaluations for frame in rough.estimates]
+    with pytest.raises(ValueError, match="smooth must be given where the translation is .* aligned, got known"):
         posefit.track("walk", frames=(0, 3), smooth=True)

@@ -1,4 +1,4 @@
-"""What the viewer of a track holds: pictures within their room, all of a long track's marks, and nothing from outside."""
+"""The data of a track's page: pictures within their room, all of a long track's marks, and no links."""
 
 import base64
 import html.parser
@@ -20,14 +20,13 @@ from posefit.silhouette.mask import Silhouette
 from posefit.tracking.page import stills
 from posefit.tracking.page.content import _beside, _marked
 from posefit.tracking.page.stills import Stills, Strip
-from tests.tracking.viewing import SIZE, doubting, right, viewed, walk
+from tests.tracking.scenes import MAXWELL, SIZE, exact_frames, truth_of, uncertain_frames, viewed, walk
 
 
-def held(page: Path) -> dict[str, Any]:
+def data_of(page: Path) -> dict[str, Any]:
     """Return the data of a page."""
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page.read_text("utf-8"))
-    assert found
-    return dict(json.loads(found[1]))
+    (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page.read_text("utf-8"))
+    return dict(json.loads(text))
 
 
 def numbers(text: str) -> Any:
@@ -44,29 +43,28 @@ def test_a_strip_keeps_what_it_has_room_for_evenly() -> None:
         for k in range(count):
             strip.add((k, 0, 1, 1), lambda k=k: [f"{k:06d}", "more"])  # type: ignore[misc]
         assert strip.every == every
-        assert [int(one) for _, (one, _) in strip.pictures] == list(range(0, count, every))
+        assert [int(first) for _, (first, _) in strip.pictures] == list(range(0, count, every))
         assert [box[0] for box, _ in strip.pictures] == list(range(0, count, every))
 
 
-def test_of_a_long_track_a_picture_is_always_of_a_frame_that_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pictures_of_a_long_track_are_of_frames_that_the_page_has(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stills, "MAX_FRAMES", 10)
     scene = replace(walk(2), count=41)
-    pictures, (frame, _) = Stills(scene), right(walk(2))
+    pictures, (frame, _) = Stills(scene), exact_frames(walk(2))
     assert pictures.step == 8
     for k in range(41):
-        mask = np.ones(SIZE[::-1], bool)  # so large that all of it is shown
+        mask = np.ones(SIZE[::-1], bool)  # so large that the picture has all of it
         mask[100, : k + 1] = False
         pictures.add(frame, Observation([Silhouette.of(mask)]), None)
     (masks,) = pictures.as_dict()["masks"]
     assert masks["every"] == 8
     assert [box for box, _ in masks["pictures"]] == [[0, 0, *SIZE]] * 6
-    assert [int((image(one) == 0).sum()) for _, one in masks["pictures"]] == [1, 9, 17, 25, 33, 41]
+    assert [int((image(uri) == 0).sum()) for _, uri in masks["pictures"]] == [1, 9, 17, 25, 33, 41]
 
 
 def test_a_picture_is_of_the_part_that_mask_and_body_are_in() -> None:
     scene = walk(1)
-    (frame,), seen = right(scene), scene.observations[0]
-    mask = seen.silhouettes[0].mask
+    (frame,), mask = exact_frames(scene), scene.observations[0].silhouettes[0].mask
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
 
     def about(shown: Any) -> Any:
@@ -83,14 +81,14 @@ def test_a_picture_is_of_the_part_that_mask_and_body_are_in() -> None:
     assert left == pytest.approx(columns[0] - space, abs=3.0)
     assert left + width == pytest.approx(columns[-1] + 1 + space, abs=3.0)
     far = np.zeros_like(mask)
-    far[:20, :20] = True  # something else was seen, and the body stays in the picture
+    far[:20, :20] = True  # something else is in the mask, and the body stays in the picture
     assert about(far)[:2] == [0, 0]
     assert sum(about(far)[::2]) == pytest.approx(left + width, abs=40.0)
     assert about(np.zeros_like(mask))[1] == 0
 
 
 def filming(count: int, size: tuple[int, int]) -> tuple[Scene, Any]:
-    """Return a scene that was filmed, and its pictures: as hard to compress as leaves."""
+    """Return a filmed scene, and its picture: as hard to compress as leaves."""
     seed = np.random.default_rng(0).integers(0, 255, (size[1] // 8, size[0] // 8, 3)).astype(np.uint8)
     picture = cv2.resize(seed, size, interpolation=cv2.INTER_CUBIC)
     scene = replace(walk(2), count=count, pictures=lambda: iter([picture] * count))
@@ -100,7 +98,7 @@ def filming(count: int, size: tuple[int, int]) -> tuple[Scene, Any]:
 @pytest.mark.parametrize(("count", "every"), [(20, 1), pytest.param(600, 4, marks=pytest.mark.slow)])
 def test_pictures_of_leaves_stay_within_a_few_megabytes(count: int, every: int) -> None:
     scene, picture = filming(count, (960, 540))
-    pictures, (frame, _), seen = Stills(scene), right(walk(2)), scene.observations[0]
+    pictures, (frame, _), seen = Stills(scene), exact_frames(walk(2)), scene.observations[0]
     for _ in range(count):
         pictures.add(frame, seen, picture)
     strip = pictures.as_dict()["film"]
@@ -113,11 +111,10 @@ def test_pictures_of_leaves_stay_within_a_few_megabytes(count: int, every: int) 
 
 def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> None:
     scene = walk(4)
-    truth = scene.truth
-    assert truth is not None
-    data = held(viewed(tmp_path / "out", scene, doubting(scene, [0.0, 0.3, 0.0, 0.0])))
+    truth = truth_of(scene)
+    data = data_of(viewed(tmp_path / "out", scene, uncertain_frames(scene, [0.0, 0.3, 0.0, 0.0])))
     joints = numbers(data["estimate"]).reshape(4, 27, 3)
-    true = 1e3 * truth.skeleton.joints(truth.poses, truth.translations)
+    true = 1e3 * truth.joints
     np.testing.assert_allclose(joints - joints[0, 0], true - true[0, 0], atol=1.01)
     assert data["truth"] == data["estimate"]
     free = truth.skeleton.free
@@ -126,13 +123,13 @@ def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> N
     assert data["angles"]["names"][:4] == ["root yaw", "root pitch", "root roll", "lfemur x (bone to the left knee)"]
     clinical = numbers(data["clinical"]["values"]).reshape(4, -1) / 10.0
     knee = data["clinical"]["names"].index("left knee flexion")
-    wanted = clinical_angles(truth.skeleton, truth.poses)["left_knee_flexion"]
-    np.testing.assert_allclose(clinical[:, knee], wanted, atol=0.051)
+    expected = clinical_angles(truth.skeleton, truth.poses)["left_knee_flexion"]
+    np.testing.assert_allclose(clinical[:, knee], expected, atol=0.051)
     assert data["clinical"]["truth"] == data["clinical"]["values"]
     assert data["places"][3] == "left ankle"
-    # nothing but the pose itself, blurred by 2 cm: Maxwell's law
+    # nothing but the pose itself, blurred by 2 cm
     radii = numbers(data["intervals"]["joints"]).reshape(4, 3, 27)
-    np.testing.assert_allclose(radii[0, :, 1], 20.0 * np.array([1.5382, 2.1544, 2.7955]), atol=1.0)
+    np.testing.assert_allclose(radii[0, :, 1], 20.0 * np.array([*MAXWELL.values()]), atol=1.0)
     assert data["intervals"]["levels"] == [50, 80, 95]
     assert data["others"]["at"] == [1]
     assert data["others"]["weights"] == pytest.approx([0.3])
@@ -140,15 +137,15 @@ def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> N
     assert data["verdict"] == "Not determined: left and right: unknown in 1 of 4 frames."
 
 
-def test_a_frame_that_is_shown_bears_the_marks_of_those_that_it_stands_for() -> None:
-    said = [k in (3, 4, 9) for k in range(12)]
-    assert _marked(said, 1) == [3, 4, 9]
-    assert _marked(said, 4) == [0, 1, 2]
+def test_a_frame_of_the_page_has_the_marks_of_those_that_it_stands_for() -> None:
+    marks = [k in (3, 4, 9) for k in range(12)]
+    assert _marked(marks, 1) == [3, 4, 9]
+    assert _marked(marks, 4) == [0, 1, 2]
 
 
-def test_true_angles_stand_beside_those_that_were_found() -> None:
-    found = np.array([[3.2], [9.5]])
-    np.testing.assert_allclose(_beside(found, np.array([[-3.1], [3.1]])), [[-3.1 + 2 * np.pi], [3.1 + 2 * np.pi]])
+def test_true_angles_stand_within_half_a_turn_of_the_estimated_ones() -> None:
+    true = _beside(np.array([[3.2], [9.5]]), np.array([[-3.1], [3.1]]))
+    np.testing.assert_allclose(true, [[-3.1 + 2 * np.pi], [3.1 + 2 * np.pi]])
 
 
 class Outside(html.parser.HTMLParser):
@@ -166,12 +163,12 @@ class Outside(html.parser.HTMLParser):
 def test_it_is_one_file_that_links_to_nothing_but_itself(tmp_path: Path) -> None:
     scene = walk(3)
     name = "</script><script>alert(1)</script>"
-    page = viewed(tmp_path / "out", replace(scene, name=name), right(scene))
+    page = viewed(tmp_path / "out", replace(scene, name=name), exact_frames(scene))
     text = page.read_text("utf-8")
     assert Outside(text).links == ["#player"]
     assert "url(" not in text
     assert "@import" not in text
     assert text.count("</script>") == 2
-    assert held(page)["title"] == name
-    assert held(page)["film"] is held(page)["intervals"] is None
-    assert embedded(held(page)["others"]) == '{"at":[],"weights":[],"joints":""}'
+    assert data_of(page)["title"] == name
+    assert data_of(page)["film"] is data_of(page)["intervals"] is None
+    assert embedded(data_of(page)["others"]) == '{"at":[],"weights":[],"joints":""}'
