@@ -10,6 +10,6 @@
 | one problem by its numbers, many to go through; calls, counts, budgets, targets, best known costs | problem.py |
 | which functions, dimensions and instances there are | functions.py |
 | the instances of each function | instances.py |
-| the boxes that are searched, and the script that made them | boxes.py, make_boxes.py |
+| the boxes that are searched, made by `docs/studies/make_boxes.py` | boxes.py |
 | an optimiser on a problem; scores of runs; checks of what methods report | running.py, tally.py, audit.py |
 """

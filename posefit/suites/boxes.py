@@ -2,8 +2,8 @@
 
 A box is never learned from the person in the silhouette. Of the ten people of the library seven are for training; for
 an instance of one of them, the box was learned from the six others. The three others are held out: their boxes were
-learned from the seven. `make_boxes.py` made the file. Its numbers are rounded, and sums are taken in one order, so that
-a proposal means the same pose on every machine.
+learned from the seven. `docs/studies/make_boxes.py` made the file. Its numbers are rounded, and sums are taken in one
+order, so that a proposal means the same pose on every machine.
 """
 
 import math

@@ -1,6 +1,6 @@
-"""Learns the boxes of the suite from the library of recorded motions, and writes `boxes.npz` beside this file.
+"""Learns the boxes of the suite from the library of recorded motions, and writes `posefit/suites/boxes.npz`.
 
-    python -m posefit.suites.make_boxes
+    python docs/studies/make_boxes.py
 
 The file of a suite is never replaced: its numbers would change. This documents how it was made.
 """
@@ -46,7 +46,7 @@ def learned_from(poses: Array) -> dict[str, Array]:
     return {**rounded, "order": np.argsort(-angles.std(axis=0), kind="stable").astype(np.int32)}
 
 
-def _poses(subjects: tuple[str, ...]) -> Array:
+def upright_poses(subjects: tuple[str, ...]) -> Array:
     """Return the upright poses (n, 66) of people, and their mirror images."""
     poses = wrapped(np.concatenate([clip.poses for clip in recorded.clips(subjects)]))
     poses = poses[[is_upright(pose) for pose in poses]]
@@ -59,9 +59,11 @@ def main() -> None:
         name: tuple(person for person in TRAINING_PEOPLE if person != name)
         for name in (*TRAINING_PEOPLE, HELD_OUT_GROUP)
     }
-    learned = [learned_from(_poses(people)) for people in groups.values()]
+    learned = [learned_from(upright_poses(people)) for people in groups.values()]
     arrays = {name: np.stack([group[name] for group in learned]) for name in learned[0]}
-    np.savez_compressed(Path(__file__).parent / "boxes.npz", names=np.array(list(groups)), **arrays)  # type: ignore[arg-type]
+    np.savez_compressed(
+        Path(__file__).parents[2] / "posefit" / "suites" / "boxes.npz", names=np.array(list(groups)), **arrays
+    )  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":
