@@ -1,8 +1,10 @@
 """Fits VSMM's motion models to CMU clips: `python docs/studies/make_models.py CMU_DIR`. Interpretations V4 to V7.
 
-Ridge regression of how the quaternions go on to the next frame; what is stored are its coefficients, the covariance of
-what it leaves, and means of similar poses, no recorded frame. Every clip is also used mirrored. Printed, and stored
-beside each model, are its errors one and ten frames ahead on clips that were not used, against standing still.
+Ridge regression of how the quaternions go on to the next frame, "zero" as the patent writes it and "identity" as ours;
+what is stored are its coefficients, the covariance of what it leaves, means of similar poses and a hundred captured
+ones. `vsmm.models` takes the file of another `--ridge-lambda` and `--out`. Every clip is also used mirrored. Printed,
+and stored beside each model, are its errors one and ten frames ahead on clips that were not used, against standing
+still.
 """
 
 import json
@@ -25,7 +27,7 @@ from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit_vsmm import motion as models
 from posefit_vsmm.kernels import minus
-from posefit_vsmm.motion import FPS, MotionModel, leg_of, ridge, without_heading
+from posefit_vsmm.motion import FPS, LAMBDA, MotionModel, leg_of, normalised_ridge, ridge, without_heading
 from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode
 
 ORIGIN = (
@@ -35,6 +37,7 @@ ORIGIN = (
 FADING = 0.07  # share of its way from the mean pose that a joint loses in a frame where nothing else is learned
 DRAWN = 400  # frames of a built-in motion
 POSES = 24  # typical poses of a model
+CAPTURED = 100  # captured poses of a model, in even steps
 LEAST = (0.002, np.radians(0.3))  # legs and radians: the least deviation a frame that any coordinate is granted
 AHEAD = 10  # frames
 # of the whole body's quaternion and each bone's: the one of the other side
@@ -184,7 +187,9 @@ def rounded(values: Array) -> Any:
 
 @click.command()
 @click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
-def main(root: Path) -> None:
+@click.option("--ridge-lambda", type=float, default=LAMBDA, show_default=True, help="Weight of |F|^2, above 0.")
+@click.option("--out", type=click.Path(path_type=Path), help="Another file than the package's models.json.")
+def main(root: Path, ridge_lambda: float, out: Path | None) -> None:
     """Write models.json beside the models. Raises ValueError where a clip it needs is missing."""
     stored: dict[str, Any] = {}
     every: list[Recorded] = []
@@ -202,17 +207,19 @@ def main(root: Path) -> None:
         typicals = typical(before)
         found: dict[str, Any] = {}
         report: dict[str, float] = {}
-        for shrink, target in (("identity", -FADING * identity), ("zero", -identity)):
-            matrix, offset = ridge(before, after, target)
-            model = MotionModel(name, matrix, offset, np.eye(ERROR), typicals)
+        captured = before[np.linspace(0, len(before) - 1, CAPTURED).astype(np.int64), 3:]
+        literal = ridge(before, after, ridge_lambda) - identity, np.zeros(STATE)
+        ours = normalised_ridge(before, after, -FADING * identity, ridge_lambda)
+        for shrink, (matrix, offset) in (("identity", ours), ("zero", literal)):
+            model = MotionModel(name, matrix, offset, np.eye(ERROR), typicals, captured)
             covariance = noise(model, before, after)
             found[shrink] = {"matrix": rounded(matrix), "offset": rounded(offset), "noise": rounded(covariance)}
             for frames in (1, AHEAD):
                 error, still = ahead(model, kept, frames)
                 report |= {f"{shrink}_{frames}": round(error, 2), f"still_{frames}": round(still, 2)}
         print(name, len(before), report)
-        stored[name] = {**found, "poses": rounded(typicals), "report": report}
-    target_file = Path(models.__file__).with_name("models.json")
+        stored[name] = {**found, "poses": rounded(typicals), "captured": captured.round(3).tolist(), "report": report}
+    target_file = out or Path(models.__file__).with_name("models.json")
     text = json.dumps({"origin": ORIGIN, "models": stored, "reliance": relied(every)}, separators=(",", ":"))
     target_file.write_text(text + "\n", encoding="utf-8")
     print(f"{target_file.name}: {len(text)} bytes")

@@ -18,11 +18,10 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.registry import registry
-from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import PLACED, Measurement
 from posefit_vsmm.motion import library
+from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import ERROR, FIRST_BONE, YAW_PITCH_ROLL, Reliance, decode, encode, free_errors
-from posefit_vsmm.switching import Switching
 from posefit_vsmm.tracker import VSMM, Matcher, SearchResult
 
 STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
@@ -153,8 +152,5 @@ def joined(
         raise InputError(f"dimensions must be at least 1, got {dimensions}")
     if not weight > 0.0:
         raise InputError(f"weight must be above 0, got {weight}")
-    carried = library("identity")
-    topology = read_topology(Path(groups) if groups else None, carried.names)
-    switching = Switching(library=carried, topology=topology)
-    search = Search(task, carried.reliance, registry().optimiser(optimiser), dimensions, weight)
-    return VSMM(task, switching, search)
+    search = Search(task, library().reliance, registry().optimiser(optimiser), dimensions, weight)
+    return VSMM(task, Settings(groups=groups), search)

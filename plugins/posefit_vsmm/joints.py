@@ -13,6 +13,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit_vsmm.preprocess import Lines
+from posefit_vsmm.settings import Assignment, JointErrors
 from posefit_vsmm.state import AT, POINTS
 
 BODY = ("torso", "left clavicle", "right clavicle", "left shoulder", "right shoulder", "left hip", "right hip")
@@ -39,15 +40,25 @@ class Errors:
     deviation: Array = field(repr=False)  # (17, 2) legs, around the bias
 
 
-@lru_cache(maxsize=1)
-def rule_errors() -> Errors:
-    """Return the errors that the package carries."""
+@lru_cache(maxsize=2)
+def rule_errors(kind: JointErrors = "measured") -> Errors:
+    """Return the errors that the package carries; "plain" are unbiased, and those of the torso are the root's."""
     stored = json.loads((files("posefit_vsmm") / "joints.json").read_text(encoding="utf-8"))
     bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
+    if kind == "plain":  # Interpretation V8
+        deviation[_TORSO], bias = deviation[AT["root"]], np.zeros_like(bias)
     return Errors(bias, deviation)
 
 
-def detected(lines: Lines, expected: Array, gates: Array, leg: float, head: float, bias: Array) -> Detection:
+def detected(
+    lines: Lines,
+    expected: Array,
+    gates: Array,
+    leg: float,
+    head: float,
+    bias: Array,
+    assignment: Assignment = "optimal",
+) -> Detection:
     """Return the points of a silhouette near where they are expected (17, 2).
 
     What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg
@@ -66,7 +77,7 @@ def detected(lines: Lines, expected: Array, gates: Array, leg: float, head: floa
     middle = _head(lines, expected[AT["head"]], head, gates[AT["head"]])
     if middle is not None:
         place("head", *middle)
-    tips, unassigned = _tips(lines, expected, gates)
+    tips, unassigned = _tips(lines, expected, gates, assignment)
     for tip, end in tips:  # VSMM 2.4
         place(POINTS[tip], end, near(POINTS[tip], end))
     points -= bias * leg * (confidence > 0.0)[:, None]
@@ -95,19 +106,22 @@ def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Ar
     return chosen, float(min(1.0, caught.max() / (np.pi * radius)))
 
 
-def _tips(lines: Lines, expected: Array, gates: Array) -> tuple[list[tuple[int, Array]], int]:
-    """Return which end points are hands and feet, and how many are unassigned: the assignment of least distance.
+def _tips(lines: Lines, expected: Array, gates: Array, assignment: Assignment) -> tuple[list[tuple[int, Array]], int]:
+    """Return which end points are hands and feet, and how many are unassigned. Interpretation V15.
 
-    It is a linear sum assignment, as the Hungarian algorithm solves it. Distances are counted in gates; the head takes
-    part, since the skeleton line ends in it too.
+    Each has the end point nearest to it; or all have their own, by the linear sum assignment of least distance.
+    Distances are counted in gates; the head takes part, since the skeleton line ends in it too.
     """
     if not len(lines.ends):
         return [], 0
     away = np.linalg.norm(expected[_TIPS][:, None] - lines.ends[None], axis=2)
-    from scipy.optimize import linear_sum_assignment  # half a second to import
-
     share = away / gates[_TIPS][:, None]
-    rows, columns = linear_sum_assignment(np.minimum(share, 1.0))
+    if assignment == "nearest":
+        rows, columns = np.arange(len(_TIPS)), away.argmin(axis=1)
+    else:
+        from scipy.optimize import linear_sum_assignment  # half a second to import
+
+        rows, columns = linear_sum_assignment(np.minimum(share, 1.0))
     pairs = [(int(_TIPS[a]), lines.ends[b]) for a, b in zip(rows, columns, strict=True) if share[a, b] < 1.0]
     return [pair for pair in pairs if pair[0] != AT["head"]], len(lines.ends) - len(pairs)
 

@@ -6,7 +6,7 @@ which detections are accepted, and its mean over a frame is the surprise of that
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,14 +16,16 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import empty_frames, place_joints
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit_vsmm.imm import Measurement
-from posefit_vsmm.joints import OWN, Errors, detected
+from posefit_vsmm.joints import OWN, detected, rule_errors
 from posefit_vsmm.kernels import bend, points_and_jacobian
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import Lines
+from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import ERROR, FIRST_BONE, POINTS, Reliance
 
 NEAREST = 0.05  # metres: a smaller distance to the camera counts as this one
 NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected
+FAR = 1e3  # legs: a gate that is none
 DEVIATIONS = 3.0  # between these, so many standard deviations
 SURPRISE = 16.0  # the Mahalanobis gate, squared standard deviations in the image: a detection farther off is rejected
 LEAST = 0.05  # the lowest confidence that counts
@@ -80,6 +82,11 @@ class JointMeasurement:
     # mean squared standard deviations a coordinate (NIS / 2) of the points that the rules detected by themselves
     surprise: float
 
+    def imputed(self, points: Array) -> "JointMeasurement":
+        """Return the same with other points (17, 2) where none are detected, as if they were. Interpretation V9."""
+        shown = self.confidence > 0.0
+        return replace(self, points=np.where(shown[:, None], self.points, points), confidence=np.ones(len(shown)))
+
 
 @dataclass(frozen=True, eq=False)
 class JointCameras:
@@ -88,7 +95,7 @@ class JointCameras:
     body: Body
     cameras: Sequence[Camera]
     figure: Figure
-    errors: Errors = field(repr=False)
+    how: Settings
 
     def detect(self, view: int, lines: Lines, expected: Array, spread: Array) -> JointMeasurement:
         """Return the joints that a camera shows, where a state (43,) is expected with a covariance (33, 33).
@@ -102,12 +109,16 @@ class JointCameras:
         leg = leg_of(self.body.skeleton) * metre
         covariances = jacobian @ spread @ jacobian.transpose(0, 2, 1)
         gates = DEVIATIONS * np.sqrt(np.einsum("pii->pi", covariances).max(axis=1))
-        gates = np.clip(gates, NARROWEST * leg, WIDEST * leg)
-        detection = detected(lines, pixels, gates, leg, head_radius(self.body) * metre, self.errors.bias)
-        variances = (self.errors.deviation * leg) ** 2 / np.maximum(detection.confidence, LEAST)[:, None]
+        gates = np.clip(gates, NARROWEST * leg, WIDEST * leg) if self.how.gates else np.full_like(gates, FAR * leg)
+        errors, radius = rule_errors(self.how.joint_errors), head_radius(self.body) * metre
+        detection = detected(lines, pixels, gates, leg, radius, errors.bias, self.how.assignment)
+        variances = (errors.deviation * leg) ** 2
+        if self.how.joint_errors == "measured":
+            variances = variances / np.maximum(detection.confidence, LEAST)[:, None]
         off = detection.points - pixels
         distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
-        confidence = np.where(distance < SURPRISE, detection.confidence, 0.0)
+        accepted = (distance < SURPRISE) | (not self.how.gates)
+        confidence = np.where(accepted, detection.confidence, 0.0)
         dropped = np.count_nonzero((confidence == 0.0) & (detection.confidence > 0.0))
         return JointMeasurement(
             detection.points,

@@ -6,10 +6,11 @@ them; the models that the package carries are fitted to CMU clips by docs/studie
 """
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
-from typing import Any, Literal, get_args
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,12 +20,13 @@ from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
 from posefit_vsmm import kernels
 from posefit_vsmm.imm import product
+from posefit_vsmm.settings import Poses, Shrink
 from posefit_vsmm.state import ERROR, STATE, Reliance, free_errors
 
 FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
+CLIP_FPS = 120.0  # the rate of the clips that they were fitted to
 LAMBDA = 0.15
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
-Shrink = Literal["identity", "zero"]  # what ridge regression draws F towards (Interpretation V5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +38,7 @@ class MotionModel:
     offset: Array = field(repr=False)  # (43,)
     noise: Array = field(repr=False)  # (33, 33) covariance of W
     poses: Array = field(repr=False)  # (n, 40) quaternions of its typical poses, heading along +z
+    captured: Array = field(repr=False)  # (n, 40) those of poses that it was fitted to
     leg: float = 1.0  # metres
     share: float = 1.0  # of the step at 30 frames a second
 
@@ -53,13 +56,15 @@ class MotionModel:
         kernels.step(self.matrix, self.offset, self.share, self.leg, state, *scratch, flow, moved, jacobian)
         return moved, jacobian
 
-    def nearest(self, state: Array) -> Array:
-        """Return a state (43,) with its place and heading, in the typical pose that is nearest to it."""
+    def nearest(self, state: Array, among: Poses = "typical") -> Array:
+        """Return a state (43,) with its place and heading, in the pose nearest to it. Interpretation V16."""
         back, quaternions = without_heading(state)
-        similarity = np.abs(np.einsum("nij,ij->ni", self.poses.reshape(len(self.poses), -1, 4), quaternions))
-        pose = self.poses[np.arccos(np.minimum(similarity, 1.0)).sum(axis=1).argmin()].copy()
+        poses = self.poses if among == "typical" else self.captured
+        similarity = np.abs(np.einsum("nij,ij->ni", poses.reshape(len(poses), -1, 4), quaternions))
+        pose = poses[np.arccos(np.minimum(similarity, 1.0)).sum(axis=1).argmin()].copy()
         pose[:4] = product(back, pose[:4])
-        return np.concatenate([state[:3], pose])
+        same_sign = np.where((pose * state[3:]).reshape(-1, 4).sum(axis=1) < 0.0, -1.0, 1.0)
+        return unit(np.concatenate([state[:3], pose * np.repeat(same_sign, 4)]))
 
     def fitted_to(self, skeleton: Skeleton, fps: float) -> "MotionModel":
         """Return the model for a body's legs and another frame rate, of which a step is a share of a step at 30."""
@@ -67,7 +72,47 @@ class MotionModel:
         scale = np.maximum(free_errors(skeleton), STIFF)
         scale[:3] = leg_of(skeleton)
         noise = self.noise * np.outer(scale, scale) * share
-        return MotionModel(self.name, self.matrix, self.offset, noise, self.poses, float(scale[0]), share)
+        return replace(self, noise=noise, leg=float(scale[0]), share=share)
+
+
+@dataclass(frozen=True, eq=False)
+class VectorModel:
+    """A model of states that are 43 plain numbers, covariances (43, 43) among them. Interpretation V4."""
+
+    model: MotionModel
+
+    def predict(self, state: Array, covariance: Array) -> tuple[Array, Array]:
+        """Return the state (43,) one frame later, and the covariance (43, 43) of its error."""
+        before = unit(state)
+        moved, jacobian = self.model.step(before)
+        flow = jacobian @ inverse_tangent(before)
+        return moved, lifted(moved, flow @ covariance @ flow.T + self.model.noise)
+
+
+def unit(state: Array) -> Array:
+    """Return a state (43,) whose quaternions have length 1."""
+    quaternions = state[3:].reshape(-1, 4)
+    return np.concatenate([state[:3], (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).ravel()])
+
+
+def tangent(state: Array) -> Array:
+    """Return how the numbers of a state (43,) change with its error: (43, 33)."""
+    from scipy.linalg import block_diag  # a fifth of a second to import
+
+    change = np.empty((STATE - 3, 3))
+    kernels.tangents(state[3:], change)
+    return block_diag(np.eye(3), *change.reshape(-1, 4, 3))
+
+
+def inverse_tangent(state: Array) -> Array:
+    """Return how the error of a state (43,) changes with its numbers: (33, 43)."""
+    return tangent(state).T * np.repeat([1.0, 4.0], [3, STATE - 3])
+
+
+def lifted(state: Array, covariance: Array) -> Array:
+    """Return the covariance (43, 43) of a state's numbers, of that of its error (33, 33)."""
+    matrix = tangent(state)
+    return np.asarray(matrix @ covariance @ matrix.T + 1e-9 * np.eye(STATE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +132,20 @@ class Library:
 
 
 @lru_cache(maxsize=2)
-def library(shrink: Shrink = "identity") -> Library:
-    """Return the models that the package carries. Raises ValueError for an unknown `shrink`."""
-    if shrink not in get_args(Shrink):
-        raise InputError(f"shrink must be one of {', '.join(get_args(Shrink))}, got {shrink!r}")
-    stored: dict[str, Any] = json.loads((files("posefit_vsmm") / "models.json").read_text(encoding="utf-8"))
+def library(shrink: Shrink = "identity", path: str = "") -> Library:
+    """Return the models of a file that docs/studies/make_models.py wrote; without one, those that the package carries.
+
+    Raises ValueError naming the file where it holds no such models.
+    """
+    source = Path(path) if path else files("posefit_vsmm") / "models.json"
+    try:
+        stored: dict[str, Any] = json.loads(source.read_text(encoding="utf-8"))
+        return _library(stored, shrink)
+    except (OSError, LookupError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: expected motion models as make_models.py writes them, got {error!r}") from None
+
+
+def _library(stored: dict[str, Any], shrink: Shrink) -> Library:
     models = {
         name: MotionModel(
             name,
@@ -99,6 +153,7 @@ def library(shrink: Shrink = "identity") -> Library:
             np.array(one[shrink]["offset"]),
             np.array(one[shrink]["noise"]),
             np.array(one["poses"]),
+            np.array([unit(np.concatenate([np.zeros(3), pose]))[3:] for pose in one["captured"]]),
         )
         for name, one in stored["models"].items()
     }
@@ -106,10 +161,17 @@ def library(shrink: Shrink = "identity") -> Library:
     return Library(models, reliance, {name: one["report"] for name, one in stored["models"].items()})
 
 
-def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
+def ridge(before: Array, after: Array, weight: float = LAMBDA) -> Array:
+    """Return F (43, 40): the one of least |F X - X'|^2 + weight |F|^2 over states X (n, 43) at the origin, X' after."""
+    inputs = before[:, 3:]
+    normal = inputs.T @ inputs + weight * np.eye(inputs.shape[1])  # VSMM 3
+    return np.asarray(np.linalg.solve(normal, inputs.T @ after).T)
+
+
+def normalised_ridge(before: Array, after: Array, target: Array, weight: float = LAMBDA) -> tuple[Array, Array]:
     """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Interpretation V5.
 
-    The penalty is 0.15 a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
+    The penalty is `weight` a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
     """
     inputs = before[:, 3:]
     middle = inputs.mean(axis=0)
@@ -118,7 +180,7 @@ def ridge(before: Array, after: Array, target: Array) -> tuple[Array, Array]:
     wanted = after - before - inputs @ target.T
     wanted[:, [0, 2]] = 0.0  # the way over the ground is not predicted: stepping on the spot is walking, too
     mean = wanted.mean(axis=0)
-    normal = scaled.T @ scaled + LAMBDA * len(scaled) * np.eye(scaled.shape[1])  # VSMM 3
+    normal = scaled.T @ scaled + weight * len(scaled) * np.eye(scaled.shape[1])
     matrix = np.linalg.solve(normal, scaled.T @ (wanted - mean)).T / unit
     return matrix + target, mean - matrix @ middle
 

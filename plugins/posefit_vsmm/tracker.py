@@ -1,8 +1,9 @@
 """The variable-structure multiple-model tracker: its settings, a first pose from one frame, and each frame."""
 
+import inspect
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, final
 
@@ -14,14 +15,15 @@ from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import areas, mismatch
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.imm import Belief, Measurement, product, start
-from posefit_vsmm.joints import JointFilter, rule_errors
+from posefit_vsmm.imm import Belief, Measurement, product
+from posefit_vsmm.joints import JointFilter
 from posefit_vsmm.kernels import minus, plus
 from posefit_vsmm.measurement import Figure, JointCameras, JointMeasurement
-from posefit_vsmm.motion import STIFF, MotionModel, Shrink, library
+from posefit_vsmm.motion import STIFF, MotionModel, library
 from posefit_vsmm.preprocess import Lines, lines_of
+from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import AT, ERROR, Reliance, bone_errors, decode, encode, free_errors
-from posefit_vsmm.switching import Measure, Models, New, Rules, SequentialTest, Structure, Switching, Test
+from posefit_vsmm.switching import Measure, Models
 
 NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # yaws that are tried where one is about known
 ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)
@@ -148,12 +150,11 @@ class Searcher(Protocol):
 class TrackFilter:
     """One track, as far as it has come; with a `searcher`, every frame ends in a search."""
 
-    def __init__(
-        self, task: Task, switching: Switching, rng: np.random.Generator, searcher: Searcher | None = None
-    ) -> None:
-        self._task, self._reliance, self._rng, self._searcher = task, switching.library.reliance, rng, searcher
-        self._models = Models(switching, task.body.skeleton, task.fps)
-        self._cameras = JointCameras(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), rule_errors())
+    def __init__(self, tracker: "VSMM", rng: np.random.Generator) -> None:
+        task, self._how = tracker.task, tracker.how
+        self._task, self._reliance, self._rng, self._searcher = task, tracker.library.reliance, rng, tracker.search
+        self._models = Models(tracker.how, tracker.library, tracker.topology, task.body.skeleton, task.fps)
+        self._cameras = JointCameras(task.body, task.cameras, Figure(task.body.skeleton, self._reliance), tracker.how)
         self._free = np.maximum(free_errors(task.body.skeleton), STIFF)
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._shown: list[JointFilter] = []
@@ -169,21 +170,24 @@ class TrackFilter:
         lines = [None if blind else lines_of(silhouette.mask) for silhouette in observation.silhouettes]
         blind = all(one is None for one in lines)
         self._unseen = self._unseen + 1 if blind else 0
-        if self._bad >= LOST_FRAMES or self._unseen > MAX_BLIND_FRAMES:
+        if self._how.recovery and (self._bad >= LOST_FRAMES or self._unseen > MAX_BLIND_FRAMES):
             self._belief = None
         if self._belief is None and blind:
             return self._held(observation, began)
         spent = self._begin(observation) if self._belief is None else 0
         belief = self._belief
         assert belief is not None
-        state, spread = models.imm.fused(belief)
+        state, spread = models.fused(belief)
         likely = models.known[models.active[int(belief.probabilities.argmax())]]
         expected, spread = likely.predict(state, spread)
         measured = self._look(lines, expected, spread)
-        if (extra := self._missing_spread(measured)).any():
-            belief = replace(belief, covariances=belief.covariances + np.diag(extra))
+        if self._how.recovery and (extra := self._missing_spread(measured)).any():
+            belief = models.widened(belief, extra)
             measured = self._look(lines, expected, spread + np.diag(extra))
-        details = {"detection_seconds": time.perf_counter() - began}
+        details = {**self._joints(measured, expected), "detection_seconds": time.perf_counter() - began}
+        imputed = [one and one.imputed(joints) for one, joints in zip(measured, details["joints"], strict=True)]
+        if self._how.hidden == "imputed":
+            measured = imputed
 
         filtering, used = time.perf_counter(), spent
 
@@ -197,7 +201,7 @@ class TrackFilter:
 
         surprise = float(np.mean([one.surprise for one in measured if one is not None] or [0.0]))
         self._belief = models.cycle(belief, measure, surprise)
-        state, spread = models.imm.fused(self._belief)
+        state, spread = models.fused(self._belief)
         details["filter_seconds"] = time.perf_counter() - filtering
         poses, places = decode(state[None], self._reliance)
         pose, place = poses[0], places[0]
@@ -206,9 +210,12 @@ class TrackFilter:
             if result is not None:
                 pose, used = result.pose, used + result.evaluations
                 self._belief = models.imm.updated(self._belief, result.measure)
-                place = models.imm.fused(self._belief)[0][:3]  # one frame alone hardly shows the depth
-        models.record(self._cameras.figure.project(self._task.cameras[0], models.imm.fused(self._belief)[0])[0])
-        details |= {**self._joints(measured, expected), "surprise": surprise, **self._model_details()}
+                place = models.fused(self._belief)[0][:3]  # one frame alone hardly shows the depth
+        drawn = imputed[0].points if imputed[0] else details["joints"][0]
+        if self._how.angles == "state":
+            drawn, _ = self._cameras.figure.project(self._task.cameras[0], models.fused(self._belief)[0])
+        models.record(drawn)
+        details |= {"surprise": surprise, **self._model_details()}
         return self._frame(pose, place, observation, used + 1, began, details)
 
     def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[JointMeasurement | None]:
@@ -229,7 +236,7 @@ class TrackFilter:
         models = list(self._models.known.values())
         state = estimated_state(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
         self._models.restart()
-        self._belief = start(state, np.diag((UNSURE * self._free) ** 2), len(models))
+        self._belief = self._models.start(state, np.diag((UNSURE * self._free) ** 2))
         self._bad = 0
         self._missing = dict.fromkeys(_LIMBS, 0)
         return matcher.evaluations
@@ -264,6 +271,7 @@ class TrackFilter:
         belief, models = self._belief, self._models
         details: dict[str, Any] = {"lost": belief is None, "models": models.active}
         details |= {"group": models.group, "newcomer": models.newcomer, "groups": models.groups}
+        details |= {"restarts": models.restarts}
         if belief is not None:
             details |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
         return details
@@ -298,61 +306,62 @@ class TrackFilter:
         return self._latest
 
 
-@dataclass(frozen=True, eq=False)
 class VSMM:
-    """Follows a person by the joints that rules find in a silhouette, with the motion models of one group at a time."""
+    """Follows a person by the joints that rules find in a silhouette, with the motion models of one group at a time.
 
-    task: Task
-    switching: Switching = field(repr=False)
-    search: Searcher | None = field(default=None, repr=False)  # with one, every frame ends in a search
+    With a `search`, every frame ends in one.
+    """
+
+    def __init__(self, task: Task, how: Settings, search: Searcher | None = None) -> None:
+        self.task, self.how, self.search = task, how, search
+        self.library = library(how.shrink, how.models)
+        self.topology = read_topology(Path(how.groups) if how.groups else None, self.library.names)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; its `details` hold models, probabilities, group and joints."""
-        filtered = TrackFilter(self.task, self.switching, rng, self.search)
+        filtered = TrackFilter(self, rng)
         for observation in observations:
             yield filtered.frame(observation)
 
 
-def vsmm(
-    task: Task,
-    *,
-    structure: Structure = "variable",
-    groups: str = "",
-    shrink: Shrink = "identity",
-    smoothing: int = Rules.smoothing,
-    floor_degrees: float = Rules.floor_degrees,
-    dwell: int = Rules.dwell,
-    new: New = "rerun",
-    test: Test = "sequential",
-    false_alarm: float = SequentialTest.false_alarm,
-    miss: float = SequentialTest.miss,
-    longest: int = SequentialTest.longest,
-) -> VSMM:
+def vsmm(task: Task, **given: Any) -> VSMM:
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
-    The patent's own form: smoothing=1 floor_degrees=0 dwell=0 new=patent test=patent.
+    `vsmm:patent` sets every interpretation to the patent's letter, but for what else is given.
 
     Settings:
+        variant: the preset, "default" or "patent".
         structure: "variable", one group at a time and two while it changes; "all" models always, a plain IMM.
         groups: path of a TOML file of groups and neighbours; "" is the package's own. Step 4, Interpretation V1.
-        shrink: what ridge regression drew the models' F towards, "identity" or "zero". Interpretation V5.
+        quaternions: kept on their "manifold", or "vector": plain numbers, as in the patent. Interpretation V4.
+        shrink: what the models' F is drawn towards, "identity" in normalised units, or "zero". Interpretation V5.
+        models: path of a file of models, with another lambda; "" is the package's own. Step 3, Interpretation V5.
+        clip_rate: F is a step of the "video", or of the "clip" at 120 a second, as in the patent. Interpretation V6.
+        joint_errors: of the joint rules, "measured", or "plain": unbiased, the torso's the root's. Interpretation V8.
+        hidden: joints that are not detected are "dropped", or "imputed", as in the patent. Interpretation V9.
+        assignment: of end points to hands and feet, "optimal", or each the "nearest". Interpretation V15.
+        gates: whether detections far from where they are expected are rejected. Interpretation V15; no in the patent.
+        angles: whose changes activate a group, of the projected "state" or of "detected" joints. Interpretation V15.
+        hip_angle: that of the thigh to the "trunk" or to the "vertical". Interpretation V15.
+        most: of the four lower limbs, 1 or more. Interpretation V15.
         smoothing: frames over which changes of angles are averaged, 1 or more. Interpretation V10; 1 in the patent.
         floor_degrees: a change below it is none, degrees a frame, 0 or more. Interpretation V10; 0 in the patent.
         dwell: frames that a group stays at least, 0 or more. Interpretation V10; 0 in the patent.
         new: how the models of a new group start: "rerun" of the cycle, or the "patent"'s rule. Interpretation V11.
+        poses: that the patent's rule starts from, "typical" means or "captured" ones. Interpretation V16.
         test: which group has to go: Wald's "sequential" probability ratio test, or the "patent"'s. Interpretation V12.
         false_alarm (alpha): share of wrong groups that are kept, between 0 and 0.5. Interpretation V12.
         miss (beta): share of right groups that the sequential test drops, between 0 and 0.5. Interpretation V12.
         longest: frames after which the more probable group stays, 1 or more. Interpretation V12.
+        restart: whether all models come back where those in force explain nothing. Interpretation V14.
+        recovery: whether a lost pose is estimated again and a lost limb sought all around. Interpretation V14.
     """
-    carried = library(shrink)
-    topology = read_topology(Path(groups) if groups else None, carried.names)
-    switching = Switching(
-        library=carried,
-        topology=topology,
-        structure=structure,
-        rules=Rules(smoothing=smoothing, floor_degrees=floor_degrees, dwell=dwell),
-        new=new,
-        test=SequentialTest(test=test, false_alarm=false_alarm, miss=miss, longest=longest),
-    )
-    return VSMM(task, switching)
+    return VSMM(task, Settings.of(given))
+
+
+vsmm.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+    [
+        inspect.Parameter("task", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=Task),
+        *inspect.signature(Settings).parameters.values(),
+    ]
+)

@@ -219,11 +219,11 @@ def test_a_senseless_setting_is_one_line_and_status_2() -> None:
             ("structure=some", "structure must be"),
             ("new=old", "new must be"),
             ("test=coin", "test must be"),
-            ("false_alarm=0.7", "false_alarm must be between 0 and 0.5, got 0.7"),
-            ("miss=0.0", "miss must be between 0 and 0.5, got 0.0"),
+            ("false_alarm=0.7", "false_alarm must lie between 0 and 0.5, got 0.7"),
+            ("miss=0.0", "miss must lie between 0 and 0.5, got 0.0"),
             ("smoothing=0", "smoothing must be at least 1, got 0"),
             ("dwell=-1", "dwell must be 0 or more, got -1"),
-            ("floor_degrees=-1.0", "floor_degrees must be 0 or more, got -1.0"),
+            ("floor_degrees=-1.0", "floor_degrees must be at least 0, got -1.0"),
             ("longest=0", "longest must be at least 1, got 0"),
             ("shrink=half", "shrink must be"),
         ]
@@ -243,17 +243,10 @@ def test_a_senseless_setting_of_the_joined_tracker_is_one_line() -> None:
 # ------------------------------------------------------------------------------------------------------------ whole
 
 
-@pytest.mark.slow
-def test_the_patents_own_form_runs() -> None:
-    for settings in cases(
-        [
-            {"structure": "all"},
-            {"smoothing": 1, "floor_degrees": 0.0, "dwell": 0, "new": "patent", "test": "patent"},
-            {"shrink": "zero"},
-        ]
-    ):
-        task, observations = seen(frames=60)
-        follow(task, observations, **settings)
+@each("settings", [{"structure": "all"}, {"variant": "patent"}, {"variant": "patent", "recovery": True}])
+def test_other_forms_run(settings: dict[str, Any]) -> None:
+    task, observations = seen(frames=40)
+    follow(task, observations, **settings)
 
 
 @pytest.mark.slow

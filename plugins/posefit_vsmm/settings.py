@@ -1,0 +1,90 @@
+"""All that `vsmm` may do in another way than the patent writes it, and the two presets."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from posefit.fitting.check import at_least, between, one_of, whole
+
+Variant = Literal["default", "patent"]
+Structure = Literal["variable", "all"]
+Quaternions = Literal["manifold", "vector"]
+Shrink = Literal["identity", "zero"]
+ClipRate = Literal["video", "clip"]
+JointErrors = Literal["measured", "plain"]
+Hidden = Literal["dropped", "imputed"]
+Assignment = Literal["optimal", "nearest"]
+AngleSource = Literal["state", "detected"]
+HipAngle = Literal["trunk", "vertical"]
+New = Literal["rerun", "patent"]
+Poses = Literal["typical", "captured"]
+Test = Literal["sequential", "patent"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The settings of `vsmm`; see `posefit_vsmm.tracker.vsmm` for what they mean."""
+
+    variant: Variant = "default"
+    structure: Structure = "variable"
+    groups: str = ""
+    quaternions: Quaternions = "manifold"
+    shrink: Shrink = "identity"
+    models: str = ""
+    clip_rate: ClipRate = "video"
+    joint_errors: JointErrors = "measured"
+    hidden: Hidden = "dropped"
+    assignment: Assignment = "optimal"
+    gates: bool = True
+    angles: AngleSource = "state"
+    hip_angle: HipAngle = "trunk"
+    most: int = 3
+    smoothing: int = 4
+    floor_degrees: float = 2.0
+    dwell: int = 10
+    new: New = "rerun"
+    poses: Poses = "typical"
+    test: Test = "sequential"
+    false_alarm: float = 0.01
+    miss: float = 0.01
+    longest: int = 45
+    restart: bool = True
+    recovery: bool = True
+
+    def __post_init__(self) -> None:
+        for name, annotation in type(self).__annotations__.items():
+            if choices := get_args(annotation):
+                one_of(name, getattr(self, name), choices)
+        for name in ("smoothing", "most", "longest"):
+            whole(name, getattr(self, name), 1)
+        whole("dwell", self.dwell, 0)
+        at_least("floor_degrees", self.floor_degrees, 0.0)
+        for name in ("false_alarm", "miss"):
+            between(name, getattr(self, name), 0.0, 0.5, ends=False)
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> "Settings":
+        """Return a preset with some settings changed. Raises ValueError where a value is none that it may be."""
+        return cls(**(PATENT | given if given.get("variant") == "patent" else given))
+
+
+# Every interpretation as the patent's letter has it.
+PATENT: Mapping[str, Any] = {
+    "quaternions": "vector",  # Interpretation V4
+    "shrink": "zero",  # Interpretation V5
+    "clip_rate": "clip",  # Interpretation V6
+    "joint_errors": "plain",  # Interpretation V8
+    "hidden": "imputed",  # Interpretation V9
+    "assignment": "nearest",  # Interpretation V15
+    "gates": False,  # Interpretation V15
+    "angles": "detected",  # Interpretation V15
+    "hip_angle": "vertical",  # Interpretation V15
+    "smoothing": 1,  # Interpretation V10
+    "floor_degrees": 0.0,  # Interpretation V10
+    "dwell": 0,  # Interpretation V10
+    "new": "patent",  # Interpretation V11
+    "poses": "captured",  # Interpretation V16
+    "test": "patent",  # Interpretation V12
+    "restart": False,  # Interpretation V14
+    "recovery": False,  # Interpretation V14
+}
