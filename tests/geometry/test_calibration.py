@@ -52,8 +52,8 @@ def test_our_own_camera_is_not_turned_however_it_is_held(tmp_path: Path) -> None
     down = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks straight down: its up is -z
     camera = Camera(320, 240, np.full(2, 300.0), np.array([160.0, 120.0]), down, np.array([0.0, 0.0, 4.0]))
     (tmp_path / "camera.json").write_text(camera.to_json())
-    found = read_calibrations(tmp_path / "camera.json")
-    np.testing.assert_allclose(found[0].camera((320, 240), upright(found)).rotation, down, atol=1e-12)
+    calibrations = read_calibrations(tmp_path / "camera.json")
+    np.testing.assert_allclose(calibrations[0].camera((320, 240), upright(calibrations)).rotation, down, atol=1e-12)
 
 
 def test_a_camera_that_is_not_placed_looks_level_from_the_origin(tmp_path: Path) -> None:

@@ -10,39 +10,19 @@ from hypothesis import strategies as st
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import geodesic, rotation_from_root_angles
-from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, Skeleton, angle_index
-from posefit.motion import amc, asf
+from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Skeleton, angle_index
 from posefit.motion.amc import read_amc, read_clip, write_amc
 from posefit.motion.asf import METRES_PER_UNIT, read_asf, write_asf
 from posefit.motion.motion import Motion
 from tests.cases import each
 
-CHILDREN = """\
-root lhipjoint rhipjoint lowerback
-lhipjoint lfemur
-lfemur ltibia
-ltibia lfoot
-lfoot ltoes
-rhipjoint rfemur
-rfemur rtibia
-rtibia rfoot
-rfoot rtoes
-lowerback upperback
-upperback thorax
-thorax lowerneck lclavicle rclavicle
-lowerneck upperneck
-upperneck head
-lclavicle lhumerus
-lhumerus lradius
-lradius lwrist
-lwrist lhand lthumb
-rclavicle rhumerus
-rhumerus rradius
-rradius rwrist
-rwrist rhand
-"""
+CHILDREN = "".join(
+    " ".join([name, *(child for child, above in zip(JOINTS, PARENTS, strict=True) if above == joint)]) + "\n"
+    for joint, name in enumerate(JOINTS)
+    if joint not in ENDS
+).replace("lwrist lhand", "lwrist lhand lthumb")
 DOF = {"lfemur": "rx ry rz", "ltibia": "rx", "ltoes": "rx", "lthumb": "rx rz", "rwrist": "ry", "rfoot": "rx rz"}
-HEADER = "#!OML:ASF C:\\somebody.ASF\n:FULLY-SPECIFIED\n:DEGREES\n"
+HEADER = "#!OML:ASF C:\\person.ASF\n:FULLY-SPECIFIED\n:DEGREES\n"
 FRAME = """\
 root 1 2 3 0 90 0
 lfemur 10 20 30
@@ -99,8 +79,8 @@ def clips(cmu: Path) -> list[tuple[Path, Path, int]]:
 
 
 def test_every_frame_is_kept(cmu: Path) -> None:
-    found = {clip.name: len(read_clip(skeleton, clip)) for skeleton, clip, _ in clips(cmu)}
-    assert found == {clip.name: frames for _, clip, frames in clips(cmu)}
+    lengths = {clip.name: len(read_clip(skeleton, clip)) for skeleton, clip, _ in clips(cmu)}
+    assert lengths == {clip.name: frames for _, clip, frames in clips(cmu)}
 
 
 def turn(x: float, y: float, z: float) -> Array:
@@ -214,7 +194,6 @@ def test_angles_may_be_radians(skeleton: Skeleton, tmp_path: Path) -> None:
         ("length 1\n", "length -1\n", "20: expected a length of 0 or more"),
         ("     length 1\n", "", "expected a bone with a length"),
         ("dof rx ry rz", "dof rz ry rx", "expected dof out of rx ry rz, in this order, got 'dof rz ry rx'"),
-        ("dof rx ry rz", "dof rx rx", "expected dof out of rx ry rz"),
         ("dof rx ry rz", "dof tx ty", "expected dof out of rx ry rz"),
         ("name lfemur", "name ltibia", "expected one new name"),
         ("lhipjoint lfemur\n", "", "expected bone 'lfemur' in the hierarchy"),
@@ -315,12 +294,9 @@ def test_a_clip_is_scaled_by_its_own_skeleton(tmp_path: Path) -> None:
         ("ltibia 40", "ltibia 4o", ":7: expected numbers for 'ltibia', got '4o'"),
         ("ltibia 40", "ltibia nan", ":7: expected finite numbers below 1e+06 for 'ltibia', got 'nan'"),
         ("10 20 30", "10 nan 30", ":6: expected finite numbers below 1e+06 for 'lfemur', got '10 nan 30'"),
-        ("10 20 30", "10 -inf 30", ":6: expected finite numbers"),
-        ("10 20 30", "10 1e400 30", ":6: expected finite numbers"),
         ("10 20 30", "10 1e300 30", ":6: expected finite numbers"),
         ("ltibia 40", "lfin 40", ":7: expected a bone of skeleton 'small' or a frame's number, got 'lfin 40'"),
         ("\n2\n", "\n3\n", ":12: expected frame 2, got frame 3"),
-        ("\n2\n", "\n1\n", ":12: expected frame 2, got frame 1"),
         ("\n2\n", "\n2.0\n", ":12: expected a bone of skeleton 'small' or a frame's number, got '2.0'"),
         (":DEGREES\n", "", ":3: expected :DEGREES or :RADIANS before the first frame, got frame 1"),
         (":DEGREES", ":GRADS", ":3: expected :FULLY-SPECIFIED, :DEGREES or :RADIANS, got ':GRADS'"),
@@ -456,7 +432,3 @@ def test_a_damaged_skeleton_is_read_or_refused(workshop: Path, cuts: list[tuple[
         assert str(error).startswith(f"{path}:")
     else:
         assert np.isfinite(skeleton.offsets).all()
-
-
-def test_limits_are_those_that_the_manual_names() -> None:
-    assert (amc.SIZE_LIMIT, asf.SIZE_LIMIT, amc.FPS) == (500_000_000, 1_000_000, 120.0)

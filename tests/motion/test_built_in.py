@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.arrays import Array
-from posefit.geometry.skeleton import BONES, INNER, JOINTS, MIRROR, angle_index
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import INNER, JOINTS, MIRROR, angle_index
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
@@ -38,13 +38,14 @@ CLIPS = {
     "wave-a": ("05/05_01", 0, 380),
     "wave-b": ("16/16_17", 0, 200),
 }
-# The largest mean error over all 66 angles that a style may have: nobody does an exercise twice in the same way.
+# The largest mean error over all 66 angles that a style may have: no repetition of an exercise equals another.
 RESIDUAL_DEGREES = {"walk": 1.0, "run": 1.0, "jacks": 1.6, "squat": 1.6, "jump": 1.6, "march": 3.2}
 RESIDUAL_DEGREES |= {"step": 1.0, "arms-out": 1.0, "wave": 1.0}
 KINDS = ("walk", "run", "march", "jacks", "squat", "jump", "step", "arms-out", "wave")
 GAITS = ("walk", "run", "arms-out", "wave")
 DRAWN = {"arms-out": "lr", "wave": "r"}  # whose arms are not the clip's
 CYCLE = 240  # frames
+TURNS = 2.0 * np.pi * np.arange(CYCLE) / CYCLE
 
 each_motion = each("name", built_in.names())
 each_gait = each("name", [name for name in built_in.names() if name.startswith(GAITS)])
@@ -68,15 +69,8 @@ def cycle(name: str, cycles: int = 1, **settings: Any) -> Motion:
     return built_in.motion(name, frames=cycles * CYCLE, fps=CYCLE / means(name, "period"), **settings)
 
 
-def joints(motion: Motion) -> Array:
-    return motion.skeleton.joints(motion.poses, motion.translations)
-
-
-def test_names_are_the_kinds_and_their_styles() -> None:
+def test_names_are_kinds_and_styles_and_the_other_styles_of_a_motion_never_contain_it() -> None:
     assert built_in.names() == KINDS + tuple(CLIPS)
-
-
-def test_the_other_styles_of_a_motion_never_contain_it() -> None:
     assert built_in.other_styles("walk-b") == ("walk-a", "walk-c")
     assert built_in.other_styles("run") == ("run-a", "run-b")
     for name in built_in.names():
@@ -87,18 +81,14 @@ def test_the_other_styles_of_a_motion_never_contain_it() -> None:
 
 
 @each_motion
-def test_a_motion_repeats_itself_one_travel_further(name: str) -> None:
+def test_a_motion_repeats_itself_one_travel_further_without_jumps(name: str) -> None:
     motion = cycle(name, 2)
     np.testing.assert_allclose(motion.poses[CYCLE:], motion.poses[:CYCLE], atol=1e-9)
     travel = [0.0, 0.0, means(name, "speed") * means(name, "period")]
     moved = motion.translations[CYCLE:] - motion.translations[:CYCLE]
     np.testing.assert_allclose(moved, np.tile(travel, (CYCLE, 1)), atol=1e-9)
-
-
-@each_motion
-def test_no_joint_jumps_anywhere_in_the_cycle(name: str) -> None:
-    motion = cycle(name, 2)
-    steps = np.linalg.norm(np.diff(joints(motion), axis=0), axis=-1) * motion.fps
+    assert not motion.poses[:, ~motion.skeleton.free].any()
+    steps = np.linalg.norm(np.diff(motion.joints, axis=0), axis=-1) * motion.fps
     assert steps.max() < 12.0  # m/s; a runner's foot swings forward at two to three times the pace
 
 
@@ -110,7 +100,7 @@ def test_a_motion_goes_along_z_and_has_its_middle_over_the_origin(name: str) -> 
     np.testing.assert_allclose(root[:, [0, 2]].mean(axis=0), 0.0, atol=0.02)
     assert (np.diff(root[:, 2]) > 0.0).all()
     assert abs(np.degrees(motion.poses[:, 0].mean())) < 5.0  # yaw 0 faces +z
-    placed = joints(motion)
+    placed = motion.joints
     # y is up and +z in front, so that +x is on the left
     assert (placed[:, JOINTS.index("lhipjoint"), 0] > placed[:, JOINTS.index("rhipjoint"), 0]).all()
     for side in "lr":
@@ -120,47 +110,33 @@ def test_a_motion_goes_along_z_and_has_its_middle_over_the_origin(name: str) -> 
 
 
 @each_gait
-def test_the_feet_stay_above_the_ground_and_reach_it(name: str) -> None:
-    lowest = joints(cycle(name))[..., 1].min(axis=1)
+def test_feet_reach_the_ground_and_hardly_slide_and_limbs_are_in_step(name: str) -> None:
+    motion = cycle(name)
+    joints = motion.joints
+    lowest = joints[..., 1].min(axis=1)
     assert 0.025 < lowest.min() < 0.035
     assert lowest.max() < (0.08 if name.startswith("walk") else 0.15)  # only a runner flies
-
-
-@each_gait
-def test_a_foot_on_the_ground_hardly_slides(name: str) -> None:
-    motion = cycle(name)
     for foot in ("lfoot", "rfoot"):
-        path = joints(motion)[:, JOINTS.index(foot)]
+        path = joints[:, JOINTS.index(foot)]
         down = path[:, 1] < path[:, 1].min() + 0.015
         slides = np.linalg.norm(np.gradient(path, 1.0 / motion.fps, axis=0)[down][:, [0, 2]], axis=1)
         assert slides.mean() < 0.2 * means(name, "speed")
-
-
-@each_gait
-def test_an_arm_swings_with_the_leg_of_the_other_side(name: str) -> None:
-    motion = cycle(name)
-    ahead = joints(motion)[..., 2] - motion.translations[:, None, 2]
+    ahead = joints[..., 2] - motion.translations[:, None, 2]
     for arm, leg in (("lwrist", "rfoot"), ("rwrist", "lfoot")):
-        if arm[0] in DRAWN.get(built_in.activity_of(name), ""):
-            continue
-        assert np.corrcoef(ahead[:, JOINTS.index(arm)], ahead[:, JOINTS.index(leg)])[0, 1] > 0.5
-
-
-@each_gait
-def test_at_phase_0_the_left_thigh_is_ahead(name: str) -> None:
+        if arm[0] not in DRAWN.get(built_in.activity_of(name), ""):
+            assert np.corrcoef(ahead[:, JOINTS.index(arm)], ahead[:, JOINTS.index(leg)])[0, 1] > 0.5
     left, right = (angle_index(JOINTS.index(bone)) for bone in ("lfemur", "rfemur"))
-    poses = cycle(name).poses
-    swing = poses[:, right] - poses[:, left]
-    turns = 2.0 * np.pi * np.arange(CYCLE) / CYCLE
-    assert swing @ np.cos(turns) > 0.0
-    assert abs(swing @ np.sin(turns)) < 1e-3 * (swing @ np.cos(turns))
+    swing = motion.poses[:, right] - motion.poses[:, left]
+    assert swing @ np.cos(TURNS) > 0.0  # the left thigh is ahead at phase 0
+    assert abs(swing @ np.sin(TURNS)) < 1e-3 * (swing @ np.cos(TURNS))
 
 
 @each("kind", KINDS)
-def test_styles_of_a_kind_differ_by_some_degrees(kind: str) -> None:
+def test_styles_of_a_kind_differ_by_some_degrees_and_the_kind_is_their_mean(kind: str) -> None:
     poses = {name: cycle(name).poses for name in (kind, *built_in.other_styles(kind))}
     for first, second in combinations(poses, 2):
         assert 1.0 < np.degrees(np.abs(poses[first] - poses[second]).mean()) < 25.0, (first, second)
+    np.testing.assert_allclose(poses.pop(kind), np.mean(list(poses.values()), axis=0), atol=1e-9)
 
 
 @each_exercise
@@ -169,7 +145,7 @@ def test_an_exercise_is_done_on_the_spot_facing_z(name: str) -> None:
     assert np.abs(motion.translations[:, [0, 2]]).max() < 0.25
     yaws = motion.poses[:, 0]
     assert abs(np.degrees(np.angle(np.exp(1j * yaws).mean()))) < 2.0  # of the series; the clip's own mean is 0
-    lowest = joints(motion)[..., 1].min(axis=1)
+    lowest = motion.joints[..., 1].min(axis=1)
     away = 0.005 if "-" in name else 0.025  # the mean of two people who stand firmly does not quite
     assert abs(lowest.min() - 0.03) < away
 
@@ -178,45 +154,34 @@ def test_each_exercise_is_what_it_is_called() -> None:
     head, foot, root = JOINTS.index("head"), JOINTS.index("lfoot"), JOINTS.index("root")
     hands = [JOINTS.index("lhand"), JOINTS.index("rhand")]
     for name in ("jacks", "jacks-a", "jacks-b"):
-        placed = joints(cycle(name))
+        placed = cycle(name).joints
         apart = np.abs(placed[:, foot] - placed[:, JOINTS.index("rfoot")])[:, 0]
         raised = placed[:, hands, 1].min(axis=1) > placed[:, root, 1]
         assert placed[:, hands, 1].max() > placed[:, head, 1].max()
         assert apart[raised].mean() > apart[~raised].mean() + 0.15
     for name in ("squat", "squat-a", "squat-b"):
-        assert np.ptp(joints(cycle(name))[:, root, 1]) > 0.4
+        assert np.ptp(cycle(name).joints[:, root, 1]) > 0.4
     for name in ("jump", "jump-a", "jump-b"):
-        assert joints(cycle(name))[..., 1].min(axis=1).max() > 0.1  # both feet leave the ground
+        assert cycle(name).joints[..., 1].min(axis=1).max() > 0.1  # both feet leave the ground
     for name in ("march", "march-a", "march-b"):
-        placed = joints(cycle(name))
+        placed = cycle(name).joints
         knees = [np.ptp(placed[:, JOINTS.index(side + "femur"), 1]) for side in "lr"]
         assert min(knees) > 0.25
 
 
 @each("kind", ["squat", "jump"])
-def test_at_phase_0_somebody_who_squats_or_jumps_is_down(kind: str) -> None:
+def test_at_phase_0_a_squat_or_jump_is_down(kind: str) -> None:
     for name in (kind, *built_in.other_styles(kind)):
         height = cycle(name).translations[:, 1]
-        turns = 2.0 * np.pi * np.arange(CYCLE) / CYCLE
-        assert height @ np.cos(turns) < 0.0
-        assert abs(height @ np.sin(turns)) < 1e-3 * abs(height @ np.cos(turns))
-
-
-@each("kind", KINDS)
-def test_a_kind_without_a_letter_is_the_mean_of_its_styles(kind: str) -> None:
-    styles = [cycle(style).poses for style in built_in.other_styles(kind)]
-    np.testing.assert_allclose(cycle(kind).poses, np.mean(styles, axis=0), atol=1e-9)
+        assert height @ np.cos(TURNS) < 0.0
+        assert abs(height @ np.sin(TURNS)) < 1e-3 * abs(height @ np.cos(TURNS))
 
 
 @each_motion
-def test_twice_the_speed_is_every_second_frame(name: str) -> None:
+def test_twice_the_speed_is_every_second_frame_and_a_phase_starts_later(name: str) -> None:
     slow, fast = built_in.motion(name, frames=39), built_in.motion(name, frames=20, speed=2.0)
     np.testing.assert_allclose(fast.poses, slow.poses[::2], atol=1e-12)
     np.testing.assert_allclose(fast.translations, slow.translations[::2], atol=1e-12)
-
-
-@each_motion
-def test_a_phase_starts_later_in_the_cycle(name: str) -> None:
     plain, shifted = cycle(name, 2), cycle(name, phase=0.25)
     np.testing.assert_allclose(shifted.poses, plain.poses[CYCLE // 4 : CYCLE // 4 + CYCLE], atol=1e-9)
     np.testing.assert_allclose(cycle(name, phase=1.0).poses, cycle(name).poses, atol=1e-9)
@@ -231,28 +196,14 @@ def test_frames_and_rate_are_as_asked() -> None:
     np.testing.assert_allclose(twice.poses[::2], built_in.motion("walk", frames=11).poses, atol=1e-12)
 
 
-def test_the_skeleton_is_its_own_mirror_image() -> None:
+def test_the_skeleton_is_its_own_mirror_image_and_an_adults() -> None:
     skeleton = built_in.average_skeleton()
     flip, other = np.diag([-1.0, 1.0, 1.0]), np.array(MIRROR)[1:] - 1
     np.testing.assert_allclose(skeleton.offsets, skeleton.offsets[other] @ flip, atol=1e-12)
     np.testing.assert_allclose(skeleton.axes, flip @ skeleton.axes[other] @ flip, atol=1e-12)
-    np.testing.assert_allclose(
-        skeleton.axes @ np.swapaxes(skeleton.axes, 1, 2), np.tile(np.eye(3), (26, 1, 1)), atol=1e-9
-    )
-
-
-def test_the_skeleton_has_a_grown_up_s_size_and_only_inner_joints_turn() -> None:
-    skeleton = built_in.average_skeleton()
+    np.testing.assert_allclose(skeleton.axes @ skeleton.axes.mT, np.tile(np.eye(3), (26, 1, 1)), atol=1e-9)
     assert 1.4 < np.ptp(skeleton.joints(np.zeros(66))[:, 1]) < 1.8  # from the sole to the head's joint
     assert {bone for bone, _ in skeleton.channels} <= {JOINTS[joint] for joint in INNER}
-    assert len(skeleton.lengths) == len(BONES)
-
-
-@each_motion
-def test_only_free_angles_move(name: str) -> None:
-    motion = cycle(name)
-    assert motion.skeleton is built_in.average_skeleton()
-    assert not motion.poses[:, ~motion.skeleton.free].any()
 
 
 @each("name", CLIPS)
@@ -280,10 +231,8 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
         same[[shoulder, shoulder + 1, shoulder + 2, elbow]] = False
 
     def error(phase: float) -> float:
-        made = built_in.motion(name, frames=len(recorded), fps=recorded.fps, phase=phase)
-        # a clip may have whole turns more
-        off = np.abs((made.poses - poses + np.pi) % (2.0 * np.pi) - np.pi)
-        return float(np.degrees(off[:, same].mean()))
+        model = built_in.motion(name, frames=len(recorded), fps=recorded.fps, phase=phase)
+        return float(np.degrees(np.abs(wrapped(model.poses - poses))[::4, same].mean()))  # whole turns do not count
 
     least = min(error(phase) for phase in np.arange(400) / 400)
     assert least < RESIDUAL_DEGREES[built_in.activity_of(name)]
@@ -291,7 +240,7 @@ def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -
 
 
 def test_arms_that_are_held_out_are_level_and_one_that_waves_points_up() -> None:
-    out, wave = (joints(built_in.motion(name, frames=40)) for name in ("arms-out", "wave"))
+    out, wave = (built_in.motion(name, frames=40).joints for name in ("arms-out", "wave"))
     for side, sign in (("l", 1.0), ("r", -1.0)):
         reach = out[:, JOINTS.index(f"{side}wrist")] - out[:, JOINTS.index(f"{side}clavicle")]
         assert (sign * reach[:, 0] > 0.45).all()
@@ -324,10 +273,8 @@ def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
     [
         ({"frames": 0}, "frames must be a whole number of at least 1, got 0"),
         ({"frames": 60.5}, "frames must be a whole number of at least 1, got 60.5"),
-        ({"frames": True}, "frames must be a whole number of at least 1, got True"),
         ({"fps": 0.0}, "fps and speed must be positive, got 0.0 and 1.0"),
         ({"speed": -1.0}, "fps and speed must be positive, got 30.0 and -1.0"),
-        ({"speed": np.inf}, "fps and speed must be positive, got 30.0 and inf"),
         ({"phase": np.nan}, "phase must be finite, got nan"),
     ],
 )

@@ -31,13 +31,11 @@ def test_a_clip_is_the_recorded_one_to_a_centimetre(cmu30: Path, subject: str) -
         for name, length in zip(stored["names"].tolist(), stored["lengths"].tolist(), strict=True):
             part = slice(start, start + length)
             start += length
-            found = recorded.clip(name)
-            motion = found.motion()
-            assert (found.subject, len(motion), motion.fps) == (subject, length, 30.0)
-            true = found.skeleton.joints(
-                stored["poses"][part].astype(float), stored["translations"][part].astype(float)
-            )
-            away = np.linalg.norm(found.skeleton.joints(motion.poses, motion.translations) - true, axis=-1)
+            clip = recorded.clip(name)
+            motion = clip.motion()
+            assert (clip.subject, len(motion), motion.fps) == (subject, length, 30.0)
+            true = clip.skeleton.joints(stored["poses"][part].astype(float), stored["translations"][part].astype(float))
+            away = np.linalg.norm(clip.skeleton.joints(motion.poses, motion.translations) - true, axis=-1)
             assert away.max() < 0.01 + ROUNDED
 
 
@@ -98,7 +96,7 @@ def test_the_command_lists_what_there_is() -> None:
     listed = CliRunner().invoke(main, ["motions"]).stdout
     assert "library:16 " in listed
     assert "walk-a" in listed
-    found: dict[str, Any] = json.loads(CliRunner().invoke(main, ["motions", "--json"]).stdout)
-    assert found["recorded"][0] == {"name": "02_01", "subject": "02", "seconds": pytest.approx(85 / 30, abs=1e-3),
+    listing: dict[str, Any] = json.loads(CliRunner().invoke(main, ["motions", "--json"]).stdout)
+    assert listing["recorded"][0] == {"name": "02_01", "subject": "02", "seconds": pytest.approx(85 / 30, abs=1e-3),
                                     "poses": len(recorded.clip("02_01"))}  # fmt: skip
-    assert len(found["recorded"]) == 216
+    assert len(listing["recorded"]) == 216

@@ -12,7 +12,7 @@ LEFT, RIGHT = JOINTS.index("lfoot"), JOINTS.index("rfoot")
 
 
 def still(frames: int) -> np.ndarray:
-    """Return joints (T, 27, 3) of somebody whose joints all stay 1 m above the ground, but for the feet, on it."""
+    """Return joints (T, 27, 3) of a person whose joints all stay 1 m above the ground, but for the feet, on it."""
     joints = np.ones((frames, len(JOINTS), 3))
     joints[:, [LEFT, RIGHT], 1] = 0.0
     return joints
@@ -23,10 +23,10 @@ def test_what_falls_accelerates_as_it_does_at_any_rate(fps: float, left_out: int
     times = np.arange(40) / fps
     joints = still(40)
     joints[..., 1] -= 0.5 * 9.81 * times[:, None] ** 2
-    found = acceleration(joints, fps)
-    np.testing.assert_allclose(found[left_out:-left_out], 9.81)
-    assert np.isnan(found[:left_out]).all()
-    assert np.isnan(found[-left_out:]).all()
+    accelerations = acceleration(joints, fps)
+    np.testing.assert_allclose(accelerations[left_out:-left_out], 9.81)
+    assert np.isnan(accelerations[:left_out]).all()
+    assert np.isnan(accelerations[-left_out:]).all()
 
 
 def test_an_even_way_has_no_acceleration_and_two_frames_have_none_that_is_known() -> None:
@@ -56,10 +56,10 @@ def test_a_step_is_as_long_as_a_foot_creeps_along_the_ground() -> None:
     joints[20:40, LEFT, 1] = 0.2  # two steps of the left foot, one of the right
     joints[40:, LEFT] += np.arange(20)[:, None] * [0.003, 0.0, 0.004]  # 5 mm a frame, 15 cm a second
     stands = standing(joints, 30.0)
-    found = slides(joints, stands)
-    assert len(found) == 3
-    assert found[0] == found[2] == 0.0
-    assert found[1] == pytest.approx(0.005 * (stands[40:, 0].sum() - 1))
+    lengths = slides(joints, stands)
+    assert len(lengths) == 3
+    assert lengths[0] == lengths[2] == 0.0
+    assert lengths[1] == pytest.approx(0.005 * (stands[40:, 0].sum() - 1))
 
 
 def test_the_lowest_place_of_the_feet_is_the_ground_wherever_that_is() -> None:
@@ -79,7 +79,7 @@ def test_recorded_walkers_stand_half_of_the_time_and_slide_by_about_two_centimet
     joints = motion.skeleton.joints(motion.poses, motion.translations)
     stands = standing(joints, motion.fps)
     assert 0.3 < stands.mean() < 0.7
-    found = slides(joints, stands)
-    assert 4 <= len(found) <= 8
-    assert found.mean() < 0.025
+    lengths = slides(joints, stands)
+    assert 4 <= len(lengths) <= 8
+    assert lengths.mean() < 0.025
     assert 3.0 < np.nanmean(acceleration(joints, motion.fps)) < 9.0
