@@ -1,4 +1,4 @@
-"""Videos of somebody in patterned clothes, rendered before a still background: passing by, or there all the time."""
+"""Videos of a person in patterned clothes, rendered before a still background: passing by, or always there."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,15 +8,13 @@ import cv2
 import numpy as np
 
 import posefit
-from posefit.footage.video import Video
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 
 SIZE = (320, 240)
 FRAMES = 60
 DEMO = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "demo.mp4"
-LAWN = (0, 345, 1547, 649)  # of the demo video: where nobody is to be seen in its first 28 frames
-Kind = Literal["passing", "jumping", "waving", "standing", "leaving", "grey"]
+Kind = Literal["passing", "jumping", "waving", "standing", "leaving"]
 
 
 def backgrounds() -> list[Any]:
@@ -27,21 +25,14 @@ def backgrounds() -> list[Any]:
     return [np.clip(place + rng.normal(0.0, 3.0, place.shape), 0, 255).astype(np.uint8) for _ in range(FRAMES)]
 
 
-def filmed_backgrounds() -> list[Any]:
-    """Return the empty lawn of the demo video, with the noise of its camera."""
-    images = list(Video.of(DEMO).frames(0, 28, (640, 360)))
-    there_and_back = [*images, *images[-2:0:-1]]
-    return [there_and_back[k % len(there_and_back)] for k in range(FRAMES)]
-
-
 def moving(kind: Kind) -> posefit.Motion:
-    """Return how somebody moves."""
+    """Return how the person moves."""
     name = {"jumping": "jacks", "waving": "wave", "standing": "wave"}.get(kind, "walk")
     motion = built_in.motion(name, frames=FRAMES)
     places = motion.translations.copy()
     places[:, [0, 2]] = 0.0
     sway = np.sin(np.arange(FRAMES) / 9.0)
-    if kind in ("passing", "grey"):
+    if kind == "passing":
         places[:, 2] = np.linspace(-1.4, 1.4, FRAMES)
     elif kind == "leaving":
         places[36:, 2] = np.linspace(0.0, 3.0, FRAMES - 36)
@@ -52,25 +43,25 @@ def moving(kind: Kind) -> posefit.Motion:
 
 
 def composed(path: Path, kind: Kind, places: list[Any]) -> tuple[Path, list[Any]]:
-    """Write a video and return it with the true mask of each frame; `grey` has trousers of the place's own colour."""
+    """Write a video and return it with the true mask of each frame."""
     rng = np.random.default_rng(0)
     tall, wide = places[0].shape[:2]
     motion = moving(kind)
     body = posefit.Body.of(motion.skeleton)
-    azimuth = np.pi / 2 if kind in ("passing", "grey", "leaving") else 0.6
-    middle, away = (1.35, 6.9) if wide > 400 else (1.1, 5.5)  # on the lawn, his head below the roof
-    camera = posefit.Camera.around(np.array([0.0, middle, 0.0]), azimuth, away, (wide, tall))
+    azimuth = np.pi / 2 if kind in ("passing", "leaving") else 0.6
+    camera = posefit.Camera.around(np.array([0.0, 1.1, 0.0]), azimuth, 5.5, (wide, tall))
     cloth = cv2.GaussianBlur(rng.normal(0.0, 1.0, (tall, wide)), (0, 0), 2.0)
     cloth *= 14.0 / cloth.std()
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (wide, tall))
     writer.set(cv2.VIDEOWRITER_PROP_QUALITY, 95)
     masks = []
-    trousers = places[0].mean(axis=(0, 1)) if kind == "grey" else np.array((90.0, 60.0, 40.0))
     for place, pose, where in zip(places, motion.poses, motion.translations, strict=True):
         mask = project(body, camera, pose, where)
         rows = np.flatnonzero(mask.any(axis=1))
         down = ((np.arange(tall) - rows.min(initial=tall)) / max(1, len(rows)))[:, None, None]
-        colour = np.where(down < 0.14, (120.0, 150.0, 200.0), np.where(down < 0.5, (60.0, 50.0, 140.0), trousers))
+        colour = np.where(
+            down < 0.14, (120.0, 150.0, 200.0), np.where(down < 0.5, (60.0, 50.0, 140.0), (90.0, 60.0, 40.0))
+        )
         moved = (
             np.roll(cloth, tuple(int(v) for v in np.argwhere(mask).mean(axis=0)), axis=(0, 1)) if len(rows) else cloth
         )
@@ -80,9 +71,3 @@ def composed(path: Path, kind: Kind, places: list[Any]) -> tuple[Path, list[Any]
         masks.append(mask)
     writer.release()
     return path, masks
-
-
-def overlap(found: Any, masks: list[Any]) -> float:
-    """Return the mean IoU of masks with the true ones, where somebody is whole in the picture."""
-    whole = [k for k, mask in enumerate(masks) if mask.any() and not mask[:, [0, -1]].any()]
-    return float(np.mean([(found[k] & masks[k]).sum() / max(1, (found[k] | masks[k]).sum()) for k in whole]))

@@ -1,20 +1,44 @@
 """A synthetic video of a walk, whose masks are known."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 
 import posefit
+from posefit.cli import main
+from posefit.footage import segmentation
 from posefit.motion import built_in
+from posefit.registry import Offer
 from posefit.silhouette.cost import project
 
 SIZE = (160, 120)
 NOBODY = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
-EMPTY, FRAMES = 12, 48  # frames without anybody, then frames of a walk across
+EMPTY, FRAMES = 12, 48  # frames without a person, then frames of a walk across
+
+
+def run(*words: object) -> Result:
+    """Return the result of a command."""
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def error_of(*words: object) -> str:
+    """Return the one line with which a command refuses its arguments."""
+    result = run(*words)
+    assert result.exit_code == 2, result.output
+    (line,) = (line for line in result.stderr.splitlines() if line.startswith("posefit:"))
+    return line
+
+
+def iou(first: Any, second: Any) -> float:
+    """Return the overlap of two masks."""
+    return float((first & second).sum() / max(1, (first | second).sum()))
 
 
 def walk() -> posefit.Motion:
@@ -31,11 +55,11 @@ def camera(azimuth: float) -> posefit.Camera:
 
 
 def truth(azimuth: float = np.pi / 2) -> list[Any]:
-    """Return the masks of a walk across, as a camera at an azimuth sees it."""
+    """Return the masks of a walk across, viewed by a camera at an azimuth."""
     motion = walk()
     body = posefit.Body.of(motion.skeleton)
-    seen = zip(motion.poses, motion.translations, strict=True)
-    return [project(body, camera(azimuth), pose, place) for pose, place in seen]
+    placed = zip(motion.poses, motion.translations, strict=True)
+    return [project(body, camera(azimuth), pose, place) for pose, place in placed]
 
 
 def film(path: Path, masks: list[Any]) -> Path:
@@ -56,3 +80,18 @@ def film(path: Path, masks: list[Any]) -> Path:
 def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
     masks = [NOBODY] * EMPTY + truth()
     return film(tmp_path_factory.mktemp("video") / "walk.avi", masks), masks
+
+
+@pytest.fixture
+def segmenter(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Any], None]:
+    """Return how a segmenter is registered."""
+    registry = segmentation.registry()
+
+    def register(name: str, factory: Any) -> None:
+        offer = Offer("segmenter", name, factory, "its-maker", "1.0")
+        changed = SimpleNamespace(
+            offers=registry.offers, offer=lambda kind, other: offer if other == name else registry.offer(kind, other)
+        )
+        monkeypatch.setattr(segmentation, "registry", lambda: changed)
+
+    return register

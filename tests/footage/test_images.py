@@ -1,4 +1,4 @@
-"""Pictures of strangers: their size is known before they are unpacked."""
+"""Images that may be hostile: their size is known before they are decoded."""
 
 import struct
 import zlib
@@ -14,20 +14,14 @@ from posefit.footage.readers import read_masks
 
 
 def test_the_size_that_is_stated_is_the_size_that_comes(tmp_path: Path) -> None:
-    for channels in [1, 3]:
-        for suffix in [".png", ".jpg", ".bmp", ".tif", ".pgm", ".ppm"]:
-            folder_of_case = tmp_path / str(len(list(tmp_path.iterdir())))
-            folder_of_case.mkdir()
-            if (suffix, channels) in ((".pgm", 3), (".ppm", 1)):
-                continue
-            drawn = np.random.default_rng(0).integers(0, 255, (37, 53, channels), dtype=np.uint8)
-            path = folder_of_case / f"a{suffix}"
-            assert cv2.imwrite(str(path), drawn if channels == 3 else drawn[..., 0])
+    drawn = np.random.default_rng(0).integers(0, 255, (37, 53, 3), dtype=np.uint8)
+    for image, suffixes in ((drawn, "png jpg bmp tif ppm"), (drawn[..., 0], "png jpg bmp tif pgm")):
+        for suffix in suffixes.split():
+            path = tmp_path / f"a.{suffix}"
+            assert cv2.imwrite(str(path), image)
             assert size_of(path.read_bytes()) == (53, 37)
-            for grey in (True, False):
-                found = read_image(path, grey=grey)
-                wanted = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR)
-                np.testing.assert_array_equal(found, wanted)
+            for grey, flag in ((True, cv2.IMREAD_GRAYSCALE), (False, cv2.IMREAD_COLOR)):
+                np.testing.assert_array_equal(read_image(path, grey=grey), cv2.imread(str(path), flag))
 
 
 def bomb(path: Path, side: int) -> None:
@@ -77,19 +71,13 @@ def test_a_size_of_many_digits_is_cut_in_the_message(tmp_path: Path) -> None:
         read_image(tmp_path / "a.pgm", grey=True)
 
 
-def test_masks_that_are_objects_are_one_line(tmp_path: Path) -> None:
-    np.savez(tmp_path / "a.npz", masks=np.array([[[{}]]], dtype=object))
-    with pytest.raises(ValueError, match="a.npz: expected an .npz file with the key masks, got masks of object"):
-        read_masks(tmp_path / "a.npz", (None, None))
-
-
 def test_masks_are_kept_as_bits_and_chosen_frames_alone(tmp_path: Path) -> None:
     drawn = np.random.default_rng(0).random((9, 31, 45)) < 0.5
     for stack in (drawn, drawn * 255.0, np.asfortranarray(drawn.astype(np.uint8))):
         np.savez_compressed(tmp_path / "a.npz", masks=stack, valid=drawn)
-        found = read_masks(tmp_path / "a.npz", (2, 7))
-        assert found.masks.nbytes == 5 * -(-31 * 45 // 8)
+        packed = read_masks(tmp_path / "a.npz", (2, 7))
+        assert packed.masks.nbytes == 5 * -(-31 * 45 // 8)
         for k in range(5):
-            np.testing.assert_array_equal(found.silhouette(k).mask, drawn[2 + k])
-            np.testing.assert_array_equal(found.silhouette(k).valid, drawn[2 + k])
-        assert found.names[0].endswith("a.npz[2]")
+            np.testing.assert_array_equal(packed.silhouette(k).mask, drawn[2 + k])
+            np.testing.assert_array_equal(packed.silhouette(k).valid, drawn[2 + k])
+        assert packed.names[0].endswith("a.npz[2]")

@@ -1,4 +1,4 @@
-"""Masks from elsewhere, as programs write them: what they mean, who is in them, and what is said where that is open."""
+"""Masks from elsewhere, as programs write them: what their values mean and which person is followed."""
 
 import json
 import struct
@@ -10,16 +10,14 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
-from posefit.cli import main
 from posefit.footage.cleaning import cleaned
 from posefit.footage.masks import PackedMasks
 from posefit.footage.readers import read_folder, read_masks
 from posefit.footage.source import scene_of
 from posefit.tracking.front import track
 from tests.cases import each
-from tests.footage.conftest import SIZE, camera, truth
+from tests.footage.conftest import SIZE, camera, error_of, run, truth
 
 ALL = (None, None)
 QUICK = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]
@@ -27,12 +25,8 @@ QUICK = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--bod
 
 @pytest.fixture(scope="module")
 def walk() -> list[Any]:
-    """Six masks of somebody who walks."""
+    """Six masks of a person who walks."""
     return truth()[10:16]
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def folder(path: Path, images: Sequence[Any], suffix: str = ".png") -> Path:
@@ -74,19 +68,18 @@ def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]]) -
 # what values mean
 
 
-def test_two_values_are_a_mask_whichever_they_are(walk: list[Any], tmp_path: Path) -> None:
-    for kind in [np.uint8, np.uint16]:
-        for values in [(0, 1), (0, 255), (0, 38), (0, 128), (64, 192)]:
-            folder_of_case = tmp_path / str(len(list(tmp_path.iterdir())))
-            folder_of_case.mkdir()
-            images = [np.where(mask, values[1], values[0]).astype(kind) for mask in walk]
-            assert check(folder(folder_of_case / "a", images), walk)[1] == []
-            np.savez(folder_of_case / "a.npz", masks=np.stack(images))
-            check(folder_of_case / "a.npz", walk)
+@each("kind", [np.uint8, np.uint16])
+@each("values", [(0, 1), (0, 255), (0, 38), (64, 192)])
+def test_two_values_are_a_mask_whichever_they_are(
+    walk: list[Any], tmp_path: Path, kind: Any, values: tuple[int, int]
+) -> None:
+    images = [np.where(mask, values[1], values[0]).astype(kind) for mask in walk]
+    assert check(folder(tmp_path / "a", images), walk)[1] == []
+    np.savez(tmp_path / "a.npz", masks=np.stack(images))
+    check(tmp_path / "a.npz", walk)
 
 
-def test_sixteen_bits_and_jpeg_are_read_as_ever(walk: list[Any], tmp_path: Path) -> None:
-    check(folder(tmp_path / "deep", [np.where(mask, 65_535, 0).astype(np.uint16) for mask in walk]), walk)
+def test_jpeg_is_cut_half_way(walk: list[Any], tmp_path: Path) -> None:
     lossy = folder(tmp_path / "lossy", [np.where(mask, 255, 0).astype(np.uint8) for mask in walk], ".jpg")
     wanted = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) > 127 for file in sorted(lossy.iterdir())]
     check(lossy, wanted)
@@ -97,20 +90,18 @@ def softened(mask: Any) -> Any:
     return cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) * 0.97
 
 
-def test_soft_masks_are_cut_half_way(walk: list[Any], tmp_path: Path) -> None:
-    for case, (kind, full) in enumerate([(np.uint8, 255), (np.uint16, 65_535), (np.float32, 1.0), (np.float64, 255)]):
-        folder_of_case = tmp_path / str(case)
-        folder_of_case.mkdir()
-        soft = [(softened(mask) * full).astype(kind) for mask in walk]
-        soft[2] = (soft[2] * 0.3).astype(kind)  # nobody, as the network thinks; a frame's own scale would show him
-        wanted = [one > (full // 2 if full > 1 else 0.5) for one in soft]
-        np.savez(folder_of_case / "a.npz", masks=np.stack(soft))
-        assert not check(folder_of_case / "a.npz", wanted)[0].usable[2]
-        if np.issubdtype(kind, np.integer):
-            check(folder(folder_of_case / "a", soft), wanted)
+@each(("kind", "full"), [(np.uint8, 255), (np.uint16, 65_535), (np.float32, 1.0), (np.float64, 255)])
+def test_soft_masks_are_cut_half_way(walk: list[Any], tmp_path: Path, kind: Any, full: float) -> None:
+    soft = [(softened(mask) * full).astype(kind) for mask in walk]
+    soft[2] = (soft[2] * 0.3).astype(kind)  # no person for the network; the frame's own scale would show one
+    wanted = [mask > (full // 2 if full > 1 else 0.5) for mask in soft]
+    np.savez(tmp_path / "a.npz", masks=np.stack(soft))
+    assert not check(tmp_path / "a.npz", wanted)[0].usable[2]
+    if np.issubdtype(kind, np.integer):
+        check(folder(tmp_path / "a", soft), wanted)
 
 
-def test_the_alpha_of_somebody_cut_out_is_the_mask(walk: list[Any], tmp_path: Path) -> None:
+def test_the_alpha_of_a_person_cut_out_is_the_mask(walk: list[Any], tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     cut_out = [
         np.dstack([rng.integers(0, 255, (*mask.shape, 3)), 255 * softened(mask)]).astype(np.uint8) for mask in walk
@@ -126,7 +117,7 @@ PALETTE = [(0, 0, 0), (128, 0, 0), (0, 128, 0), (128, 128, 0)]
 
 
 def labelled(walk: list[Any]) -> list[Any]:
-    """Return label images: the floor is 1, the person 2, somebody's bag 3."""
+    """Return label images: the floor is 1, the person 2, a bag 3."""
     images = []
     for mask in walk:
         numbers = np.zeros(mask.shape, dtype=np.uint8)
@@ -138,7 +129,7 @@ def labelled(walk: list[Any]) -> list[Any]:
 
 
 @each("kind", ["palette", "grey", "colours", "npz"])
-def test_labels_are_told_apart_and_one_is_chosen(walk: list[Any], tmp_path: Path, kind: str) -> None:
+def test_one_of_several_labels_is_chosen(walk: list[Any], tmp_path: Path, kind: str) -> None:
     images, path, label = labelled(walk), tmp_path / "masks", 2
     if kind == "palette":
         path.mkdir()
@@ -154,15 +145,13 @@ def test_labels_are_told_apart_and_one_is_chosen(walk: list[Any], tmp_path: Path
         np.savez(path, masks=np.stack(images).astype(np.int32))
     check(path, walk, label)
     names = "0x800000, 0x008000, 0x808000" if kind == "colours" else "1, 2, 3"
-    result = run("track", path, "--out", tmp_path / "out", *QUICK)
-    assert result.exit_code == 2
-    came = result.stderr.splitlines()[-1]
-    assert "expected masks of one person, got the labels " in came
-    assert "; --label N chooses one" in came
-    assert all(name in came for name in names.split(", "))
-    result = run("track", path, "--out", tmp_path / "out", "--label", "9", *QUICK)
-    assert "label must be one of those that are there, " in result.stderr
-    assert ", got 9" in result.stderr
+    error = error_of("track", path, "--out", tmp_path / "out", *QUICK)
+    assert "expected masks of one person, got the labels " in error
+    assert "; --label N chooses one" in error
+    assert all(name in error for name in names.split(", "))
+    error = error_of("track", path, "--out", tmp_path / "out", "--label", "9", *QUICK)
+    assert "label must be one of those that are there, " in error
+    assert error.endswith(", got 9")
     assert not (tmp_path / "out").exists()
     assert run("track", path, "--out", tmp_path / "out", "--label", hex(label), *QUICK).exit_code == 0
 
@@ -184,44 +173,41 @@ def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path)
     check(folder(tmp_path / "a", smooth), [one > 127 for one in smooth])
 
 
-def test_a_mistake_with_masks_is_one_line_and_leaves_nothing(walk: list[Any], tmp_path: Path) -> None:
-    for case, (words, message) in enumerate(
-        [
-            (["MASKS", "--label", "person"], "expected a whole number such as 15, or a colour 0xRRGGBB, got 'person'"),
-            (["MASKS", "--holes", "2"], "holes must lie in 0 to 1, a share of the person's area, got 2.0"),
-            (["walk", "--label", "1"], "label must be given for masks only, got 1 for a motion"),
-            (["walk", "--holes", "0.1"], "holes must be given for masks only, got 0.1 for a motion"),
-            (["SOFT", "--label", "1"], "label must be given for masks whose values are labels, PNG or whole numbers"),
-            (
-                ["PHOTOS"],
-                "photos: expected masks, got pictures in many colours; a person cut out needs an alpha channel",
-            ),
-            (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
-            (
-                ["EMPTY"],
-                "0000.png: expected a mask with a person before a background, got an empty one first, and no other",
-            ),
-            (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
-        ]
-    ):
-        folder_of_case = tmp_path / str(case)
-        folder_of_case.mkdir()
-        inputs = folder_of_case / "in"
-        inputs.mkdir()
-        images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
-        photo = [np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)]
-        stand = {
-            "MASKS": folder(inputs / "masks", images),
-            "SOFT": folder(inputs / "soft", images, ".jpg"),
-            "PHOTOS": folder(inputs / "photos", photo, ".jpg"),
-            "PICTURES": folder(inputs / "pictures", photo),
-            "EMPTY": folder(inputs / "empty", [np.zeros_like(one) for one in images]),
-            "SIZES": folder(inputs / "sizes", [images[0], images[1][::2, ::2], *images[2:]]),
-        }
-        result = run("track", *(stand.get(word, word) for word in words), "--out", folder_of_case / "out", *QUICK)
-        assert result.exit_code == 2, result.output
-        assert message in result.stderr.splitlines()[-1]
-        assert [one.name for one in folder_of_case.iterdir()] == ["in"]
+@each(
+    ("words", "message"),
+    [
+        (["MASKS", "--label", "person"], "expected a whole number such as 15, or a colour 0xRRGGBB, got 'person'"),
+        (["MASKS", "--holes", "2"], "holes must lie in 0 to 1, a share of the person's area, got 2.0"),
+        (["walk", "--label", "1"], "label must be given for masks only, got 1 for a motion"),
+        (["walk", "--holes", "0.1"], "holes must be given for masks only, got 0.1 for a motion"),
+        (["SOFT", "--label", "1"], "label must be given for masks whose values are labels, PNG or whole numbers"),
+        (["PHOTOS"], "photos: expected masks, got pictures in many colours; a person cut out needs an alpha channel"),
+        (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
+        (
+            ["EMPTY"],
+            "0000.png: expected a mask with a person before a background, got an empty one first, and no other",
+        ),
+        (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
+    ],
+)
+def test_a_mistake_with_masks_is_one_line_and_leaves_nothing(
+    walk: list[Any], tmp_path: Path, words: list[str], message: str
+) -> None:
+    inputs = tmp_path / "in"
+    inputs.mkdir()
+    images = [np.where(mask, 255, 0).astype(np.uint8) for mask in walk]
+    photo = [np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)]
+    folders = {
+        "MASKS": folder(inputs / "masks", images),
+        "SOFT": folder(inputs / "soft", images, ".jpg"),
+        "PHOTOS": folder(inputs / "photos", photo, ".jpg"),
+        "PICTURES": folder(inputs / "pictures", photo),
+        "EMPTY": folder(inputs / "empty", [np.zeros_like(image) for image in images]),
+        "SIZES": folder(inputs / "sizes", [images[0], images[1][::2, ::2], *images[2:]]),
+    }
+    words = [str(folders.get(word, word)) for word in words]
+    assert message in run("track", *words, "--out", tmp_path / "out", *QUICK).stderr.splitlines()[-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
 
 
 def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> None:
@@ -233,7 +219,7 @@ def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> N
     assert [Path(name).name for name in read_folder(path, ALL).names] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
 
 
-# who is in them
+# the people in them
 
 
 def stack(path: Path, masks: Sequence[Any]) -> Path:
@@ -241,20 +227,13 @@ def stack(path: Path, masks: Sequence[Any]) -> Path:
     return path
 
 
-def test_inverted_masks_are_turned_round_and_said(walk: list[Any], tmp_path: Path) -> None:
-    for case, write in enumerate(
-        [stack, lambda path, masks: folder(path, [255 * one.astype(np.uint8) for one in masks])]
-    ):
-        folder_of_case = tmp_path / str(case)
-        folder_of_case.mkdir()
-        path = write(folder_of_case / "a.npz", [~mask for mask in walk])
-        (warning,) = check(path, walk)[1]
-        assert (
-            warning == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
-        )
+def test_inverted_masks_are_turned_round_with_a_warning(walk: list[Any], tmp_path: Path) -> None:
+    path = stack(tmp_path / "a.npz", [~mask for mask in walk])
+    (warning,) = check(path, walk)[1]
+    assert warning == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
 
 
-def test_somebody_who_fills_a_side_is_not_inverted(tmp_path: Path) -> None:
+def test_a_person_who_fills_a_side_is_not_inverted(tmp_path: Path) -> None:
     near = np.zeros((120, 160), dtype=bool)
     near[10:, 30:130] = True  # on the lower border, for most of it
     assert check(stack(tmp_path / "a.npz", [near] * 3), [near] * 3)[1] == []
@@ -266,8 +245,8 @@ def test_empty_and_full_masks_are_held_and_counted(walk: list[Any], tmp_path: Pa
     masks[3][:] = False
     masks[4][:] = True
     path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in masks])
-    found, _ = check(path, masks)
-    assert found.usable.tolist() == [False, True, True, False, False, True]
+    packed, _ = check(path, masks)
+    assert packed.usable.tolist() == [False, True, True, False, False, True]
     result = run("track", path, "--out", tmp_path / "out", *QUICK)
     assert result.exit_code == 0, result.stderr
     assert "3 frames show too little of the person: the pose is held" in result.stdout
@@ -282,25 +261,23 @@ def blob(*middles: tuple[int, int], wide: int = 16, tall: int = 60) -> Any:
 
 
 def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Path) -> None:
-    goer, stander = [(40 + 4 * k, 60) for k in range(25)], (100, 58)
-    masks = [blob(one, tall=64) | blob(stander) for one in goer]  # he goes past, and they touch for a while
-    found, (warning,) = read(stack(tmp_path / "a.npz", masks))
+    walker, stander = [(40 + 4 * k, 60) for k in range(25)], (100, 58)
+    masks = [blob(place, tall=64) | blob(stander) for place in walker]  # they touch for a while
+    followed, (warning,) = read(stack(tmp_path / "a.npz", masks))
     for k in (*range(10), *range(20, 25)):
-        np.testing.assert_array_equal(found.silhouette(k).mask, blob(goer[k], tall=64), err_msg=str(k))
+        np.testing.assert_array_equal(followed.silhouette(k).mask, blob(walker[k], tall=64), err_msg=str(k))
     several = sum(cv2.connectedComponents(mask.astype(np.uint8))[0] > 2 for mask in masks)
     assert f"several people in {several} of 25 masks; the largest of the first is followed, then" in warning
     assert "leaps" not in warning
 
 
-def test_a_leap_to_somebody_else_is_named(tmp_path: Path) -> None:
+def test_a_leap_to_another_person_is_named(tmp_path: Path) -> None:
     masks = [blob((40, 60), tall=64) | blob((180, 60))] * 3 + [blob((180, 60)) | blob((160, 60))] * 2
     (warning,) = read(stack(tmp_path / "a.npz", masks))[1]
-    assert warning.endswith(
-        "then the nearest to the last, which leaps at " + str(tmp_path / "a.npz") + "[3]: look there"
-    )
+    assert warning.endswith(f"then the nearest to the last, which leaps at {tmp_path / 'a.npz'}[3]: look there")
 
 
-def test_somebody_in_pieces_is_one_person_and_specks_are_nobody(tmp_path: Path) -> None:
+def test_a_person_in_pieces_is_one_and_specks_are_none(tmp_path: Path) -> None:
     tree, table = blob((60, 60)), blob((60, 60))
     tree[:, 59:61] = False
     table[50:62] = False
@@ -314,7 +291,7 @@ def test_somebody_in_pieces_is_one_person_and_specks_are_nobody(tmp_path: Path) 
     check(tmp_path / "b.npz", [hidden & known] * 3)
 
 
-def test_small_holes_are_filled_unless_somebody_asks_otherwise(tmp_path: Path) -> None:
+def test_small_holes_are_filled_by_default(tmp_path: Path) -> None:
     mask = blob((60, 60), wide=40)
     holed = mask.copy()
     holed[50:53, 50:53] = False

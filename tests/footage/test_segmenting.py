@@ -1,6 +1,6 @@
-"""Is what was taken out of a video a person? Somebody who is always in the picture must never pass for one."""
+"""Whether masks from a video are a person's: one who is always in the picture is refused, or segmented well."""
 
-import json
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -8,29 +8,23 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 import posefit
-from posefit.cli import main
 from posefit.fitting.validation import BrokenRuleError
-from posefit.footage import segmentation
+from posefit.footage.extract import extract
 from posefit.footage.masks import Views
 from posefit.footage.quality import FrameQuality, disagreement, verdict
 from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
-from posefit.registry import Offer
 from posefit.silhouette.foreground import Person
+from tests.cases import each
 from tests.files import arrays
-from tests.footage.composites import DEMO, LAWN, Kind, backgrounds, composed, filmed_backgrounds, overlap
-from tests.footage.conftest import camera, truth
+from tests.footage.composites import DEMO, Kind, backgrounds, composed
+from tests.footage.conftest import camera, error_of, iou, run, truth
 
 ALWAYS: tuple[Kind, ...] = ("jumping", "waving", "standing")
 mediapipe = pytest.mark.skipif(find_spec("mediapipe") is None, reason="without mediapipe")
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 @pytest.fixture(scope="module")
@@ -41,106 +35,85 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, lis
 
 
 def segmented(path: Path, how: Extraction, frames: Any = (None, None)) -> tuple[Segmentation, list[Any]]:
-    found = Segmentation(Video.of(path), how, frames)
-    return found, [person.mask for _, person in found]
+    segmentation = Segmentation(Video.of(path), how, frames)
+    return segmentation, [person.mask for _, person in segmentation]
 
 
-def test_somebody_who_is_always_there_is_refused_before_any_tracking(films: dict[str, Any], tmp_path: Path) -> None:
-    for method in ["mixture", "median"]:
-        for kind in ALWAYS:
-            folder_of_case = tmp_path / str(len(list(tmp_path.iterdir())))
-            folder_of_case.mkdir()
-            result = run("track", films[kind][0], "--extraction", method, "--out", folder_of_case / "out")
-            assert result.exit_code == 2, result.output
-            lines = [line for line in result.stderr.splitlines() if line.startswith("posefit:")]
-            assert len(lines) == 1
-            assert f"{kind}.avi: the person seems to stand in the background" in lines[0]
-            assert "give --background with an empty picture, or --extraction mediapipe" in lines[0]
-            assert list(folder_of_case.iterdir()) == []
+def overlap(masks: list[Any], true: list[Any]) -> float:
+    """Return the mean IoU of masks with the true ones, where the whole person is in the picture."""
+    whole = [k for k, mask in enumerate(true) if mask.any() and not mask[:, [0, -1]].any()]
+    return float(np.mean([iou(masks[k], true[k]) for k in whole]))
+
+
+@each("method", ["mixture", "median"])
+@each("kind", ALWAYS)
+def test_a_person_who_is_always_there_is_refused_before_any_tracking(
+    films: dict[str, Any], tmp_path: Path, method: str, kind: Kind
+) -> None:
+    error = error_of("track", films[kind][0], "--extraction", method, "--out", tmp_path / "out")
+    assert f"{kind}.avi: the person seems to stand in the background" in error
+    assert "give --background with an empty picture, or --extraction mediapipe" in error
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_extract_shows_the_masks_that_track_refuses(films: dict[str, Any], tmp_path: Path) -> None:
-    result = run("extract", films["jumping"][0], "--out", tmp_path / "out", "--json")
-    assert result.exit_code == 0, result.output
-    said = json.loads(result.stdout)
-    assert "the person seems to stand in the background" in said["warnings"][0]
-    assert said["usable"] < 0.3 * said["frames"]
-    assert "warning: " in result.stderr
+    summary = extract(films["jumping"][0], tmp_path / "out")
+    assert "the person seems to stand in the background" in summary["warnings"][0]
+    assert summary["usable"] < 0.3 * summary["frames"]
 
 
-def test_an_empty_picture_finds_him_whatever_he_does(films: dict[str, Any]) -> None:
-    for kind in ["passing", "leaving", *ALWAYS]:
-        path, masks = films[kind]
-        found, seen = segmented(path, Extraction(background=str(path.with_name("empty.png"))))
-        assert found.method == "mean"
-        assert overlap(seen, masks) > 0.8
-        assert found.verdict is None
-        assert found.summary["usable"] >= 49  # of 60; who leaves is not seen whole in the last 11
+@each("kind", ["passing", "leaving", *ALWAYS])
+def test_with_an_empty_picture_the_person_is_segmented_whatever_they_do(films: dict[str, Any], kind: Kind) -> None:
+    path, true = films[kind]
+    segmentation, masks = segmented(path, Extraction(background=str(path.with_name("empty.png"))))
+    assert segmentation.method == "mean"
+    assert overlap(masks, true) > 0.8
+    assert segmentation.verdict is None
+    assert segmentation.summary["usable"] >= 49  # of 60; a person who leaves is not whole in the last 11
 
 
-def test_nothing_is_said_of_somebody_who_passes_by(films: dict[str, Any]) -> None:
-    for method in ["mixture", "median"]:
-        path, masks = films["passing"]
-        found, seen = segmented(path, Extraction(method))
-        assert overlap(seen, masks) > 0.8
-        assert found.warnings == []
-        assert found.summary["usable"] > 55
+@each("method", ["mixture", "median"])
+def test_a_person_who_passes_by_causes_no_warning(films: dict[str, Any], method: str) -> None:
+    path, true = films["passing"]
+    segmentation, masks = segmented(path, Extraction(method))
+    assert overlap(masks, true) > 0.8
+    assert segmentation.warnings == []
+    assert segmentation.summary["usable"] > 55
 
 
 @mediapipe
-@pytest.mark.parametrize("kind", ALWAYS)
+@each("kind", ALWAYS)
 def test_mediapipe_needs_no_background(films: dict[str, Any], kind: Kind) -> None:
-    path, masks = films[kind]
-    found, seen = segmented(path, Extraction("mediapipe"))
-    assert overlap(seen, masks) > 0.85
-    assert found.verdict is None
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not DEMO.is_file(), reason=f"no video at {DEMO}")
-@pytest.mark.parametrize("kind", ["passing", "jumping", "standing"])
-def test_the_same_holds_before_a_real_place(kind: Kind, tmp_path: Path) -> None:
-    places = filmed_backgrounds()
-    path, masks = composed(tmp_path / "a.avi", kind, places)
-    cv2.imwrite(str(tmp_path / "empty.png"), places[0])
-    roi = tuple(round(value * 640 / 1768) for value in LAWN)
-    bad = kind != "passing"
-    for method in ("mixture", "median"):
-        found, _ = segmented(path, Extraction(method, roi=roi))  # type: ignore[arg-type]
-        assert (found.verdict is not None and found.verdict.refused) == bad
-    good = [Extraction(background=str(tmp_path / "empty.png"), roi=roi)]  # type: ignore[arg-type]
-    if find_spec("mediapipe"):
-        good.append(Extraction("mediapipe", roi=roi))  # type: ignore[arg-type]
-    for how in good:
-        found, seen = segmented(path, how)
-        assert overlap(seen, masks) > 0.85
-        assert found.verdict is None
+    path, true = films[kind]
+    segmentation, masks = segmented(path, Extraction("mediapipe"))
+    assert overlap(masks, true) > 0.85
+    assert segmentation.verdict is None
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not DEMO.is_file(), reason=f"no video at {DEMO}")
 def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_is_refused() -> None:
     walker, jumper = ((0, 420, 1520, 532), (55, 166)), ((380, 0, 600, 450), (0, 160))
-    found, masks = segmented(DEMO, Extraction(roi=walker[0]), walker[1])
-    assert found.warnings == []
-    assert found.summary["usable"] >= 110
+    segmentation, masks = segmented(DEMO, Extraction(roi=walker[0]), walker[1])
+    assert segmentation.warnings == []
+    assert segmentation.summary["usable"] >= 110
     assert segmented(DEMO, Extraction("median", roi=walker[0]), walker[1])[0].warnings == []
-    refused = segmented(DEMO, Extraction(roi=jumper[0]), jumper[1])[0].verdict
-    assert refused is not None
-    assert refused.refused
+    verdict = segmented(DEMO, Extraction(roi=jumper[0]), jumper[1])[0].verdict
+    assert verdict is not None
+    assert verdict.refused
     if find_spec("mediapipe"):
-        found, others = segmented(DEMO, Extraction("mediapipe", roi=walker[0]), walker[1])
-        assert found.warnings == []
-        assert np.mean([(a & b).sum() / (a | b).sum() for a, b in zip(masks, others, strict=True)]) > 0.75
-        found, _ = segmented(DEMO, Extraction("mediapipe", roi=jumper[0]), jumper[1])
-        assert found.verdict is None
-        assert found.summary["usable"] > 150
+        segmentation, others = segmented(DEMO, Extraction("mediapipe", roi=walker[0]), walker[1])
+        assert segmentation.warnings == []
+        assert np.mean([iou(first, second) for first, second in zip(masks, others, strict=True)]) > 0.75
+        segmentation, _ = segmented(DEMO, Extraction("mediapipe", roi=jumper[0]), jumper[1])
+        assert segmentation.verdict is None
+        assert segmentation.summary["usable"] > 150
 
 
 # the signs
 
 
-def scene(shift: int = 0, tall: int = 60, wide: int = 22) -> tuple[Any, Any]:
+def figure(shift: int = 0, tall: int = 60, wide: int = 22) -> tuple[Any, Any]:
     """Return a striped figure before grey, and its mask."""
     mask = np.zeros((120, 160), dtype=bool)
     mask[30 : 30 + tall, 60 + shift : 60 + shift + wide] = True
@@ -154,14 +127,14 @@ def of(mask: Any) -> Person:
     return Person(mask, np.ones_like(mask), int(mask.sum()), 1, 0.0, False)
 
 
-def looked(shown: Any, frames: int = 8, background: Any = None) -> list[dict[str, Any]]:
-    """Return the rows of a figure that moves by 6 pixels a frame, of which `shown` leaves a part in the mask."""
-    watch = FrameQuality(30.0, background)
-    return [watch.row(image, of(shown(mask)), k) for k, (image, mask) in enumerate(scene(6 * k) for k in range(frames))]
+def rows_of(part: Any) -> list[dict[str, Any]]:
+    """Return the rows of a figure that moves by 6 pixels a frame, of which `part` leaves a part in the mask."""
+    quality = FrameQuality(30.0)
+    return [quality.row(image, of(part(mask)), k) for k, (image, mask) in enumerate(figure(6 * k) for k in range(8))]
 
 
 def test_a_mask_that_covers_what_moves_is_usable() -> None:
-    rows = looked(lambda mask: mask)
+    rows = rows_of(lambda mask: mask)
     assert all(row["usable"] for row in rows)
     assert max(row["beside"] for row in rows) == 0.0
     assert {row["longer_side"] for row in rows} == {60}
@@ -174,86 +147,82 @@ def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
         part[:, : np.flatnonzero(mask.any(axis=0))[12]] = False
         return part
 
-    rows = looked(arm)
+    rows = rows_of(arm)
     assert min(row["beside"] for row in rows[4:]) > 0.5
     assert not any(row["usable"] for row in rows[4:])
 
 
 def test_what_has_no_persons_shape_is_not_usable() -> None:
     for tall, wide in [(10, 4), (60, 2), (40, 40)]:
-        image, mask = scene(0, tall, wide)
+        image, mask = figure(0, tall, wide)
         assert FrameQuality(30.0).row(image, of(mask), 0)["usable"] == 0
 
 
-def test_a_place_that_somebody_has_left_is_a_ghost() -> None:
-    with_him, mask = scene()
-    empty = np.full_like(with_him, 120)
-    assert FrameQuality(30.0, background=with_him).row(empty, of(mask), 0)["ghost"] == 1
-    assert FrameQuality(30.0, background=empty).row(with_him, of(mask), 0)["ghost"] == 0
+def test_a_place_that_the_person_has_left_is_a_ghost() -> None:
+    with_person, mask = figure()
+    empty = np.full_like(with_person, 120)
+    assert FrameQuality(30.0, background=with_person).row(empty, of(mask), 0)["ghost"] == 1
+    assert FrameQuality(30.0, background=empty).row(with_person, of(mask), 0)["ghost"] == 0
     assert FrameQuality(30.0).row(empty, of(mask), 0)["ghost"] == 0
 
 
 def test_one_mask_twice_as_large_as_the_others_is_not_usable_but_a_person_who_stays_so_is() -> None:
-    watch = FrameQuality(30.0)
+    quality = FrameQuality(30.0)
     sizes = [18] * 6 + [29] + [18] * 6 + [29] * 16
-    rows = [watch.row(image, of(mask), k) for k, (image, mask) in enumerate(scene(0, 60, wide) for wide in sizes)]
+    rows = [quality.row(image, of(mask), k) for k, (image, mask) in enumerate(figure(0, 60, wide) for wide in sizes)]
     assert [row["usable"] for row in rows[:13]] == [1] * 6 + [0] + [1] * 6
     assert rows[-1]["usable"] == 1
 
 
-def test_a_verdict_is_given_on_what_all_frames_say() -> None:
-    def rows(
-        beside: float = 0.0, areas: tuple[int, ...] = (100, 100), ghost: int = 0, usable: int = 1, pieces: int = 1
-    ) -> Any:
-        return [
-            {"frame": k, "area": areas[k % 2], "longer_side": 10, "touches_border": 0, "beside": beside, "ghost": ghost}
-            | {"usable": usable, "pieces": pieces}
-            for k in range(20)
-        ]
+def rows(
+    beside: float = 0.0, areas: tuple[int, ...] = (100, 100), ghost: int = 0, usable: int = 1, pieces: int = 1
+) -> list[dict[str, Any]]:
+    return [
+        {"frame": k, "area": areas[k % 2], "longer_side": 10, "touches_border": 0, "beside": beside, "ghost": ghost}
+        | {"usable": usable, "pieces": pieces}
+        for k in range(20)
+    ]
 
-    assert verdict(rows(), "mixture", learned=True) is None
-    assert verdict(rows(0.2, (100, 110)), "mixture", learned=True) is None
-    said = verdict(rows(0.6, (100, 150)), "mixture", learned=True)
-    assert said is not None
-    assert said.refused
-    assert said.text.startswith("the person seems to stand in the background: 60% of what moves lies outside the masks")
-    for warned, words in (
-        (rows(0.0, (100, 150)), "parts of the person seem to be missing"),
-        (rows(0.6), "60% of what moves near the person lies outside"),
-    ):
-        said = verdict(warned, "mean", learned=False)
-        assert said is not None
-        assert not said.refused
-        assert words in said.text
-        assert "--background" not in said.text
-    assert verdict(rows(pieces=2), "median", learned=True) is None
-    parts = verdict(rows(0.16, (100, 150), pieces=2), "median", learned=True)
-    assert parts is not None
-    assert parts.refused
-    assert parts.text == (
-        "the masks change by 50% from frame to frame and are in pieces in 100% of the frames: parts of the person seem "
-        "to be missing; give --background with an empty picture, or --extraction mediapipe"
-    )
-    ghosts = verdict(rows(ghost=1), "median", learned=True)
-    assert ghosts is not None
-    assert ghosts.refused
-    assert "100% of the masks show a place that is empty now" in ghosts.text
-    nobody = verdict(rows(usable=0)[:4], "mediapipe", learned=True)
-    assert nobody is not None
-    assert nobody.text == "expected masks of a person, got none in any of 4 frames; --roi says where to look"
+
+@each(
+    ("rows", "method", "learned", "refused", "text"),
+    [
+        (rows(), "mixture", True, None, ""),
+        (rows(0.2, (100, 110)), "mixture", True, None, ""),
+        (rows(pieces=2), "median", True, None, ""),
+        (rows(0.6, (100, 150)), "mixture", True, True, "in the background: 60% of what moves lies outside the masks"),
+        (rows(0.0, (100, 150)), "mean", False, False, "parts of the person seem to be missing; --extraction mediapipe"),
+        (rows(0.6), "mean", False, False, "60% of what moves near the person lies outside"),
+        (
+            rows(0.16, (100, 150), pieces=2),
+            "median",
+            True,
+            True,
+            "by 50% from frame to frame and are in pieces in 100%",
+        ),
+        (rows(ghost=1), "median", True, True, "100% of the masks show a place that is empty now"),
+        (rows(usable=0)[:4], "mediapipe", True, True, "got none in any of 4 frames; --roi says where to look"),
+    ],
+)
+def test_the_verdict_follows_from_all_frames(
+    rows: list[dict[str, Any]], method: str, learned: bool, refused: bool | None, text: str
+) -> None:
+    result = verdict(rows, method, learned=learned)
+    assert (None if result is None else result.refused) is refused
+    assert result is None or text in result.text
 
 
 # several cameras
 
 
 def views(folder: Path, azimuths: list[float], part: Any = lambda mask: mask) -> Views:
-    seen = []
+    masks = []
     for k, azimuth in enumerate(azimuths):
         (folder / str(k)).mkdir(parents=True)
         for n, mask in enumerate(truth(azimuth)[8:16]):
             cv2.imwrite(str(folder / str(k) / f"{n}.png"), 255 * part(mask).astype(np.uint8))
-        seen.append(read_masks(folder / str(k), (None, None)))
-    return Views(seen)
+        masks.append(read_masks(folder / str(k), (None, None)))
+    return Views(masks)
 
 
 def upper(mask: Any) -> Any:
@@ -263,7 +232,7 @@ def upper(mask: Any) -> Any:
     return part
 
 
-def test_cameras_see_one_person_of_his_height_or_it_is_said(tmp_path: Path) -> None:
+def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None:
     azimuths = [np.pi / 2, 0.6]
     cameras = [camera(azimuth) for azimuth in azimuths]
     assert disagreement(views(tmp_path / "a", azimuths), cameras, 1.75) is None
@@ -285,7 +254,7 @@ def test_cameras_see_one_person_of_his_height_or_it_is_said(tmp_path: Path) -> N
 
 
 class Half:
-    """Says that the left half is the person."""
+    """Reports the left half as the person."""
 
     def __init__(self, footage: Any, *, wrong: str = "") -> None:
         self.footage, self.wrong = footage, wrong
@@ -301,36 +270,23 @@ class Half:
         return (mask.astype(np.uint8), mask) if self.wrong == "type" else (mask, ~mask)
 
 
-@pytest.fixture
-def half(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = segmentation.registry()
-
-    class Known:
-        offers = real.offers
-
-        @staticmethod
-        def offer(kind: Any, name: str) -> Offer:
-            return Offer("segmenter", "half", Half, "posefit-half", "1.0") if name == "half" else real.offer(kind, name)
-
-    monkeypatch.setattr(segmentation, "registry", Known)
-
-
-@pytest.mark.usefixtures("half")
-def test_a_segmenter_sees_the_roi_alone_and_its_masks_are_put_where_that_is(filmed: tuple[Path, list[Any]]) -> None:
-    found, masks = segmented(filmed[0], Extraction("half", roi=(40, 10, 80, 100)), (0, 4))
+def test_a_segmenter_gets_the_roi_alone_and_its_masks_are_put_there(
+    filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
+) -> None:
+    segmenter("half", Half)
+    segmentation, masks = segmented(filmed[0], Extraction("half", roi=(40, 10, 80, 100)), (0, 4))
     assert masks[0].shape == (120, 160)
     rows, columns = np.flatnonzero(masks[0].any(axis=1)), np.flatnonzero(masks[0].any(axis=0))
     assert (rows[0], columns[0], columns[-1]) == (30, 40, 59)
-    assert found.summary["frames"] == 4
+    assert segmentation.summary["frames"] == 4
 
 
-@pytest.mark.usefixtures("half")
-def test_a_segmenter_that_breaks_a_rule_is_named(filmed: tuple[Path, list[Any]]) -> None:
+def test_a_segmenter_that_breaks_a_rule_is_named(
+    filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
+) -> None:
+    segmenter("half", Half)
     for wrong, message in [
-        (
-            "shape",
-            r"segmenter 'half': segment must return two boolean masks of shape \(120, 160\), got \(119, 160\) bool",
-        ),
+        ("shape", r"segment must return two boolean masks of shape \(120, 160\), got \(119, 160\) bool"),
         ("type", r"segmenter 'half': segment must return two boolean masks .* got \(120, 160\) uint8"),
         ("fails", "segmenter 'half': segment must not fail, got KeyError: 'lost'"),
     ]:
@@ -343,11 +299,8 @@ def test_settings_of_a_segmenter_are_checked(filmed: tuple[Path, list[Any]]) -> 
         Extraction(settings={"colour": 3})
     with pytest.raises(ValueError, match="history must be at least 1, got 0"):
         segmented(filmed[0], Extraction(settings={"history": 0}))
-    result = run("track", filmed[0], "--set", "mixture.threshold=-3")
-    assert result.exit_code == 2
-    assert "threshold must be above 0, got -3" in result.stderr
-    result = run("track", filmed[0], "--set", "median.samples=3")
-    assert "--set must name one of " in result.stderr
+    assert "threshold must be above 0, got -3" in error_of("track", filmed[0], "--set", "mixture.threshold=-3")
+    assert "--set must name one of " in error_of("track", filmed[0], "--set", "median.samples=3")
 
 
 def test_settings_of_a_segmenter_reach_it(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:

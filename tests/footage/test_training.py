@@ -1,14 +1,14 @@
-"""What a method learns from, by name."""
+"""The motions that a method learns from, by name."""
 
+import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import posefit
-from posefit.cli import main
 from posefit.footage import training
 from posefit.footage.training import POSE_BYTES, training_clips, training_motions
 from posefit.motion import built_in, recorded
@@ -16,6 +16,8 @@ from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
 from posefit.sweep.plan import Plan
+from tests.cases import each
+from tests.footage.conftest import error_of, run
 
 
 def test_people_of_the_library_are_all_their_clips_at_any_rate() -> None:
@@ -31,12 +33,7 @@ def test_a_folder_is_its_clips(cmu: Path, tmp_path: Path) -> None:
     assert [clip(30.0).name for clip in training_clips([tmp_path])] == ["16_15", "16_17"]
 
 
-def test_a_folder_without_clips_is_a_mistake(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"expected a folder of \.amc or \.bvh files, got none in it"):
-        training_clips([tmp_path])
-
-
-def test_a_recorded_person_is_followed_by_what_others_taught() -> None:
+def test_a_recorded_person_is_tracked_with_the_motions_of_others() -> None:
     track = posefit.track("09_01", train=["library:17", "library:-02,-05,-09,-14,-16,-29,-49,-127,-135"], frames=(0, 2))
     assert track.summary["train"] == ["17_03", "17_10", "17_03", "17_10"]
     assert track.motion.skeleton.name == "09"
@@ -64,15 +61,12 @@ def test_mistakes_are_one_line() -> None:
             "the library must keep at least one person, got all left out",
         ),
     ]:
-        done = CliRunner().invoke(main, ["track", "walk", *words])
-        assert done.exit_code == 2
-        assert done.stderr.startswith(f"posefit: {message}")
-        assert len(done.stderr.splitlines()) == 1
+        assert error_of("track", "walk", *words).startswith(f"posefit: {message}")
 
 
 def test_many_clips_are_counted_not_listed() -> None:
-    done = CliRunner().invoke(main, ["track", "walk", "--train", "library:16", "--frames", "0:1"])
-    assert "trained on 54 clips, 16_01 to 16_58" in done.stdout.splitlines()[0]
+    result = run("track", "walk", "--train", "library:16", "--frames", "0:1")
+    assert "trained on 54 clips, 16_01 to 16_58" in result.stdout.splitlines()[0]
 
 
 def test_clips_of_a_folder_have_their_own_rates(tmp_path: Path) -> None:
@@ -82,14 +76,13 @@ def test_clips_of_a_folder_have_their_own_rates(tmp_path: Path) -> None:
     clips = training_clips([tmp_path])
     assert [len(clip(30.0)) for clip in clips] == [21, 31]
     assert [clip.count(30.0) for clip in clips] == [20, 30]  # about as many, before it is made
-    found, whole = clips[0](30.0), built_in.motion("walk-a", frames=41, fps=60.0)
-    joints = whole.skeleton.joints(whole.poses, whole.translations)[::2]
-    np.testing.assert_allclose(found.skeleton.joints(found.poses, found.translations), joints, atol=1e-5)
+    joints = built_in.motion("walk-a", frames=41, fps=60.0).joints[::2]
+    np.testing.assert_allclose(clips[0](30.0).joints, joints, atol=1e-5)
 
 
-def test_nobody_learns_from_the_clip_that_is_followed(tmp_path: Path) -> None:
+def test_the_clip_that_is_followed_is_left_out(tmp_path: Path) -> None:
     names = {clip(30.0).name for clip in training_clips(["library:16"], followed="16_15")}
-    assert names == {one.name for one in recorded.clips(only=["16"])} - {"16_15"}
+    assert names == {clip.name for clip in recorded.clips(only=["16"])} - {"16_15"}
     same = {clip(30.0).name for clip in training_clips(["library:16"], followed=Path("somewhere/16_15.amc"))}
     assert same == names
     for name in ("a", "b"):
@@ -102,8 +95,8 @@ def test_nobody_learns_from_the_clip_that_is_followed(tmp_path: Path) -> None:
         training_clips([tmp_path / "a.bvh"], followed=str(tmp_path / "x" / ".." / "a.bvh"))
 
 
-def test_more_than_the_memory_holds_is_told_before_a_motion_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    poses = sum(int(one.times[-1]) + 1 for one in recorded.clips())
+def test_more_than_the_memory_holds_is_refused_before_a_motion_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    poses = sum(int(clip.times[-1]) + 1 for clip in recorded.clips())
     clips = training_clips(["library"])
     assert sum(clip.count(recorded.FPS) for clip in clips) == poses
     monkeypatch.setattr(training, "allowed_bytes", lambda: 3 * poses * POSE_BYTES)
@@ -114,64 +107,47 @@ def test_more_than_the_memory_holds_is_told_before_a_motion_is_made(monkeypatch:
     with pytest.raises(ValueError, match=message):
         training_motions(clips, 120.0)
     monkeypatch.setattr(training, "allowed_bytes", lambda: 100_000_000)
-    done = CliRunner().invoke(main, ["track", "walk", "--train", "library"])
-    assert done.exit_code == 2
-    assert done.stderr.startswith("posefit: train must take at most the 0.1 GB of memory that there may be, got 0.1 GB")
-    assert len(done.stderr.splitlines()) == 1
+    error = error_of("track", "walk", "--train", "library")
+    assert error.startswith("posefit: train must take at most the 0.1 GB of memory that there may be, got 0.1 GB")
 
 
-BVH = built_in.motion("walk-a", frames=3, fps=60.0)
+@each(
+    ("spoil", "message"),
+    [
+        (
+            lambda text: text.replace(text.split()[-5], "nan", 1),
+            "a.bvh: expected finite numbers below 1e[+]06, got nan",
+        ),
+        (lambda text: "\x00 no clip", "a.bvh: expected a BVH file, got one that pybvh cannot read"),
+        (
+            lambda text: text.partition("Frames:")[0] + "Frames: 0\nFrame Time: 0.02\n",
+            "a.bvh: expected a BVH file, got",
+        ),
+        (lambda text: "", "a.bvh: expected a file with content, got an empty one"),
+        (None, "expected a folder of .amc or .bvh files, got none in it"),
+    ],
+)
+def test_a_folder_with_a_clip_that_cannot_be_read_is_one_line(
+    tmp_path: Path, spoil: Callable[[str], str] | None, message: str
+) -> None:
+    path = tmp_path / "a.bvh"
+    if spoil is None:
+        path.mkdir()
+    else:
+        write_bvh(path, built_in.motion("walk-a", frames=3, fps=60.0))
+        path.write_text(spoil(path.read_text()))
+    assert re.search(message, error_of("track", "walk", "--train", tmp_path, "--out", tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_with_a_clip_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
-    for case, (spoil, message) in enumerate(
-        [
-            (
-                lambda text: text.replace(text.split()[-5], "nan", 1),
-                "a.bvh: expected finite numbers below 1e[+]06, got nan",
-            ),
-            (lambda text: "\x00 no clip", "a.bvh: expected a BVH file, got one that pybvh cannot read"),
-            (
-                lambda text: text.partition("Frames:")[0] + "Frames: 0\nFrame Time: 0.02\n",
-                "a.bvh: expected a BVH file, got",
-            ),
-            (lambda text: "", "a.bvh: expected a file with content, got an empty one"),
-            (None, "expected a folder of .amc or .bvh files, got none in it"),
-        ]
-    ):
-        folder_of_case = tmp_path / str(case)
-        folder_of_case.mkdir()
-        path = folder_of_case / "a.bvh"
-        if callable(spoil):
-            write_bvh(path, BVH)
-            path.write_text(spoil(path.read_text()))
-        else:
-            path.mkdir()
-        done = CliRunner().invoke(
-            main, ["track", "walk", "--train", str(folder_of_case), "--out", str(folder_of_case / "out")]
-        )
-        assert (done.exit_code, done.stdout) == (2, "")
-        assert len(done.stderr.splitlines()) == 1
-        with pytest.raises(ValueError, match=message):
-            training_clips([folder_of_case])
-        assert not (folder_of_case / "out").exists()
-
-
-def test_a_clip_of_one_frame_is_too_short_to_learn_from(tmp_path: Path) -> None:
-    for case, (method, message) in enumerate(
-        [
-            (["--method", "exemplars"], "a must have at least 2 frames to be followed, got 1"),
-            (["--method", "@pca"], "angles must hold at least 7 frames, got 1"),
-        ]
-    ):
-        folder_of_case = tmp_path / str(case)
-        folder_of_case.mkdir()
-        write_bvh(folder_of_case / "a.bvh", built_in.motion("walk-a", frames=1))
-        done = CliRunner().invoke(main, ["track", "walk", "--train", str(folder_of_case), "--frames", "0:2", *method])
-        assert (done.exit_code, done.stdout) == (2, "")
-        assert done.stderr.splitlines()[-1] == f"posefit: {message}"
-
-
-def test_a_library_of_one_person_is_one_to_learn_from() -> None:
-    track = posefit.track("02_01", train=["library:17"], method="exemplars", frames=(0, 3), evaluations=400)
-    assert track.summary["train"] == ["17_03", "17_10"]
+@each(
+    ("method", "message"),
+    [
+        ("exemplars", "a must have at least 2 frames to be followed, got 1"),
+        ("@pca", "angles must hold at least 7 frames, got 1"),
+    ],
+)
+def test_a_clip_of_one_frame_is_too_short_to_learn_from(tmp_path: Path, method: str, message: str) -> None:
+    write_bvh(tmp_path / "a.bvh", built_in.motion("walk-a", frames=1))
+    error = error_of("track", "walk", "--train", tmp_path, "--frames", "0:2", "--method", method)
+    assert error == f"posefit: {message}"
