@@ -1,23 +1,23 @@
-"""Images that may be hostile: the size is read from the first bytes, and checked, before OpenCV decodes one."""
+"""Images that may be hostile: Pillow reads the size, which is checked, before OpenCV decodes one."""
 
-import struct
+import io
+import warnings
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from posefit.errors import InputError
-from posefit.reading import check_size, cut
+from posefit.reading import check_size
 
 PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
 LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
 FORMATS = "PNG, JPEG, BMP, TIFF or PGM"
 INDEXED = 3  # PNG's type of colour for a palette
 COLOUR_RANGE, COLOUR_SHARE = 32, 0.02  # of 255, and the share of an image's pixels: with more it is no mask
-_FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # of JPEG: markers before a frame's height and width
-_WIDTH, _HEIGHT, _SAMPLES = 256, 257, 277  # tags of TIFF
 
 
 def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
@@ -68,13 +68,14 @@ def _content(path: Path) -> bytes | None:
         return None
     check_size(path, LARGEST_FILE)
     content = path.read_bytes()
-    size = size_of(content)
-    if size is None:
-        return None
-    if size[0] * size[1] > PIXELS:
-        came = cut(f"{size[0]}x{size[1]}")
-        raise InputError(f"{path}: expected at most {PIXELS // 10**6} million pixels, got {came}")
-    return content
+    expected = f"{path}: expected at most {PIXELS // 10**6} million pixels"
+    try:
+        size = size_of(content)
+    except Image.DecompressionBombError:
+        raise InputError(f"{expected}, got far more") from None
+    if size is not None and size[0] * size[1] > PIXELS:
+        raise InputError(f"{expected}, got {size[0]}x{size[1]}")
+    return None if size is None else content
 
 
 def _decoded(content: bytes, how: int) -> NDArray[Any] | None:
@@ -101,81 +102,19 @@ def _numbers(colours: NDArray[Any], channels: tuple[int, int, int]) -> NDArray[n
 
 
 def size_of(content: bytes) -> tuple[int, int] | None:
-    """Return the width and height that a picture states in its first bytes; None where it is no picture we read."""
+    """Return the width and height that a picture states; None where it is no picture we read.
+
+    A PNG is checked to hold each chunk that it states: OpenCV allocates what one states.
+    """
     try:
-        if content.startswith(b"\x89PNG\r\n\x1a\n") and content[12:16] == b"IHDR":
-            return struct.unpack(">II", content[16:24]) if _whole_chunks(content) else None
-        if content.startswith(b"\xff\xd8"):
-            return _jpeg(content)
-        if content.startswith(b"BM"):
-            return _bmp(content)
-        if content[:4] in (b"II*\0", b"MM\0*"):
-            return _tiff(content)
-        if content[:1] == b"P" and content[1:2] in b"123456":
-            return _pnm(content)
-    except (struct.error, IndexError, ValueError):
-        pass
-    return None
-
-
-def _whole_chunks(content: bytes) -> bool:
-    """Return whether a PNG file holds each chunk that it states: OpenCV allocates what one states."""
-    place = 8
-    while place + 8 <= len(content):
-        length = int.from_bytes(content[place : place + 4], "big")
-        if place + 12 + length > len(content):
-            return False
-        if content[place + 4 : place + 8] == b"IEND":
-            return True
-        place += 12 + length
-    return False
-
-
-def _jpeg(content: bytes) -> tuple[int, int] | None:
-    """Return the largest size of the frames that a JPEG file states."""
-    place, stated = 2, None
-    while place + 4 <= len(content):
-        if content[place] != 0xFF:
-            place += 1  # as OpenCV does, search the next marker
-            continue
-        marker = content[place + 1]
-        if marker in (0x00, 0x01, 0xFF) or 0xD0 <= marker <= 0xD8:
-            place += 1 if marker == 0xFF else 2
-            continue
-        if marker in _FRAMES:
-            tall, wide = struct.unpack(">HH", content[place + 5 : place + 9])
-            if stated is None or wide * tall > stated[0] * stated[1]:
-                stated = wide, tall
-        if marker == 0xDA:  # what follows are pixels
-            return stated
-        place += 2 + int.from_bytes(content[place + 2 : place + 4], "big")
-    return stated
-
-
-def _bmp(content: bytes) -> tuple[int, int]:
-    (header,) = struct.unpack("<I", content[14:18])
-    wide, tall = struct.unpack("<HH" if header == 12 else "<ii", content[18 : 22 if header == 12 else 26])
-    return abs(wide), abs(tall)
-
-
-def _tiff(content: bytes) -> tuple[int, int] | None:
-    """Return the size of the first picture of a TIFF file, as wide as its samples are many."""
-    order = "<" if content[:2] == b"II" else ">"
-    (place,) = struct.unpack(f"{order}I", content[4:8])
-    (count,) = struct.unpack(f"{order}H", content[place : place + 2])
-    stated: dict[int, int] = {}
-    for k in range(count):
-        entry = content[place + 2 + 12 * k : place + 14 + 12 * k]
-        tag, kind = struct.unpack(f"{order}HH", entry[:4])
-        if tag in (_WIDTH, _HEIGHT, _SAMPLES):
-            short = kind == 3
-            (stated[tag],) = struct.unpack(f"{order}{'H' if short else 'I'}", entry[8 : 10 if short else 12])
-    if not {_WIDTH, _HEIGHT} <= stated.keys():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(content), formats=("PNG", "JPEG", "BMP", "TIFF", "PPM")) as image:
+                size = image.size
+                if image.format == "PNG":
+                    image.verify()
+        return size
+    except Image.DecompressionBombError:
+        raise
+    except Exception:  # whatever the library trips over, the file is to blame
         return None
-    return stated[_WIDTH] * max(1, -(-stated.get(_SAMPLES, 1) // 4)), stated[_HEIGHT]
-
-
-def _pnm(content: bytes) -> tuple[int, int]:
-    lines = (line.partition(b"#")[0] for line in content[2:4096].split(b"\n"))
-    words = b" ".join(lines).split()
-    return int(words[0]), int(words[1])

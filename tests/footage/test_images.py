@@ -40,15 +40,17 @@ def bomb(path: Path, side: int) -> None:
 def test_a_picture_of_too_many_pixels_is_refused_before_it_is_unpacked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bomb(tmp_path / "a.png", 30_000)
     monkeypatch.setattr(cv2, "imdecode", None)
-    with pytest.raises(ValueError, match="a.png: expected at most 50 million pixels, got 30000x30000"):
-        read_masks(tmp_path, (None, None))
+    for side, came in ((8_000, "8000x8000"), (12_000, "12000x12000"), (30_000, "far more")):
+        bomb(tmp_path / "a.png", side)
+        with pytest.raises(ValueError, match=f"a.png: expected at most 50 million pixels, got {came}"):
+            read_masks(tmp_path, (None, None))
 
 
 def test_a_picture_that_opencv_refuses_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bomb(tmp_path / "a.png", 2**20 + 1)  # wider than OpenCV reads, where it raises
     monkeypatch.setattr(images, "PIXELS", 2**60)
+    monkeypatch.setattr(images.Image, "MAX_IMAGE_PIXELS", None)
     with pytest.raises(
         ValueError, match=r"a.png: expected an image \(PNG, JPEG, BMP, TIFF or PGM\), got a file that is none"
     ):
@@ -63,12 +65,6 @@ def test_a_chunk_that_says_it_has_more_than_the_file_is_not_made_room_for(
     (tmp_path / "a.png").write_bytes(content[:33] + b"\x7f" + content[34:])  # OpenCV took 2 GB for it
     monkeypatch.setattr(cv2, "imdecode", None)
     assert read_image(tmp_path / "a.png", grey=True) is None
-
-
-def test_a_size_of_many_digits_is_cut_in_the_message(tmp_path: Path) -> None:
-    (tmp_path / "a.pgm").write_bytes(b"P5\n64 " + b"1" * 1000 + b"\n255\n")
-    with pytest.raises(ValueError, match=r"got 64x1{74}\.\.\.$"):
-        read_image(tmp_path / "a.pgm", grey=True)
 
 
 def test_masks_are_kept_as_bits_and_chosen_frames_alone(tmp_path: Path) -> None:
