@@ -59,14 +59,13 @@ def _compiled(alone: Callable[[Any], Any], signature: Any) -> Any:
 @contextmanager
 def uncollected() -> Iterator[None]:
     """Have Python look for no garbage in the body: numba has so many objects that a fifth of compiling goes into it."""
-    if not gc.isenabled():
-        yield
-        return
+    enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        gc.enable()
+        if enabled:
+            gc.enable()
 
 
 @contextmanager

@@ -87,19 +87,17 @@ def people_in(silhouette: Silhouette) -> list[Mask]:
     if len(large) < 2:
         return [mask]
     through = cv2.connectedComponents((mask | ~silhouette.valid).astype(np.uint8), connectivity=8)[1]
-    groups: list[list[int]] = []
-    for k in large:
+    from scipy.sparse.csgraph import connected_components  # takes a tenth of a second to import
+
+    near = np.zeros((len(large), len(large)), dtype=bool)
+    for row, k in enumerate(large):
         distance = cv2.distanceTransform((labels != k).astype(np.uint8), cv2.DIST_L2, 3)
         joined = through == through[labels == k][0]
-        merged = [k]
-        for group in [*groups]:
-            if any(
-                _is_one_person(stats[k], stats[j], distance[labels == j].min(), joined[labels == j].all())
-                for j in group
-            ):
-                groups.remove(group)
-                merged += group
-        groups.append(merged)
+        for column, j in enumerate(large[:row]):
+            other = labels == j
+            near[row, column] = _is_one_person(stats[k], stats[j], distance[other].min(), joined[other].all())
+    owners = connected_components(near, directed=False)[1]
+    groups = [[k for k, owner in zip(large, owners, strict=True) if owner == number] for number in np.unique(owners)]
     totals = [sum(int(areas[k]) for k in group) for group in groups]
     people = [k for k in np.argsort(totals)[::-1].tolist() if totals[k] >= RIVAL_AREA * max(totals)]
     return [mask] if len(people) == 1 else [np.isin(labels, groups[k]) for k in people]

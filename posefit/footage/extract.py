@@ -3,7 +3,6 @@
 import csv
 import os
 import zipfile
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -12,13 +11,12 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.files import new_folder
-from posefit.footage.masks import PackedMasks, Range, empty_planes
-from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.masks import PackedMasks, Range
+from posefit.footage.segmentation import Extraction, Progress, Segmentation
 from posefit.footage.video import Video, VideoWriter
 from posefit.silhouette.foreground import Image, Person
 
 FILES = ("masks.npz", "preview.mp4", "quality.csv")
-Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 
 
 def extract(
@@ -43,34 +41,13 @@ def extract(
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
         with VideoWriter(building / "preview.mp4", video.fps, segmentation.size) as preview:
-            masks = segmented(segmentation, progress, lambda *frame: preview.write(_painted(*frame)))
+            masks = segmentation.masks(progress, lambda *frame: preview.write(_painted(*frame)))
         _write_npz(building / "masks.npz", masks)
         with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(segmentation.rows[0]))
             writer.writeheader()
             writer.writerows(segmentation.rows)
     return {"video": str(source), "method": how.method, **segmentation.summary}
-
-
-def segmented(
-    segmentation: Segmentation,
-    progress: Progress | None = None,
-    on_frame: Callable[[Image, Person, bool], None] | None = None,
-) -> PackedMasks:
-    """Return the masks of a video, which is decoded once.
-
-    `on_frame` gets each frame, the person in it, and whether it is usable.
-    """
-    masks, valid = (empty_planes(len(segmentation), segmentation.size) for _ in range(2))
-    frames, count = iter(segmentation), 0
-    for image, person in progress(frames, len(segmentation)) if progress else frames:
-        masks[count], valid[count] = np.packbits(person.mask), np.packbits(person.valid)
-        count += 1
-        if on_frame is not None:
-            on_frame(image, person, bool(segmentation.rows[-1]["usable"]))
-    usable = np.array([row["usable"] for row in segmentation.rows], dtype=bool)
-    names = [f"{segmentation.video.path}, frame {segmentation.start + k}" for k in range(count)]
-    return PackedMasks(names, segmentation.size, masks[:count], valid[:count], usable, segmentation.video.fps)
 
 
 def _write_npz(path: Path, masks: PackedMasks) -> None:

@@ -1,9 +1,8 @@
 """The person in a video, separated from the background frame by frame."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from inspect import Parameter
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -17,7 +16,7 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.facing import facings_on_the_spot
 from posefit.footage.images import read_image
-from posefit.footage.masks import Range, span
+from posefit.footage.masks import PackedMasks, Range, empty_planes, span
 from posefit.footage.quality import FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video
 from posefit.registry import registry
@@ -27,6 +26,7 @@ from posefit.silhouette.mask import Mask
 
 T = TypeVar("T", bound=np.generic)
 Box = tuple[int, int, int, int]  # x, y, width, height
+Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 
 DEFAULT_SEGMENTER = "mixture"
 BACKGROUND_SEGMENTER = "mean"  # where a background is given
@@ -145,9 +145,8 @@ class Segmentation:
         self.video, self.method = video, how.name
         self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
         self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
-        self._learn = partial(how.segmenter, self._film)
-        self._given = "background" in how.settings
-        self._segmenter = self._learn() if self._given else None  # a background is checked now
+        self._given, self._how = "background" in how.settings, how
+        self._segmenter = how.segmenter(self._film) if self._given else None  # a background is checked now
         self._shifts: list[float] = []
         self._facings: list[float] = []  # of each frame, as `Segmenter.facing`; NaN where unknown
         self._middles: list[float] = []  # of the mask's pixels in each frame, from the left; NaN where it is empty
@@ -155,12 +154,20 @@ class Segmentation:
     def __len__(self) -> int:
         return self.stop - self.start
 
-    def __iter__(self) -> Iterator[tuple[Image, Person]]:
-        """Learn the background and yield each frame, scaled, with the person in it; `rows` holds its quality."""
-        segmenter = self._segmenter or self._learn()
+    def masks(
+        self, progress: Progress | None = None, on_frame: Callable[[Image, Person, bool], None] | None = None
+    ) -> PackedMasks:
+        """Return the masks of the video, which is decoded once, after the background was learned.
+
+        `on_frame` gets each frame, scaled, the person in it, and whether it is usable. Raises InputError where no frame
+        shows a person.
+        """
+        masks, valid = (empty_planes(len(self), self.size) for _ in range(2))
+        segmenter = self._segmenter or self._how.segmenter(self._film)
         quality = FrameQuality(self.video.fps, getattr(segmenter, "background", None))
         motion = CameraMotion(self.size)
-        for k, image in enumerate(self.video.frames(self.start, self.stop, self.size)):
+        frames = self.video.frames(self.start, self.stop, self.size)
+        for k, image in enumerate(progress(frames, len(self)) if progress else frames):
             if k % PERIOD == 0:
                 self._shifts.append(motion.shift(image))
             result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
@@ -169,14 +176,19 @@ class Segmentation:
                 float((np.flatnonzero(result.mask) % self.size[0]).mean()) if result.area else math.nan
             )
             part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
-            self.rows.append(quality.row(self._film.cut(image), part, self.start + k))
-            if not self.video.is_filmed(self.start + k):
-                self.rows[-1]["usable"] = 0
-            yield image, result
+            row = quality.row(self._film.cut(image), part, self.start + k)
+            row["usable"] = int(row["usable"] and self.video.is_filmed(self.start + k))
+            self.rows.append(row)
+            masks[k], valid[k] = np.packbits(result.mask), np.packbits(result.valid)
+            if on_frame is not None:
+                on_frame(image, result, bool(row["usable"]))
         if not any(row["area"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
             none = "expected a person who moves before a still background, got none in any frame"
             raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
+        count, usable = len(self.rows), np.array([row["usable"] for row in self.rows], dtype=bool)
+        names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
+        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps)
 
     def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
         """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""

@@ -10,7 +10,6 @@ from typing import Any, Literal, Self
 from posefit.errors import InputError
 from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.cleaning import cleaned
-from posefit.footage.extract import segmented
 from posefit.footage.masks import FPS, Range, existing
 from posefit.footage.readers import IMAGES, read_masks
 from posefit.footage.scene import Scene, synthetic
@@ -114,7 +113,7 @@ def _filmed(segmentation: Segmentation, progress: Progress) -> CameraView:
     """Return what a video shows. Raises InputError where its masks cannot be those of a person."""
     video = segmentation.video
     progress.log(f"taking the person out of {video.path}")
-    masks = segmented(segmentation, progress.steps)
+    masks = segmentation.masks(progress.steps)
     if segmentation.verdict and segmentation.verdict.refused:
         raise InputError(segmentation.verdict.text)
     pictures = partial(video.frames, segmentation.start, segmentation.stop, segmentation.size)

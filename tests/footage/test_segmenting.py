@@ -36,7 +36,8 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, lis
 
 def segmented(path: Path, how: Extraction, frames: Any = (None, None)) -> tuple[Segmentation, list[Any]]:
     segmentation = Segmentation(Video.of(path), how, frames)
-    return segmentation, [person.mask for _, person in segmentation]
+    packed = segmentation.masks()
+    return segmentation, [packed.silhouette(k).mask for k in range(len(packed))]
 
 
 def overlap(masks: list[Any], true: list[Any]) -> float:
