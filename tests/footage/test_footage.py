@@ -1,6 +1,5 @@
 """Video and masks of real cameras: calibrations, several views, restarts, what is written, and what is resumed."""
 
-import csv
 import json
 import subprocess
 import sys
@@ -15,21 +14,15 @@ import pytest
 import posefit
 from posefit.errors import InputError
 from posefit.fitting import metrics
-from posefit.fitting.problem import PoseProblem
-from posefit.fitting.space import SearchSpace
 from posefit.footage.extract import extract
 from posefit.footage.masks import Views, undistorted
 from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import MOVED, OFTEN, PERIOD, SMALL, CameraMotion, Extraction
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
+from posefit.geometry.calibration import Calibration
 from posefit.geometry.rotation import wrapped
-from posefit.motion import built_in
-from posefit.motion.amc import read_clip
-from posefit.motion.bvh import read_bvh
-from posefit.registry import registry
 from tests.cases import each
-from tests.files import arrays
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, error_of, film, iou, run, truth, walk
 
 QUICK: dict[str, Any] = {
@@ -42,15 +35,9 @@ QUICK: dict[str, Any] = {
 BRIEF = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0"]
 
 
-@pytest.fixture(scope="module")
-def tracked(filmed: tuple[Path, list[Any]], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, posefit.Track]:
-    out = tmp_path_factory.mktemp("tracked") / "out"
+def test_a_video_is_tracked_from_nothing_but_its_frames(filmed: tuple[Path, list[Any]]) -> None:
     settings = {**QUICK, "body_frames": 12, "restarts": 4, "evaluations": 1000}
-    return out, posefit.track(filmed[0], out=out, height=1.7, **settings)
-
-
-def test_a_video_is_tracked_from_nothing_but_its_frames(tracked: tuple[Path, posefit.Track]) -> None:
-    _, result = tracked
+    result = posefit.track(filmed[0], height=1.7, **settings)
     assert result.summary["frames"] == 24
     assert result.summary["method"] == "sapso@loose"
     assert result.summary["fps"] == 25.0
@@ -61,31 +48,6 @@ def test_a_video_is_tracked_from_nothing_but_its_frames(tracked: tuple[Path, pos
     # the camera is on the person's left, so they walk to the left of the image, and face there
     assert result.motion.translations[-1, 0] < result.motion.translations[0, 0] - 0.5
     assert np.abs(wrapped(result.motion.poses[:, 0] + np.pi / 2)).mean() < np.radians(45.0)
-
-
-def test_what_is_written_opens_elsewhere(tracked: tuple[Path, posefit.Track]) -> None:
-    out, result = tracked
-    with (out / "frames.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    joints = result.motion.joints
-    assert float(rows[3]["left_ball_y"]) == pytest.approx(
-        joints[3, posefit.geometry.skeleton.JOINTS.index("lfoot"), 1], abs=1e-5
-    )
-    clip = read_clip(out / "skeleton.asf", out / "track.amc", fps=25.0)
-    np.testing.assert_allclose(clip.joints, joints, atol=1e-6)
-    bvh = read_bvh(out / "track.bvh")
-    assert bvh.fps == pytest.approx(25.0)
-    np.testing.assert_allclose(bvh.joints, joints, atol=1e-5)
-    lines = (out / "track.trc").read_text().splitlines()
-    assert lines[2].split("\t")[:5] == ["25", "25", "24", "27", "m"]
-    assert lines[3].split("\t")[:3] == ["Frame#", "Time", "pelvis"]
-    np.testing.assert_allclose(np.array(lines[6].split("\t"), dtype=float)[2:], joints[0].ravel(), atol=1e-5)
-    video = cv2.VideoCapture(str(out / "overlay.mp4"))
-    assert round(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 24
-    video.release()
-    stored = arrays(out / "poses.npz")
-    assert stored["radii"].shape == (26, 2)
-    assert dict(zip(stored["joints"], stored["places"], strict=True))["lfemur"] == "left_knee"
 
 
 def toml(path: Path, *cameras: posefit.Camera) -> Path:
@@ -123,14 +85,6 @@ def test_two_calibrated_cameras_place_the_person(filmed: tuple[Path, list[Any]],
     assert filmed_twice.summary["iou"] > 0.4
 
 
-AVERAGE = posefit.Body.of(built_in.average_skeleton())
-
-
-def space_of(body: posefit.Body) -> SearchSpace:
-    prior = registry().prior("pca")().fit(walk().poses[:, 3:], body.skeleton)
-    return SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
-
-
 def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path: Path) -> None:
     side, front = (np.stack(truth(azimuth)[8:14]).astype(np.uint8) for azimuth in (np.pi / 2, 0.6))
     usable = np.array([True, True, False, True, True, True])
@@ -141,24 +95,22 @@ def test_a_camera_that_sees_too_little_counts_for_nothing_in_that_frame(tmp_path
     assert not views[2].silhouettes[0].valid.any()
     assert views[2].silhouettes[1].valid.all()
     assert views[3].silhouettes[0].valid.all()
-    calibration = toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6))
-    sources = [tmp_path / "a.npz", tmp_path / "b.npz"]
-    result = posefit.track(
-        sources, camera=calibration, up="y", method="@loose", evaluations=200, restarts=1, body_frames=0
+    calibration, sources = (
+        toml(tmp_path / "two.toml", camera(np.pi / 2), camera(0.6)),
+        [tmp_path / "a.npz", tmp_path / "b.npz"],
     )
+    settings: dict[str, Any] = {"method": "@loose", "evaluations": 200, "restarts": 1, "body_frames": 0}
+    result = posefit.track(sources, camera=calibration, up="y", **settings)
     assert result.summary["held_frames"] == 0
-    blind = PoseProblem(AVERAGE, [camera(np.pi / 2), camera(0.6)], views[2].silhouettes, space_of(AVERAGE))
-    alone = PoseProblem(AVERAGE, [camera(0.6)], views[2].silhouettes[1:], space_of(AVERAGE))
-    pose, place = walk().poses[10:11], walk().translations[10:11]
-    np.testing.assert_array_equal(blind.cost(pose, place), alone.cost(pose, place))
+    np.savez(tmp_path / "b.npz", masks=front, usable=~usable)  # no frame shows enough in both
+    scene = scene_of(sources, camera=[calibration], up="y")
+    assert np.linalg.norm(scene.anchor - walk().translations[8]) < 1.0
 
 
 def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path: Path) -> None:
-    from posefit.geometry.calibration import read_calibrations, upright
-
-    path = toml(tmp_path / "bent.toml", camera(np.pi / 2))
-    path.write_text(path.read_text().replace("[0.0, 0.0, 0.0, 0.0]", "[0.8, 0.0, 0.0, 0.0]"))
-    (one,) = read_calibrations(path)
+    side = camera(np.pi / 2)
+    matrix = np.array([[side.focal[0], 0.0, 79.5], [0.0, side.focal[1], 59.5], [0.0, 0.0, 1.0]])
+    one = Calibration("bent", SIZE, matrix, np.array([0.8, 0.0, 0.0, 0.0]), side.rotation, side.translation)
     straight = truth()[20]
     # what the lens makes of it: each bent pixel looks up its straight place
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]].astype(np.float64)
@@ -170,13 +122,6 @@ def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path:
     silhouette = masks.silhouette(0)
     assert iou(silhouette.mask, straight) > 0.93 > iou(bent_mask > 0, straight)
     assert not silhouette.valid.all()
-    assert one.camera(SIZE, upright([one])).width == SIZE[0]
-
-
-def test_several_synthetic_cameras_see_one_motion() -> None:
-    result = posefit.track("walk", view_degrees=[0, 90], frames=(0, 4), evaluations=400)
-    assert result.summary["views"] == 2
-    assert result.summary["view_degrees"] == [0, 90]
 
 
 # interruptions
