@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 from posefit.errors import InputError
 from posefit.footage.cameras import CameraView, calibrated, combined
@@ -19,7 +19,9 @@ from posefit.geometry.body import Body
 from posefit.geometry.calibration import Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in, recorded
+from posefit.motion.amc import read_clip
 from posefit.motion.asf import read_asf
+from posefit.motion.bvh import read_bvh
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
 from posefit.reading import quoted
@@ -132,16 +134,6 @@ class SourceClip:
         """Return the motion at a rate."""
         return self.motion(fps)
 
-    @classmethod
-    def of(cls, motion: Motion) -> Self:
-        """Return the clip of a motion."""
-        return cls(motion.resampled, len(motion), motion.fps)
-
-    @classmethod
-    def of_recorded(cls, clip: recorded.RecordedClip) -> Self:
-        """Return that of a recorded clip, whose motion is made when it is asked for."""
-        return cls(lambda fps: clip.motion().resampled(fps), int(clip.times[-1]) + 1, recorded.FPS)
-
     def count(self, fps: float) -> int:
         """Return about how many poses the motion has at a rate."""
         return self.poses if self.fps is None else round(self.poses * fps / self.fps)
@@ -153,28 +145,30 @@ def clip_of(source: Source, asf: str | Path | None = None) -> SourceClip:
     A file is read once, now; the .asf of an .amc is `asf`, or the only one beside it. Raises InputError where there is
     no such motion.
     """
-    if isinstance(source, Motion):
-        return SourceClip.of(source)
     if source in built_in.names():
         name = str(source)
         return SourceClip(lambda fps: built_in.motion(name, fps=fps), len(built_in.motion(name)), None)
     if recorded.is_recorded(source):
-        return SourceClip.of_recorded(recorded.clip(str(source)))
+        return recorded_clip(recorded.clip(str(source)))
+    motion = source if isinstance(source, Motion) else _motion_in(source, asf)
+    return SourceClip(motion.resampled, len(motion), motion.fps)
+
+
+def recorded_clip(clip: recorded.RecordedClip) -> SourceClip:
+    """Return what gives a recorded clip's motion at any rate, which is made only then."""
+    return SourceClip(lambda fps: clip.motion().resampled(fps), int(clip.times[-1]) + 1, recorded.FPS)
+
+
+def _motion_in(source: str | Path, asf: str | Path | None) -> Motion:
     path = Path(source)
     if path.suffix.lower() == ".amc":
-        from posefit.motion.amc import read_clip
-
-        return SourceClip.of(read_clip(_skeleton_file(path, asf), existing(path)))
+        return read_clip(_skeleton_file(path, asf), existing(path))
     if path.suffix.lower() == ".bvh":
-        from posefit.motion.bvh import read_bvh
-
-        return SourceClip.of(read_bvh(existing(path)))
+        return read_bvh(existing(path))
     if path.exists() or path.suffix or os.sep in str(source):
-        existing(path)
-        raise InputError(
-            f"{path}: expected an .amc file, a .bvh file or a built-in motion, got {path.suffix or 'a folder'}"
-        )
-    return SourceClip.of(built_in.motion(str(source)))  # raises: there is none of that name
+        expected = "an .amc file, a .bvh file or a built-in motion"
+        raise InputError(f"{existing(path)}: expected {expected}, got {path.suffix or 'a folder'}")
+    return built_in.motion(str(source))  # raises: there is none of that name
 
 
 def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from posefit.errors import InputError
 from posefit.footage.masks import FPS
-from posefit.footage.source import MOTIONS, Source, SourceClip, clip_of
+from posefit.footage.source import MOTIONS, Source, SourceClip, clip_of, recorded_clip
 from posefit.limits import allowed_bytes
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
@@ -51,7 +51,7 @@ def _clips(source: Source, asf: str | Path | None, followed: Source | None) -> I
         clips = [clip for clip in recorded.named(source) if clip.name != _stem(followed)]
         if not clips:
             raise InputError(f"train must hold another clip than the source, got {source} for {followed}")
-        yield from (SourceClip.of_recorded(clip) for clip in clips)
+        yield from (recorded_clip(clip) for clip in clips)
     elif not isinstance(source, Motion) and Path(source).is_dir():
         paths = sorted(path for path in Path(source).iterdir() if path.suffix.lower() in MOTIONS and path.is_file())
         if not paths:

@@ -17,49 +17,28 @@ from posefit.arrays import Array, frozen, writeable
 from posefit.errors import InputError
 from posefit.geometry import kernels
 
-_TREE = """
-root        lhipjoint rhipjoint lowerback
-lhipjoint   lfemur
-lfemur      ltibia
-ltibia      lfoot
-lfoot       ltoes
-rhipjoint   rfemur
-rfemur      rtibia
-rtibia      rfoot
-rfoot       rtoes
-lowerback   upperback
-upperback   thorax
-thorax      lowerneck lclavicle rclavicle
-lowerneck   upperneck
-upperneck   head
-lclavicle   lhumerus
-lhumerus    lradius
-lradius     lwrist
-lwrist      lhand
-rclavicle   rhumerus
-rhumerus    rradius
-rradius     rwrist
-rwrist      rhand
-"""
+# The chains of bones that the tree consists of, each with the joint it starts from; l and r are left and right.
+_CHAINS = (
+    ("root", "lhipjoint lfemur ltibia lfoot ltoes"),
+    ("root", "rhipjoint rfemur rtibia rfoot rtoes"),
+    ("root", "lowerback upperback thorax lowerneck upperneck head"),
+    ("thorax", "lclavicle lhumerus lradius lwrist lhand"),
+    ("thorax", "rclavicle rhumerus rradius rwrist rhand"),
+)
 
 
-def _walk_tree() -> tuple[tuple[str, ...], tuple[int, ...]]:
-    children = {line.split()[0]: line.split()[1:] for line in _TREE.strip().split("\n")}
-    names: list[str] = []
-    parents: list[int] = []
-
-    def visit(name: str, parent: int) -> None:
-        names.append(name)
-        parents.append(parent)
-        here = len(names) - 1
-        for child in children.get(name, []):
-            visit(child, here)
-
-    visit("root", -1)
+def _tree() -> tuple[tuple[str, ...], tuple[int, ...]]:
+    names, parents = ["root"], [-1]
+    for start, chain in _CHAINS:
+        above = names.index(start)
+        for name in chain.split():
+            names.append(name)
+            parents.append(above)
+            above = len(names) - 1
     return tuple(names), tuple(parents)
 
 
-JOINTS, PARENTS = _walk_tree()  # 27 names, parents before children; PARENTS[0] is -1
+JOINTS, PARENTS = _tree()  # 27 names, parents before children; PARENTS[0] is -1
 BONES = JOINTS[1:]  # bone b runs from joint PARENTS[b + 1] to joint b + 1
 ENDS = tuple(j for j in range(len(JOINTS)) if j not in PARENTS)
 INNER = tuple(j for j in range(1, len(JOINTS)) if j in PARENTS)

@@ -16,7 +16,7 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
 )
 from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
-from posefit.motion.asf import LARGEST, METRES_PER_UNIT, mistake, parse_asf, unit_length
+from posefit.motion.asf import LARGEST, METRES_PER_UNIT, checked_unit, mistake, parse_asf
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import SHOWN, check_size, cut
 
@@ -46,7 +46,7 @@ def read_amc(
     of bones outside the 27 joints are read and left out. All angles are unwrapped along time. Every frame must give
     all channels of `skeleton`, in any order. Raises ValueError with file and line.
     """
-    path, unit = Path(path), unit_length("metres_per_unit", metres_per_unit)
+    path, unit = Path(path), checked_unit(metres_per_unit)
     check_size(path, SIZE_LIMIT)
     spans, columns, targets = _layout(skeleton)
     values, radians = _frames(path, spans, skeleton.name)
@@ -151,7 +151,7 @@ def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METR
     Channels that a pose does not hold, such as fingers, are written as 0. Raises ValueError where the motion turns a
     joint about an axis that its skeleton has no channel for, as the file could not hold that.
     """
-    unit = unit_length("metres_per_unit", metres_per_unit)
+    unit = checked_unit(metres_per_unit)
     lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)
     if lost > 1e-9:
         raise InputError(f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one")

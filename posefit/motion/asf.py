@@ -26,11 +26,11 @@ def mistake(path: Path, line: int, expected: str, got: str) -> InputError:
     return InputError(f"{path}:{line}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
 
 
-def unit_length(name: str, value: float) -> float:
-    """Return a value that must be positive and finite. Raises ValueError with its name otherwise."""
-    if not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{name} must be a positive number, got {value}")
-    return float(value)
+def checked_unit(metres_per_unit: float) -> float:
+    """Return a unit's length. Raises ValueError where it is not positive and finite."""
+    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0.0):
+        raise InputError(f"metres_per_unit must be a positive number, got {metres_per_unit}")
+    return float(metres_per_unit)
 
 
 @dataclass(frozen=True)
@@ -98,14 +98,12 @@ def parse_asf(path: str | Path) -> tuple[Skeleton, float]:
 
 def _limits(bones: dict[str, _Bone]) -> Array | None:
     """Return the limits (63, 2) of the joint angles; None where a free angle has none."""
-    limits = np.zeros((ANGLES - 3, 2))
-    for joint in INNER:
-        bone = bones[JOINTS[joint]]
-        if bone.free and bone.limits is None:
+    limits = np.zeros((ANGLES, 2))
+    for name in (JOINTS[joint] for joint in INNER if bones[JOINTS[joint]].free):
+        if bones[name].limits is None:
             return None
-        if bone.limits is not None:
-            limits[[angle - 3 for angle in channel_angles(JOINTS[joint], bone.free)]] = bone.limits
-    return limits
+        limits[channel_angles(name, bones[name].free)] = bones[name].limits
+    return limits[3:]
 
 
 def _sections(path: Path) -> dict[str, list[_Line]]:
@@ -248,7 +246,7 @@ def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = 
 
     Bones of which only the channels are known, such as fingers, get the length 0.
     """
-    unit = unit_length("metres_per_unit", metres_per_unit)
+    unit = checked_unit(metres_per_unit)
     axes = np.rad2deg(joint_angles_from_rotation(skeleton.axes))
     header = (
         f":version 1.10\n:name {'_'.join(skeleton.name.split()) or 'skeleton'}\n:units\n  mass 1.0\n"

@@ -25,7 +25,7 @@ from posefit.geometry.rotation import (
 )
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Channels, Skeleton, angle_index
 from posefit.motion.amc import SIZE_LIMIT, VALUES
-from posefit.motion.asf import LARGEST, mistake, unit_length
+from posefit.motion.asf import LARGEST, checked_unit, mistake
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import check_size, cut
 
@@ -71,7 +71,7 @@ def read_bvh(path: str | Path, *, metres_per_unit: float = 1.0) -> Motion:
     say; its OFFSET is not added. Raises ValueError where the file is not a BVH file of this tree, and ImportError
     without pybvh.
     """
-    path, unit = Path(path), unit_length("metres_per_unit", metres_per_unit)
+    path, unit = Path(path), checked_unit(metres_per_unit)
     bvh = _parsed(path)
     from scipy.spatial.transform import Rotation  # a quarter of a second to import
 
