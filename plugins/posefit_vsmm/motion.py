@@ -101,7 +101,7 @@ def tangent(state: Array) -> Array:
 
     change = np.empty((STATE - 3, 3))
     kernels.tangents(state[3:], change)
-    return block_diag(np.eye(3), *change.reshape(-1, 4, 3))
+    return np.asarray(block_diag(np.eye(3), *change.reshape(-1, 4, 3)))
 
 
 def inverse_tangent(state: Array) -> Array:

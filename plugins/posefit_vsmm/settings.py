@@ -65,7 +65,7 @@ class Settings:
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "Settings":
         """Return a preset with some settings changed. Raises ValueError where a value is none that it may be."""
-        return cls(**(PATENT | given if given.get("variant") == "patent" else given))
+        return cls(**({**PATENT, **given} if given.get("variant") == "patent" else given))
 
 
 # Every interpretation as the patent's letter has it.

@@ -211,7 +211,7 @@ class TrackFilter:
                 pose, used = result.pose, used + result.evaluations
                 self._belief = models.imm.updated(self._belief, result.measure)
                 place = models.fused(self._belief)[0][:3]  # one frame alone hardly shows the depth
-        drawn = imputed[0].points if imputed[0] else details["joints"][0]
+        drawn = details["joints"][0]
         if self._how.angles == "state":
             drawn, _ = self._cameras.figure.project(self._task.cameras[0], models.fused(self._belief)[0])
         models.record(drawn)
@@ -254,7 +254,7 @@ class TrackFilter:
         return np.asarray(extra * self._free**2)
 
     def _joints(self, measured: Sequence[JointMeasurement | None], expected: Array) -> dict[str, Any]:
-        """Return the 17 joints (views, 17, 2) as they are displayed, and the rules' confidence in them (views, 17)."""
+        """Return the joints (views, 17, 2), predicted where hidden, and the rules' confidence in them (views, 17)."""
         points, confidence = [], []
         for view, (camera, one) in enumerate(zip(self._task.cameras, measured, strict=True)):
             if one is None:
@@ -262,7 +262,7 @@ class TrackFilter:
                 one = JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
             if len(self._shown) == view:
                 self._shown.append(JointFilter(one.points))
-            points.append(self._shown[view].follow(one.points, one.confidence, one.variances))
+            points.append(one.imputed(self._shown[view].follow(one.points, one.confidence, one.variances)).points)
             confidence.append(one.confidence)
         return {"joints": np.array(points), "confidence": np.array(confidence)}
 

@@ -1,4 +1,4 @@
-"""The variable-structure multiple-model tracker, CN101894278, step by step; so far step 6, the filter.
+"""The variable-structure multiple-model tracker, CN101894278, step 6: the filter.
 
 The textbook case is a target that flies straight and then turns: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation
 with Applications to Tracking and Navigation, Wiley 2001, chapter 11.
@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
 from posefit_vsmm.imm import IMM, Belief, Manifold, Measurement, positive_definite, start, update
-from tests.cases import cases
+from tests.cases import each
 
 STEP, SIGMA = 1.0, 20.0  # seconds between measurements, metres of noise in each
 TRANSITION = np.array([[0.95, 0.05], [0.10, 0.90]])
@@ -90,8 +90,8 @@ def test_a_flight_is_filtered_as_the_book_writes_it() -> None:  # VSMM 6.2a
     truth, seen = path(np.random.default_rng(0))
     imm = IMM(MODELS, TRANSITION)
     belief = twin = begin(truth)
-    for one in seen:
-        belief, twin = imm.cycle(belief, measuring(one)), reference(twin, one)
+    for place in seen:
+        belief, twin = imm.cycle(belief, measuring(place)), reference(twin, place)
         np.testing.assert_allclose(belief.states, twin.states, rtol=1e-8, atol=1e-6)
         np.testing.assert_allclose(belief.covariances, twin.covariances, rtol=1e-7, atol=1e-6)
         np.testing.assert_allclose(belief.log_probabilities, twin.log_probabilities, atol=1e-7)
@@ -118,18 +118,19 @@ def test_a_model_predicts_by_its_own_motion() -> None:  # VSMM 6.3a
     np.testing.assert_allclose(after.probabilities, 0.5)  # nothing was measured
 
 
+FOUR = Measurement(np.array([4.0]), np.eye(1), np.eye(1))
+
+
 def test_the_innovation_has_the_noise_of_state_and_measurement() -> None:  # VSMM 6.3b
     # by hand: variance 3 of the state and 1 of the measurement: a gain of 3/4, and 3/4 left
-    seen = Measurement(np.array([4.0]), np.eye(1), np.eye(1))
-    state, left, _ = update(np.zeros(1), 3.0 * np.eye(1), seen, Manifold())
+    state, left, _ = update(np.zeros(1), 3.0 * np.eye(1), FOUR, Manifold())
     np.testing.assert_allclose(state, 3.0)
     np.testing.assert_allclose(left, 0.75)
 
 
 def test_the_likelihood_is_the_gaussian_of_the_residual() -> None:  # VSMM 6.3c
     # S = 4, residual 4: -1/2 (16 / 4 + ln 4 + ln 2 pi)
-    seen = Measurement(np.array([4.0]), np.eye(1), np.eye(1))
-    likelihood = update(np.zeros(1), 3.0 * np.eye(1), seen, Manifold())[2]
+    likelihood = update(np.zeros(1), 3.0 * np.eye(1), FOUR, Manifold())[2]
     assert likelihood == pytest.approx(-0.5 * (4.0 + np.log(4.0) + np.log(2.0 * np.pi)))
 
 
@@ -150,14 +151,14 @@ def test_the_model_that_flies_as_the_target_does_is_the_probable_one() -> None: 
         imm, belief = IMM(MODELS, TRANSITION), begin(truth)
         singles = {"straight": IMM(MODELS[:1], np.eye(1)), "turn": IMM(MODELS[1:], np.eye(1))}
         alone = {name: start(truth[0], belief.covariances[0], 1) for name in singles}
-        for k, one in enumerate(seen):
-            belief = imm.cycle(belief, measuring(one))
+        for k, place in enumerate(seen):
+            belief = imm.cycle(belief, measuring(place))
             turning = 25 <= k < 45
             right.append(belief.probabilities[int(turning)] > 0.5)
             fused = imm.fused(belief)[0]
             errors["imm"].append(float(np.hypot(*(H @ (fused - truth[k])))))
             for name, single in singles.items():
-                alone[name] = single.cycle(alone[name], measuring(one))
+                alone[name] = single.cycle(alone[name], measuring(place))
                 errors[name].append(float(np.hypot(*(H @ (alone[name].states[0] - truth[k])))))
     assert np.mean(right) > 0.8  # a change is noticed some steps late
     root = {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in errors.items()}
@@ -194,34 +195,32 @@ def test_a_34_dimensional_residual_of_60_pixels_leaves_probabilities() -> None: 
     assert np.isfinite(imm.cycle(belief, lambda state: Measurement(-state, np.eye(34), np.eye(34))).states).all()
 
 
+def plus(state: Array, error: Array) -> Array:
+    return np.asarray((Rotation.from_quat(state) * Rotation.from_rotvec(error)).as_quat())
+
+
+def minus(first: Array, second: Array) -> Array:
+    return np.asarray((Rotation.from_quat(second).inv() * Rotation.from_quat(first)).as_rotvec())
+
+
+SPHERE = Manifold(plus, minus)
+
+
 def test_quaternions_are_mixed_on_their_manifold() -> None:  # Interpretation V4
-    def plus(state: Array, error: Array) -> Array:
-        return np.asarray((Rotation.from_quat(state) * Rotation.from_rotvec(error)).as_quat())
-
-    def minus(first: Array, second: Array) -> Array:
-        return np.asarray((Rotation.from_quat(second).inv() * Rotation.from_quat(first)).as_rotvec())
-
-    sphere = Manifold(plus, minus)
     turns = Rotation.from_euler("y", [[170.0], [-170.0]], degrees=True).as_quat()
     turns[1] *= -1.0  # the same rotation
-    mean = sphere.mean(turns, np.array([0.5, 0.5]))
+    mean = SPHERE.mean(turns, np.array([0.5, 0.5]))
     assert np.degrees(Rotation.from_quat(mean).magnitude()) == pytest.approx(180.0)
     assert np.linalg.norm(mean) == pytest.approx(1.0)
-    spread = sphere.spread(turns, np.zeros((2, 3, 3)), np.array([0.5, 0.5]), mean)
+    spread = SPHERE.spread(turns, np.zeros((2, 3, 3)), np.array([0.5, 0.5]), mean)
     assert np.degrees(np.sqrt(spread[1, 1])) == pytest.approx(10.0)
 
 
 def test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance() -> None:  # Interpretation V4
-    def plus(state: Array, error: Array) -> Array:
-        return np.asarray((Rotation.from_quat(state) * Rotation.from_rotvec(error)).as_quat())
-
-    def minus(first: Array, second: Array) -> Array:
-        return np.asarray((Rotation.from_quat(second).inv() * Rotation.from_quat(first)).as_rotvec())
-
     # quarter turns about x, y and z, alike in every way: the mean turns about (1, 1, 1), by an angle t at which
     # nothing is left along (1, 1, 1). One step from the first of them comes near it, but not there.
     turns = Rotation.from_rotvec(0.5 * np.pi * np.eye(3))
-    mean = Manifold(plus, minus).mean(turns.as_quat(), np.full(3, 1.0 / 3.0))
+    mean = SPHERE.mean(turns.as_quat(), np.full(3, 1.0 / 3.0))
     diagonal = np.full(3, 1.0 / np.sqrt(3.0))
 
     def left(t: float) -> float:
@@ -254,13 +253,14 @@ def test_a_single_model_is_a_kalman_filter_and_a_model_that_nothing_leads_to_sta
     assert np.isfinite(after.states).all()
 
 
-def test_a_transition_that_is_none_is_named() -> None:
-    for transition, message in cases(
-        [
-            (np.eye(3), r"transition must have shape \(2, 2\), a row a model, got \(3, 3\)"),
-            (np.full((2, 2), 0.4), "transition must hold probabilities whose rows sum to 1"),
-            (np.array([[1.5, -0.5], [0.0, 1.0]]), "transition must hold probabilities"),
-        ]
-    ):
-        with pytest.raises(ValueError, match=message):
-            IMM(MODELS, transition)
+@each(
+    ("transition", "message"),
+    [
+        (np.eye(3), r"transition must have shape \(2, 2\), a row a model, got \(3, 3\)"),
+        (np.full((2, 2), 0.4), "transition must hold probabilities whose rows sum to 1"),
+        (np.array([[1.5, -0.5], [0.0, 1.0]]), "transition must hold probabilities"),
+    ],
+)
+def test_a_transition_that_is_none_is_named(transition: Array, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        IMM(MODELS, transition)

@@ -15,7 +15,7 @@ from posefit.geometry.skeleton import PARENTS
 from posefit.silhouette.foreground import Image
 from posefit.tracking.drawing import draw_body, side_view
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film
-from posefit_reproduce.vsmm.experiment import ELBOW, HAND, both_joints, projected_cm
+from posefit_reproduce.vsmm.experiment import ELBOW, HAND, both_joints, detected_cm, projected_cm
 from posefit_reproduce.vsmm.switches import ModelState, model_states
 
 STILLS = (10, 60, 110, 140, 180, 235, 258, 290, 340, 380, 405, 430)
@@ -29,7 +29,7 @@ def patent_figures(film: Film, frames: Sequence[Frame], folder: Path) -> list[st
     states = model_states(frames)
     figures = {
         "figure-10-probabilities.png": probability_figure(film, states),
-        "figure-11-errors.png": error_figure(film, frames),
+        "figure-11-errors.png": error_figure(film, frames, states),
     }
     for name, figure in figures.items():
         figure.savefig(folder / name, dpi=130)
@@ -64,22 +64,23 @@ def probability_figure(film: Film, states: Sequence[ModelState]) -> Figure:
     return figure
 
 
-def error_figure(film: Film, frames: Sequence[Frame]) -> Figure:
-    """Return the errors of right elbow and right hand over time, in the image and in space."""
-    truth, estimate = both_joints(film, frames)
-    flat = projected_cm(film, truth, estimate)
-    deep = 100.0 * np.linalg.norm(truth - estimate, axis=-1)
-    figure = Figure(figsize=(10.0, 4.6), layout="constrained")
-    seconds = np.arange(len(flat)) / FPS
-    for axes, values, label in zip(
-        figure.subplots(2, 1, sharex=True), (flat, deep), ("in the image, cm", "in space, cm"), strict=True
-    ):
-        for name, joint in (("right elbow", ELBOW), ("right hand", HAND)):
-            axes.plot(seconds, values[:, joint], linewidth=1.0, label=f"{name}, mean {values[:, joint].mean():.1f}")
+def error_figure(film: Film, frames: Sequence[Frame], states: Sequence[ModelState]) -> Figure:
+    """Return the errors of right elbow and hand over time, against the detected joints and against the truth."""
+    truth, estimate = (joints[:, [ELBOW, HAND]] for joints in both_joints(film, frames))
+    errors = {
+        "to the detected, cm": detected_cm(film, frames, states),
+        "to the truth, cm": projected_cm(film, truth, estimate),
+        "in space, cm": 100.0 * np.linalg.norm(truth - estimate, axis=-1),
+    }
+    figure = Figure(figsize=(10.0, 6.4), layout="constrained")
+    seconds = np.arange(len(frames)) / FPS
+    for axes, (label, values) in zip(figure.subplots(3, 1, sharex=True), errors.items(), strict=True):
+        for name, series in zip(("right elbow", "right hand"), values.T, strict=True):
+            axes.plot(seconds, series, linewidth=1.0, label=f"{name}, mean {np.nanmean(series):.1f}")
         axes.set(ylabel=label, ylim=(0.0, None))
         axes.legend(fontsize=7, frameon=False)
         _activities(axes, film, label=False)
-        if values is flat:
+        if label != "in space, cm":
             axes.axhspan(*PATENT_CM, color="0.5", alpha=0.2)
     axes.set_xlabel("seconds")
     return figure

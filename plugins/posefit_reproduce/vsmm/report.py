@@ -1,19 +1,23 @@
 """What `posefit reproduce vsmm` prints and writes."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from posefit.files import new_folder
 from posefit.version import __version__
 from posefit_reproduce.jobs import Progress
-from posefit_reproduce.vsmm.activities import film_of
+from posefit_reproduce.vsmm.activities import ACTIVITIES, film_of
 from posefit_reproduce.vsmm.experiment import SHOWN, WORKERS, repeat_patent
 
 _COLUMNS = (
+    ("elbow_detected_cm", "elbow det.", 1),
+    ("hand_detected_cm", "hand det.", 1),
     ("elbow_cm", "elbow cm", 1),
     ("hand_cm", "hand cm", 1),
     ("elbow_3d_cm", "elbow 3D", 1),
@@ -21,19 +25,28 @@ _COLUMNS = (
     ("mpjpe_mm", "MPJPE mm", 0),
     ("error_degrees", "degrees", 2),
     ("iou", "IoU", 2),
-    ("dominant_fraction", "dominant", 2),
-    ("switch_delay_frames", "delay", 1),
+    ("dominant_fraction", "a model", 2),
+    ("right_model_fraction", "right model", 2),
+    ("right_group_fraction", "right group", 2),
+    ("restarts", "restarts", 1),
+    ("activations", "activations", 1),
     ("wrong_activations", "wrong act.", 1),
     ("wrong_terminations", "wrong term.", 1),
+    ("switch_delay_frames", "delay", 1),
+    ("activity_accuracy", "label", 2),
     ("filter_ms", "filter ms", 2),
     ("detection_ms", "detect ms", 1),
     ("frame_ms", "frame ms", 1),
+    ("worse_mm", "worse mm", 1),
+    ("worse_films", "worse films", 0),
 )
+_KEYS = ("still_1", "identity_1", "zero_1", "still_10", "identity_10", "zero_10")
 
 
 def patent_report(
     seeds: int,
     searches: bool,
+    letters: bool,
     out: str | Path | None,
     workers: int = WORKERS,
     progress: Progress | None = None,
@@ -46,7 +59,7 @@ def patent_report(
     if out is not None and find_spec("matplotlib") is None:
         raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
     with nullcontext() if out is None else new_folder(out) as folder:
-        figures, shown = repeat_patent(seeds, searches, workers, progress)
+        figures, shown = repeat_patent(seeds, searches, letters, workers, progress)
         figures["version"] = __version__
         if folder is not None:
             from posefit_reproduce.vsmm.figures import patent_figures
@@ -56,13 +69,42 @@ def patent_report(
     return figures
 
 
-def patent_table(figures: Mapping[str, Any]) -> str:
-    """Return the figures as a table: a row a method, the means over seeds."""
-    rows: dict[str, Mapping[str, Any]] = {"vsmm": figures}
-    rows |= {name: one for name, one in figures.items() if isinstance(one, Mapping)}
-    lines = ["  ".join([f"seeds: {figures['seeds']:.0f}".ljust(12), *(label.rjust(10) for _, label, _ in _COLUMNS)])]
-    for name, row in rows.items():
-        cells = [f"{row[key]:.{digits}f}" if key in row else "-" for key, _, digits in _COLUMNS]
-        lines.append("  ".join([name.ljust(12), *(cell.rjust(10) for cell in cells)]))
-    lines.append("the patent: elbow and hand 2.7 to 5.2 cm, filter 100 ms, detection 1000 ms")
-    return "\n".join(lines)
+def patent_text(figures: Mapping[str, Any]) -> str:
+    """Return the figures as tables: a column a method, the means over seeds; a row a model; a row an activity."""
+    methods = figures["methods"]
+    shown = [column for column in _COLUMNS if any(column[0] in row for row in methods.values())]
+    parts = [
+        _table(
+            f"seeds: {figures['seeds']}",
+            [label for _, label, _ in shown],
+            {
+                name: [f"{row[key]:.{digits}f}" if key in row else "-" for key, _, digits in shown]
+                for name, row in methods.items()
+            },
+        )
+    ]
+    parts.append(
+        "the patent: elbow and hand 2.7 to 5.2 cm against the detected joints, filter 100 ms, detection 1000 ms"
+    )
+    rows = {name: [f"{report[key]:.2f}" for key in _KEYS] for name, report in figures["prediction_degrees"].items()}
+    labels = ["still, 1", "default, 1", "patent, 1", "still, 10", "default, 10", "patent, 10"]
+    parts.append(_table("degrees ahead", labels, rows))
+    for preset in ("default", "patent"):
+        counts = np.sum([row["confusion"] for row in methods[preset]["per_seed"]], axis=0)
+        shares = counts / counts.sum(axis=1, keepdims=True)
+        rows = {
+            activity.label: [f"{share:.2f}" for share in row] for activity, row in zip(ACTIVITIES, shares, strict=True)
+        }
+        parts.append(_table(f"labels, {preset}", [*(activity.label for activity in ACTIVITIES), "a jump"], rows))
+    return "\n\n".join(parts)
+
+
+def _table(corner: str, labels: Sequence[str], rows: Mapping[str, Sequence[str]]) -> str:
+    """Return rows of cells below a line of labels."""
+    first = max(len(name) for name in (corner, *rows))
+    widths = [max(len(label), 6) + 2 for label in labels]
+    lines = [(corner, labels), *rows.items()]
+    return "\n".join(
+        name.ljust(first) + "".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
+        for name, cells in lines
+    )

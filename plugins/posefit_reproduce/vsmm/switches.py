@@ -11,6 +11,9 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit_reproduce.vsmm.activities import ACTIVITIES, Film
 
+# the activity that each model stands for; jumps are none of the film's
+LABELS = {"stiff-walk": 0, "walk": 0, "arms-out": 1, "jacks": 2, "squat": 3}
+
 
 @dataclass(frozen=True, eq=False)
 class ModelState:
@@ -23,6 +26,7 @@ class ModelState:
     probabilities: Array  # of each of these
     lost: bool
     repairs: int  # of covariances, so far
+    restarts: int  # of all models, so far
     filter_seconds: float
     detection_seconds: float
     joints: Array = field(repr=False)  # (views, 17, 2) pixels
@@ -53,17 +57,18 @@ def switching_figures(film: Film, states: Sequence[ModelState]) -> dict[str, Any
         return {}
     right = [ACTIVITIES[label].models for label in film.labels]
     likely = [one.models[int(np.argmax(one.probabilities))] for one in states]
-    delays = [_delay(states, first, film.labels, right[first]) for first in film.switches]
-    settled = [k for k, one in enumerate(states) if one.group is not None and one.newcomer is None]
-    smallest = min(len(states[k].models) for k in settled) if settled else 0
-    steady = [k for k in settled if len(states[k].models) == smallest]
+    right_group = [bool(_group_models(state) & models) for state, models in zip(states, right, strict=True)]
+    delays = [_delay(right_group, first, film.labels) for first in film.switches]
     return {
         "dominant_fraction": float(np.mean([one.probabilities.max() > 0.5 for one in states])),
         "right_model_fraction": float(np.mean([a in b for a, b in zip(likely, right, strict=True)])),
+        "right_group_fraction": float(np.mean(right_group)),
+        "restarts": int(states[-1].restarts),
+        **activity_figures(film, states),
         "switch_delay_frames": max(delays),
         "switch_delays_frames": delays,
-        "filter_ms": 1e3 * float(np.median([states[k].filter_seconds for k in steady or range(len(states))])),
-        "detection_ms": 1e3 * float(np.median([one.detection_seconds for one in states])),
+        "filter_ms": 1e3 * float(np.mean([one.filter_seconds for one in states])),
+        "detection_ms": 1e3 * float(np.mean([one.detection_seconds for one in states])),
         "activations": sum(_came(before, now) for before, now in pairwise(states)),
         "wrong_activations": sum(
             _came(states[k - 1], states[k]) and not right[k] & set(states[k].contending) for k in range(1, len(states))
@@ -77,17 +82,34 @@ def switching_figures(film: Film, states: Sequence[ModelState]) -> dict[str, Any
     }
 
 
-def _delay(states: Sequence[ModelState], first: int, labels: Sequence[int], right: frozenset[str]) -> int:
+def _delay(right_group: Sequence[bool], first: int, labels: Sequence[int]) -> int:
     """Return how many frames after a switch a group with a right model is in force; all of the activity if never."""
-    for k in range(first, len(states)):
-        if labels[k] != labels[first]:
+    for k in range(first, len(labels)):
+        if right_group[k] or labels[k] != labels[first]:
             return k - first
-        one = states[k]
-        names = [one.newcomer] if one.newcomer else []
-        names += [one.group] if one.group else list(one.groups)  # all of them while a group is chosen
-        if any(right & set(one.groups[name]) for name in names):
-            return k - first
-    return len(states) - first
+    return len(labels) - first
+
+
+def _group_models(state: ModelState) -> set[str]:
+    """Return the models of the group in force and of the one that contends with it; none while one is chosen."""
+    return {model for name in (state.group, state.newcomer) if name is not None for model in state.groups[name]}
+
+
+def activity_figures(film: Film, states: Sequence[ModelState]) -> dict[str, Any]:
+    """Return how well the models' probabilities name the activity of a frame.
+
+    Each frame's label is the activity whose models are the most probable together. `confusion` has the frames of each
+    true activity by label, the last column being models of none; chance always says the commonest activity.
+    """
+    counts = np.zeros((len(ACTIVITIES), len(ACTIVITIES) + 1), dtype=np.int64)
+    for state, label in zip(states, film.labels, strict=True):
+        sums = np.zeros(len(ACTIVITIES) + 1)
+        for model, probability in zip(state.models, state.probabilities, strict=True):
+            sums[LABELS.get(model, len(ACTIVITIES))] += probability
+        counts[label, sums.argmax()] += 1
+    right = np.trace(counts)
+    chance = counts.sum(axis=1).max() / counts.sum()
+    return {"activity_accuracy": float(right / counts.sum()), "chance": float(chance), "confusion": counts.tolist()}
 
 
 def _came(before: ModelState, now: ModelState) -> bool:
