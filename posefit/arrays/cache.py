@@ -30,7 +30,7 @@ class Cache(FunctionCache):  # type: ignore[misc]
 def cached(dispatcher: Any) -> Path | None:
     """Return the folder of a dispatcher's cache, which is used from now on; None where there is none.
 
-    To be called when the function is compiled or looked for: earlier, what it calls may not be defined yet.
+    To be called when the function is compiled or searched: earlier, what it calls may not be defined yet.
     """
     with suppress(RuntimeError):
         dispatcher._cache = Cache(dispatcher)
@@ -58,13 +58,13 @@ def made_of(dispatcher: Any) -> str:
     return digest.hexdigest()
 
 
-def _parts(one: Any) -> Iterator[Any]:
+def _parts(called: Any) -> Iterator[Any]:
     """Yield what one function is made of; what it names as a tuple of name and value."""
-    function = inspect.unwrap(one)
+    function = inspect.unwrap(called)
     known, names = function.__globals__, set(_names(function.__code__))
-    yield one, function.__code__, function.__defaults__
-    if isinstance(one, Dispatcher):
-        yield sorted((name, _described(value)) for name, value in one.targetoptions.items())
+    yield called, function.__code__, function.__defaults__
+    if isinstance(called, Dispatcher):
+        yield sorted((name, _described(value)) for name, value in called.targetoptions.items())
     else:
         beside = vars(sys.modules[function.__module__]).values()
         for other in map(inspect.unwrap, filter(callable, beside)):

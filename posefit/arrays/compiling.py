@@ -1,12 +1,12 @@
 """Of several processes that need one compiled function, one compiles it; the others wait for it in numba's cache.
 
 numba's own cache lets them all compile at the same time, and loses a signature where two of them write its index. So
-each function has a lock beside its cache, a file that is locked (`flock`) while the function is looked for, compiled
+each function has a lock beside its cache, a file that is locked (`flock`) while the function is searched, compiled
 and written: who comes later finds it there. The operating system drops a lock when its process ends in any way.
 
 Locks cannot wait for each other in a circle: a process takes them one within the other only where one function calls
 another, and no two functions call each other. Where there is no lock to be had, on a disk without them or one that
-cannot be written to, everybody compiles, as without this module.
+cannot be written to, every process compiles, as without this module.
 """
 
 import gc
@@ -40,7 +40,7 @@ def compiled_once(dispatcher: Any) -> Any:
 
     def compile_in_turn(signature: Any) -> Any:
         if isinstance(signature, tuple):  # a number written out in a call would be a type of its own
-            signature = tuple(unliteral(one) for one in signature)  # type: ignore[no-untyped-call]
+            signature = tuple(unliteral(argument) for argument in signature)  # type: ignore[no-untyped-call]
         # a thread of this process that waits for another process must not hold what a second thread needs to go on
         with global_compiler_lock, uncollected(), in_turn(lock()):
             return _compiled(alone, signature)

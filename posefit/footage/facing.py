@@ -21,15 +21,15 @@ def facings_on_the_spot(
     `middles` and `sides` are those of the mask, in pixels. For a person who goes along, the frames themselves show
     front and back, and a network is no surer.
     """
-    kept, reach = np.array(facings, dtype=np.float64), max(round(STAYING * fps), 1)
-    for k in range(len(kept)):
+    result, reach = np.array(facings, dtype=np.float64), max(round(STAYING * fps), 1)
+    for k in range(len(result)):
         rows = slice(max(k - reach, 0), k + reach + 1)
         known = np.isfinite(middles[rows])
         if known.any() and np.ptp(np.asarray(middles[rows])[known]) > CROSSING * np.median(
             np.asarray(sides[rows])[known]
         ):
-            kept[k] = np.nan
-    return kept
+            result[k] = np.nan
+    return result
 
 
 def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Array:

@@ -30,7 +30,7 @@ MIN_SIDE = 12  # pixels of the longer side below which a person cannot be distin
 LAG = 0.1  # seconds between two pictures that are compared for motion
 MOVING_LEVELS = 25  # grey levels by which a pixel that moved has changed
 MIN_MOVING = 0.1  # of the mask's area: fewer pixels that moved outside the mask are no evidence
-AROUND = 0.5  # of the person's longer side: motion is looked for as far as that from the mask
+AROUND = 0.5  # of the person's longer side: motion is searched as far as that from the mask
 SLACK = 0.02  # of the same: motion as near as that to the mask is the mask's own
 MAX_OUTSIDE = 0.5  # a frame is not usable where a larger share of what moves lies outside the mask
 EDGE_RATIO, EDGE_LEVELS = 1.5, 6.0  # an edge is in one picture only where it is stronger there by both
@@ -62,7 +62,7 @@ class FrameQuality:
     def row(self, image: Image, person: Person, frame: int) -> dict[str, Any]:
         """Return a frame's row: usable where the mask is whole, looks like a person and covers what moves.
 
-        Its area must not be far from that of the frames before either, as far as they looked like a person.
+        Its area must not be far from that of the frames before either, where they are like a person's.
         """
         left, top, right, bottom = _box(person.mask) if person.area else (0, 0, 0, 0)
         side = max(right - left, bottom - top)

@@ -114,7 +114,7 @@ def on_device(scene: Scene, device: str) -> Scene:
 
     def at(k: int) -> Observation:
         observation = scene.observations[k]
-        return replace(observation, silhouettes=[moved_to(one, device) for one in observation.silhouettes])
+        return replace(observation, silhouettes=[moved_to(mask, device) for mask in observation.silhouettes])
 
     return replace(scene, observations=LazyObservations(len(scene.observations), at))
 

@@ -81,12 +81,12 @@ def scene_of(
     if len(kinds) > 1:
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     kind = next(iter(kinds))
-    given = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
-    check_used(kind, {**given, "camera": camera, "up": up})
+    options = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
+    check_used(kind, {**options, "camera": camera, "up": up})
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
-        cameras = [each for one in camera for each in _cameras(one, up)]
+        cameras = [placed for source in camera for placed in _cameras(source, up)]
         motion = motion_of(sources[0], asf, fps or FPS)
         return synthetic(motion, view_degrees, size or SIZE, cameras, frames)
     if len(view_degrees) > 1:
@@ -189,10 +189,10 @@ def kind_of(source: Source) -> Kind:
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
 
 
-def _cameras(one: Camera | str | Path, up: Up | None) -> list[Camera]:
-    if isinstance(one, Camera):
-        return [one]
-    known = read_calibrations(one)
+def _cameras(source: Camera | str | Path, up: Up | None) -> list[Camera]:
+    if isinstance(source, Camera):
+        return [source]
+    known = read_calibrations(source)
     return [calibration.camera(calibration.size, upright(known, up)) for calibration in known]
 
 

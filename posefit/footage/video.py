@@ -19,7 +19,7 @@ Order = NDArray[np.int64]  # (T,) numbers of frames
 CODE = "mp4v"
 UNEVEN = 0.75  # of the distance between frames: one that comes so much too early or too late is not in its place
 DENSEST = 4.0  # times the mean rate: frames are not taken more often, however short some of them are
-# what is wrong with a file is said once, by us; a user who wants to hear FFmpeg may set it himself
+# posefit reports once what is wrong with a file; a user may set the variable to get FFmpeg's own messages
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 
@@ -43,7 +43,7 @@ class Video:
             raise InputError(f"{path}: expected a video file, got {came}")
         capture = cv2.VideoCapture(str(path))
         try:
-            wide, tall = (capture.get(one) for one in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+            wide, tall = (capture.get(key) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
             if wide * tall > PIXELS:
                 most = f"{PIXELS // 10**6} million pixels"
                 raise InputError(f"{path}: expected frames of at most {most}, got {wide:.0f}x{tall:.0f}")

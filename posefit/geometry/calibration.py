@@ -65,8 +65,8 @@ class Calibration:
         Codecs fill up a picture to blocks of 16 pixels, so that 1080 rows become 1088, and some programs leave them
         there. None where the sizes differ otherwise.
         """
-        for one, other in zip(self.size, size, strict=True):
-            if one != other and (abs(one - other) >= BLOCK or max(one, other) % BLOCK):
+        for mine, other in zip(self.size, size, strict=True):
+            if mine != other and (abs(mine - other) >= BLOCK or max(mine, other) % BLOCK):
                 return None
         return replace(self, size=size)
 
@@ -89,8 +89,8 @@ def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """
     if up is not None and up not in TURNS:
         raise InputError(f"up must be one of x, y, z, got {up!r}")
-    placed = [one.rotation for one in calibrations if one.rotation is not None]
-    if not placed or any(one.upright for one in calibrations):
+    placed = [camera.rotation for camera in calibrations if camera.rotation is not None]
+    if not placed or any(camera.upright for camera in calibrations):
         return np.eye(3)
     image_up = -np.sum([rotation[1] for rotation in placed], axis=0)  # images' up, in the world
     axis: Up = up or ("x", "y", "z")[int(np.abs(image_up).argmax())]
@@ -106,8 +106,8 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     text = read_text(path, LARGEST_FILE)
     try:
         calibrations = _reader(path, text)(path, text)
-        for one in calibrations:
-            one.camera(one.size, np.eye(3))
+        for calibration in calibrations:
+            calibration.camera(calibration.size, np.eye(3))
     except (ValueError, TypeError, KeyError, OverflowError, AttributeError, RecursionError, cv2.error) as error:
         cause = " ".join(str(error).split()) or type(error).__name__
         reason = cut(f"no {cause}" if isinstance(error, KeyError) else cause, MESSAGE)

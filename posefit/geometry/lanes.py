@@ -46,8 +46,8 @@ def _place_bone(  # type: ignore[no-untyped-def]
     offset,
     frames,
 ) -> Any:
-    given = (types.int64, types.int64, types.boolean, turn, types.int64, sines, cosines, offset, frames)
-    return types.void(*given), _build_bone
+    signature = (types.int64, types.int64, types.boolean, turn, types.int64, sines, cosines, offset, frames)
+    return types.void(*signature), _build_bone
 
 
 @overload(place_bone, inline="always")  # type: ignore[untyped-decorator]

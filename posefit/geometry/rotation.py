@@ -69,15 +69,15 @@ def angles_about(axes: tuple[int, int, int], rotations: Array) -> Array:
     """
     i, j, k = axes
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
-    given = np.asarray(rotations, dtype=np.float64)
-    level = np.hypot(given[..., i, i], given[..., i, j])  # the cosine of the middle angle
+    rotations = np.asarray(rotations, dtype=np.float64)
+    level = np.hypot(rotations[..., i, i], rotations[..., i, j])  # the cosine of the middle angle
+    outer = np.arctan2(-sign * rotations[..., j, k], rotations[..., k, k])
+    inner = np.arctan2(-sign * rotations[..., i, j], rotations[..., i, i])
     locked = level < LOCKED
-    outer = np.arctan2(-sign * given[..., j, k], given[..., k, k])
-    inner = np.arctan2(-sign * given[..., i, j], given[..., i, i])
-    alone = np.arctan2(sign * given[..., k, j], given[..., j, j])  # the outer one where the inner is zero
-    if i > k:
-        alone, inner, outer = np.arctan2(sign * given[..., j, i], given[..., j, j]), outer, inner
-    outer, inner = np.where(locked, alone, outer), np.where(locked, 0.0, inner)
-    if i > k:
-        outer, inner = inner, outer
-    return np.stack([outer, np.arctan2(sign * given[..., i, k], level), inner], axis=-1)
+    if i < k:
+        alone = np.arctan2(sign * rotations[..., k, j], rotations[..., j, j])
+        outer, inner = np.where(locked, alone, outer), np.where(locked, 0.0, inner)
+    else:
+        alone = np.arctan2(sign * rotations[..., j, i], rotations[..., j, j])
+        outer, inner = np.where(locked, 0.0, outer), np.where(locked, alone, inner)
+    return np.stack([outer, np.arctan2(sign * rotations[..., i, k], level), inner], axis=-1)

@@ -60,10 +60,12 @@ def numbers_of(value: Any) -> Array:
     if isinstance(value, str):
         value = value[: 40 * NUMBERS].split()
     rows = value if isinstance(value, list) else [value]
-    flat = [one for row in rows[: NUMBERS + 1] for one in (row[: NUMBERS + 1] if isinstance(row, list) else [row])]
+    flat = [
+        number for row in rows[: NUMBERS + 1] for number in (row[: NUMBERS + 1] if isinstance(row, list) else [row])
+    ]
     if len(flat) > NUMBERS:
         raise InputError(f"a matrix of more than {NUMBERS} numbers")
-    numbers = np.array([number_of(one) for one in flat], dtype=np.float64)
+    numbers = np.array([number_of(number) for number in flat], dtype=np.float64)
     if rows and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows):
         return numbers.reshape(len(rows), -1)
     return numbers
@@ -113,14 +115,14 @@ def _xml(text: str) -> dict[str, Any]:
     root = xml_of(text)
     if root.tag != "opencv_storage":
         raise InputError(f"XML of {quoted(root.tag)}")
-    return {one.tag: _content(one) for one in root}
+    return {child.tag: _content(child) for child in root}
 
 
 def _content(element: Any) -> Any:
     if len(element) == 0:
         words = (element.text or "").split()
         return words[0] if len(words) == 1 else words
-    return {one.tag: (one.text or "").strip() for one in element}
+    return {child.tag: (child.text or "").strip() for child in element}
 
 
 def xml_of(text: str) -> Any:

@@ -7,7 +7,7 @@ with funding from NSF EIA-0196217.
 
     from posefit.motion import recorded
 
-    others = recorded.clips(without=("16",))     # of everybody but the person 16; also recorded.named("library:-16")
+    others = recorded.clips(without=("16",))     # of all people but 16; also recorded.named("library:-16")
     print(others[0].name, others[0].poses.shape, others[0].times[:4])
     walk = recorded.clip("16_15").motion()       # as a motion of 30 frames a second
 """
@@ -120,7 +120,9 @@ def clips(only: Iterable[str] = (), without: Iterable[str] = ()) -> Sequence[Rec
     for subject in (*only, *without):
         if subject not in subjects():
             raise InputError(f"a subject of the library must be one of {', '.join(subjects())}, got {quoted(subject)}")
-    chosen = [one for one in _stored().values() if one.subject not in without and (not only or one.subject in only)]
+    chosen = [
+        clip for clip in _stored().values() if clip.subject not in without and clip.subject in (only or subjects())
+    ]
     if not chosen:
         raise InputError("the library must keep at least one person, got all left out")
     return chosen
@@ -137,14 +139,14 @@ def named(name: str) -> Sequence[RecordedClip]:
     Raises ValueError where one of them is not in the library, or where no one is left.
     """
     _, colon, listed = name.partition(":")
-    people = [one.strip() for one in listed.split(",")] if colon else []
+    people = [person.strip() for person in listed.split(",")] if colon else []
     if not is_library(name) or "" in people or "-" in people:
         raise InputError(f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, got {quoted(name)}")
-    return clips([one for one in people if one[0] != "-"], [one[1:] for one in people if one[0] == "-"])
+    return clips([name for name in people if name[0] != "-"], [name[1:] for name in people if name[0] == "-"])
 
 
 def leaving_out(name: str, subjects: Iterable[str]) -> str:
     """Return the name of the same library without some people."""
     named(name)  # raises where it is none
-    people = [one for one in [name.partition(":")[2], *(f"-{subject}" for subject in subjects)] if one]
-    return f"{LIBRARY}:{','.join(people)}"
+    people = [name.partition(":")[2], *(f"-{subject}" for subject in subjects)]
+    return f"{LIBRARY}:{','.join(filter(None, people))}"

@@ -10,7 +10,7 @@ PACE = 30.0  # a second: the rate at which places are compared, so that jitter c
 BALLS = JOINTS.index("lfoot"), JOINTS.index("rfoot")  # of the feet, which stay where they are while a foot rolls off
 LOW = 0.05  # metres above the lowest place of either foot, up to which a foot may stand
 SLOW = 0.2  # metres a second, up to which it may
-WINDOW = 2.0  # seconds about a frame in which that lowest place is looked for: the ground may rise, and depth may drift
+WINDOW = 2.0  # seconds about a frame in which that lowest place is searched: the ground may rise, and depth may drift
 SHORTEST = 0.1  # seconds that a foot stands at least
 
 
