@@ -1,7 +1,6 @@
 """The motions that a method learns from, by name."""
 
 import re
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,12 +26,6 @@ def test_people_of_the_library_are_all_their_clips_at_any_rate() -> None:
     assert len(clips[0](15.0)) == (len(whole) + 1) // 2
 
 
-def test_a_folder_is_its_clips(cmu: Path, tmp_path: Path) -> None:
-    for name in ("16.asf", "16_15.amc", "16_17.amc"):
-        shutil.copy(next(cmu.rglob(name)), tmp_path / name)
-    assert [clip(30.0).name for clip in training_clips([tmp_path])] == ["16_15", "16_17"]
-
-
 def test_a_recorded_person_is_tracked_with_the_motions_of_others() -> None:
     track = posefit.track("09_01", train=["library:17", "library:-02,-05,-09,-14,-16,-29,-49,-127,-135"], frames=(0, 2))
     assert track.summary["train"] == ["17_03", "17_10", "17_03", "17_10"]
@@ -48,18 +41,10 @@ def test_a_plan_may_train_on_people_of_the_library() -> None:
 
 def test_mistakes_are_one_line() -> None:
     for words, message in [
-        (
-            ["--train", "walk-a", "--without-subject", "16"],
-            "without_subject must be given with --train library, got walk-a",
-        ),
         (["--without-subject", "16"], "without_subject must be given with --train library, got walk-a, walk-b, walk-c"),
         (["--train", "library", "--without-subject", "99"], "a subject of the library must be one of 02, 05"),
         (["--train", "library:"], "a library must be library, library:02,16 or library:-16, got 'library:'"),
-        (["--train", "library:99"], "a subject of the library must be one of 02, 05"),
-        (
-            ["--train", "library:16", "--without-subject", "16"],
-            "the library must keep at least one person, got all left out",
-        ),
+        (["--train", "library:16", "--without-subject", "16"], "the library must keep at least one person"),
     ]:
         assert error_of("track", "walk", *words).startswith(f"posefit: {message}")
 
@@ -101,9 +86,7 @@ def test_more_than_the_memory_holds_is_refused_before_a_motion_is_made(monkeypat
     assert sum(clip.count(recorded.FPS) for clip in clips) == poses
     monkeypatch.setattr(training, "allowed_bytes", lambda: 3 * poses * POSE_BYTES)
     assert len(training_motions(clips[:1], 120.0)) == 1
-    message = (
-        f"at most the 0.6 GB of memory that there may be, got 0.8 GB for {4 * poses:,} poses at 120 frames a second"
-    )
+    message = f"the 0.6 GB of memory that there may be, got 0.8 GB for {4 * poses:,} poses at 120 frames a second"
     with pytest.raises(ValueError, match=message):
         training_motions(clips, 120.0)
     monkeypatch.setattr(training, "allowed_bytes", lambda: 100_000_000)
