@@ -1,7 +1,8 @@
 """How particles move, in numba: plain functions over arrays, shapes checked by the callers.
 
 `swarm` is a tuple: positions (n, d) and their costs (n,), personal bests (n, d) and their costs
-(n,), velocities (n, d), the lowest and highest velocities (d,) and which coordinates are periodic (d,).
+(n,), velocities (n, d), the lowest and highest velocities (d,), which coordinates are periodic (d,), and whether
+velocities are clamped to their limits; else one outside them breaks a constraint.
 """
 
 import math
@@ -16,8 +17,8 @@ def wrap(x):
 
 
 @jit
-def step(r1, r2, omega, acceleration, x, v, best, swarm_best, low, high, periodic):
-    """Return the next velocity, kept within low and high, and the next position of one coordinate of a particle.
+def step(r1, r2, omega, acceleration, x, v, best, swarm_best, low, high, periodic, clamped):
+    """Return the next velocity and position of one coordinate of a particle, and whether both are within their limits.
 
     A periodic coordinate goes the short way round and wraps.
     """
@@ -26,18 +27,27 @@ def step(r1, r2, omega, acceleration, x, v, best, swarm_best, low, high, periodi
         to_personal, to_swarm = wrap(to_personal), wrap(to_swarm)
     phi1, phi2 = acceleration * r1, acceleration * r2
     v = omega * v + phi1 * to_personal + phi2 * to_swarm  # SAPSO (1)
-    v = min(max(v, low), high)
+    if clamped:
+        v = min(max(v, low), high)
     x = x + v  # SAPSO (2)
-    return v, wrap(x) if periodic else x
+    if periodic:
+        x = wrap(x)
+    return v, x, abs(x) <= 1.0 and low <= v <= high
 
 
 @jit
-def reachable(omega, acceleration, x, v, best, swarm_best, low, high):
-    """Return whether some rand() in [0, 1] would keep one coordinate, which is not periodic, in the box."""
-    a, b = acceleration * (best - x), acceleration * (swarm_best - x)
-    least = min(max(omega * v + min(a, 0.0) + min(b, 0.0), low), high)
-    most = min(max(omega * v + max(a, 0.0) + max(b, 0.0), low), high)
-    return x + least <= 1.0 and x + most >= -1.0
+def reachable(omega, acceleration, x, v, best, swarm_best, low, high, periodic, clamped):
+    """Return whether some rand() in [0, 1] would keep one coordinate, and its velocity, within the limits."""
+    to_personal, to_swarm = best - x, swarm_best - x
+    if periodic:
+        to_personal, to_swarm = wrap(to_personal), wrap(to_swarm)
+    a, b = acceleration * to_personal, acceleration * to_swarm
+    least = omega * v + min(a, 0.0) + min(b, 0.0)
+    most = omega * v + max(a, 0.0) + max(b, 0.0)
+    if not clamped and (least > high or most < low):
+        return False
+    least, most = min(max(least, low), high), min(max(most, low), high)
+    return periodic or (x + least <= 1.0 and x + most >= -1.0)
 
 
 @jit
@@ -45,14 +55,13 @@ def move(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_bes
     """Write the next velocities and positions (k, d) of particles `rows` (k,), from the one that is `first` among them.
 
     The last 2 k d numbers of `rand` are the draws of rand(): one for each coordinate's pull towards the personal best,
-    then one for each towards the swarm's. A coordinate out of the box has its two drawn again, from `spare` after the
-    first `used`, at most `redraws` times. `stopped` (k,) marks particles
-    stopped at the border: no draw could keep a coordinate in the box, and then none is drawn again, or all redraws of
-    one left it.
+    then one for each towards the swarm's. A coordinate beyond its limits has its two drawn again, from `spare` after
+    the first `used`, at most `redraws` times. `stopped` (k,) marks particles stopped at the border: no draw could keep
+    a coordinate within its limits, and then none is drawn again, or all redraws of one left them.
 
     Returns `first` and `used` as they are then: the first is k, or whose turn it was when `spare` held too little.
     """
-    position, _, best, _, velocity, low, high, periodic = swarm
+    position, _, best, _, velocity, low, high, periodic, clamped = swarm
     d = low.size
     personal, swarms = rand.size - 2 * rows.size * d, rand.size - rows.size * d
     for k in range(first, rows.size):
@@ -63,24 +72,25 @@ def move(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_bes
         for j in range(d):
             r1, r2 = rand[personal + k * d + j], rand[swarms + k * d + j]
             x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
-            v, x = step(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
+            v, x, within = step(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j], clamped)
             velocities[k, j], moved[k, j] = v, x
-            inside &= abs(x) <= 1.0
+            inside &= within
         if not inside:
             for j in range(d):
                 x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
-                hope &= periodic[j] or reachable(omega, acceleration, x, v, p, g, low[j], high[j])
+                hope &= reachable(omega, acceleration, x, v, p, g, low[j], high[j], periodic[j], clamped)
         stopped[k] = not hope
         j = 0
         while j < d and not (inside or stopped[k]):
             left = redraws
-            while left > 0 and abs(moved[k, j]) > 1.0:
+            within = abs(moved[k, j]) <= 1.0 and low[j] <= velocities[k, j] <= high[j]
+            while left > 0 and not within:
                 r1, r2 = spare[used], spare[used + 1]
                 x, v, p, g = position[i, j], velocity[i, j], best[i, j], swarm_best[j]
-                v, x = step(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j])
+                v, x, within = step(r1, r2, omega, acceleration, x, v, p, g, low[j], high[j], periodic[j], clamped)
                 velocities[k, j], moved[k, j] = v, x
                 left, used = left - 1, used + 2
-            stopped[k] = redraws > 0 and abs(moved[k, j]) > 1.0
+            stopped[k] = redraws > 0 and not within
             j += 1
         if stopped[k]:
             for j in range(d):
@@ -95,7 +105,7 @@ def accept(moved, costs, chances, temperature, kept, swarm, accepted):
     The rule is Metropolis' criterion: a rise of the cost is accepted with probability exp(-rise / temperature). The
     first n of `chances` are the draws for it. A particle whose move is refused keeps `kept` times its velocity.
     """
-    position, position_costs, best, best_costs, velocity, _, _, _ = swarm
+    position, position_costs, best, best_costs, velocity, _, _, _, _ = swarm
     leader = 0
     for i in range(costs.size):
         rise = costs[i] - position_costs[i]

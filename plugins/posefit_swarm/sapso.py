@@ -34,6 +34,9 @@ class SAPSO:
         rand: fresh for every "dimension", or one "scalar" a particle. Interpretation S8.
         velocity_limits: "symmetric" about 0, or "literal", alpha times the range's own ends. Interpretation S9.
         rejected_velocity: of a particle whose move was refused, "kept" or "zeroed". Interpretation S11.
+        velocity_check: velocities beyond their limits are "clamped", or "redrawn" as step 2c says. Interpretation S7.
+        last_generation: of moves, "evaluated" or "skipped". Interpretation S10.
+        preset: "paper" sets the letter of the settings that Interpretations S6 to S10 name; "default" leaves them.
     """
 
     def __init__(
@@ -54,6 +57,9 @@ class SAPSO:
         rand: Literal["dimension", "scalar"] = "dimension",
         velocity_limits: Literal["symmetric", "literal"] = "symmetric",
         rejected_velocity: Literal["kept", "zeroed"] = "kept",
+        velocity_check: Literal["clamped", "redrawn"] = "clamped",
+        last_generation: Literal["evaluated", "skipped"] = "evaluated",
+        preset: Literal["default", "paper"] = "default",
     ) -> None:
         _check(
             population_size, iterations, temperature, cooling, stop_temperature, inertia, acceleration, alpha, redraws
@@ -62,18 +68,25 @@ class SAPSO:
         one_of("rand", rand, ("dimension", "scalar"))
         one_of("velocity_limits", velocity_limits, ("symmetric", "literal"))
         one_of("rejected_velocity", rejected_velocity, ("kept", "zeroed"))
+        one_of("velocity_check", velocity_check, ("clamped", "redrawn"))
+        one_of("last_generation", last_generation, ("evaluated", "skipped"))
+        one_of("preset", preset, ("default", "paper"))
+        if preset == "paper":
+            cool, rand, velocity_limits = "acceptance", "scalar", "literal"
+            velocity_check, last_generation = "redrawn", "skipped"
         self._iterations, self._inertia, self._acceleration = iterations, inertia, acceleration
+        self._last = iterations if last_generation == "evaluated" else iterations - 1  # Interpretation S10
         self._temperature, self._cooling, self._stop = temperature, cooling, stop_temperature
         self._cool_each = cool == "acceptance"
         self._kept = 1.0 if rejected_velocity == "kept" else 0.0  # Interpretation S11
         self._iteration, self._dimensions = 0, space.dimensions
         limits = speed_limits(space, alpha, velocity_limits)
-        self._swarm = SwarmState(space, rng, population_size, limits, redraws, rand)  # SAPSO A1.1
+        clamped = velocity_check == "clamped"
+        self._swarm = SwarmState(space, rng, population_size, limits, redraws, rand, clamped)  # SAPSO A1.1
 
     def ask(self) -> Array:
         """Return the particles (n, d) after their move; none once the iterations or the temperature are used up."""
-        # Interpretation S10: the last generation is evaluated too
-        if self._iteration > self._iterations or self._temperature <= self._stop:  # SAPSO A1.2
+        if self._iteration > self._last or self._temperature <= self._stop:  # SAPSO A1.2
             return np.empty((0, self._dimensions))
         return self._swarm.moved.copy()
 

@@ -34,7 +34,8 @@ class SwarmState:
     """The state of a swarm: `moved` (n, d) are the particles after their move, which is not accepted yet.
 
     `rand` is fresh for every "dimension" or one "scalar" a particle (Interpretation S8). What breaks a constraint has
-    it drawn again, at most `redraws` times, before the particle is stopped (Interpretation S7).
+    it drawn again, at most `redraws` times, before the particle is stopped (Interpretation S7). Velocities are
+    `clamped` to their limits, or redrawn beyond them.
 
     Constraint 1: only the coordinate that left the box is drawn again, which has the distribution of drawing the whole
     particle again. Given positions, velocities and bests, a particle's next coordinates X_1 ... X_d are independent,
@@ -56,8 +57,9 @@ class SwarmState:
         limits: tuple[Array, Array],
         redraws: int,
         rand: Literal["dimension", "scalar"],
+        clamped: bool = True,
     ) -> None:
-        self._space, self._rng, self._limits = space, rng, limits
+        self._space, self._rng, self._limits, self._clamped = space, rng, limits, clamped
         self._redraws, self._scalar = redraws, rand == "scalar"
         self._coordinate_redraws = 0 if self._scalar else redraws  # of a coordinate by itself
         self._spare, self._used = np.empty(0), 0  # random numbers for those redraws
@@ -117,7 +119,7 @@ class SwarmState:
     def _arrays(self) -> tuple[Any, ...]:
         """Return the arrays that the compiled loops take."""
         known = self.position, self.cost, self.best, self.best_cost, self.velocity
-        return *known, *self._limits, self._space.periodic
+        return *known, *self._limits, self._space.periodic, self._clamped
 
     def _checked(self, proposals: Array, costs: Array) -> Array:
         """Return costs (n,). Raises ValueError where they, or the proposals, are not those of the population."""
@@ -142,7 +144,7 @@ class SwarmState:
         """Move the particles from number `reached` on, and then see to constraint 2."""
         if reached < len(self.moved):
             self._move(reached, self._all_rows, rand, pull, (self._next_velocity, self.moved, self._stopped))
-        works = self._space.feasible(self.moved)
+        works = self._allowed(self._next_velocity, self.moved)
         if np.count_nonzero(works) < len(works):
             self._redraw(np.flatnonzero(~works), pull)
         self.velocity, self._next_velocity = self._next_velocity, self.velocity
@@ -166,9 +168,17 @@ class SwarmState:
             moves = np.empty((len(rows), self.moved.shape[1])), np.empty((len(rows), self.moved.shape[1]))
             self._move(0, rows, self._draws(len(rows)), pull, (*moves, np.empty(len(rows), dtype=bool)))
             # SAPSO A1.2c
-            broken = repair(broken, self._space.feasible(moves[1]), *moves, self._next_velocity, self.moved)
+            broken = repair(broken, self._allowed(*moves), *moves, self._next_velocity, self.moved)
             left, many = left - many, self._redraws
         self._stop(np.concatenate([stopped, broken]))
+
+    def _allowed(self, velocities: Array, moved: Array) -> NDArray[np.bool_]:
+        """Return which particles (n,) meet both constraints."""
+        allowed = self._space.feasible(moved)
+        if not self._clamped:
+            low, high = self._limits
+            allowed &= ((low <= velocities) & (velocities <= high)).all(axis=1)
+        return allowed
 
     def _first_velocities(self) -> Array:
         shape, start = self.moved.shape, self._space.start

@@ -11,11 +11,12 @@ from posefit.errors import InputError
 from posefit.fitting.box import Start
 from posefit.fitting.kernels import unpack_proposals, unpack_tilted, within
 from posefit.fitting.prior import Prior, Tilt
-from posefit.geometry.rotation import wrapped
+from posefit.geometry.rotation import wrapped, yaw_first
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted
 
 Translation = Literal["known", "searched", "aligned"]  # Interpretation S4
+RootOrder = Literal["yaw_first", "xyz"]
 TRANSLATIONS: tuple[Translation, ...] = ("known", "searched", "aligned")
 
 ROOT_RANGE_DEGREES = (45.0, 15.0, 15.0)  # ours: how far yaw, pitch and roll are searched to either side
@@ -39,6 +40,7 @@ class SearchSpace:
     translation_range: Array = field(default_factory=lambda: np.array(TRANSLATION_RANGE))  # (3,) metres
     start: Start | None = None  # None: the first population is drawn uniformly from the box
     tilt: Tilt | None = field(default=None, repr=False)  # None: pitch and roll are those of the pose
+    root_order: RootOrder = "yaw_first"  # Interpretation S3; "xyz" goes without a tilt
     centre: Array = field(init=False, repr=False)  # (d,) coordinates of the box's middle
     half: Array = field(init=False, repr=False)  # (d,) half its sides
     periodic: NDArray[np.bool_] = field(init=False, repr=False)  # (d,) coordinates that wrap around
@@ -46,6 +48,8 @@ class SearchSpace:
     def __post_init__(self) -> None:
         if self.translation not in TRANSLATIONS:
             raise InputError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {self.translation!r}")
+        if self.root_order == "xyz" and self.tilt is not None:
+            raise InputError('tilt must be "box" where the root is in the order xyz, got a learned one')
         for name in ("root_range", "translation_range"):
             reach = np.asarray(getattr(self, name))
             if reach.shape != (3,) or not (np.isfinite(reach).all() and (reach >= 0.0).all()):
@@ -106,6 +110,8 @@ class SearchSpace:
         finite = unpack_proposals(*box, *filled) if tilt is None else unpack_tilted(*box, tilt.mean, *filled)
         if not finite:
             raise InputError("proposals must be finite, got nan or infinity")
+        if self.root_order == "xyz":
+            poses[:, :3] = yaw_first(poses[:, :3])
         poses[:, 3:] = self.prior.inverse_transform(latents)
         return poses, translations
 

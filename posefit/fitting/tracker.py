@@ -15,7 +15,7 @@ from posefit.fitting.check import between, one_of, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
-from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, SearchSpace, Translation
+from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, RootOrder, SearchSpace, Translation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
@@ -27,6 +27,7 @@ SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiple
 KEPT = 3  # frames: how far back a prediction looks
 TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
+PAPER = {"prediction": "literal", "tilt": "box", "root_order": "xyz"}  # Interpretations S12, S16 and S3 to the letter
 FLOOR = 0.05  # Interpretation S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
 
 
@@ -121,6 +122,8 @@ class Prediction:
         modes_share: their evaluations, over those of the track's own search, above 0. Ours.
         posterior_temperature: what costs are divided by where modes are weighed, above 0. Ours.
         relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
+        root_order: the root's angles are "yaw_first", or the paper's "xyz", without a tilt. Interpretation S3.
+        preset: "paper" sets the letter of SAPSO's paper: a "literal" prediction, a "box" of tilts, "xyz".
     """
 
     spread: float = SPREAD
@@ -136,9 +139,15 @@ class Prediction:
     modes_share: float = 0.2
     posterior_temperature: float = 2.0
     relocalise_gap: int | None = None
+    root_order: RootOrder = "yaw_first"
+    preset: Literal["default", "paper"] = "default"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
+        one_of("preset", self.preset, ("default", "paper"))
+        if self.preset == "paper":
+            for name, value in PAPER.items():
+                object.__setattr__(self, name, value)
         positive("floor", self.floor)
         positive("modes_share", self.modes_share)
         positive("posterior_temperature", self.posterior_temperature)
@@ -156,6 +165,7 @@ class Prediction:
         if not 0.0 <= self.tilt_margin_degrees < np.inf:
             raise InputError(f"tilt_margin_degrees must be 0 or more, got {self.tilt_margin_degrees}")
         one_of("prediction", self.prediction, ("latest", "literal"))
+        one_of("root_order", self.root_order, ("yaw_first", "xyz"))
         between("beta", self.beta, 0.0, 1.0)
 
     def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
@@ -181,7 +191,8 @@ class Follower:
         if self._tilt is not None:  # the first frame looks at all tilts
             centre[1:], reach[1:] = self._tilt.around(np.zeros(2), np.full(2, np.inf))
         limits = np.array(prediction.translation_range)
-        self._space = SearchSpace(prior, centre, reach, task.anchor, task.translation, limits, tilt=self._tilt)
+        how = {"tilt": self._tilt, "root_order": prediction.root_order}
+        self._space = SearchSpace(prior, centre, reach, task.anchor, task.translation, limits, **how)
         earlier = [frame.coordinates for frame in task.before if frame.coordinates is not None]
         self._latest: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
 

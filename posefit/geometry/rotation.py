@@ -21,6 +21,15 @@ def rotation_from_root_angles(angles: Array) -> Array:
     return _about(1, yaw) @ _about(0, pitch) @ _about(2, roll)
 
 
+def yaw_first(angles: Array) -> Array:
+    """Return yaw, pitch, roll (..., 3) of the root angles of the paper: about x, then y, then z. Interpretation S3.
+
+    `angles` (..., 3) are in the order of yaw, pitch and roll, too: about y, x and z.
+    """
+    y, x, z = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
+    return root_angles_from_rotation(_about(0, x) @ _about(1, y) @ _about(2, z))
+
+
 def root_angles_from_rotation(rotations: Array) -> Array:
     """Return yaw, pitch, roll (..., 3) of rotations (..., 3, 3). Interpretation S3."""
     return angles_about(ROOT_ORDER, rotations)

@@ -22,7 +22,7 @@ def redrawn(
     """Return where so many copies of a particle fly to, and which of them are stuck."""
     rng, d = np.random.default_rng(3), len(position)
     where, speeds, bests = (np.tile(one, (count, 1)) for one in (position, velocity, best))
-    limits = np.full(d, -REACH), np.full(d, REACH), np.zeros(d, dtype=bool)
+    limits = np.full(d, -REACH), np.full(d, REACH), np.zeros(d, dtype=bool), True
     swarm = where, np.zeros(count), bests, np.zeros(count), speeds, *limits
     flown, moved, stuck = np.empty((count, d)), np.empty((count, d)), np.empty(count, dtype=bool)
     rand, spare = rng.random(2 * count * d), rng.random(2 * redraws * d * (count + 1))
@@ -96,8 +96,8 @@ def test_a_coordinate_is_out_of_reach_if_no_rand_could_keep_it_in_the_box() -> N
         x, best = rng.uniform(-1.0, 1.0, 2)
         one = OMEGA, ACCELERATION, x, rng.uniform(-0.3, 0.3), best, 0.99, -0.15, 0.15
         # rand() of 0 or 1 gives the extremes, and all between them can be had
-        ends = [kernels.step(r1, r2, *one, False)[1] for r1 in (0.0, 1.0) for r2 in (0.0, 1.0)]
-        reachable = kernels.reachable(*one)
+        ends = [kernels.step(r1, r2, *one, False, True)[1] for r1 in (0.0, 1.0) for r2 in (0.0, 1.0)]
+        reachable = kernels.reachable(*one, False, True)
         assert reachable == (min(ends) <= 1.0 and max(ends) >= -1.0)
         found.add(reachable)
     assert found == {False, True}

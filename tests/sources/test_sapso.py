@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from posefit.fitting.box import draw_population
 from posefit.fitting.tracker import Observation, Prediction, SynthesisTracker, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.rotation import rotation_from_root_angles
+from posefit.geometry.rotation import rotation_from_root_angles, yaw_first
 from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import built_in
 from posefit.silhouette.cost import areas, mismatch, project
@@ -199,8 +200,9 @@ def flown(**changed: Any) -> tuple[float, float]:
         "low": -9.0,
         "high": 9.0,
         "periodic": False,
+        "clamped": True,
     }
-    velocity, position = kernels.step(*{**given, **changed}.values())
+    velocity, position, _ = kernels.step(*{**given, **changed}.values())
     return velocity, position
 
 
@@ -226,7 +228,7 @@ def test_every_particle_flies_with_draws_of_its_own() -> None:
     # the draws are in the order they are asked for: all of the pulls to personal bests, then all to the swarm's
     position, velocity, best = (np.array([[0.1, 0.0], [0.2, -0.1]]) * scale for scale in (1.0, 0.5, 2.0))
     known = position, np.zeros(2), best, np.zeros(2), velocity
-    swarm = *known, np.full(2, -1.0), np.full(2, 1.0), np.zeros(2, dtype=bool)
+    swarm = *known, np.full(2, -1.0), np.full(2, 1.0), np.zeros(2, dtype=bool), True
     rand, target, rows = np.arange(0.1, 0.9, 0.1), np.array([0.3, 0.3]), np.array([1, 0])
     moved, stuck = np.empty((2, 2, 2)), np.ones(2, dtype=bool)
     done = kernels.move(rows, 0, rand, np.empty(0), 0, 0, 0.5, 2.0, target, swarm, *moved, stuck)
@@ -303,6 +305,41 @@ def test_a1_2_there_are_c_moves_and_n_times_c_plus_1_evaluations() -> None:  # I
     assert sum(map(len, populations)) == 7 * (5 + 1)
 
 
+def test_a1_2_to_the_letter_the_last_generation_is_not_evaluated() -> None:  # Interpretation S10
+    optimiser = SAPSO(
+        line_space(), np.random.default_rng(0), population_size=7, iterations=5, last_generation="skipped"
+    )
+    assert sum(map(len, run(optimiser, bowl))) == 7 * 5
+
+
+def test_s3_the_papers_root_angles_are_about_x_then_y_then_z() -> None:
+    # a quarter turn about y, which is at the singularity: turns about x and about z are the same there
+    space = replace(line_space(), root_order="xyz")
+    side = np.array([np.pi / 2, 0.3, 0.0]), np.array([np.pi / 2, 0.0, 0.3])
+    about_x, about_z = (rotation_from_root_angles(yaw_first(angles)) for angles in side)
+    np.testing.assert_allclose(about_x, about_z, atol=1e-12)
+    # x first: R = Rx(0.3) Ry(0.5) Rz(0)
+    cos, sin = np.cos(0.3), np.sin(0.3)
+    about = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]]) @ rotation_from_root_angles(np.array([0.5, 0.0, 0.0]))
+    coordinates = np.concatenate([[0.5, 0.3, 0.0], space.centre[3:]])
+    space = replace(space, root_range=np.full(3, 1.0))
+    pose = space.decode(space.proposals(coordinates)[None])[0][0]
+    np.testing.assert_allclose(rotation_from_root_angles(pose[:3]), about, atol=1e-12)
+
+
+def test_the_papers_preset_is_the_letter_of_every_interpretation() -> None:
+    letter = {"cool": "acceptance", "rand": "scalar", "velocity_limits": "literal"}
+    letter |= {"velocity_check": "redrawn", "last_generation": "skipped"}
+    paper, ours, literal = (
+        np.concatenate(run(SAPSO(line_space(), np.random.default_rng(0), **settings), bowl))
+        for settings in ({"preset": "paper"}, {}, letter)
+    )
+    np.testing.assert_array_equal(paper, literal)
+    assert not np.array_equal(paper[: len(ours)], ours[: len(paper)])
+    prediction = Prediction(preset="paper")
+    assert (prediction.prediction, prediction.tilt, prediction.root_order) == ("literal", "box", "xyz")
+
+
 def test_a1_2_the_loop_ends_at_the_stop_temperature() -> None:
     # 0.95^k <= 0.5 first at k = 14 moves: the first population and 14 more are evaluated
     optimiser = SAPSO(line_space(), np.random.default_rng(0), stop_temperature=0.5)
@@ -311,7 +348,7 @@ def test_a1_2_the_loop_ends_at_the_stop_temperature() -> None:
 
 def settled(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool, float, float]:
     position, best, velocity = np.array([[0.1]]), np.array([[0.5]]), np.array([[0.0]])
-    limits = np.array([-9.0]), np.array([9.0]), np.array([False])
+    limits = np.array([-9.0]), np.array([9.0]), np.array([False]), True
     swarm = position, np.array([2.0]), best, np.array([1.5]), velocity, *limits
     accepted, moved = np.empty(1, dtype=bool), np.array([[0.7]])
     kernels.accept(moved, np.array([cost]), np.array([chance]), temperature, 1.0, swarm, accepted)
@@ -338,9 +375,35 @@ def test_a1_2d_a_rise_is_accepted_with_chance_exp_minus_de_over_t() -> None:
 
 def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:
     space = line_space(gap=(-0.5, 0.5))
-    for settings in ({}, {"redraws": 0}, {"rand": "scalar"}, {"velocity_limits": "literal"}):
+    redrawn = {"velocity_check": "redrawn"}
+    for settings in (
+        {},
+        {"redraws": 0},
+        {"rand": "scalar"},
+        {"velocity_limits": "literal"},
+        redrawn,
+        {"rand": "scalar", **redrawn},
+        {"preset": "paper"},
+    ):
         for proposals in run(SAPSO(space, np.random.default_rng(1), population_size=30, **settings), bowl):
             assert space.feasible(proposals).all()
+
+
+def test_a1_2c_a_velocity_beyond_its_limits_is_redrawn_and_not_moved_to_them() -> None:  # Interpretation S7
+    # from 0, a pull of 2 rand() 0.2 towards the swarm's best: uniform on 0 to 0.4, of which the limit 0.15 leaves 3/8
+    for rand in ("dimension", "scalar"):
+        velocities = {}
+        for check in ("clamped", "redrawn"):
+            optimiser = SAPSO(
+                line_space(), np.random.default_rng(0), population_size=2000, rand=rand, velocity_check=check
+            )
+            state = optimiser._swarm
+            state.position[:], state.best[:], state.velocity[:] = 0.0, 0.0, 0.0
+            state.move(0.9, 2.0, np.array([0.2, 0.0, 0.0, 0.0]))
+            velocities[check] = state.velocity[:, 0]
+        assert (velocities["clamped"] == 0.15).mean() == pytest.approx(5 / 8, abs=0.05)
+        assert velocities["redrawn"].max() < 0.15
+        assert velocities["redrawn"].mean() == pytest.approx(0.075, abs=0.005)
 
 
 def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border() -> None:  # Interpretation S7

@@ -22,8 +22,9 @@ PART = 262_144  # proposals: 145 MB of poses
 
 
 def decodes(space: SearchSpace) -> bool:
-    """Return whether a device can decode proposals: the prior is affine and nothing has to be aligned."""
-    return space.translation != "aligned" and getattr(space.prior, "affine", None) is not None
+    """Return whether a device can decode proposals: the prior is affine, and yaw first; nothing has to be aligned."""
+    affine = getattr(space.prior, "affine", None) is not None
+    return affine and space.translation != "aligned" and space.root_order == "yaw_first"
 
 
 def areas_of_proposals(
