@@ -36,7 +36,7 @@ class SAPSO:
         rejected_velocity: of a particle whose move was refused, "kept" or "zeroed". Interpretation S11.
         velocity_check: velocities beyond their limits are "clamped", or "redrawn" as step 2c says. Interpretation S7.
         last_generation: of moves, "evaluated" or "skipped". Interpretation S10.
-        preset: "paper" sets the letter of the settings that Interpretations S6 to S10 name; "default" leaves them.
+        variant: "paper" sets the letter of the settings that Interpretations S6 to S10 name; "default" leaves them.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class SAPSO:
         rejected_velocity: Literal["kept", "zeroed"] = "kept",
         velocity_check: Literal["clamped", "redrawn"] = "clamped",
         last_generation: Literal["evaluated", "skipped"] = "evaluated",
-        preset: Literal["default", "paper"] = "default",
+        variant: Literal["default", "paper"] = "default",
     ) -> None:
         _check(
             population_size, iterations, temperature, cooling, stop_temperature, inertia, acceleration, alpha, redraws
@@ -70,8 +70,8 @@ class SAPSO:
         one_of("rejected_velocity", rejected_velocity, ("kept", "zeroed"))
         one_of("velocity_check", velocity_check, ("clamped", "redrawn"))
         one_of("last_generation", last_generation, ("evaluated", "skipped"))
-        one_of("preset", preset, ("default", "paper"))
-        if preset == "paper":
+        one_of("variant", variant, ("default", "paper"))
+        if variant == "paper":
             cool, rand, velocity_limits = "acceptance", "scalar", "literal"
             velocity_check, last_generation = "redrawn", "skipped"
         self._iterations, self._inertia, self._acceleration = iterations, inertia, acceleration

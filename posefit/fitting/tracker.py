@@ -123,7 +123,7 @@ class Prediction:
         posterior_temperature: what costs are divided by where modes are weighed, above 0. Ours.
         relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
         root_order: the root's angles are "yaw_first", or the paper's "xyz", without a tilt. Interpretation S3.
-        preset: "paper" sets the letter of SAPSO's paper: a "literal" prediction, a "box" of tilts, "xyz".
+        variant: "paper" sets the letter of SAPSO's paper: a "literal" prediction, a "box" of tilts, "xyz".
     """
 
     spread: float = SPREAD
@@ -140,12 +140,12 @@ class Prediction:
     posterior_temperature: float = 2.0
     relocalise_gap: int | None = None
     root_order: RootOrder = "yaw_first"
-    preset: Literal["default", "paper"] = "default"
+    variant: Literal["default", "paper"] = "default"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
-        one_of("preset", self.preset, ("default", "paper"))
-        if self.preset == "paper":
+        one_of("variant", self.variant, ("default", "paper"))
+        if self.variant == "paper":
             for name, value in PAPER.items():
                 object.__setattr__(self, name, value)
         positive("floor", self.floor)

@@ -327,16 +327,16 @@ def test_s3_the_papers_root_angles_are_about_x_then_y_then_z() -> None:
     np.testing.assert_allclose(rotation_from_root_angles(pose[:3]), about, atol=1e-12)
 
 
-def test_the_papers_preset_is_the_letter_of_every_interpretation() -> None:
+def test_the_papers_variant_is_the_letter_of_every_interpretation() -> None:
     letter = {"cool": "acceptance", "rand": "scalar", "velocity_limits": "literal"}
     letter |= {"velocity_check": "redrawn", "last_generation": "skipped"}
     paper, ours, literal = (
         np.concatenate(run(SAPSO(line_space(), np.random.default_rng(0), **settings), bowl))
-        for settings in ({"preset": "paper"}, {}, letter)
+        for settings in ({"variant": "paper"}, {}, letter)
     )
     np.testing.assert_array_equal(paper, literal)
     assert not np.array_equal(paper[: len(ours)], ours[: len(paper)])
-    prediction = Prediction(preset="paper")
+    prediction = Prediction(variant="paper")
     assert (prediction.prediction, prediction.tilt, prediction.root_order) == ("literal", "box", "xyz")
 
 
@@ -383,7 +383,7 @@ def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:
         {"velocity_limits": "literal"},
         redrawn,
         {"rand": "scalar", **redrawn},
-        {"preset": "paper"},
+        {"variant": "paper"},
     ):
         for proposals in run(SAPSO(space, np.random.default_rng(1), population_size=30, **settings), bowl):
             assert space.feasible(proposals).all()

@@ -1,6 +1,8 @@
 """`posefit reproduce sapso` and `posefit reproduce vsmm`."""
 
+from dataclasses import replace
 from functools import partial
+from typing import Literal
 
 import click
 
@@ -36,15 +38,31 @@ def vsmm_command(seeds: int, searches: bool, letters: bool, out: str | None, wor
 )
 @click.option("--seeds", type=int, default=5, show_default=True, help="Tracks of each method, motion and view.")
 @click.option("--quick", is_flag=True, help="30 frames from one view, a sixth of the time.")
+@click.option(
+    "--first-yaw",
+    type=click.Choice(["known", "unknown"]),
+    default="known",
+    show_default=True,
+    help="What a track begins with; unknown is a full circle, with restarts.",
+)
 @click.option("--out", metavar="DIR", help="New folder for the report and the figures; needs posefit[figures].")
 @click.option("--workers", type=int, default=2, show_default=True, metavar="N", help=NEIGHBOURS)
 @JSON
-def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, workers: int, as_json: bool) -> None:
+def sapso_command(
+    clips: str | None,
+    seeds: int,
+    quick: bool,
+    first_yaw: Literal["known", "unknown"],
+    out: str | None,
+    workers: int,
+    as_json: bool,
+) -> None:
     """A walk, a walk with a turn and a run: tables 1 and 2 and figures 3-7 and 9 of Acta Automatica Sinica 38(5)."""
     from posefit_reproduce.sapso.design import QUICK, Scale
     from posefit_reproduce.sapso.report import paper_report, paper_text
 
-    report = paper_report(clips, seeds, QUICK if quick else Scale(), out, workers, partial(progress, unit="run"))
+    scale = replace(QUICK if quick else Scale(), first_yaw=first_yaw)
+    report = paper_report(clips, seeds, scale, out, workers, partial(progress, unit="run"))
     click.echo(json_line(report) if as_json else paper_text(report))
     if out and not as_json:
         click.echo(f"written to {out}: look at {', '.join(report['figures'])}")

@@ -1,10 +1,10 @@
-"""The experiments of the SAPSO paper's section 5: tracks of three motions, first frames, and baselines.
+"""The experiments of the SAPSO paper's section 5: single images, tracks of three motions, first frames, baselines.
 
 The tables need errors of single angles and frames, and the figures poses, which a sweep does not keep; so all are jobs.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from typing import NamedTuple
@@ -13,12 +13,18 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
+from posefit.fitting.tracker import Frame
+from posefit.footage.scene import with_corruption
 from posefit.geometry.rotation import wrapped
 from posefit.tracking.evaluation import nearest
 from posefit.tracking.front import track
+from posefit.tracking.initialise import task_of
 from posefit.tracking.measures import BASELINES
+from posefit.tracking.method import prepare
+from posefit.tracking.options import TrackOptions
+from posefit.tracking.restarts import RESTARTS
 from posefit_reproduce.jobs import Progress, check_seeds, each
-from posefit_reproduce.sapso.design import COMPARED, DRIVEN, METHODS, WORKERS, Scale
+from posefit_reproduce.sapso.design import COMPARED, DRIVEN, LETTER, OCCLUDER, OURS, WORKERS, Scale, settings_of
 from posefit_reproduce.sapso.motions import PaperMotion, paper_scene
 
 
@@ -31,9 +37,19 @@ class TrackKey(NamedTuple):
     seed: int
 
 
+class ImageKey(NamedTuple):
+    """Names the estimates of a motion's frames, each by itself; `hidden` where an occluder covers a part."""
+
+    motion: str
+    method: str
+    view: float
+    seed: int
+    hidden: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class PaperTrack:
-    """A track and its figures."""
+    """Poses of a motion's frames, tracked or each by itself, and their figures."""
 
     poses: Array = field(repr=False)  # (T, 66)
     seconds: float  # a frame
@@ -50,6 +66,7 @@ class PaperResults:
     scale: Scale
     seeds: int
     tracks: dict[TrackKey, PaperTrack] = field(repr=False)
+    images: dict[ImageKey, PaperTrack] = field(repr=False)
     baselines: dict[tuple[str, float], dict[str, Array]] = field(repr=False)  # poses (T, 66) of each baseline
     histories: dict[tuple[str, float, int], Array] = field(repr=False)  # (swarms, iterations + 1) lowest cost
 
@@ -76,10 +93,24 @@ class PaperResults:
         poses, truth = self.poses(motion, name), self.motions[motion].test.poses
         return np.array([[metrics.pose_error_degrees(truth, one) for one in view] for view in poses])
 
-    def angle_errors(self, motion: str, name: str) -> Array:
-        """Return the mean absolute error (66,) of each angle in degrees, over views, seeds and frames."""
-        away = wrapped(self.poses(motion, name) - self.motions[motion].test.poses)
-        return np.asarray(np.degrees(np.abs(away)).mean(axis=(0, 1, 2)))
+    def free_errors(self, motion: str, name: str) -> Array:
+        """Return the errors (8) in degrees over the angles that move alone, (views, seeds, T). Interpretation S18."""
+        poses, test = self.poses(motion, name), self.motions[motion].test
+        free = test.skeleton.free
+        return np.array([[metrics.pose_error_degrees(test.poses, one, free) for one in view] for view in poses])
+
+    def estimated(self, motion: str, name: str = OURS, hidden: bool = False) -> Array:
+        """Return the poses of single images, (views, seeds, T, 66); of a baseline as in `poses`. Section 5.3."""
+        if name in BASELINES:
+            return self.poses(motion, name)
+        keys = [ImageKey(motion, name, view, seed, hidden) for view, seed in self._pairs]
+        poses = np.array([self.images[key].poses for key in keys])
+        return poses.reshape(len(self.scale.views), self.seeds, *poses.shape[1:])
+
+    def angle_errors(self, motion: str, name: str = OURS, hidden: bool = False) -> Array:
+        """Return the absolute errors (views, seeds, T, 66) of each angle in degrees, of single images."""
+        away = wrapped(self.estimated(motion, name, hidden) - self.motions[motion].test.poses)
+        return np.asarray(np.degrees(np.abs(away)))
 
 
 class ViewKey(NamedTuple):
@@ -109,11 +140,14 @@ def repeat_paper(
     Raises ValueError where `seeds` is no positive number.
     """
     check_seeds(seeds)
-    jobs: dict[TrackKey | ViewKey | StartKey, Callable[[], PaperTrack | dict[str, Array] | Array]] = {}
+    jobs: dict[TrackKey | ImageKey | ViewKey | StartKey, Callable[[], PaperTrack | dict[str, Array] | Array]] = {}
     for motion, view, seed in product(motions, scale.views, range(seeds)):
         for method in COMPARED[motion]:
             key = TrackKey(motion, method, view, seed)
             jobs[key] = partial(follow_paper, motions[motion], key, scale)
+    for motion, name, view, seed, hidden in product(motions, (OURS, LETTER), scale.views, range(seeds), (False, True)):
+        image = ImageKey(motion, name, view, seed, hidden)
+        jobs[image] = partial(estimate_paper, motions[motion], image, scale)
     for motion, view in product(motions, scale.views):
         jobs[ViewKey(motion, view)] = partial(baseline_poses, motions[motion], view)
     for motion, view, seed in product(("walk", "run"), scale.views, range(seeds)):
@@ -124,19 +158,22 @@ def repeat_paper(
         scale,
         seeds,
         {key: one for key, one in results.items() if isinstance(key, TrackKey) and isinstance(one, PaperTrack)},
+        {key: one for key, one in results.items() if isinstance(key, ImageKey) and isinstance(one, PaperTrack)},
         {key: one for key, one in results.items() if isinstance(key, ViewKey) and isinstance(one, dict)},
         {key: one for key, one in results.items() if isinstance(key, StartKey) and isinstance(one, np.ndarray)},
     )
 
 
 def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack:
-    """Follow a motion with a method; the first pose is searched, the root's translation is known."""
-    method = METHODS[key.method]
+    """Track a motion; the first pose is searched, from any yaw if it is unknown, and the translation is known."""
+    unknown = scale.first_yaw == "unknown"  # Interpretation S17
+    scene = paper_scene(motion, key.view)
     results = track(
-        paper_scene(motion, key.view),
+        replace(scene, yaw=None) if unknown else scene,
+        restarts=RESTARTS if unknown else None,
         train=motion.training,
-        method=f"{method.optimiser}@{method.prior}",
-        settings={**{f"{method.prior}.{name}": value for name, value in method.prior_settings.items()}, **DRIVEN},
+        method=key.method,
+        settings=settings_of(key.method),
         iterations=scale.iterations,
         seed=key.seed,
     )
@@ -147,6 +184,35 @@ def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack
         summary["evaluations"] / summary["frames"],
         summary["swap_rate"],
         summary["lost_rate"],
+    )
+
+
+def estimate_paper(motion: PaperMotion, key: ImageKey, scale: Scale) -> PaperTrack:
+    """Estimate the pose in each frame by itself, whichever way the person faces: a full circle of yaws. Section 5.3.
+
+    The translation of each frame is known.
+    """
+    scene, frames = paper_scene(motion, key.view), list[Frame]()
+    observations = scene.observations
+    if key.hidden:
+        observations = with_corruption(observations, {"occluder": OCCLUDER}, 0.0, key.seed)
+    options = TrackOptions(
+        method=key.method, settings=settings_of(key.method), iterations=scale.iterations, seed=key.seed
+    )
+    task = replace(task_of(scene, options, motion.training), yaw=None)  # Interpretation S17
+    method = prepare(options, task)
+    for k, observation in enumerate(observations):
+        assert observation.translation is not None
+        tracker = method.tracker(replace(task, anchor=observation.translation))
+        frames += tracker.track([observation], np.random.default_rng([key.seed, k]))
+    estimate = replace(motion.test, poses=np.array([frame.pose for frame in frames]))
+    truth, joints = motion.test.joints, estimate.joints
+    return PaperTrack(
+        estimate.poses,
+        float(np.mean([frame.seconds for frame in frames])),
+        float(np.mean([frame.evaluations for frame in frames])),
+        float(metrics.swapped(truth, joints).mean()),
+        float((metrics.mpjpe_mm(truth, joints) > metrics.LOST_MM).mean()),
     )
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
-from posefit_reproduce.sapso.design import METHODS, PAPER
+from posefit_reproduce.sapso.design import METHODS, OURS, PAPER
 from posefit_reproduce.sapso.experiment import PaperResults
 from posefit_reproduce.sapso.first_frame import WatchedSwarm, compact_space, watched_swarm
 from posefit_reproduce.sapso.motions import LABELS
@@ -122,13 +122,13 @@ def lowest_cost_figure(results: PaperResults) -> Figure:
 
 
 def dimension_figure(results: PaperResults) -> Figure:
-    """Return the error of each angle, of PCA + SAPSO and of the mean training pose."""
+    """Return the error of each angle in single images, of PCA + SAPSO and of the mean training pose."""
     names = ["root", *(JOINTS[joint] for joint in INNER)]
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
     panels: Any = figure.subplots(len(results.motions), 1, sharex=True)
     for axes, motion in zip(panels, results.motions, strict=True):
-        for name, style in (("sapso@pca", "bars"), ("mean_pose", "marks")):
-            away = results.angle_errors(motion, name)
+        for name, style in ((OURS, "bars"), ("mean_pose", "marks")):
+            away = results.angle_errors(motion, name).mean(axis=(0, 1, 2))
             where = np.arange(len(away))
             if style == "bars":
                 axes.bar(where, away, color=COLOURS[0], label=METHODS[name].label)

@@ -16,10 +16,11 @@ from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, angle_index
 from posefit.tracking.measures import BASELINES
+from posefit.tracking.restarts import RESTARTS
 from posefit.version import __version__
 from posefit_reproduce.jobs import Progress
 from posefit_reproduce.sapso.claims import paper_claims
-from posefit_reproduce.sapso.design import COMPARED, METHODS, WORKERS, Scale
+from posefit_reproduce.sapso.design import COMPARED, LETTER, METHODS, OURS, WORKERS, Scale
 from posefit_reproduce.sapso.experiment import PaperResults, repeat_paper
 from posefit_reproduce.sapso.motions import FPS, LABELS, SIZE, paper_motions
 from posefit_reproduce.sapso.numbers import FRAMES, TABLE_1, TABLE_1_JOINTS, TABLE_2, TRAINING_FRAMES
@@ -33,39 +34,42 @@ def paper_text(report: dict[str, Any]) -> str:
 
 
 def _lines_1(report: dict[str, Any]) -> Iterator[str]:
-    yield "Table 1: angles in degrees. Ours are x, y, z of an Acclaim skeleton, whose knee has x alone; the paper's"
-    yield "axes are not given. Error: mean of the twelve, in this frame and in all frames"
-    yield f"{'':34} {''.join(f'{name:>24}' for name in TABLE_1_JOINTS)}  error  all frames"
+    yield "Table 1: angles in degrees of single images, the yaw unknown. Ours are x, y, z of an Acclaim skeleton, whose"
+    yield "knee has x alone; the paper's axes are not given. Error: mean of the twelve, in this frame and in all frames"
+    yield f"{'':39} {''.join(f'{name:>24}' for name in TABLE_1_JOINTS)}  error  all frames"
     for motion, rows in report["table_1"].items():
         paper = rows["paper"]
         yield _angles(f"{LABELS[motion]}, the paper's truth", paper["truth"])
         yield _angles("  the paper's estimate", paper["estimate"], f"{paper['error']:7.2f}")
         yield _angles(f"  ours, truth of frame {rows['frame']}", rows["truth"])
-        for name in ("sapso@pca", *BASELINES):
+        for name in (OURS, LETTER, *BASELINES):
             one = rows[name]
             errors = f"{one['error']:7.2f} {one['error_all_frames']:11.2f}"
             yield _angles(f"  {_label(name)}", one["angles"], errors)
 
 
 def _angles(label: str, joints: list[list[float]], errors: str = "") -> str:
-    return f"{label:34} " + "".join(f"{x:8.1f}{y:8.1f}{z:8.1f}" for x, y, z in joints) + errors
+    return f"{label:39} " + "".join(f"{x:8.1f}{y:8.1f}{z:8.1f}" for x, y, z in joints) + errors
 
 
 def _lines_2(report: dict[str, Any]) -> Iterator[str]:
-    yield "Table 2: error in degrees (9), its spread (10) and seconds a frame, the paper's and ours"
-    heads = ("paper", "spread", "s", "ours", "worst", "spread", "s", "skill", "swapped", "lost", "evaluations")
+    yield "Table 2: error in degrees (9), its spread (10) and seconds a frame, the paper's and ours; free: over the"
+    yield "angles that move; wrong: runs that err more than the mean pose"
+    heads = ("paper", "spread", "s", "ours", "free", "worst", "spread", "s", "skill", "swapped", "lost", "wrong")
+    heads = (*heads, "evaluations")
     for motion, rows in report["table_2"].items():
-        yield f"{LABELS[motion]:34}" + "".join(f"{head:>{12 if head == 'evaluations' else 8}}" for head in heads)
+        yield f"{LABELS[motion]:39}" + "".join(f"{head:>{12 if head == 'evaluations' else 8}}" for head in heads)
         for name, one in rows.items():
             paper = list(one["paper"].values()) if "paper" in one else []
             cells = [f"{value:8}" for value in paper] or [f"{'-':>8}"] * 3
-            cells += [f"{one[key]:8.2f}" for key in ("error_degrees", "worst_degrees", "spread_degrees")]
+            figures = ("error_degrees", "free_degrees", "worst_degrees", "spread_degrees")
+            cells += [f"{one[key]:8.2f}" for key in figures]
             cells.append(f"{one['seconds_per_frame']:8.4f}" if name in METHODS else f"{'-':>8}")
             cells.append(f"{'-':>8}" if one["skill"] is None else f"{one['skill']:8.2f}")
             if name in METHODS:
-                cells += [f"{100 * one[key]:6.0f} %" for key in ("swapped", "lost")]
+                cells += [f"{100 * one[key]:6.0f} %" for key in ("swapped", "lost", "wrong")]
                 cells.append(f"{one['evaluations']:12,.0f}")
-            yield f"  {_label(name):32}" + "".join(cells)
+            yield f"  {_label(name):37}" + "".join(cells)
 
 
 def _label(name: str) -> str:
@@ -84,7 +88,10 @@ def _lines_claims(report: dict[str, Any]) -> Iterator[str]:
 
 
 def _lines_shortened(report: dict[str, Any]) -> Iterator[str]:
-    yield f"Against the paper ({report['seeds']} seeds; baselines have the true root, which no method has)"
+    yield "What was given"
+    for experiment, given in report["given"].items():
+        yield f"  {experiment}: {given}"
+    yield f"Against the paper ({report['seeds']} seeds)"
     for one in report["shortened"]:
         yield f"  {one}"
 
@@ -117,6 +124,7 @@ def paper_report(
             "motions": {name: _described(results, name) for name in results.motions},
             "seeds": seeds,
             "views_degrees": list(scale.views),
+            "given": _given(scale),
             "table_1": {name: _table_1(results, name) for name in results.motions},
             "table_2": {name: _table_2(results, name) for name in results.motions},
             "claims": [asdict(one) for one in paper_claims(results)],
@@ -129,6 +137,17 @@ def paper_report(
             (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
             (folder / "report.txt").write_text(paper_text(report) + "\n", encoding="utf-8")
     return report
+
+
+def _given(scale: Scale) -> dict[str, str]:
+    """Return what each experiment was given beside the silhouettes."""
+    always = "each frame's translation, as the paper has none; the person's own body; masks drawn by posefit itself"
+    yaw = "the first yaw" if scale.first_yaw == "known" else f"no yaw, and {RESTARTS} restarts"
+    return {
+        "single images, table 1 and figure 7": f"{always}; no yaw",
+        "tracks, table 2 and figure 9": f"{always}; {yaw}; the first pose is searched",
+        "baselines": "the true root in every frame, which no method has",
+    }
 
 
 def _described(results: PaperResults, motion: str) -> dict[str, Any]:
@@ -145,7 +164,7 @@ def _table_1(results: PaperResults, motion: str) -> dict[str, Any]:
     """Return four joints' angles in the middle frame, in degrees, and their mean absolute errors."""
     truth, scale = results.motions[motion].test.poses, results.scale
     frame, view = len(truth) // 2, scale.views.index(scale.shown)
-    poses = {name: results.poses(motion, name)[view, 0] for name in ("sapso@pca", *BASELINES)}
+    poses = {name: results.estimated(motion, name)[view, 0] for name in (OURS, LETTER, *BASELINES)}
     true, estimate = TABLE_1[motion]
     rows = {name: _row(truth, one, frame) for name, one in poses.items()}
     paper = {"truth": true.tolist(), "estimate": estimate.tolist(), "error": float(np.abs(estimate - true).mean())}
@@ -173,6 +192,7 @@ def _table_2(results: PaperResults, motion: str) -> dict[str, Any]:
         error, spread = _by_run(results, motion, name), _by_run(results, motion, name, metrics.error_spread)
         rows[name] = {
             "error_degrees": float(error.mean()),
+            "free_degrees": float(results.free_errors(motion, name).mean()),
             "worst_degrees": float(error.max()),
             "spread_degrees": float(spread.mean()),
             "skill": metrics.skill(float(error.mean()), mean),
@@ -184,6 +204,7 @@ def _table_2(results: PaperResults, motion: str) -> dict[str, Any]:
                 "evaluations": float(np.mean([track.evaluations for track in tracks])),
                 "swapped": float(np.mean([track.swapped for track in tracks])),
                 "lost": float(np.mean([track.lost for track in tracks])),
+                "wrong": float((error > mean).mean()),
             }
         if name in TABLE_2.get(motion, {}):
             rows[name]["paper"] = TABLE_2[motion][name]._asdict()
@@ -210,7 +231,6 @@ def _shortened(results: PaperResults, clips: bool, workers: int) -> list[str]:
         f"training poses (the paper's): {trained}; which clips it took, and of whom, the paper does not say",
         f"silhouettes: rendered, {SIZE[0]} x {SIZE[1]} pixels, seen from {views} degrees (0: in front), both ours",
         "left out: figures 8 and 10, which are of real video; `posefit track VIDEO` follows one",
-        "the root's translation is given, as the paper has none; the first pose is searched by every method",
         "full space: the range of the training poses; PF is in that space, as far as the paper tells",
         f"every method has the same evaluations a frame, which the paper's had not; {_at_once(workers)} ran at once",
     ]
