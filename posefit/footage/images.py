@@ -1,6 +1,7 @@
 """Images that may be hostile: Pillow reads the size, which is checked, before OpenCV decodes one."""
 
 import io
+import logging
 import warnings
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
 FORMATS = "PNG, JPEG, BMP, TIFF or PGM"
 INDEXED = 3  # PNG's type of colour for a palette
 COLOUR_RANGE, COLOUR_SHARE = 32, 0.02  # of 255, and the share of an image's pixels: with more it is no mask
+logging.getLogger("PIL").addHandler(logging.NullHandler())  # what is wrong with a file is reported by posefit
 
 
 def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
