@@ -1,4 +1,4 @@
-"""Array types, and the compilation of plain functions of arrays, for every layer."""
+"""Array types, checked arrays that cannot be written to, and the compilation of plain functions of arrays."""
 
 import os
 from collections.abc import Callable
